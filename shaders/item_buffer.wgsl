@@ -1,0 +1,67 @@
+// Draws the scene's own triangles over one face of a hemicube; every pixel gets the item seen
+// there: OPEN (the clear value), BACK, or FIRST_ELEMENT + the element, found from the barycentric
+// position in the triangle's lattice of cells.
+
+const BACK: u32 = 1u;
+const FIRST_ELEMENT: u32 = 2u;
+
+struct FaceView {
+    eye: vec3f,           // patch centre, scene unit from the local origin
+    near: f32,            // near plane, scene unit
+    right: vec3f,         // unit vectors of the view, right x up = -forward
+    bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
+    up: vec3f,
+    own_triangle: u32,    // the patch's own triangle is never drawn
+    forward: vec3f,
+    padding: u32,
+}
+
+struct TriangleCells {
+    first: u32,           // first cell of this triangle in `cells`
+    side: u32,            // cells along an edge, a power of two
+}
+
+@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+@group(0) @binding(1) var<storage, read> triangles: array<TriangleCells>;
+@group(0) @binding(2) var<storage, read> cells: array<u32>;
+@group(0) @binding(3) var<storage, read> views: array<FaceView>;
+
+struct Varying {
+    @builtin(position) position: vec4f,
+    @location(0) barycentric: vec2f,
+    @location(1) @interpolate(flat) triangle: u32,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index: u32) -> Varying {
+    let view = views[view_index];
+    let triangle = index / 3u;
+    let corner = index % 3u;
+    let d = corners[index].xyz - view.eye;
+    let x = dot(d, view.right);
+    let y = dot(d, view.up);
+    let w = dot(d, view.forward);
+    // Lines from `bottom` to 1 fill the viewport; depth near/w is reversed, its far end infinite.
+    let span = 1.0 - view.bottom;
+    var out: Varying;
+    out.position = vec4f(x, (2.0 * y - (1.0 + view.bottom) * w) / span, view.near, w);
+    if triangle == view.own_triangle {
+        out.position = vec4f(0.0, 0.0, -1.0, 1.0);
+    }
+    out.barycentric = vec2f(f32(corner == 1u), f32(corner == 2u));
+    out.triangle = triangle;
+    return out;
+}
+
+@fragment
+fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) u32 {
+    if !front {
+        return BACK;
+    }
+    let grid = triangles[in.triangle];
+    let p = max(in.barycentric, vec2f(0.0)) * f32(grid.side);
+    let i = min(u32(p.x), grid.side - 1u);
+    let j = min(u32(p.y), grid.side - 1u - i);
+    let beyond = p.x - f32(i) + p.y - f32(j) > 1.0 && i + j + 1u < grid.side;
+    return FIRST_ELEMENT + cells[grid.first + i * (2u * grid.side - i) + 2u * j + u32(beyond)];
+}

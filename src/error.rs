@@ -1,0 +1,83 @@
+//! The crate's one error: where, what was found, what would be right.
+
+use std::fmt;
+
+/// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
+///
+/// Shown with `{}`, it is one line: `place: found; remedy`.
+pub struct Error(Box<Inner>);
+
+struct Inner {
+    kind: ErrorKind,
+    place: String,
+    found: String,
+    remedy: String,
+    source: Option<Box<dyn std::error::Error + Send + Sync>>,
+}
+
+/// The broad class of an [`Error`], for callers that react differently to each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A scene that cannot be used: geometry, materials or a malformed file.
+    Scene,
+    /// A setting outside its range.
+    Setting,
+    /// A file that could not be read or written.
+    File,
+    /// No usable graphics device, or a device that failed.
+    Device,
+    /// A form-factor row that breaks its contract, found by the solver.
+    FormFactor,
+}
+
+impl Error {
+    /// An error of `kind` at `place`: `found` is wrong, `remedy` would be right.
+    pub fn new(
+        kind: ErrorKind,
+        place: impl Into<String>,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        let (place, found, remedy) = (place.into(), found.into(), remedy.into());
+        Error(Box::new(Inner { kind, place, found, remedy, source: None }))
+    }
+
+    /// The same error with the lower-level one that caused it.
+    pub fn with_source(
+        mut self,
+        source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+    ) -> Self {
+        self.0.source = Some(source.into());
+        self
+    }
+
+    /// The class of this error.
+    pub fn kind(&self) -> ErrorKind {
+        self.0.kind
+    }
+
+    /// Where in the input: a file and line, a material, a setting.
+    pub fn place(&self) -> &str {
+        &self.0.place
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Inner { place, found, remedy, .. } = &*self.0;
+        write!(f, "{place}: {found}; {remedy}")
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} error at {self}", self.0.kind)
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.0.source.as_ref().map(|e| &**e as &(dyn std::error::Error + 'static))
+    }
+}

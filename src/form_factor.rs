@@ -1,0 +1,94 @@
+//! The contract between whoever makes form-factor rows and whoever uses them.
+
+
+
+
+use crate::error::{Error, ErrorKind};
+use crate::mesh::{Mesh, NodeId};
+
+/// Where light that leaves one patch goes: the row F_i· of the form-factor matrix, sparse.
+///
+/// F_ij is the fraction of the flux leaving patch i that arrives at the front of element j. Shares
+/// are whole numbers in units of 1/[`Row::TOTAL`], so that they add up exactly, in any order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Row {
+    /// Elements that receive, by ascending index, each with its share.
+    pub entries: Vec<Entry>,
+    /// Share that meets nothing and leaves the scene.
+    pub open: u32,
+    /// Share that meets the back of a surface and is lost there.
+    pub back: u32,
+}
+
+/// One nonzero of a [`Row`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Receiving element.
+    pub element: u32,
+    /// Form factor in units of 1/[`Row::TOTAL`].
+    pub share: u32,
+}
+
+impl Row {
+    /// The share that is all of the light: F = 1.
+    pub const TOTAL: u32 = u32::MAX;
+
+    /// The form factor, in [0, 1], that `share` stands for.
+    pub fn form_factor(share: u32) -> f64 {
+        f64::from(share) / f64::from(Row::TOTAL)
+    }
+
+    /// Sum of all shares over [`Row::TOTAL`]: 1 for a row that neither loses nor makes light.
+    pub fn closure(&self) -> f64 {
+        self.sum() as f64 / f64::from(Row::TOTAL)
+    }
+
+    fn sum(&self) -> u64 {
+        let seen: u64 = self.entries.iter().map(|e| u64::from(e.share)).sum();
+        seen + u64::from(self.open) + u64::from(self.back)
+    }
+
+    /// Bytes that keeping this row takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Row>() + self.entries.len() * size_of::<Entry>()
+    }
+
+    /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::FormFactor`] that names `patch` and what is off.
+    pub fn check(&self, mesh: &Mesh, patch: NodeId) -> Result<(), Error> {
+        let broken = |found: String, remedy: &str| {
+            let place = format!("form-factor row of patch {}", patch.0);
+            Err(Error::new(ErrorKind::FormFactor, place, found, remedy))
+        };
+        if self.sum() != u64::from(Row::TOTAL) {
+            let found = format!("shares sum to {} of {}", self.sum(), Row::TOTAL);
+            return broken(found, "entries, open and back must add up to Row::TOTAL");
+        }
+        if self.entries.windows(2).any(|w| w[0].element >= w[1].element) {
+            return broken("elements out of order".into(), "they must ascend, each once");
+        }
+        match self.entries.last() {
+            Some(last) if last.element as usize >= mesh.element_count() => broken(
+                format!("element {}", last.element),
+                &format!("the mesh has {} elements", mesh.element_count()),
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Someone who makes rows: hemicubes on a GPU, rays on the CPU, closed forms.
+pub trait FormFactors {
+    /// The rows of `patches`, in their order.
+    ///
+    /// # Errors
+    /// Whatever keeps the maker from making them, [`ErrorKind::Device`] above all.
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error>;
+
+    /// How many rows are best asked for at once.
+    fn batch(&self) -> usize {
+        1
+    }
+}

@@ -1,0 +1,276 @@
+//! Form-factor rows from hemicubes: batches drawn, reduced and read back.
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::device::Gpu;
+use super::item_buffer::ItemBuffer;
+use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
+use super::reduce::Reduce;
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::{Entry, FormFactors, Row};
+use crate::hemicube::{self, Face, Frame};
+use crate::mesh::{Mesh, NodeId};
+
+/// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
+///
+/// The scene's own triangles are drawn over the five faces of a hemicube at a patch's centroid; a
+/// pixel sees a triangle, and the element is found from the barycentric position there. A row is
+/// the sum of exact pixel weights: its error is that of pixels that straddle a border between
+/// elements, and of seeing the patch from one point.
+#[derive(Debug)]
+pub struct Hemicubes {
+    gpu: Gpu,
+    item_buffer: ItemBuffer,
+    reduce: Reduce,
+    staging: wgpu::Buffer,
+    clock: Option<Clock>,
+    origin: DVec3,
+    slots: u32,
+    batch: u32,
+    seconds: StageSeconds,
+    drawn: u64,
+}
+
+/// Time spent in the stages of making rows, in seconds.
+///
+/// Draw and reduce are the device's own timestamps where it has them; else all is in `readback`,
+/// which is the rest of the time from submission to finished rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    /// Rendering item buffers.
+    pub draw: f64,
+    /// Adding up pixel weights.
+    pub reduce: f64,
+    /// Recording, waiting, copying and making rows sparse.
+    pub readback: f64,
+}
+
+#[derive(Debug)]
+struct Clock {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    seconds_per_tick: f64,
+}
+
+/// Item and depth buffers of a batch take at most this many bytes.
+const BATCH_BYTES: u64 = 64 << 20;
+
+/// Hemicubes in a batch at most.
+const MAX_BATCH: u32 = 32;
+
+impl Hemicubes {
+    /// Hemicubes with a top face of `resolution` × `resolution` pixels over `mesh`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a mesh
+    /// whose rows do not fit the device; [`ErrorKind::Device`] when the device fails.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<Hemicubes, Error> {
+        hemicube::check_resolution(resolution)?;
+        let limits = gpu.device.limits();
+        let setting = |place: String, found: String, remedy: String| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        let texture = limits.max_texture_dimension_2d;
+        if 3 * resolution > texture {
+            return setting(
+                format!("hemicube resolution {resolution}"),
+                format!("an item buffer {} pixels high", 3 * resolution),
+                format!("this device allows resolutions up to {}", texture / 6 * 2),
+            );
+        }
+        let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
+        let triangles = mesh.scene().triangles().len() as u64;
+        let largest = (u64::from(slots) * 4 + 64).max(triangles * 3 * 16);
+        if largest > buffer {
+            return setting(
+                "mesh".into(),
+                format!("{} elements in {triangles} triangles", mesh.element_count()),
+                format!("this device holds {} and {}", (buffer - 64) / 4, buffer / 48),
+            );
+        }
+        let hemicube_bytes = 3 * u64::from(resolution).pow(2) * 8;
+        let batch = MAX_BATCH
+            .min((BATCH_BYTES / hemicube_bytes).max(1) as u32)
+            .min(texture / resolution)
+            .min(((buffer - 64) / (u64::from(slots) * 4)) as u32);
+        let (low, high) = mesh.scene().bounds();
+        let origin = low + (high - low) / 2.0;
+        let item_buffer = ItemBuffer::new(gpu, mesh, origin, resolution, batch);
+        let reduce = Reduce::new(gpu, &item_buffer, resolution, slots, batch)?;
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: reduce.rows.size().next_multiple_of(8) + Clock::BYTES,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let clock = gpu.timestamps().then(|| Clock::new(gpu));
+        gpu.check()?;
+        Ok(Hemicubes {
+            gpu: gpu.clone(),
+            item_buffer,
+            reduce,
+            staging,
+            clock,
+            origin,
+            slots,
+            batch,
+            seconds: StageSeconds::default(),
+            drawn: 0,
+        })
+    }
+
+    /// Time spent so far.
+    pub fn seconds(&self) -> StageSeconds {
+        self.seconds
+    }
+
+    /// Hemicubes drawn so far.
+    pub fn drawn(&self) -> u64 {
+        self.drawn
+    }
+
+    fn views(&self, mesh: &Mesh, patch: NodeId) -> [FaceView; 5] {
+        let frame = Frame::new(mesh.normal(patch), rotation(patch));
+        let near = (mesh.area(patch).sqrt() * NEAR) as f32;
+        let eye = (mesh.centroid(patch) - self.origin).as_vec3().to_array();
+        Face::all(&frame).map(|face| FaceView {
+            eye,
+            near,
+            right: face.right.as_vec3().to_array(),
+            bottom: face.bottom as f32,
+            up: face.up.as_vec3().to_array(),
+            own_triangle: mesh.triangle(patch) as u32,
+            forward: face.forward.as_vec3().to_array(),
+            padding: 0,
+        })
+    }
+
+    fn draw_batch(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        let start = Instant::now();
+        let views: Vec<FaceView> = patches.iter().flat_map(|&p| self.views(mesh, p)).collect();
+        let count = patches.len() as u32;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let clock = self.clock.as_ref();
+        self.item_buffer.draw(&self.gpu, &mut encoder, &views, clock.map(Clock::draw));
+        self.reduce.reduce(&mut encoder, count, clock.map(Clock::reduce));
+        let bytes = u64::from(count * self.slots) * 4;
+        encoder.copy_buffer_to_buffer(&self.reduce.rows, 0, &self.staging, 0, bytes);
+        let times = bytes.next_multiple_of(8);
+        if let Some(clock) = clock {
+            clock.resolve(&mut encoder, &self.staging, times);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+
+        let slice = self.staging.slice(..times + Clock::BYTES);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
+        let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        self.gpu.check()?;
+        waited.map_err(|e| self.gpu.failed(e.to_string()))?;
+        let mapped = receiver.try_recv();
+        if !matches!(mapped, Ok(Ok(()))) {
+            return Err(self.gpu.failed("rows could not be read back".into()));
+        }
+        let view = slice.get_mapped_range().map_err(|e| self.gpu.failed(e.to_string()))?;
+        let dense: &[u32] = bytemuck::cast_slice(&view[..bytes as usize]);
+        let rows = dense.chunks_exact(self.slots as usize).map(sparse).collect();
+        let (draw, reduce) = clock.map_or((0.0, 0.0), |c| c.read(&view[times as usize..]));
+        drop(view);
+        self.staging.unmap();
+        self.drawn += u64::from(count);
+        self.seconds.draw += draw;
+        self.seconds.reduce += reduce;
+        self.seconds.readback += (start.elapsed().as_secs_f64() - draw - reduce).max(0.0);
+        Ok(rows)
+    }
+}
+
+impl FormFactors for Hemicubes {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::with_capacity(patches.len());
+        for batch in patches.chunks(self.batch as usize) {
+            rows.extend(self.draw_batch(mesh, batch)?);
+        }
+        Ok(rows)
+    }
+
+    fn batch(&self) -> usize {
+        self.batch as usize
+    }
+}
+
+/// Near plane, in units of the square root of the patch's area.
+const NEAR: f64 = 1e-4;
+
+/// Turn of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours do
+/// not repeat one another's pixel pattern and every run turns alike.
+fn rotation(patch: NodeId) -> f64 {
+    // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+    let mut z = (u64::from(patch.0) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
+    unit * std::f64::consts::FRAC_PI_2
+}
+
+fn sparse(dense: &[u32]) -> Row {
+    let seen = dense[FIRST_ELEMENT as usize..].iter();
+    let entries = (0..)
+        .zip(seen)
+        .filter(|&(_, &share)| share != 0)
+        .map(|(element, &share)| Entry { element, share })
+        .collect();
+    Row { entries, open: dense[OPEN as usize], back: dense[BACK as usize] }
+}
+
+impl Clock {
+    /// Room for the four ticks in the staging buffer.
+    const BYTES: u64 = 32;
+
+    fn new(gpu: &Gpu) -> Clock {
+        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("clock"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 4,
+        });
+        let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("clock"),
+            size: Clock::BYTES,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
+        Clock { queries, resolved, seconds_per_tick }
+    }
+
+    fn draw(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }
+    }
+
+    fn reduce(&self) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(2),
+            end_of_pass_write_index: Some(3),
+        }
+    }
+
+    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
+        encoder.resolve_query_set(&self.queries, 0..4, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, to, offset, Clock::BYTES);
+    }
+
+    /// Seconds of draw and reduce.
+    fn read(&self, bytes: &[u8]) -> (f64, f64) {
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes[..Clock::BYTES as usize]);
+        let span = |a: usize| ticks[a + 1].saturating_sub(ticks[a]) as f64 * self.seconds_per_tick;
+        (span(0), span(2))
+    }
+}

@@ -1,0 +1,186 @@
+//! The render pass: the scene's triangles over every face of a batch of hemicubes.
+
+use wgpu::util::DeviceExt;
+
+use super::device::Gpu;
+use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use crate::hemicube::Face;
+use crate::mesh::Mesh;
+
+/// Item buffers of a batch of hemicubes side by side, and what it takes to draw them.
+#[derive(Debug)]
+pub struct ItemBuffer {
+    pipeline: wgpu::RenderPipeline,
+    bindings: wgpu::BindGroup,
+    views: wgpu::Buffer,
+    pub items: wgpu::TextureView,
+    #[cfg(test)]
+    pub texture: wgpu::Texture,
+    depth: wgpu::TextureView,
+    vertices: u32,
+    resolution: u32,
+}
+
+impl ItemBuffer {
+    /// For the triangles of `mesh`, relative to `origin`; `batch` hemicubes of `resolution`.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, origin: glam::DVec3, resolution: u32, batch: u32) -> Self {
+        let device = &gpu.device;
+        let count = mesh.scene().triangles().len();
+        let corners: Vec<[f32; 4]> = (0..count)
+            .flat_map(|t| mesh.scene().corners(t))
+            .map(|p| (p - origin).as_vec3().extend(1.0).to_array())
+            .collect();
+        let (triangles, cells) = element_table(mesh);
+        let storage = |label, contents: &[u8]| {
+            let usage = wgpu::BufferUsages::STORAGE;
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let corners = storage("corners", bytemuck::cast_slice(&corners));
+        let triangles = storage("triangles", bytemuck::cast_slice(&triangles));
+        let cells = storage("cells", bytemuck::cast_slice(&cells));
+        let views = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("views"),
+            size: u64::from(batch) * 5 * size_of::<FaceView>() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("item_buffer.wgsl"),
+            source: wgpu::ShaderSource::Wgsl(ITEM_BUFFER_WGSL.into()),
+        });
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("item buffer"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Greater),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let buffers = [&corners, &triangles, &cells, &views];
+        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("item buffer"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[0, 1, 2, 3].map(|k: usize| wgpu::BindGroupEntry {
+                binding: k as u32,
+                resource: buffers[k].as_entire_binding(),
+            }),
+        });
+        let texture = |label, format, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width: batch * resolution,
+                    height: 3 * resolution,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let items = texture("items", wgpu::TextureFormat::R32Uint, readable);
+        let depth = texture("depth", wgpu::TextureFormat::Depth32Float, wgpu::TextureUsages::empty());
+        ItemBuffer {
+            pipeline,
+            bindings,
+            views,
+            items: items.create_view(&Default::default()),
+            #[cfg(test)]
+            texture: items,
+            depth: depth.create_view(&Default::default()),
+            vertices: 3 * count as u32,
+            resolution,
+        }
+    }
+
+    /// Records the drawing of the hemicubes that `views` (five each) look out from.
+    pub fn draw(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        views: &[FaceView],
+        timestamps: Option<wgpu::RenderPassTimestampWrites>,
+    ) {
+        gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(views));
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("item buffer"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.items,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: timestamps,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        let n = self.resolution;
+        for k in 0..views.len() as u32 {
+            let (hemicube, face) = (k / 5, (k % 5) as usize);
+            let lines = Face::rows(face, n);
+            let (x, y) = ((hemicube * n) as f32, lines.start as f32);
+            pass.set_viewport(x, y, n as f32, lines.len() as f32, 0.0, 1.0);
+            pass.draw(0..self.vertices, k..k + 1);
+        }
+    }
+}
+
+/// Per triangle the place and size of its lattice of finest cells; per cell its element.
+fn element_table(mesh: &Mesh) -> (Vec<TriangleCells>, Vec<u32>) {
+    let count = mesh.scene().triangles().len();
+    let mut triangles = Vec::with_capacity(count);
+    let mut cells = Vec::with_capacity(mesh.element_count());
+    for t in 0..count {
+        let first = cells.len() as u32;
+        let side = 1 << mesh.depth(t);
+        triangles.push(TriangleCells { first, side });
+        cells.resize(cells.len() + (side * side) as usize, 0);
+        for e in mesh.elements_of(mesh.root(t)) {
+            let cell = mesh.cell(mesh.element(e));
+            cell.for_each_descendant(mesh.depth(t), &mut |c| {
+                cells[(first + c.index()) as usize] = e as u32;
+            });
+        }
+    }
+    (triangles, cells)
+}

@@ -1,0 +1,99 @@
+//! The compute pass: item buffers to dense rows in fixed point.
+
+use wgpu::util::DeviceExt;
+
+use super::device::Gpu;
+use super::item_buffer::ItemBuffer;
+use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
+use crate::error::Error;
+use crate::hemicube;
+
+/// The reduction of a batch of hemicubes.
+#[derive(Debug)]
+pub struct Reduce {
+    pipeline: wgpu::ComputePipeline,
+    bindings: wgpu::BindGroup,
+    /// Dense rows of the batch, `slots` words each.
+    pub rows: wgpu::Buffer,
+    resolution: u32,
+}
+
+impl Reduce {
+    /// For `batch` hemicubes of `resolution` in `source`, to rows of `slots` words.
+    pub fn new(
+        gpu: &Gpu,
+        source: &ItemBuffer,
+        resolution: u32,
+        slots: u32,
+        batch: u32,
+    ) -> Result<Self, Error> {
+        let device = &gpu.device;
+        let buffer = |label, contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let weights = hemicube::weights(resolution)?;
+        let weights =
+            buffer("weights", bytemuck::cast_slice(&weights), wgpu::BufferUsages::STORAGE);
+        let reduction = Reduction { resolution, slots };
+        let reduction =
+            buffer("reduction", bytemuck::bytes_of(&reduction), wgpu::BufferUsages::UNIFORM);
+        let rows = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("rows"),
+            size: u64::from(batch) * u64::from(slots) * 4,
+            usage: wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("reduce.wgsl"),
+            source: wgpu::ShaderSource::Wgsl(REDUCE_WGSL.into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("reduce"),
+            layout: None,
+            module: &module,
+            entry_point: Some("reduce"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let resources = [
+            wgpu::BindingResource::TextureView(&source.items),
+            weights.as_entire_binding(),
+            rows.as_entire_binding(),
+            reduction.as_entire_binding(),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("reduce"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        Ok(Reduce { pipeline, bindings, rows, resolution })
+    }
+
+    /// Records the reduction of the first `count` hemicubes.
+    pub fn reduce(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        count: u32,
+        timestamps: Option<wgpu::ComputePassTimestampWrites>,
+    ) {
+        encoder.clear_buffer(&self.rows, 0, None);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("reduce"),
+            timestamp_writes: timestamps,
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        let n = self.resolution;
+        pass.dispatch_workgroups(n.div_ceil(WORKGROUP), (3 * n).div_ceil(STRIP), count);
+    }
+}

@@ -1,0 +1,10 @@
+mod error;
+pub mod form_factor;
+pub mod hemicube;
+mod mesh;
+mod scene;
+mod gpu;
+pub use error::{Error, ErrorKind};
+pub use gpu::*;
+pub use mesh::*;
+pub use scene::*;

@@ -1,0 +1,235 @@
+//! Quadtrees on triangles: elements that receive, patches that shoot.
+//!
+//! Every scene triangle carries a quadtree of midpoint splits. Its leaves are *elements*; any node
+//! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
+//! a patch is one contiguous range of elements, however unequal the depths below it.
+
+mod quadtree;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::error::{Error, ErrorKind};
+use crate::scene::{Material, Scene};
+pub(crate) use quadtree::Cell;
+
+/// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub(crate) u32);
+
+/// Levels of subdivision that a triangle can have at most: 4¹² elements.
+pub const MAX_DEPTH: u32 = 12;
+
+/// Elements that a mesh can have at most.
+pub const MAX_ELEMENTS: usize = 1 << 26;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    triangle: u32,
+    cell: Cell,
+    first_element: u32,
+    element_count: u32,
+    /// First of four consecutive children, or `LEAF`.
+    children: u32,
+}
+const LEAF: u32 = u32::MAX;
+
+/// A scene cut into elements.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    scene: Arc<Scene>,
+    nodes: Vec<Node>,
+    /// Node of each element.
+    elements: Vec<NodeId>,
+    /// Deepest level in each triangle.
+    depths: Vec<u32>,
+    /// Unit normal and area of each triangle.
+    normals: Vec<DVec3>,
+    areas: Vec<f64>,
+}
+
+impl Mesh {
+    /// Splits every triangle of `scene` until no element edge is longer than `element_size` (in
+    /// the scene's length unit; infinity splits nothing).
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `element_size` is not above zero, or when it asks for more than
+    /// [`MAX_DEPTH`] splits of a triangle or [`MAX_ELEMENTS`] elements.
+    pub fn new(scene: impl Into<Arc<Scene>>, element_size: f64) -> Result<Mesh, Error> {
+        let scene = scene.into();
+        let place = || format!("element size {element_size}");
+        if element_size.is_nan() || element_size <= 0.0 {
+            let remedy = "must be a length above 0, in the scene's unit";
+            return Err(Error::new(ErrorKind::Setting, place(), "not above 0", remedy));
+        }
+        let triangles = 0..scene.triangles().len();
+        let longest = |t: usize| {
+            let [a, b, c] = scene.corners(t);
+            (b - a).length().max((c - b).length()).max((a - c).length())
+        };
+        let depths: Vec<u32> = triangles
+            .clone()
+            .map(|t| {
+                // Rounding must not cost a level where the edge is a power of two times the size.
+                let splits = (longest(t) / element_size * (1.0 - 1e-12)).log2().ceil();
+                splits.clamp(0.0, 64.0) as u32
+            })
+            .collect();
+        let wanted: f64 = depths.iter().map(|&d| 4f64.powi(d as i32)).sum();
+        let deepest = depths.iter().copied().max().unwrap_or(0);
+        if deepest > MAX_DEPTH || wanted > MAX_ELEMENTS as f64 {
+            let size = triangles.map(longest).fold(0.0, f64::max) / 64.0;
+            return Err(Error::new(
+                ErrorKind::Setting,
+                place(),
+                format!("asks for {wanted:.3e} elements and {deepest} splits of a triangle"),
+                format!(
+                    "at most {MAX_ELEMENTS} and {MAX_DEPTH}; {size:.3} would split 6 times at most"
+                ),
+            ));
+        }
+        Ok(Mesh::with_depths(scene, depths))
+    }
+
+    fn with_depths(scene: Arc<Scene>, depths: Vec<u32>) -> Mesh {
+        let count = scene.triangles().len();
+        let normals = (0..count).map(|t| scene.normal(t)).collect();
+        let areas = (0..count).map(|t| scene.area(t)).collect();
+        let mut mesh =
+            Mesh { scene, nodes: vec![], elements: vec![], depths: vec![], normals, areas };
+        for triangle in 0..count as u32 {
+            let root = Node {
+                triangle,
+                cell: Cell::ROOT,
+                first_element: 0,
+                element_count: 0,
+                children: LEAF,
+            };
+            mesh.nodes.push(root);
+        }
+        for (t, &depth) in depths.iter().enumerate() {
+            mesh.grow(t, depth);
+        }
+        mesh.depths = depths;
+        mesh
+    }
+
+    /// Builds the subtree of node `n` down to `depth` and numbers its elements.
+    fn grow(&mut self, n: usize, depth: u32) {
+        let Node { triangle, cell, .. } = self.nodes[n];
+        let first_element = self.elements.len() as u32;
+        self.nodes[n].first_element = first_element;
+        if cell.level == depth {
+            self.elements.push(NodeId(n as u32));
+        } else {
+            let children = self.nodes.len();
+            self.nodes[n].children = children as u32;
+            for cell in cell.children() {
+                let node =
+                    Node { triangle, cell, first_element: 0, element_count: 0, children: LEAF };
+                self.nodes.push(node);
+            }
+            for k in children..children + 4 {
+                self.grow(k, depth);
+            }
+        }
+        self.nodes[n].element_count = self.elements.len() as u32 - first_element;
+    }
+
+    /// The scene that was cut.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// How many elements there are.
+    pub fn element_count(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// The quadtree leaf that is element `e`.
+    pub fn element(&self, e: usize) -> NodeId {
+        self.elements[e]
+    }
+
+    /// The elements below `node`, as one range.
+    pub fn elements_of(&self, node: NodeId) -> Range<usize> {
+        let n = self.node(node);
+        n.first_element as usize..(n.first_element + n.element_count) as usize
+    }
+
+    /// The root of triangle `t`'s quadtree.
+    pub fn root(&self, t: usize) -> NodeId {
+        debug_assert!(t < self.depths.len());
+        NodeId(t as u32)
+    }
+
+    /// The four parts of `node`, or `None` for an element.
+    pub fn children(&self, node: NodeId) -> Option<[NodeId; 4]> {
+        let first = self.node(node).children;
+        (first != LEAF).then(|| [0, 1, 2, 3].map(|k| NodeId(first + k)))
+    }
+
+    /// The scene triangle that `node` lies in.
+    pub fn triangle(&self, node: NodeId) -> usize {
+        self.node(node).triangle as usize
+    }
+
+    /// Area of `node`, length unit squared.
+    pub fn area(&self, node: NodeId) -> f64 {
+        let n = self.node(node);
+        self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
+    }
+
+    /// Unit normal of `node`, on its front.
+    pub fn normal(&self, node: NodeId) -> DVec3 {
+        self.normals[self.triangle(node)]
+    }
+
+    /// Corners of `node`, counter-clockwise from the front.
+    pub fn corners(&self, node: NodeId) -> [DVec3; 3] {
+        let n = self.node(node);
+        let [a, b, c] = self.scene.corners(n.triangle as usize);
+        // Weights that sum to one exactly, so that corners of the triangle stay what they are.
+        n.cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
+    }
+
+    /// Centroid of `node`.
+    pub fn centroid(&self, node: NodeId) -> DVec3 {
+        let [a, b, c] = self.corners(node);
+        a + ((b - a) + (c - a)) / 3.0
+    }
+
+    /// Material of `node`.
+    pub fn material(&self, node: NodeId) -> &Material {
+        self.scene.material(self.triangle(node))
+    }
+
+    /// The element at barycentric position (`u`, `v`) of triangle `t`: weights of its second and
+    /// third corner. Positions outside the triangle go to the nearest element along the axes.
+    pub fn element_at(&self, t: usize, u: f64, v: f64) -> usize {
+        let mut node = self.root(t);
+        let finest = Cell::at(self.depths[t], u, v);
+        while let Some(children) = self.children(node) {
+            let cell = finest.ancestor(self.node(node).cell.level + 1);
+            let here = children.into_iter().find(|&k| self.node(k).cell == cell);
+            node = here.expect("four children cover their parent");
+        }
+        self.node(node).first_element as usize
+    }
+
+    /// Deepest level of triangle `t`'s quadtree.
+    pub(crate) fn depth(&self, t: usize) -> u32 {
+        self.depths[t]
+    }
+
+    /// The place of `node` in its triangle.
+    pub(crate) fn cell(&self, node: NodeId) -> Cell {
+        self.node(node).cell
+    }
+
+    fn node(&self, id: NodeId) -> &Node {
+        &self.nodes[id.0 as usize]
+    }
+}

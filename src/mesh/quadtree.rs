@@ -1,0 +1,141 @@
+//! One cell of a triangle's quadtree: where it is, its corners, children and parent.
+
+/// A cell of the midpoint subdivision of a triangle.
+///
+/// At level `l` the triangle is a lattice of 2ˡ steps along its barycentric axes u and v (weights
+/// of the second and third corner). An upright cell has the corners (i, j), (i+1, j), (i, j+1); a
+/// flipped one (i+1, j+1), (i, j+1), (i+1, j). Both wind like the triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Cell {
+    pub level: u32,
+    pub i: u32,
+    pub j: u32,
+    pub flipped: bool,
+}
+
+impl Cell {
+    pub const ROOT: Cell = Cell { level: 0, i: 0, j: 0, flipped: false };
+
+    /// Corners on the lattice of this level, as (i, j).
+    pub fn lattice_corners(self) -> [[u32; 2]; 3] {
+        let Cell { i, j, flipped, .. } = self;
+        match flipped {
+            false => [[i, j], [i + 1, j], [i, j + 1]],
+            true => [[i + 1, j + 1], [i, j + 1], [i + 1, j]],
+        }
+    }
+
+    /// Corners as barycentric (u, v), exact.
+    pub fn corners(self) -> [[f64; 2]; 3] {
+        let step = 1.0 / f64::from(1u32 << self.level);
+        self.lattice_corners().map(|c| c.map(|k| f64::from(k) * step))
+    }
+
+    /// The four cells of the next level: one at each corner, then the middle one.
+    pub fn children(self) -> [Cell; 4] {
+        let (level, i, j) = (self.level + 1, 2 * self.i, 2 * self.j);
+        let cell = |i, j, flipped| Cell { level, i, j, flipped };
+        match self.flipped {
+            false => [
+                cell(i, j, false),
+                cell(i + 1, j, false),
+                cell(i, j + 1, false),
+                cell(i, j, true),
+            ],
+            true => [
+                cell(i + 1, j + 1, true),
+                cell(i, j + 1, true),
+                cell(i + 1, j, true),
+                cell(i + 1, j + 1, false),
+            ],
+        }
+    }
+
+    /// The cell of `level` (not deeper than this one) that contains this one.
+    pub fn ancestor(self, level: u32) -> Cell {
+        let mut cell = self;
+        while cell.level > level {
+            // A step back from either child orientation: the middle child is turned over.
+            let (i, j) = (cell.i / 2, cell.j / 2);
+            let odd = cell.i % 2 + cell.j % 2;
+            let flipped = if cell.flipped { odd > 0 } else { odd == 2 };
+            cell = Cell { level: cell.level - 1, i, j, flipped };
+        }
+        cell
+    }
+
+    /// Calls `f` with every cell of `level` (not above this one) that lies in this one.
+    pub fn for_each_descendant(self, level: u32, f: &mut impl FnMut(Cell)) {
+        match self.level == level {
+            true => f(self),
+            false => self.children().into_iter().for_each(|c| c.for_each_descendant(level, f)),
+        }
+    }
+
+    /// The cell of `level` at barycentric (u, v); positions outside are brought inside.
+    pub fn at(level: u32, u: f64, v: f64) -> Cell {
+        let side = 1u32 << level;
+        let (fu, fv) = (u * f64::from(side), v * f64::from(side));
+        // Casts from float saturate: below zero and NaN become 0.
+        let i = (fu as u32).min(side - 1);
+        let j = (fv as u32).min(side - 1 - i);
+        let beyond = fu - f64::from(i) + fv - f64::from(j) > 1.0;
+        Cell { level, i, j, flipped: beyond && i + j < side - 1 }
+    }
+
+    /// Number of this cell among the 4ˡ of its level, row by row (`i` first). The item-buffer
+    /// shader computes the same number.
+    pub fn index(self) -> u32 {
+        let side = 1u32 << self.level;
+        self.i * (2 * side - self.i) + 2 * self.j + u32::from(self.flipped)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All cells of a level, by descent from the root.
+    fn level(l: u32) -> Vec<Cell> {
+        (0..l).fold(vec![Cell::ROOT], |cells, _| cells.into_iter().flat_map(Cell::children).collect())
+    }
+
+    fn signed_area(c: Cell) -> f64 {
+        let [a, b, d] = c.corners();
+        (b[0] - a[0]) * (d[1] - a[1]) - (d[0] - a[0]) * (b[1] - a[1])
+    }
+
+    #[test]
+    fn children_tile_their_parent_and_keep_its_winding() {
+        for l in 0..5 {
+            for parent in level(l) {
+                for child in parent.children() {
+                    // Lattice coordinates are exact: four equal parts, wound like the root.
+                    assert_eq!(signed_area(child) * 4.0, signed_area(parent));
+                    assert!(signed_area(child) > 0.0);
+                    assert_eq!(child.ancestor(l), parent);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn indices_number_a_level_without_gaps() {
+        for l in 0..6 {
+            let mut indices: Vec<u32> = level(l).into_iter().map(Cell::index).collect();
+            indices.sort();
+            assert_eq!(indices, (0..4u32.pow(l)).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_cell_is_found_by_its_centroid() {
+        for cell in level(5) {
+            let c = cell.corners();
+            let mid = |k: usize| (c[0][k] + c[1][k] + c[2][k]) / 3.0;
+            assert_eq!(Cell::at(5, mid(0), mid(1)), cell);
+        }
+        assert_eq!(Cell::at(3, -1.0, 9.0), Cell { level: 3, i: 0, j: 7, flipped: false });
+        assert_eq!(Cell::at(3, f64::NAN, 0.0), Cell { level: 3, i: 0, j: 0, flipped: false });
+    }
+}

@@ -1,0 +1,285 @@
+//! Triangles and materials as given, checked once, here.
+
+use glam::DVec3;
+
+use crate::error::{Error, ErrorKind};
+
+/// One value per colour channel (r, g, b), linear; the unit is said where it is used.
+pub type Rgb = DVec3;
+
+/// Reflectance of faces that name no material.
+pub const DEFAULT_REFLECTANCE: f64 = 0.5;
+
+/// How the front of a face reflects and emits. Backs only block light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name, for messages and look-up.
+    pub name: String,
+    /// Diffuse hemispherical reflectance ρ per channel, in [0, 1).
+    pub reflectance: Rgb,
+    /// Exitance E per channel, W/m²: π times the emitted radiance.
+    pub exitance: Rgb,
+}
+
+/// A face of the scene: counter-clockwise corners seen from its front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Triangle {
+    /// Indices into the positions.
+    pub corners: [u32; 3],
+    /// Index into the groups.
+    pub group: u32,
+    /// Index into the materials.
+    pub material: u32,
+}
+
+/// A checked scene: every index in range, every number finite, every triangle with area.
+///
+/// Lengths are in whatever unit the positions are in; radiosity does not depend on it.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    positions: Vec<DVec3>,
+    triangles: Vec<Triangle>,
+    groups: Vec<String>,
+    materials: Vec<Material>,
+    degenerate: usize,
+    warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
+    ///
+    /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
+    /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
+    /// edge squared.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
+    /// is not finite, an index out of range, or when no triangle with area is left.
+    pub fn new(
+        positions: Vec<DVec3>,
+        triangles: Vec<Triangle>,
+        groups: Vec<String>,
+        materials: Vec<Material>,
+    ) -> Result<Scene, Error> {
+        for (i, p) in positions.iter().enumerate() {
+            if !p.is_finite() {
+                let place = format!("vertex {}", i + 1);
+                return Err(bad(place, format!("coordinates {p}"), "all three must be finite"));
+            }
+        }
+        materials.iter().try_for_each(Material::check)?;
+        let mut kept = Vec::with_capacity(triangles.len());
+        for (i, t) in triangles.iter().enumerate() {
+            let tables = [
+                ("group", t.group, groups.len()),
+                ("material", t.material, materials.len()),
+                ("vertex", t.corners[0], positions.len()),
+                ("vertex", t.corners[1], positions.len()),
+                ("vertex", t.corners[2], positions.len()),
+            ];
+            for (what, index, count) in tables {
+                if index as usize >= count {
+                    return Err(bad(
+                        format!("triangle {}", i + 1),
+                        format!("{what} index {index}"),
+                        format!("must be below {count}"),
+                    ));
+                }
+            }
+            let [a, b, c] = t.corners.map(|k| positions[k as usize]);
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let cross = (b - a).cross(c - a).length();
+            if !(cross * cross).is_finite() || !(longest * longest).is_finite() {
+                return Err(bad(
+                    format!("triangle {} of group '{}'", i + 1, groups[t.group as usize]),
+                    format!("an extent of {longest:e}"),
+                    "scale the scene down: areas must stay finite in 64-bit floats",
+                ));
+            }
+            if cross > 4.0 * f64::EPSILON * longest * longest {
+                kept.push(*t);
+            }
+        }
+        let degenerate = triangles.len() - kept.len();
+        if kept.is_empty() {
+            let found = match triangles.len() {
+                0 => "no triangle".to_string(),
+                n => format!("{n} triangles, none with area"),
+            };
+            return Err(bad("scene", found, "give at least one triangle with area"));
+        }
+        let mut scene =
+            Scene { positions, triangles: kept, groups, materials, degenerate, warnings: vec![] };
+        if degenerate > 0 {
+            scene.warn(format!("{degenerate} triangles without area were dropped"));
+        }
+        Ok(scene)
+    }
+
+    /// Vertex positions in the scene's length unit.
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+
+    /// The triangles that have area, in the order given.
+    pub fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    /// Names of the groups (or objects).
+    pub fn groups(&self) -> &[String] {
+        &self.groups
+    }
+
+    /// The materials.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// How many triangles were dropped for having no area.
+    pub fn degenerate(&self) -> usize {
+        self.degenerate
+    }
+
+    /// What was accepted but deserves a look, one sentence each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Corners of triangle `t`, counter-clockwise from the front.
+    pub fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].corners.map(|k| self.positions[k as usize])
+    }
+
+    /// Unit normal of triangle `t`, on its front.
+    pub fn normal(&self, t: usize) -> DVec3 {
+        let [a, b, c] = self.corners(t);
+        // Scaled by the longest edge first, so that tiny triangles do not underflow.
+        let (e1, e2) = (b - a, c - a);
+        let scale = 1.0 / e1.abs().max(e2.abs()).max_element();
+        (e1 * scale).cross(e2 * scale).normalize()
+    }
+
+    /// Area of triangle `t`, length unit squared.
+    pub fn area(&self, t: usize) -> f64 {
+        let [a, b, c] = self.corners(t);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Lowest and highest corner of the axis-aligned box around all triangles.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let corners = (0..self.triangles.len()).flat_map(|t| self.corners(t));
+        corners.fold(nothing, |(low, high), p| (low.min(p), high.max(p)))
+    }
+
+    /// Material of triangle `t`.
+    pub fn material(&self, t: usize) -> &Material {
+        &self.materials[self.triangles[t].material as usize]
+    }
+
+    pub(crate) fn warn(&mut self, warning: String) {
+        self.warnings.push(warning);
+    }
+}
+
+impl Material {
+    /// A surface that reflects `reflectance` in every channel and emits nothing.
+    pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
+        Material {
+            name: name.into(),
+            reflectance: Rgb::splat(reflectance),
+            exitance: Rgb::ZERO,
+        }
+    }
+
+    /// Reflectance in [0, 1), exitance finite and not negative.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let place = || format!("material '{}'", self.name);
+        for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
+            if !(0.0..1.0).contains(&rho) {
+                return Err(bad(
+                    place(),
+                    format!("reflectance {rho} in channel {channel}"),
+                    "must be at least 0 and below 1: a surface cannot return all light or more",
+                ));
+            }
+        }
+        for (channel, e) in ["r", "g", "b"].iter().zip(self.exitance.to_array()) {
+            if !(e.is_finite() && e >= 0.0) {
+                return Err(bad(
+                    place(),
+                    format!("exitance {e} in channel {channel}"),
+                    "must be finite and not negative",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn bad(place: impl Into<String>, found: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Scene, place, found, remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(corners: [[f64; 3]; 3], material: Material) -> Result<Scene, Error> {
+        let positions = corners.map(DVec3::from_array).to_vec();
+        let t = Triangle { corners: [0, 1, 2], group: 0, material: 0 };
+        Scene::new(positions, vec![t], vec!["it".into()], vec![material])
+    }
+    const RIGHT: [[f64; 3]; 3] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
+
+    #[test]
+    fn a_plain_triangle_is_taken_with_its_normal_and_area() {
+        let s = one(RIGHT, Material::grey("m", 0.5)).unwrap();
+        assert_eq!(s.normal(0), DVec3::Z);
+        assert_eq!(s.area(0), 0.5);
+        assert_eq!((s.degenerate(), s.warnings().len()), (0, 0));
+    }
+
+    #[test]
+    fn reflectance_at_its_ends() {
+        assert!(one(RIGHT, Material::grey("m", 0.0)).is_ok());
+        assert!(one(RIGHT, Material::grey("m", 1.0 - 1e-15)).is_ok());
+        for rho in [1.0, 1.5, -1e-9, f64::NAN, f64::INFINITY] {
+            let e = one(RIGHT, Material::grey("chalk", rho)).unwrap_err();
+            assert_eq!(e.kind(), ErrorKind::Scene);
+            assert!(e.to_string().contains("chalk"), "{e}");
+        }
+    }
+
+    #[test]
+    fn every_bad_number_and_index_is_refused() {
+        let m = || Material::grey("m", 0.5);
+        assert!(one([[f64::NAN, 0., 0.], RIGHT[1], RIGHT[2]], m()).is_err());
+        assert!(one([[0., 0., f64::INFINITY], RIGHT[1], RIGHT[2]], m()).is_err());
+        assert!(one([[0.; 3], [1e200, 0., 0.], [0., 1e200, 0.]], m()).is_err());
+        let dark = Material { exitance: Rgb::new(0., -1., 0.), ..m() };
+        assert!(one(RIGHT, dark).is_err());
+        for (corners, group, material) in [([0, 1, 3], 0, 0), ([0, 1, 2], 1, 0), ([0, 1, 2], 0, 1)] {
+            let t = Triangle { corners, group, material };
+            let p = RIGHT.map(DVec3::from_array).to_vec();
+            assert!(Scene::new(p, vec![t], vec!["g".into()], vec![m()]).is_err());
+        }
+    }
+
+    #[test]
+    fn triangles_without_area_are_dropped_and_counted_but_one_must_stay() {
+        let line = [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.]];
+        assert!(one(line, Material::grey("m", 0.5)).is_err());
+        assert!(Scene::new(vec![], vec![], vec![], vec![]).is_err());
+        let mut p = RIGHT.map(DVec3::from_array).to_vec();
+        p.push(DVec3::new(2., 0., 0.));
+        let t = |corners| Triangle { corners, group: 0, material: 0 };
+        let all = vec![t([0, 1, 2]), t([0, 1, 3])];
+        let s = Scene::new(p, all, vec!["g".into()], vec![Material::grey("m", 0.1)]).unwrap();
+        assert_eq!((s.triangles().len(), s.degenerate(), s.warnings().len()), (1, 1, 1));
+        // A needle a million times longer than wide is still a triangle.
+        let needle = [[0., 0., 0.], [1., 0., 0.], [0., 1e-6, 0.]];
+        assert_eq!(one(needle, Material::grey("m", 0.5)).unwrap().area(0), 5e-7);
+    }
+}
