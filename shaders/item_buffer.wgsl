@@ -1,9 +1,9 @@
 // Draws the scene's own triangles over one face of a hemicube; every pixel gets the item seen
-// there: OPEN (the clear value), BACK, or FIRST_ELEMENT + the element, found from the barycentric
+// there: OPEN (the clear value), BACK, or FIRST_CELL + the element, found from the barycentric
 // position in the triangle's lattice of cells.
 
 const BACK: u32 = 1u;
-const FIRST_ELEMENT: u32 = 2u;
+const FIRST_CELL: u32 = 2u;
 
 struct FaceView {
     eye: vec3f,           // patch centre, scene unit from the local origin
@@ -23,13 +23,13 @@ struct TriangleCells {
 
 @group(0) @binding(0) var<storage, read> corners: array<vec4f>;
 @group(0) @binding(1) var<storage, read> triangles: array<TriangleCells>;
-@group(0) @binding(2) var<storage, read> cells: array<u32>;
-@group(0) @binding(3) var<storage, read> views: array<FaceView>;
+@group(0) @binding(2) var<storage, read> views: array<FaceView>;
 
 struct Varying {
     @builtin(position) position: vec4f,
-    @location(0) barycentric: vec2f,
-    @location(1) @interpolate(flat) triangle: u32,
+    @location(0) lattice: vec2f,
+    @location(1) @interpolate(flat) first: u32,
+    @location(2) @interpolate(flat) side: u32,
 }
 
 @vertex
@@ -48,20 +48,19 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     if triangle == view.own_triangle {
         out.position = vec4f(0.0, 0.0, -1.0, 1.0);
     }
-    out.barycentric = vec2f(f32(corner == 1u), f32(corner == 2u));
-    out.triangle = triangle;
+    let grid = triangles[triangle];
+    out.lattice = f32(grid.side) * vec2f(f32(corner == 1u), f32(corner == 2u));
+    out.first = FIRST_CELL + grid.first;
+    out.side = grid.side;
     return out;
 }
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) u32 {
-    if !front {
-        return BACK;
-    }
-    let grid = triangles[in.triangle];
-    let p = max(in.barycentric, vec2f(0.0)) * f32(grid.side);
-    let i = min(u32(p.x), grid.side - 1u);
-    let j = min(u32(p.y), grid.side - 1u - i);
-    let beyond = p.x - f32(i) + p.y - f32(j) > 1.0 && i + j + 1u < grid.side;
-    return FIRST_ELEMENT + cells[grid.first + i * (2u * grid.side - i) + 2u * j + u32(beyond)];
+    let p = max(in.lattice, vec2f(0.0));
+    let i = min(u32(p.x), in.side - 1u);
+    let j = min(u32(p.y), in.side - 1u - i);
+    let beyond = p.x - f32(i) + p.y - f32(j) > 1.0 && i + j + 1u < in.side;
+    let cell = in.first + i * (2u * in.side - i) + 2u * j + u32(beyond);
+    return select(BACK, cell, front);
 }

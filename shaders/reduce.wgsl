@@ -14,6 +14,7 @@ struct Reduction {
 @group(0) @binding(1) var<storage, read> weights: array<u32>;
 @group(0) @binding(2) var<storage, read_write> rows: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> reduction: Reduction;
+@group(0) @binding(4) var<storage, read> slots: array<u32>;
 
 @compute @workgroup_size(64)
 fn reduce(@builtin(global_invocation_id) id: vec3u) {
@@ -30,11 +31,11 @@ fn reduce(@builtin(global_invocation_id) id: vec3u) {
     for (var y = id.y * STRIP; y < end; y++) {
         let next = textureLoad(items, vec2u(column, y), 0).x;
         if next != item {
-            atomicAdd(&rows[base + item], sum);
+            atomicAdd(&rows[base + slots[item]], sum);
             sum = 0u;
             item = next;
         }
         sum += weights[y * n + x];
     }
-    atomicAdd(&rows[base + item], sum);
+    atomicAdd(&rows[base + slots[item]], sum);
 }

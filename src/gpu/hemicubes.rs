@@ -58,7 +58,7 @@ struct Clock {
 const BATCH_BYTES: u64 = 64 << 20;
 
 /// Hemicubes in a batch at most.
-const MAX_BATCH: u32 = 32;
+const MAX_BATCH: u32 = 16;
 
 impl Hemicubes {
     /// Hemicubes with a top face of `resolution` × `resolution` pixels over `mesh`.

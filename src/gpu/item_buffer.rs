@@ -3,7 +3,7 @@
 use wgpu::util::DeviceExt;
 
 use super::device::Gpu;
-use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::layout::{BACK, FIRST_ELEMENT, OPEN, FaceView, ITEM_BUFFER_WGSL, TriangleCells};
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
@@ -13,6 +13,7 @@ pub struct ItemBuffer {
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
     views: wgpu::Buffer,
+    pub slots: wgpu::Buffer,
     pub items: wgpu::TextureView,
     #[cfg(test)]
     pub texture: wgpu::Texture,
@@ -41,7 +42,8 @@ impl ItemBuffer {
         };
         let corners = storage("corners", bytemuck::cast_slice(&corners));
         let triangles = storage("triangles", bytemuck::cast_slice(&triangles));
-        let cells = storage("cells", bytemuck::cast_slice(&cells));
+        let slots: Vec<u32> = [OPEN, BACK].into_iter().chain(cells.iter().map(|e| e + FIRST_ELEMENT)).collect();
+        let slots = storage("slots", bytemuck::cast_slice(&slots));
         let views = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("views"),
             size: u64::from(batch) * 5 * size_of::<FaceView>() as u64,
@@ -79,11 +81,11 @@ impl ItemBuffer {
             multiview_mask: None,
             cache: None,
         });
-        let buffers = [&corners, &triangles, &cells, &views];
+        let buffers = [&corners, &triangles, &views];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("item buffer"),
             layout: &pipeline.get_bind_group_layout(0),
-            entries: &[0, 1, 2, 3].map(|k: usize| wgpu::BindGroupEntry {
+            entries: &[0, 1, 2].map(|k: usize| wgpu::BindGroupEntry {
                 binding: k as u32,
                 resource: buffers[k].as_entire_binding(),
             }),
@@ -111,6 +113,7 @@ impl ItemBuffer {
             pipeline,
             bindings,
             views,
+            slots,
             items: items.create_view(&Default::default()),
             #[cfg(test)]
             texture: items,

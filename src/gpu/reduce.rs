@@ -66,6 +66,7 @@ impl Reduce {
             weights.as_entire_binding(),
             rows.as_entire_binding(),
             reduction.as_entire_binding(),
+            source.slots.as_entire_binding(),
         ];
         let entries: Vec<_> = (0..)
             .zip(resources)
