@@ -1,9 +1,8 @@
-// Draws the scene's own triangles over one face of a hemicube; every pixel gets the item seen
-// there: OPEN (the clear value), BACK, or FIRST_CELL + the element, found from the barycentric
-// position in the triangle's lattice of cells.
+// Draws the scene's own triangles over one face of a hemicube. Every pixel gets the item seen
+// there: 0 (the clear value) for nothing, BACK, or a cell of the triangle's lattice, found from the
+// barycentric position.
 
 const BACK: u32 = 1u;
-const FIRST_CELL: u32 = 2u;
 
 struct FaceView {
     eye: vec3f,           // patch centre, scene unit from the local origin
@@ -17,7 +16,7 @@ struct FaceView {
 }
 
 struct TriangleCells {
-    first: u32,           // first cell of this triangle in `cells`
+    first: u32,           // item of its first cell
     side: u32,            // cells along an edge, a power of two
 }
 
@@ -50,11 +49,13 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     }
     let grid = triangles[triangle];
     out.lattice = f32(grid.side) * vec2f(f32(corner == 1u), f32(corner == 2u));
-    out.first = FIRST_CELL + grid.first;
+    out.first = grid.first;
     out.side = grid.side;
     return out;
 }
 
+// The lattice position is perspective-correct: (1, 0) steps along the first side, (0, 1) along the
+// third. A square of the lattice holds an upright cell and, beyond its diagonal, a flipped one.
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) u32 {
     let p = max(in.lattice, vec2f(0.0));

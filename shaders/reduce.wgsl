@@ -1,7 +1,8 @@
-// Adds up the weights of the pixels that see each item: item buffers to form-factor rows, dense,
-// in fixed point, so that the order of the additions does not matter.
+// Adds up the weights of the pixels that see each element: item buffers to form-factor rows,
+// dense, in fixed point, so that the order of the additions does not matter.
 //
-// A thread walks down one pixel column of a strip and adds to memory only where the item changes.
+// A thread walks down one pixel column of a strip, and looks the element up and adds to memory only
+// where the item changes.
 
 const STRIP: u32 = 16u;
 
@@ -14,7 +15,7 @@ struct Reduction {
 @group(0) @binding(1) var<storage, read> weights: array<u32>;
 @group(0) @binding(2) var<storage, read_write> rows: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> reduction: Reduction;
-@group(0) @binding(4) var<storage, read> slots: array<u32>;
+@group(0) @binding(4) var<storage, read> slots: array<u32>;   // the row slot of each item
 
 @compute @workgroup_size(64)
 fn reduce(@builtin(global_invocation_id) id: vec3u) {

@@ -1,6 +1,7 @@
 //! The crate's one error: where, what was found, what would be right.
 
 use std::fmt;
+use std::path::Path;
 
 /// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
 ///
@@ -49,6 +50,12 @@ impl Error {
         source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
     ) -> Self {
         self.0.source = Some(source.into());
+        self
+    }
+
+    /// The same error with `file` before its place.
+    pub(crate) fn inside(mut self, file: &Path) -> Self {
+        self.0.place = format!("{}: {}", file.display(), self.0.place);
         self
     }
 

@@ -1,7 +1,6 @@
 //! The contract between whoever makes form-factor rows and whoever uses them.
 
-
-
+pub(crate) mod ray_cast;
 
 use crate::error::{Error, ErrorKind};
 use crate::mesh::{Mesh, NodeId};

@@ -1,5 +1,6 @@
 //! The one room that knows wgpu: device, item buffer, reduction; hemicubes come out as rows.
 
+mod cells;
 mod device;
 mod hemicubes;
 mod item_buffer;

@@ -5,6 +5,7 @@
 //! a patch is one contiguous range of elements, however unequal the depths below it.
 
 mod quadtree;
+mod smooth;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,6 +15,8 @@ use glam::DVec3;
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Scene};
 pub(crate) use quadtree::Cell;
+pub use smooth::CREASE_DEGREES;
+pub(crate) use smooth::{Side, Smooth};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

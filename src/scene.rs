@@ -186,11 +186,7 @@ impl Scene {
 impl Material {
     /// A surface that reflects `reflectance` in every channel and emits nothing.
     pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
-        Material {
-            name: name.into(),
-            reflectance: Rgb::splat(reflectance),
-            exitance: Rgb::ZERO,
-        }
+        Material { name: name.into(), reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO }
     }
 
     /// Reflectance in [0, 1), exitance finite and not negative.
@@ -260,7 +256,8 @@ mod tests {
         assert!(one([[0.; 3], [1e200, 0., 0.], [0., 1e200, 0.]], m()).is_err());
         let dark = Material { exitance: Rgb::new(0., -1., 0.), ..m() };
         assert!(one(RIGHT, dark).is_err());
-        for (corners, group, material) in [([0, 1, 3], 0, 0), ([0, 1, 2], 1, 0), ([0, 1, 2], 0, 1)] {
+        for (corners, group, material) in [([0, 1, 3], 0, 0), ([0, 1, 2], 1, 0), ([0, 1, 2], 0, 1)]
+        {
             let t = Triangle { corners, group, material };
             let p = RIGHT.map(DVec3::from_array).to_vec();
             assert!(Scene::new(p, vec![t], vec!["g".into()], vec![m()]).is_err());

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::cells::Cells;
 use super::device::Gpu;
 use super::item_buffer::ItemBuffer;
 use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
@@ -83,23 +84,24 @@ impl Hemicubes {
         let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
         let triangles = mesh.scene().triangles().len() as u64;
-        let largest = (u64::from(slots) * 4 + 64).max(triangles * 3 * 16);
-        if largest > buffer {
+        let (row_bytes, items) = (u64::from(slots) * 4, Cells::count(mesh));
+        if (row_bytes + 64).max(items * 4).max(triangles * 48) > buffer {
             return setting(
                 "mesh".into(),
-                format!("{} elements in {triangles} triangles", mesh.element_count()),
-                format!("this device holds {} and {}", (buffer - 64) / 4, buffer / 48),
+                format!("{items} finest cells of elements in {triangles} triangles"),
+                format!("this device holds {} and {}", buffer / 4 - 16, buffer / 48),
             );
         }
         let hemicube_bytes = 3 * u64::from(resolution).pow(2) * 8;
         let batch = MAX_BATCH
             .min((BATCH_BYTES / hemicube_bytes).max(1) as u32)
             .min(texture / resolution)
-            .min(((buffer - 64) / (u64::from(slots) * 4)) as u32);
+            .min(((buffer - 64) / row_bytes) as u32);
         let (low, high) = mesh.scene().bounds();
         let origin = low + (high - low) / 2.0;
-        let item_buffer = ItemBuffer::new(gpu, mesh, origin, resolution, batch);
-        let reduce = Reduce::new(gpu, &item_buffer, resolution, slots, batch)?;
+        let cells = Cells::new(mesh);
+        let item_buffer = ItemBuffer::new(gpu, mesh, &cells, origin, resolution, batch);
+        let reduce = Reduce::new(gpu, &item_buffer, &cells, resolution, slots, batch)?;
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),
             size: reduce.rows.size().next_multiple_of(8) + Clock::BYTES,

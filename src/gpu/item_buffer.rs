@@ -1,9 +1,11 @@
 //! The render pass: the scene's triangles over every face of a batch of hemicubes.
 
+use glam::DVec3;
 use wgpu::util::DeviceExt;
 
+use super::cells::Cells;
 use super::device::Gpu;
-use super::layout::{BACK, FIRST_ELEMENT, OPEN, FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::layout::{FaceView, ITEM_BUFFER_WGSL};
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
@@ -13,7 +15,6 @@ pub struct ItemBuffer {
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
     views: wgpu::Buffer,
-    pub slots: wgpu::Buffer,
     pub items: wgpu::TextureView,
     #[cfg(test)]
     pub texture: wgpu::Texture,
@@ -24,14 +25,20 @@ pub struct ItemBuffer {
 
 impl ItemBuffer {
     /// For the triangles of `mesh`, relative to `origin`; `batch` hemicubes of `resolution`.
-    pub fn new(gpu: &Gpu, mesh: &Mesh, origin: glam::DVec3, resolution: u32, batch: u32) -> Self {
+    pub fn new(
+        gpu: &Gpu,
+        mesh: &Mesh,
+        cells: &Cells,
+        origin: DVec3,
+        resolution: u32,
+        batch: u32,
+    ) -> Self {
         let device = &gpu.device;
         let count = mesh.scene().triangles().len();
         let corners: Vec<[f32; 4]> = (0..count)
             .flat_map(|t| mesh.scene().corners(t))
             .map(|p| (p - origin).as_vec3().extend(1.0).to_array())
             .collect();
-        let (triangles, cells) = element_table(mesh);
         let storage = |label, contents: &[u8]| {
             let usage = wgpu::BufferUsages::STORAGE;
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -41,9 +48,7 @@ impl ItemBuffer {
             })
         };
         let corners = storage("corners", bytemuck::cast_slice(&corners));
-        let triangles = storage("triangles", bytemuck::cast_slice(&triangles));
-        let slots: Vec<u32> = [OPEN, BACK].into_iter().chain(cells.iter().map(|e| e + FIRST_ELEMENT)).collect();
-        let slots = storage("slots", bytemuck::cast_slice(&slots));
+        let triangles = storage("triangles", bytemuck::cast_slice(&cells.triangles));
         let views = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("views"),
             size: u64::from(batch) * 5 * size_of::<FaceView>() as u64,
@@ -108,12 +113,12 @@ impl ItemBuffer {
         };
         let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let items = texture("items", wgpu::TextureFormat::R32Uint, readable);
-        let depth = texture("depth", wgpu::TextureFormat::Depth32Float, wgpu::TextureUsages::empty());
+        let depth =
+            texture("depth", wgpu::TextureFormat::Depth32Float, wgpu::TextureUsages::empty());
         ItemBuffer {
             pipeline,
             bindings,
             views,
-            slots,
             items: items.create_view(&Default::default()),
             #[cfg(test)]
             texture: items,
@@ -166,24 +171,4 @@ impl ItemBuffer {
             pass.draw(0..self.vertices, k..k + 1);
         }
     }
-}
-
-/// Per triangle the place and size of its lattice of finest cells; per cell its element.
-fn element_table(mesh: &Mesh) -> (Vec<TriangleCells>, Vec<u32>) {
-    let count = mesh.scene().triangles().len();
-    let mut triangles = Vec::with_capacity(count);
-    let mut cells = Vec::with_capacity(mesh.element_count());
-    for t in 0..count {
-        let first = cells.len() as u32;
-        let side = 1 << mesh.depth(t);
-        triangles.push(TriangleCells { first, side });
-        cells.resize(cells.len() + (side * side) as usize, 0);
-        for e in mesh.elements_of(mesh.root(t)) {
-            let cell = mesh.cell(mesh.element(e));
-            cell.for_each_descendant(mesh.depth(t), &mut |c| {
-                cells[(first + c.index()) as usize] = e as u32;
-            });
-        }
-    }
-    (triangles, cells)
 }

@@ -16,7 +16,7 @@ pub struct FaceView {
     pub padding: u32,
 }
 
-/// Where a triangle's finest cells lie in the table of elements.
+/// Where a triangle's items start, and how many cells lie along its edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TriangleCells {
@@ -32,9 +32,11 @@ pub struct Reduction {
     pub slots: u32,
 }
 
-/// Row slots before the elements: what is seen in a pixel that no front of an element fills.
+/// What a pixel shows: nothing, the back of a triangle, or from here on a cell of a front. Slots
+/// of a row start alike: open, back, then the elements.
 pub const OPEN: u32 = 0;
 pub const BACK: u32 = 1;
+pub const FIRST_CELL: u32 = 2;
 pub const FIRST_ELEMENT: u32 = 2;
 
 /// Image lines that one thread of `reduce.wgsl` walks down, and threads in its workgroup.
@@ -96,9 +98,7 @@ mod tests {
         let (item, reduce) = (parsed(ITEM_BUFFER_WGSL), parsed(REDUCE_WGSL));
         assert_eq!(
             wgsl_layout(&item, "FaceView"),
-            rust_layout!(FaceView {
-                eye, near, right, bottom, up, own_triangle, forward, padding
-            })
+            rust_layout!(FaceView { eye, near, right, bottom, up, own_triangle, forward, padding })
         );
         assert_eq!(
             wgsl_layout(&item, "TriangleCells"),
@@ -122,7 +122,6 @@ mod tests {
             }
         };
         assert_eq!(constant(&item, "BACK"), BACK);
-        assert_eq!(constant(&item, "FIRST_ELEMENT"), FIRST_ELEMENT);
         assert_eq!(constant(&reduce, "STRIP"), STRIP);
         assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
         // OPEN is the clear value of the item buffer: wgpu clears to zero.

@@ -2,6 +2,7 @@
 
 use wgpu::util::DeviceExt;
 
+use super::cells::Cells;
 use super::device::Gpu;
 use super::item_buffer::ItemBuffer;
 use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
@@ -23,6 +24,7 @@ impl Reduce {
     pub fn new(
         gpu: &Gpu,
         source: &ItemBuffer,
+        cells: &Cells,
         resolution: u32,
         slots: u32,
         batch: u32,
@@ -38,6 +40,8 @@ impl Reduce {
         let weights = hemicube::weights(resolution)?;
         let weights =
             buffer("weights", bytemuck::cast_slice(&weights), wgpu::BufferUsages::STORAGE);
+        let slot_of =
+            buffer("slots", bytemuck::cast_slice(&cells.slots), wgpu::BufferUsages::STORAGE);
         let reduction = Reduction { resolution, slots };
         let reduction =
             buffer("reduction", bytemuck::bytes_of(&reduction), wgpu::BufferUsages::UNIFORM);
@@ -66,7 +70,7 @@ impl Reduce {
             weights.as_entire_binding(),
             rows.as_entire_binding(),
             reduction.as_entire_binding(),
-            source.slots.as_entire_binding(),
+            slot_of.as_entire_binding(),
         ];
         let entries: Vec<_> = (0..)
             .zip(resources)

@@ -36,12 +36,9 @@ impl Cell {
         let (level, i, j) = (self.level + 1, 2 * self.i, 2 * self.j);
         let cell = |i, j, flipped| Cell { level, i, j, flipped };
         match self.flipped {
-            false => [
-                cell(i, j, false),
-                cell(i + 1, j, false),
-                cell(i, j + 1, false),
-                cell(i, j, true),
-            ],
+            false => {
+                [cell(i, j, false), cell(i + 1, j, false), cell(i, j + 1, false), cell(i, j, true)]
+            }
             true => [
                 cell(i + 1, j + 1, true),
                 cell(i, j + 1, true),
@@ -97,7 +94,8 @@ mod tests {
 
     /// All cells of a level, by descent from the root.
     fn level(l: u32) -> Vec<Cell> {
-        (0..l).fold(vec![Cell::ROOT], |cells, _| cells.into_iter().flat_map(Cell::children).collect())
+        (0..l)
+            .fold(vec![Cell::ROOT], |cells, _| cells.into_iter().flat_map(Cell::children).collect())
     }
 
     fn signed_area(c: Cell) -> f64 {

@@ -1,0 +1,101 @@
+//! Bakes the radiosity of any OBJ scene to its vertices.
+//!
+//!     cargo run --release --example bake -- SCENE.obj [options]
+
+mod support;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use glam::DVec3;
+use lexopt::prelude::*;
+use radiosity::Camera;
+use support::{Bake, Device};
+
+const USAGE: &str = "\
+usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--unshot F] [--shots N]
+            [--row-memory MB] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
+            [--image W,H] [--adapter NAME | --cpu]
+
+Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
+(linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
+
+  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32]
+  --hemicube N      pixels along an edge of a hemicube's top face, even [128]
+  --unshot F        stop at this share of unshot flux [0.001]
+  --shots N         stop after this many shots
+  --row-memory MB   memory for form-factor rows that are kept [1024]
+  --patch-level N   a patch is 4^N elements [1]
+  --camera ...      eye, target, vertical field of view in degrees
+  --image W,H       size of the picture in pixels [512,512]
+  --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
+  --cpu             rays on the CPU instead of hemicubes, N squared a row";
+
+fn main() -> ExitCode {
+    let bake = match parse(lexopt::Parser::from_env()) {
+        Ok(Some(bake)) => bake,
+        Ok(None) => {
+            println!("{USAGE}");
+            return ExitCode::SUCCESS;
+        }
+        Err(e) => {
+            eprintln!("error: {e}\n\n{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match bake.run() {
+        Ok(report) => {
+            println!("{}", support::table(&report));
+            ExitCode::SUCCESS
+        }
+        Err(e) => {
+            eprintln!("error: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The settings asked for, or `None` for help.
+fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
+    let mut scene: Option<OsString> = None;
+    let mut bake = Bake::new("");
+    let mut out = None;
+    while let Some(arg) = args.next()? {
+        match arg {
+            Long("help") | Short('h') => return Ok(None),
+            Long("out") => out = Some(args.value()?),
+            Long("element-size") => bake.element_size = Some(args.value()?.parse()?),
+            Long("hemicube") => bake.hemicube = args.value()?.parse()?,
+            Long("unshot") => bake.shooting.unshot = args.value()?.parse()?,
+            Long("shots") => bake.shooting.shots = Some(args.value()?.parse()?),
+            Long("row-memory") => {
+                let megabytes: usize = args.value()?.parse()?;
+                bake.shooting.row_memory = megabytes.saturating_mul(1 << 20);
+            }
+            Long("patch-level") => bake.shooting.level = args.value()?.parse()?,
+            Long("camera") => {
+                let [a, b, c, d, e, f, vertical_fov] = args.value()?.parse_with(numbers)?;
+                let (eye, target) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
+                bake.camera = Some(Camera { eye, target, vertical_fov });
+            }
+            Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
+            Long("adapter") => bake.device = Device::Gpu(Some(args.value()?.string()?)),
+            Long("cpu") => bake.device = Device::Cpu,
+            Value(path) if scene.is_none() => scene = Some(path),
+            _ => return Err(arg.unexpected()),
+        }
+    }
+    bake.scene = scene.ok_or("no scene given")?.into();
+    bake.out = out.map_or_else(|| bake.scene.with_extension(""), Into::into);
+    Ok(Some(bake))
+}
+
+/// Exactly `N` numbers with commas between.
+fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
+    let parts: Vec<T> = text
+        .split(',')
+        .map(|part| part.trim().parse().map_err(|_| format!("'{part}' is not a number")))
+        .collect::<Result<_, _>>()?;
+    let count = parts.len();
+    parts.try_into().map_err(|_| format!("{count} numbers, {N} wanted"))
+}

@@ -1,0 +1,279 @@
+//! What the examples share: the whole path from a scene file to the files that come out.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use radiosity::{
+    Camera, Error, ErrorKind, FormFactors, Go, Gpu, Hemicubes, Mesh, NodeId, Progress, RayCast,
+    Report, Row, Scene, Seconds, Shooting, VertexRadiosity, load_obj, write_exr, write_ply,
+    write_png,
+};
+use serde_json::json;
+
+/// Settings of a bake.
+#[derive(Clone, Debug)]
+pub struct Bake {
+    pub scene: PathBuf,
+    /// Path of the output without its ending.
+    pub out: PathBuf,
+    /// Longest element edge, scene unit; by default a 32nd of the scene's diagonal.
+    pub element_size: Option<f64>,
+    pub hemicube: u32,
+    pub shooting: Shooting,
+    pub camera: Option<Camera>,
+    pub image: (u32, u32),
+    pub device: Device,
+}
+
+/// Who makes rows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Device {
+    /// Hemicubes on the adapter of this name, or the best.
+    Gpu(Option<String>),
+    /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
+    Cpu,
+}
+
+impl Bake {
+    pub fn new(scene: impl Into<PathBuf>) -> Bake {
+        let scene = scene.into();
+        Bake {
+            out: scene.with_extension(""),
+            scene,
+            element_size: None,
+            hemicube: 128,
+            shooting: Shooting::default(),
+            camera: None,
+            image: (512, 512),
+            device: Device::Gpu(None),
+        }
+    }
+
+    /// From the scene file to STEM.ply, STEM.json and, with a camera, STEM.exr and STEM.png.
+    pub fn run(&self) -> Result<Report, Error> {
+        let mut clock = Clock::start();
+        let mut seconds = Seconds::default();
+        writable(&self.out)?;
+        let scene = load_obj(&self.scene)?;
+        for warning in scene.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        let warnings = scene.warnings().to_vec();
+        seconds.load = clock.lap();
+
+        let element_size = self.element_size.unwrap_or_else(|| default_element_size(&scene));
+        let mesh = Mesh::new(scene, element_size)?;
+        let mut maker = Maker::new(&self.device, &mesh, self.hemicube)?;
+        seconds.mesh = clock.lap();
+
+        let bar = bar();
+        let solution = self.shooting.solve(&mesh, &mut maker, |p| {
+            show(&bar, p, self.shooting.unshot);
+            Go::Continue(())
+        })?;
+        bar.finish_and_clear();
+        (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
+        seconds.solve = clock.lap() - maker.seconds;
+
+        let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+        seconds.vertices = clock.lap();
+
+        write_ply(self.out.with_added_extension("ply"), &surface)?;
+        if let Some(camera) = self.camera {
+            let image = camera.image(&surface, self.image.0, self.image.1, 4)?;
+            write_exr(self.out.with_added_extension("exr"), &image)?;
+            write_png(self.out.with_added_extension("png"), &image)?;
+        }
+        seconds.write = clock.lap();
+        seconds.total = clock.total();
+
+        let report = Report {
+            scene: self.scene.display().to_string(),
+            adapter: maker.adapter(),
+            settings: vec![
+                ("element_size".into(), json!(element_size)),
+                ("hemicube".into(), json!(self.hemicube)),
+                ("unshot".into(), json!(self.shooting.unshot)),
+                ("shots".into(), json!(self.shooting.shots)),
+                ("row_memory".into(), json!(self.shooting.row_memory)),
+                ("patch_level".into(), json!(self.shooting.level)),
+            ],
+            triangles: mesh.scene().triangles().len(),
+            elements: mesh.element_count(),
+            vertices: surface.positions.len(),
+            shots: solution.shots,
+            hemicubes: solution.rows_made,
+            stop: solution.stop.to_string(),
+            ledger: solution.ledger,
+            seconds,
+            warnings,
+        };
+        report.write(self.out.with_added_extension("json"))?;
+        Ok(report)
+    }
+}
+
+/// A 32nd of the diagonal of the scene's bounding box.
+pub fn default_element_size(scene: &Scene) -> f64 {
+    let (low, high) = scene.bounds();
+    (high - low).length() / 32.0
+}
+
+/// Refuses an output that could not be written before any work is done for it.
+pub fn writable(out: &Path) -> Result<(), Error> {
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let probe = folder.join(format!(".radiosity-{}", std::process::id()));
+    let result = std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe));
+    result.map_err(|e| {
+        let place = format!("output folder {}", folder.display());
+        let remedy = "choose a folder that exists and can be written";
+        Error::new(ErrorKind::File, place, e.to_string(), remedy).with_source(e)
+    })
+}
+
+/// Makes rows one way or the other, and counts the time.
+pub struct Maker {
+    rows: Rows,
+    seconds: f64,
+}
+
+enum Rows {
+    Gpu(Gpu, Box<Hemicubes>),
+    Cpu(RayCast),
+}
+
+impl Maker {
+    pub fn new(device: &Device, mesh: &Mesh, hemicube: u32) -> Result<Maker, Error> {
+        let rows = match device {
+            Device::Gpu(name) => {
+                let gpu = Gpu::new(name.as_deref())?;
+                let hemicubes = Hemicubes::new(&gpu, mesh, hemicube)?;
+                Rows::Gpu(gpu, Box::new(hemicubes))
+            }
+            Device::Cpu => {
+                radiosity::hemicube::check_resolution(hemicube)?;
+                Rows::Cpu(RayCast::new(mesh, hemicube * hemicube)?)
+            }
+        };
+        Ok(Maker { rows, seconds: 0.0 })
+    }
+
+    /// Name, type and driver.
+    pub fn adapter(&self) -> [String; 3] {
+        match &self.rows {
+            Rows::Gpu(gpu, _) => {
+                let adapter = gpu.adapter().clone();
+                [adapter.name, adapter.kind, adapter.driver]
+            }
+            Rows::Cpu(_) => ["rays".into(), "CPU".into(), "none".into()],
+        }
+    }
+
+    /// Seconds of draw, reduce and read-back; rays are all draw.
+    fn stages(&self) -> (f64, f64, f64) {
+        match &self.rows {
+            Rows::Gpu(_, hemicubes) => {
+                let s = hemicubes.seconds();
+                (s.draw, s.reduce, s.readback)
+            }
+            Rows::Cpu(_) => (self.seconds, 0.0, 0.0),
+        }
+    }
+}
+
+impl FormFactors for Maker {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        let start = Instant::now();
+        let rows = match &mut self.rows {
+            Rows::Gpu(_, hemicubes) => hemicubes.rows(mesh, patches),
+            Rows::Cpu(rays) => rays.rows(mesh, patches),
+        };
+        self.seconds += start.elapsed().as_secs_f64();
+        rows
+    }
+
+    fn batch(&self) -> usize {
+        match &self.rows {
+            Rows::Gpu(_, hemicubes) => hemicubes.batch(),
+            Rows::Cpu(rays) => rays.batch(),
+        }
+    }
+}
+
+fn bar() -> ProgressBar {
+    let bar = ProgressBar::new(1000);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// The bar fills with the logarithm of the unshot share, which falls about evenly.
+fn show(bar: &ProgressBar, p: &Progress, wanted: f64) {
+    let done = p.unshot_share.max(1e-16).ln() / wanted.clamp(1e-16, 0.999).ln();
+    bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
+    bar.set_message(format!(
+        "{:.3} % unshot, {} shots, {} hemicubes, {:.1} s",
+        100.0 * p.unshot_share,
+        p.shots,
+        p.rows_made,
+        p.elapsed.as_secs_f64()
+    ));
+}
+
+struct Clock {
+    start: Instant,
+    lap: Instant,
+}
+
+impl Clock {
+    fn start() -> Clock {
+        Clock { start: Instant::now(), lap: Instant::now() }
+    }
+
+    fn lap(&mut self) -> f64 {
+        let seconds = self.lap.elapsed().as_secs_f64();
+        self.lap = Instant::now();
+        seconds
+    }
+
+    fn total(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+}
+
+/// A small table of what was done.
+pub fn table(report: &Report) -> String {
+    let [name, kind, driver] = &report.adapter;
+    let s = report.seconds;
+    let share = |c: radiosity::Rgb| {
+        let whole = report.ledger.emitted.element_sum();
+        if whole > 0.0 { 100.0 * c.element_sum() / whole } else { 0.0 }
+    };
+    let ledger = report.ledger;
+    [
+        format!("adapter    {name} ({kind}), {driver}"),
+        format!(
+            "mesh       {} triangles, {} elements, {} vertices",
+            report.triangles, report.elements, report.vertices
+        ),
+        format!(
+            "shooting   {} shots, {} hemicubes, {}",
+            report.shots, report.hemicubes, report.stop
+        ),
+        format!(
+            "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",
+            share(ledger.absorbed),
+            share(ledger.left),
+            share(ledger.back),
+            share(ledger.unshot)
+        ),
+        format!(
+            "seconds    load {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, read back {:.2}, \
+             solve {:.2}, vertices {:.2}, write {:.2}, total {:.2}",
+            s.load, s.mesh, s.draw, s.reduce, s.readback, s.solve, s.vertices, s.write, s.total
+        ),
+    ]
+    .join("\n")
+}

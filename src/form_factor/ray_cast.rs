@@ -1,0 +1,98 @@
+//! Form-factor rows from rays on the CPU: a second opinion, and what runs without a GPU.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+
+use super::{Entry, FormFactors, Row};
+use crate::error::{Error, ErrorKind};
+use crate::mesh::{Mesh, NodeId};
+use crate::rays::Rays;
+
+/// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid.
+///
+/// Every ray carries the same share of the light, so a form factor is a count: for n rays the
+/// standard error of an entry F is at most √(F(1−F)/n) (independent rays; these are stratified and
+/// do better).
+pub struct RayCast {
+    rays: Rays,
+    count: u32,
+}
+
+impl RayCast {
+    /// `count` rays a row over the triangles of `mesh`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁸.
+    pub fn new(mesh: &Mesh, count: u32) -> Result<RayCast, Error> {
+        if count == 0 || count > 1 << 28 {
+            let place = format!("{count} rays a row");
+            return Err(Error::new(ErrorKind::Setting, place, "not usable", "use 1 to 268435456"));
+        }
+        let scene = mesh.scene();
+        let rays = Rays::new((0..scene.triangles().len()).map(|t| scene.corners(t)));
+        Ok(RayCast { rays, count })
+    }
+
+    fn row(&self, mesh: &Mesh, patch: NodeId) -> Row {
+        let normal = mesh.normal(patch);
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
+        let start = START * mesh.area(patch).sqrt();
+        let turn = f64::from(shuffle(patch.0)) / 2f64.powi(32);
+        let mut seen: Vec<u32> = (0..self.count)
+            .map(|k| {
+                // Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley points.
+                let radius2 = (f64::from(k) + 0.5) / f64::from(self.count);
+                let phi = TAU * (f64::from(k.reverse_bits()) / 2f64.powi(32) + turn);
+                let (sin, cos) = phi.sin_cos();
+                let flat = (tangent * cos + bitangent * sin) * radius2.sqrt();
+                let direction = flat + normal * (1.0 - radius2).sqrt();
+                match self.rays.nearest(eye, direction, start, Some(own)) {
+                    None => OPEN,
+                    Some(hit) if !hit.front => BACK,
+                    Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v) as u32,
+                }
+            })
+            .collect();
+        seen.sort_unstable();
+        // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
+        let upto = |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(self.count)) as u32;
+        let mut row = Row::default();
+        let mut first = 0;
+        for run in seen.chunk_by(|a, b| a == b) {
+            let share = upto(first + run.len()) - upto(first);
+            first += run.len();
+            match run[0] {
+                OPEN => row.open = share,
+                BACK => row.back = share,
+                element => row.entries.push(Entry { element, share }),
+            }
+        }
+        row
+    }
+}
+
+impl FormFactors for RayCast {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        Ok(patches.par_iter().map(|&p| self.row(mesh, p)).collect())
+    }
+
+    /// The same on every machine, since it decides the order of shots.
+    fn batch(&self) -> usize {
+        16
+    }
+}
+
+const OPEN: u32 = u32::MAX;
+const BACK: u32 = u32::MAX - 1;
+
+/// Rays start this far from the patch, in units of the square root of its area.
+const START: f64 = 1e-6;
+
+/// A 32-bit mixer (Wellons 2018, "lowbias32").
+fn shuffle(mut x: u32) -> u32 {
+    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}

@@ -1,0 +1,39 @@
+//! Files in and out; nothing outside this room opens one.
+
+mod image;
+mod mtl;
+mod obj;
+mod ply;
+mod polygon;
+mod report;
+mod table;
+mod text;
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use crate::error::{Error, ErrorKind};
+
+pub use image::{write_exr, write_png};
+pub use obj::load_obj;
+pub use ply::write_ply;
+pub use report::{Report, Seconds};
+pub use table::write_view_factors;
+
+/// Creates `path` and hands it to `write`; any failure names the file.
+fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), Error> {
+    let file = File::create(path).map_err(|e| cannot_write(path, e))?;
+    let mut out = BufWriter::new(file);
+    write(&mut out).and_then(|()| out.flush()).map_err(|e| cannot_write(path, e))
+}
+
+fn cannot_write(path: &Path, e: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+    let e = e.into();
+    let found = format!("cannot be written: {e}");
+    let remedy = "choose a folder that exists, can be written and has room";
+    Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
+}

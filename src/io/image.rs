@@ -1,0 +1,51 @@
+//! EXR and PNG out.
+
+use std::path::Path;
+
+use exr::prelude::WritableImage;
+
+use super::{cannot_write, write_file};
+use crate::camera::RadianceImage;
+use crate::error::Error;
+use crate::tone::ToneCurve;
+
+/// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let pixel = |at: exr::math::Vec2<usize>| {
+        let [r, g, b] = image.pixels[at.y() * width + at.x()].as_vec3().to_array();
+        (r, g, b)
+    };
+    let channels = exr::image::SpecificChannels::rgb(pixel);
+    let encoded = exr::image::Image::from_encoded_channels(
+        (width, height),
+        exr::image::Encoding::FAST_LOSSLESS,
+        channels,
+    );
+    let mut bytes = std::io::Cursor::new(vec![]);
+    encoded.write().to_buffered(&mut bytes).map_err(|e| cannot_write(path.as_ref(), e))?;
+    write_file(path.as_ref(), |out| std::io::Write::write_all(out, bytes.get_ref()))
+}
+
+/// Writes the image through a tone curve as 8-bit sRGB PNG.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_png(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
+    let tone = ToneCurve::fit(&image.pixels);
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(|&c| tone.display(c)).collect();
+    let mut png = std::io::Cursor::new(vec![]);
+    image::write_buffer_with_format(
+        &mut png,
+        &bytes,
+        image.width,
+        image.height,
+        image::ExtendedColorType::Rgb8,
+        image::ImageFormat::Png,
+    )
+    .map_err(|e| cannot_write(path.as_ref(), e))?;
+    write_file(path.as_ref(), |out| std::io::Write::write_all(out, png.get_ref()))
+}

@@ -1,0 +1,196 @@
+//! Materials of MTL files: `Kd` and `Ke`; what else could change the light is warned about.
+
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::text::{self, Line, finite, quoted, shortened, words};
+use crate::error::{Error, ErrorKind};
+use crate::scene::{Material, Rgb};
+
+/// The materials of all libraries loaded so far.
+#[derive(Default)]
+pub(super) struct Library {
+    entries: Vec<Entry>,
+    by_name: HashMap<String, u32>,
+    files: HashSet<PathBuf>,
+    redefined: Vec<String>,
+}
+
+/// One `newmtl` and what follows it.
+struct Entry {
+    name: String,
+    reflectance: Option<Rgb>,
+    exitance: Rgb,
+    textured: bool,
+    transparent: bool,
+}
+
+impl Library {
+    /// Index of the material that `name` stands for.
+    pub fn find(&self, name: &str) -> Option<u32> {
+        self.by_name.get(name).copied()
+    }
+
+    /// What a `usemtl` that found nothing should have said.
+    pub fn remedy(&self) -> String {
+        let names: Vec<_> = self.entries.iter().map(|e| &e.name).collect();
+        match (self.files.len(), names.len()) {
+            (0, _) => "add `mtllib FILE` above it, with a file that defines the material".into(),
+            (_, 0) => "define it with `newmtl`: the libraries loaded so far are empty".into(),
+            _ => format!("the libraries loaded so far define {}", quoted(&names)),
+        }
+    }
+
+    /// Loads the files that a `mtllib` line names: one name, which may contain spaces, or several.
+    pub fn load(&mut self, line: &Line, names: &str) -> Result<(), Error> {
+        if names.is_empty() {
+            return Err(line.refuse("no file name", "write `mtllib FILE`"));
+        }
+        let folder = line.file.parent().unwrap_or(Path::new(""));
+        if folder.join(names).is_file() {
+            return self.load_file(line, &folder.join(names));
+        }
+        names.split_whitespace().try_for_each(|name| self.load_file(line, &folder.join(name)))
+    }
+
+    fn load_file(&mut self, line: &Line, path: &Path) -> Result<(), Error> {
+        let unreadable = |e: io::Error| {
+            let (text, path) = (shortened(&line.text), path.display());
+            let found = format!("{text:?} names '{path}', which cannot be read: {e}");
+            Error::new(ErrorKind::File, line.place(), found, beside(line.file)).with_source(e)
+        };
+        if self.files.insert(fs::canonicalize(path).map_err(unreadable)?) {
+            let text = text::read(path).map_err(unreadable)?;
+            let start = self.entries.len();
+            text::lines(path, &text).try_for_each(|line| self.line(&line, start))?;
+        }
+        Ok(())
+    }
+
+    /// Takes in one line of a file whose first material has the index `start`.
+    fn line(&mut self, line: &Line, start: usize) -> Result<(), Error> {
+        let (keyword, rest) = line.keyword();
+        if keyword == "newmtl" {
+            return self.begin(line, rest);
+        }
+        if !["Kd", "Ke", "d", "Tr", "map_Kd", "map_Ke", "map_d"].contains(&keyword) {
+            return Ok(());
+        }
+        let Some(entry) = self.entries.get_mut(start..).and_then(<[_]>::last_mut) else {
+            return Err(line.refuse(format!("`{keyword}` of no material"), "begin with `newmtl`"));
+        };
+        match keyword {
+            "Kd" => entry.reflectance = Some(reflectance(line, &entry.name, rest)?),
+            "Ke" => entry.exitance = exitance(line, &entry.name, rest)?,
+            "map_Kd" | "map_Ke" => entry.textured = true,
+            "map_d" => entry.transparent = true,
+            _ => {
+                let number = words(rest).last().and_then(finite);
+                let x = number.ok_or_else(|| refuse(line, &entry.name, "a finite number"))?;
+                // Files disagree about which end of `Tr` is opaque.
+                entry.transparent |= x < 1.0 && (keyword == "d" || x > 0.0);
+            }
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, line: &Line, name: &str) -> Result<(), Error> {
+        if name.is_empty() {
+            return Err(line.refuse("a material without a name", "write `newmtl NAME`"));
+        }
+        if self.by_name.insert(name.into(), self.entries.len() as u32).is_some() {
+            self.redefined.push(name.into());
+        }
+        self.entries.push(Entry {
+            name: name.into(),
+            reflectance: None,
+            exitance: Rgb::ZERO,
+            textured: false,
+            transparent: false,
+        });
+        Ok(())
+    }
+
+    /// The materials by index, and warnings about those for which `used` holds.
+    pub fn into_materials(mut self, used: &HashSet<u32>) -> (Vec<Material>, Vec<String>) {
+        self.redefined.sort();
+        self.redefined.dedup();
+        let names = |odd: fn(&Entry) -> bool| {
+            let entries = self.entries.iter().enumerate();
+            let odd = entries.filter(|(i, e)| used.contains(&(*i as u32)) && odd(e));
+            odd.map(|(_, e)| e.name.clone()).collect::<Vec<_>>()
+        };
+        let dark = |e: &Entry| e.reflectance.is_none() && e.exitance == Rgb::ZERO;
+        let lists = [
+            (names(dark), "neither `Kd` nor `Ke`, so they are black"),
+            (names(|e| e.textured), "textures, which are not modelled: `Kd` and `Ke` count alone"),
+            (names(|e| e.transparent), "transparency, which is not modelled: they are opaque"),
+            (self.redefined, "several definitions: each `usemtl` takes the last one above it"),
+        ];
+        let lists = lists.into_iter().filter(|(names, _)| !names.is_empty());
+        let warnings = lists.map(|(n, what)| format!("materials with {what}: {}", quoted(&n)));
+        let warnings = warnings.collect();
+        let material = |e: Entry| Material {
+            name: e.name,
+            reflectance: e.reflectance.unwrap_or(Rgb::ZERO),
+            exitance: e.exitance,
+        };
+        (self.entries.into_iter().map(material).collect(), warnings)
+    }
+}
+
+fn reflectance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
+    let rho = colour(line, name, rest)?;
+    if rho.to_array().iter().any(|x| !(0.0..1.0).contains(x)) {
+        let right = "a diffuse reflectance of at least 0 and below 1 in each channel";
+        return Err(refuse(line, name, right));
+    }
+    Ok(rho)
+}
+
+/// `Ke` is radiance L; a diffuse surface then has the exitance π L.
+fn exitance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
+    let exitance = PI * colour(line, name, rest)?;
+    if !exitance.is_finite() || exitance.min_element() < 0.0 {
+        return Err(refuse(line, name, "a radiance of at least 0 in each channel"));
+    }
+    Ok(exitance)
+}
+
+/// Three finite numbers, or one for all channels.
+fn colour(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
+    if let Some(form @ ("spectral" | "xyz")) = words(rest).next() {
+        let found = format!("material {}: unsupported form `{form}`", quoted(&[name]));
+        return Err(line.refuse(found, "write linear r g b"));
+    }
+    let numbers: Option<Vec<f64>> = words(rest).take(4).map(finite).collect();
+    match numbers.as_deref() {
+        Some(&[grey]) => Ok(Rgb::splat(grey)),
+        Some(&[r, g, b]) => Ok(Rgb::new(r, g, b)),
+        _ => Err(refuse(line, name, "three finite numbers r g b, or one for all three")),
+    }
+}
+
+fn refuse(line: &Line, name: &str, right: &str) -> Error {
+    line.refuse(format!("material {}: unusable value", quoted(&[name])), format!("write {right}"))
+}
+
+/// Which libraries lie beside the OBJ file.
+fn beside(obj: &Path) -> String {
+    let folder = match obj.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let libraries = files.filter(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl")));
+    let mut names: Vec<_> =
+        libraries.filter_map(|f| Some(f.file_name()?.to_string_lossy().into_owned())).collect();
+    names.sort();
+    match names.len() {
+        0 => format!("the folder '{}' has no .mtl file", folder.display()),
+        _ => format!("the folder '{}' has {}", folder.display(), quoted(&names)),
+    }
+}

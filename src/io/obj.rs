@@ -1,0 +1,306 @@
+//! Scenes from Wavefront OBJ files and their MTL libraries.
+
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::mtl::Library;
+use super::polygon::triangulate;
+use super::text::{self, Line, finite, quoted, words};
+use crate::error::{Error, ErrorKind};
+use crate::scene::{DEFAULT_REFLECTANCE, Material, Scene, Triangle};
+
+/// Group of the faces that come before any `o` or `g` line.
+const DEFAULT_GROUP: &str = "default";
+
+/// Loads a Wavefront OBJ file and the MTL files that it names.
+///
+/// The front of a face is where its corners run counter-clockwise. A face may have any number of
+/// corners, and its outline may be concave, but must not cross itself. It belongs to the group of
+/// the latest `o` or `g` line ("default" before the first); a name that comes again continues its
+/// group. Lengths stay in the file's own unit. Normals, texture coordinates, smoothing, points and
+/// lines are not used.
+///
+/// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
+/// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
+/// material reflect [`DEFAULT_REFLECTANCE`]. MTL files are looked for from the folder of the OBJ
+/// file.
+///
+/// What is read but not modelled, or replaced by a default, is in [`Scene::warnings`].
+///
+/// # Errors
+/// [`ErrorKind::File`] for a file that cannot be read. [`ErrorKind::Scene`], with file and line,
+/// for one whose content cannot be used: numbers that are not finite, corners without a vertex,
+/// unknown materials, reflectances outside [0, 1), negative radiances, outlines that cross
+/// themselves; and for a scene without a triangle that has area.
+pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    let path = path.as_ref();
+    let scan = Scan::of(path)?;
+    scan.into_scene(path)
+}
+
+/// What one pass over the lines finds. Every number is checked here, where its line is known.
+#[derive(Default)]
+struct Scan {
+    /// Vertices and faces alone, in a form that the parser takes without surprises.
+    geometry: String,
+    vertices: usize,
+    /// In the order of `geometry`.
+    faces: Vec<Face>,
+    groups: Vec<String>,
+    group_by_name: HashMap<String, u32>,
+    /// What the latest `o` or `g` line says, and its index once a face needs it.
+    group_name: String,
+    group: Option<u32>,
+    library: Library,
+    material: Option<u32>,
+    points_and_lines: usize,
+    unknown: usize,
+    first_unknown: String,
+}
+
+/// Where a face stands and what it belongs to.
+struct Face {
+    line: usize,
+    group: u32,
+    material: Option<u32>,
+}
+
+impl Scan {
+    fn of(path: &Path) -> Result<Scan, Error> {
+        let text = text::read(path).map_err(|e| {
+            let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
+            Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
+        })?;
+        let mut scan = Scan::default();
+        text::lines(path, &text).try_for_each(|line| scan.line(&line))?;
+        if scan.faces.is_empty() {
+            let mut found = format!("no face, {} vertices", scan.vertices);
+            if scan.unknown > 0 {
+                found += &format!(", {} lines that are not OBJ", scan.unknown);
+            }
+            let remedy = "give an OBJ file with `v` and `f` lines";
+            return Err(Error::new(ErrorKind::Scene, path.display().to_string(), found, remedy));
+        }
+        Ok(scan)
+    }
+
+    fn line(&mut self, line: &Line) -> Result<(), Error> {
+        let (keyword, rest) = line.keyword();
+        match keyword {
+            "v" => self.vertex(line, rest)?,
+            "f" => self.face(line, rest)?,
+            "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
+            "usemtl" => self.material = Some(self.use_material(line, rest)?),
+            "mtllib" => self.library.load(line, rest)?,
+            "p" | "l" => self.points_and_lines += 1,
+            "vt" | "vn" | "s" | "" => {}
+            comment if comment.starts_with('#') => {}
+            _ => {
+                if self.unknown == 0 {
+                    self.first_unknown = line.place();
+                }
+                self.unknown += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// `v x y z`, with a fourth number to divide by, or with a colour, which is left out.
+    fn vertex(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
+        let words: Vec<&str> = words(rest).take(7).collect();
+        let used = match words.len() {
+            3 | 4 => &words[..],
+            6 => &words[..3],
+            n => return Err(line.refuse(format!("{n} numbers"), "a vertex is `v x y z`")),
+        };
+        self.geometry.push('v');
+        for word in used {
+            if finite(word).is_none() {
+                let found = format!("coordinate {}", quoted(&[word]));
+                return Err(line.refuse(found, "coordinates must be finite numbers"));
+            }
+            self.geometry.push(' ');
+            self.geometry.push_str(word);
+        }
+        self.geometry.push('\n');
+        if let Some(w) = used.get(3).and_then(|w| finite(w)) {
+            let divided = |word: &&str| finite(word).is_some_and(|x| (x / w).is_finite());
+            if !used[..3].iter().all(divided) {
+                return Err(line.refuse(format!("weight {w}"), "leave the fourth number out"));
+            }
+        }
+        self.vertices += 1;
+        Ok(())
+    }
+
+    /// `f` and its corners: `v`, `v/vt`, `v//vn` or `v/vt/vn` each.
+    fn face(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
+        self.geometry.push('f');
+        let (mut corners, mut last) = (0, "");
+        for word in words(rest) {
+            last = self.corner(line, word)?;
+            self.geometry.push(' ');
+            self.geometry.push_str(last);
+            corners += 1;
+        }
+        if corners == 0 {
+            return Err(line.refuse("a face without corners", "write `f` and three or more"));
+        }
+        // With one or two corners: a triangle without area, to be counted as such.
+        for _ in corners..3 {
+            self.geometry.push(' ');
+            self.geometry.push_str(last);
+        }
+        self.geometry.push('\n');
+        let group = self.current_group();
+        self.faces.push(Face { line: line.number, group, material: self.material });
+        Ok(())
+    }
+
+    /// The vertex index of a corner, which must exist.
+    fn corner<'a>(&self, line: &Line, word: &'a str) -> Result<&'a str, Error> {
+        let bad = |found: &str, remedy: String| {
+            Err(line.refuse(format!("corner {}, {found}", quoted(&[word])), remedy))
+        };
+        let mut parts = word.split('/');
+        let vertex = parts.next().unwrap_or(word);
+        let Ok(index) = vertex.parse::<i64>() else {
+            return bad("not a vertex index", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
+        };
+        let whole = |part: &str| part.is_empty() || part.parse::<i64>().is_ok();
+        if parts.clone().count() > 2 || !parts.all(whole) {
+            return bad("not whole numbers", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
+        }
+        if index == 0 {
+            return bad("vertex index 0", "count from 1, or back from -1".into());
+        }
+        if index.unsigned_abs() > self.vertices as u64 {
+            return match self.vertices {
+                0 => bad("but no vertex so far", "put `v` lines above the faces".into()),
+                n => bad(
+                    &format!("vertex index {index} of {n} vertices so far"),
+                    format!("use 1 to {n}, or -1 to -{n} counting back"),
+                ),
+            };
+        }
+        Ok(vertex)
+    }
+
+    /// Index of the group that faces belong to now.
+    fn current_group(&mut self) -> u32 {
+        let new = self.groups.len() as u32;
+        *self.group.get_or_insert_with(|| {
+            let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
+            *self.group_by_name.entry(name.into()).or_insert_with(|| {
+                self.groups.push(name.into());
+                new
+            })
+        })
+    }
+
+    fn use_material(&self, line: &Line, name: &str) -> Result<u32, Error> {
+        if name.is_empty() {
+            return Err(line.refuse("no material name", self.library.remedy()));
+        }
+        let unknown = || {
+            let found = format!("unknown material {}", quoted(&[name]));
+            line.refuse(found, self.library.remedy())
+        };
+        self.library.find(name).ok_or_else(unknown)
+    }
+
+    fn into_scene(mut self, path: &Path) -> Result<Scene, Error> {
+        let mesh = parse(path, std::mem::take(&mut self.geometry))?;
+        let positions: Vec<DVec3> = mesh.positions.chunks_exact(3).map(DVec3::from_slice).collect();
+        let mut warnings = self.warnings();
+        let used: HashSet<u32> = self.faces.iter().filter_map(|f| f.material).collect();
+        let (mut materials, about) = self.library.into_materials(&used);
+        warnings.extend(about);
+        let default = materials.len() as u32;
+        if self.faces.iter().any(|f| f.material.is_none()) {
+            materials.push(Material::grey("(default)", DEFAULT_REFLECTANCE));
+        }
+        // Faces of any size in order; no sizes are given where all are triangles.
+        let mut rest = &mesh.indices[..];
+        let mut triangles = Vec::with_capacity(self.faces.len());
+        for (number, face) in self.faces.iter().enumerate() {
+            let size = mesh.face_arities.get(number).map_or(3, |&n| n as usize);
+            let (corners, after) = rest.split_at_checked(size).unwrap_or((rest, &[]));
+            rest = after;
+            let pieces = cut(corners, &positions).ok_or_else(|| {
+                let group = quoted(&[&self.groups[face.group as usize]]);
+                let found = format!(
+                    "face {} ({size} corners, group {group}) cannot be cut into triangles",
+                    number + 1
+                );
+                let remedy = "its outline must not cross itself; or give it as triangles";
+                Error::new(ErrorKind::Scene, text::place(path, face.line), found, remedy)
+            })?;
+            let (group, material) = (face.group, face.material.unwrap_or(default));
+            triangles.extend(pieces.into_iter().map(|corners| Triangle {
+                corners,
+                group,
+                material,
+            }));
+        }
+        let mut scene =
+            Scene::new(positions, triangles, self.groups, materials).map_err(|e| e.inside(path))?;
+        warnings.into_iter().for_each(|warning| scene.warn(warning));
+        Ok(scene)
+    }
+
+    /// What was replaced by a default or passed over in the OBJ file.
+    fn warnings(&self) -> Vec<String> {
+        let mut warnings = vec![];
+        match (self.faces.iter().filter(|f| f.material.is_none()).count(), self.faces.len()) {
+            (0, _) => {}
+            (bare, all) if bare == all => warnings.push(format!(
+                "no face names a material: all {all} reflect {DEFAULT_REFLECTANCE} and emit nothing"
+            )),
+            (bare, _) => warnings.push(format!(
+                "{bare} faces before the first `usemtl` reflect {DEFAULT_REFLECTANCE} and emit nothing"
+            )),
+        }
+        if self.points_and_lines > 0 {
+            let count = self.points_and_lines;
+            warnings.push(format!("{count} `p` and `l` lines (points and lines) were ignored"));
+        }
+        if self.unknown > 0 {
+            let (count, first) = (self.unknown, &self.first_unknown);
+            warnings.push(format!("{count} lines of unknown kind were ignored, first at {first}"));
+        }
+        warnings
+    }
+}
+
+/// Vertices and faces by the OBJ parser. Only vertices that a face uses are kept.
+fn parse(path: &Path, geometry: String) -> Result<tobj::Mesh, Error> {
+    let none = |_: &Path| Ok(Default::default());
+    let parsed = tobj::load_obj_buf(&mut geometry.as_bytes(), &tobj::LoadOptions::default(), none);
+    let (models, _) = parsed.map_err(|e| {
+        let (place, found) = (path.display().to_string(), format!("refused by the parser: {e}"));
+        Error::new(ErrorKind::Scene, place, found, "give a plain OBJ file").with_source(e)
+    })?;
+    // Without names in it, the geometry is one model.
+    Ok(models.into_iter().next().map(|model| model.mesh).unwrap_or_default())
+}
+
+/// The triangles of one face. Corners that repeat the one before them are left out.
+fn cut(corners: &[u32], positions: &[DVec3]) -> Option<Vec<[u32; 3]>> {
+    if let &[a, b, c] = corners {
+        return Some(vec![[a, b, c]]);
+    }
+    let mut ring = corners.to_vec();
+    ring.dedup();
+    while ring.len() > 1 && ring.first() == ring.last() {
+        ring.pop();
+    }
+    if let [a] | [a, _] = ring[..] {
+        return Some(vec![[a, a, a]]);
+    }
+    let points: Vec<DVec3> = ring.iter().map(|&i| positions[i as usize]).collect();
+    let triangles = triangulate(&points)?;
+    Some(triangles.into_iter().map(|t| t.map(|i| ring[i])).collect())
+}

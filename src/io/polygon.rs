@@ -1,0 +1,187 @@
+//! Polygons in space, cut into triangles.
+
+use earcut::{Earcut, utils3d::project3d_to_2d};
+use glam::DVec3;
+
+/// Corners a polygon may have when no fan covers it: ear clipping is quadratic at worst.
+const MOST_CORNERS_TO_CLIP: usize = 20_000;
+
+/// Parts of the polygon's largest extent squared that rounding may hide: the measure of
+/// [`crate::Scene::new`], which drops triangles below it.
+const LOST: f64 = 4.0 * f64::EPSILON;
+
+/// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
+///
+/// A fan from the first corner, where that covers it, else from one of the next three, else ear
+/// clipping. A polygon whose corners all lie on a line gives one triangle without area. `None` for
+/// an outline that crosses itself, and for one that neither of the ways covers.
+pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
+    let n = corners.len();
+    if n <= 3 {
+        return (n == 3).then(|| vec![[0, 1, 2]]);
+    }
+    // Around the first corner and in units of the largest extent, so that neither rounds away.
+    let origin = corners[0];
+    let extent = corners.iter().map(|&p| (p - origin).abs().max_element()).fold(0.0, f64::max);
+    let points: Vec<DVec3> = corners.iter().map(|&p| (p - origin) / extent).collect();
+    if extent == 0.0 || on_a_line(&points) {
+        return Some(vec![[0, 0, 0]]);
+    }
+    // Newell's normal: its length is twice the area of a flat polygon.
+    let newell: DVec3 = (1..n).map(|i| points[i - 1].cross(points[i])).sum();
+    let doubled_area = newell.length();
+    // Each of the n products is off by a few ε.
+    let rounding = 16.0 * f64::EPSILON * n as f64;
+    if doubled_area.is_nan() || doubled_area <= rounding {
+        return None;
+    }
+    let up = newell / doubled_area;
+    match (0..4).find(|&start| fan_covers(&points, start, up)) {
+        Some(start) => {
+            Some((1..n - 1).map(|i| [start, (start + i) % n, (start + i + 1) % n]).collect())
+        }
+        None => {
+            // The areas sum to that of the outline unless it crosses itself.
+            let (triangles, covered) = clip(&points, up)?;
+            ((covered - doubled_area).abs() <= rounding).then_some(triangles)
+        }
+    }
+}
+
+/// Whether all corners lie on the line through the first and the one farthest from it.
+fn on_a_line(points: &[DVec3]) -> bool {
+    let farther = |a: DVec3, b: DVec3| if b.length() > a.length() { b } else { a };
+    let far = points.iter().copied().fold(DVec3::ZERO, farther);
+    points.iter().all(|p| far.cross(*p).length() <= LOST)
+}
+
+/// Whether the fan from corner `start` covers the polygon once: each triangle turns about `up` and
+/// has area, and all lie within the half-plane left of the first edge.
+fn fan_covers(points: &[DVec3], start: usize, up: DVec3) -> bool {
+    let n = points.len();
+    let spoke = |i: usize| points[(start + i) % n] - points[start];
+    let first = spoke(1);
+    (1..n - 1).all(|i| {
+        let (a, b) = (spoke(i), spoke(i + 1));
+        let longest = a.length().max(b.length()).max((b - a).length());
+        a.cross(b).dot(up) > LOST * longest * longest && first.cross(b).dot(up) > 0.0
+    })
+}
+
+/// Ear clipping in the plane across `up`: triangles, and twice the area that they cover there.
+fn clip(points: &[DVec3], up: DVec3) -> Option<(Vec<[usize; 3]>, f64)> {
+    if points.len() > MOST_CORNERS_TO_CLIP {
+        return None;
+    }
+    let points: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
+    let mut flat = Vec::new();
+    if !project3d_to_2d(&points, points.len(), &mut flat) {
+        return None;
+    }
+    let mut indices: Vec<u32> = Vec::new();
+    Earcut::new().earcut_slice(&flat, &[], &mut indices);
+    let mut covered = 0.0;
+    let mut triangles = Vec::with_capacity(indices.len() / 3);
+    for corners in indices.chunks_exact(3) {
+        let mut triangle = [corners[0], corners[1], corners[2]].map(|i| i as usize);
+        let [a, b, c] = triangle.map(|i| DVec3::from_array(points[i]));
+        let turn = (b - a).cross(c - a).dot(up);
+        if turn < 0.0 {
+            triangle.swap(1, 2);
+        }
+        covered += turn.abs();
+        triangles.push(triangle);
+    }
+    Some((triangles, covered))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    /// Twice the area that `outline` bounds, counter-clockwise positive, by the shoelace formula.
+    fn shoelace(outline: &[[f64; 2]]) -> f64 {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+    }
+
+    /// Cuts `outline`, laid into several planes, from every first corner and in both directions;
+    /// the triangles must sum to its area and all turn as it does.
+    fn covers(outline: &[[f64; 2]]) {
+        let mut outline = outline.to_vec();
+        let tilted = DMat3::from_axis_angle(DVec3::new(1., 2., 3.).normalize(), 1.0);
+        let swapped = DMat3::from_cols(DVec3::Y, DVec3::X, -DVec3::Z);
+        for turn in 0..2 * outline.len() {
+            outline.rotate_left(1);
+            if turn == outline.len() {
+                outline.reverse();
+            }
+            let doubled = shoelace(&outline);
+            for frame in [DMat3::IDENTITY, swapped, tilted, tilted * 1e-9, tilted * 1e9] {
+                let put = |p: &[f64; 2]| frame * DVec3::new(p[0], p[1], 4.0);
+                let corners: Vec<DVec3> = outline.iter().map(put).collect();
+                let up = frame.z_axis.normalize() * doubled.signum();
+                let scale = frame.z_axis.length_squared();
+                let triangles = triangulate(&corners).unwrap();
+                let mut sum = 0.0;
+                for t in triangles {
+                    let [a, b, c] = t.map(|i| corners[i]);
+                    let cross = (b - a).cross(c - a) / scale;
+                    // Coordinates below 10 and rotations round by some 10 ε = 2e-15 each.
+                    assert!(cross.dot(up) > 1e-13, "{t:?} of {outline:?}");
+                    sum += cross.dot(up);
+                }
+                assert!((sum - doubled.abs()).abs() < 1e-12, "{sum} of {doubled}: {outline:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn concave_outlines_keep_area_and_winding() {
+        let l = [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 2.], [0., 2.]];
+        let arrow = [[0., 0.], [2., -1.], [1., 0.], [2., 1.]];
+        let u = [[0., 0.], [3., 0.], [3., 3.], [2., 3.], [2., 1.], [1., 1.], [1., 3.], [0., 3.]];
+        let star: Vec<_> = (0..10)
+            .map(|i| (i as f64 * 0.2 * std::f64::consts::PI, [2.0, 0.5][i % 2]))
+            .map(|(angle, r): (f64, f64)| [r * angle.cos(), r * angle.sin()])
+            .collect();
+        for outline in [&l[..], &arrow, &u, &star] {
+            covers(outline);
+        }
+    }
+
+    #[test]
+    fn corners_within_an_edge_give_no_flat_triangle() {
+        covers(&[[0., 0.], [1., 0.], [2., 0.], [2., 2.], [0., 2.]]);
+        covers(&[[0., 0.], [1., 0.], [2., 0.], [2., 1.], [2., 2.], [1., 2.], [0., 2.], [0., 1.]]);
+    }
+
+    #[test]
+    fn a_convex_outline_is_a_fan_from_its_first_corner() {
+        let corner = |i: usize| DVec3::from_array([(i as f64).cos(), (i as f64).sin(), 0.0]);
+        let corners: Vec<DVec3> = (0..6).map(corner).collect();
+        let fan = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        assert_eq!(triangulate(&corners), Some(fan));
+        // So is a quad that is a little bent.
+        let mut bent = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        bent[2].z = 0.1;
+        assert_eq!(triangulate(&bent), Some(vec![[0, 1, 2], [0, 2, 3]]));
+    }
+
+    #[test]
+    fn outlines_that_cross_themselves_are_refused() {
+        let flat = |outline: &[[f64; 2]]| {
+            triangulate(&outline.iter().map(|p| DVec3::new(p[0], p[1], 0.0)).collect::<Vec<_>>())
+        };
+        assert_eq!(flat(&[[0., 0.], [1., 1.], [1., 0.], [0., 1.]]), None);
+        assert_eq!(flat(&[[0., 0.], [3., 3.], [3., 0.], [0., 1.]]), None);
+        let point = |i: usize| [(1.6 * i as f64).cos(), (1.6 * i as f64).sin()];
+        let round_thrice: Vec<_> = (0..11).map(point).collect();
+        assert_eq!(flat(&round_thrice), None);
+        let pentagram = [0., 2., 4., 1., 3.].map(|i: f64| [(1.2566 * i).cos(), (1.2566 * i).sin()]);
+        assert_eq!(flat(&pentagram), None);
+        // All on a line: without area, rather than wrong.
+        assert_eq!(flat(&[[0., 0.], [1., 1.], [3., 3.], [2., 2.]]), Some(vec![[0, 0, 0]]));
+    }
+}

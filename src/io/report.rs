@@ -1,0 +1,106 @@
+//! The JSON report of a bake.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+use super::write_file;
+use crate::error::Error;
+use crate::scene::Rgb;
+use crate::solve::Ledger;
+
+/// What was done, with what, and where the light and the time went.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// The scene, as the user named it.
+    pub scene: String,
+    /// Name, type and driver of what made the rows.
+    pub adapter: [String; 3],
+    /// Settings by name.
+    pub settings: Vec<(String, Value)>,
+    /// Triangles with area.
+    pub triangles: usize,
+    /// Elements of the mesh.
+    pub elements: usize,
+    /// Vertices exported.
+    pub vertices: usize,
+    /// Patches shot.
+    pub shots: u64,
+    /// Rows made: hemicubes drawn, or fans of rays cast.
+    pub hemicubes: u64,
+    /// Why the solver stopped.
+    pub stop: String,
+    /// Where the light went.
+    pub ledger: Ledger,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// What deserves a look.
+    pub warnings: Vec<String>,
+}
+
+/// Seconds of wall time by stage. Draw, reduce and read-back are parts of making rows; `solve` is
+/// the rest of the shooting.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seconds {
+    /// Reading the scene.
+    pub load: f64,
+    /// Cutting it into elements, and opening the device.
+    pub mesh: f64,
+    /// Rendering item buffers, or casting rays.
+    pub draw: f64,
+    /// Adding up pixel weights.
+    pub reduce: f64,
+    /// Getting rows from the device.
+    pub readback: f64,
+    /// Shooting on rows.
+    pub solve: f64,
+    /// Elements to vertices.
+    pub vertices: f64,
+    /// Drawing the camera image and writing all other files.
+    pub write: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+impl Report {
+    /// The report as JSON.
+    pub fn to_json(&self) -> Value {
+        let channels = |c: Rgb| json!(c.to_array());
+        let Ledger { emitted, absorbed, left, back, unshot } = self.ledger;
+        let s = self.seconds;
+        let [name, kind, driver] = &self.adapter;
+        json!({
+            "scene": self.scene,
+            "adapter": { "name": name, "type": kind, "driver": driver },
+            "settings": self.settings.iter().cloned().collect::<Map<String, Value>>(),
+            "triangles": self.triangles,
+            "elements": self.elements,
+            "vertices": self.vertices,
+            "shots": self.shots,
+            "hemicubes": self.hemicubes,
+            "stop": self.stop,
+            "ledger": {
+                "emitted": channels(emitted),
+                "absorbed": channels(absorbed),
+                "left": channels(left),
+                "back": channels(back),
+                "unshot": channels(unshot),
+            },
+            "seconds": {
+                "load": s.load, "mesh": s.mesh, "draw": s.draw, "reduce": s.reduce,
+                "readback": s.readback, "solve": s.solve, "vertices": s.vertices,
+                "write": s.write, "total": s.total,
+            },
+            "warnings": self.warnings,
+        })
+    }
+
+    /// Writes the report.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::File`] when the file cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        write_file(path.as_ref(), |out| writeln!(out, "{:#}", self.to_json()))
+    }
+}

@@ -1,0 +1,135 @@
+//! Text of OBJ and MTL files: numbered lines, keywords, words, and errors that name the line.
+
+use std::borrow::Cow;
+use std::path::Path;
+use std::{fs, io};
+
+use crate::error::{Error, ErrorKind};
+
+/// A line of a file, for messages.
+pub(super) struct Line<'a> {
+    pub file: &'a Path,
+    /// Counted from 1; where backslashes join several, the first of them.
+    pub number: usize,
+    /// Without surrounding white space.
+    pub text: Cow<'a, str>,
+}
+
+impl Line<'_> {
+    /// The first word, and what follows it.
+    pub fn keyword(&self) -> (&str, &str) {
+        let (keyword, rest) = self.text.split_once(char::is_whitespace).unwrap_or((&self.text, ""));
+        (keyword, rest.trim_start())
+    }
+
+    /// `file:line`.
+    pub fn place(&self) -> String {
+        place(self.file, self.number)
+    }
+
+    /// The error that `found` stands in this line where `remedy` would be right.
+    pub fn refuse(&self, found: impl std::fmt::Display, remedy: impl Into<String>) -> Error {
+        let found = format!("{found} in {:?}", shortened(&self.text));
+        Error::new(ErrorKind::Scene, self.place(), found, remedy)
+    }
+}
+
+/// `file:line`.
+pub(super) fn place(file: &Path, line: usize) -> String {
+    format!("{}:{line}", file.display())
+}
+
+/// The whole of a regular file; bytes that are not UTF-8 become U+FFFD.
+pub(super) fn read(path: &Path) -> io::Result<String> {
+    let about = fs::metadata(path)?;
+    if about.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
+    }
+    if !about.is_file() {
+        // A pipe or a device might never end.
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    let lossy = |e: std::string::FromUtf8Error| String::from_utf8_lossy(e.as_bytes()).into_owned();
+    Ok(String::from_utf8(fs::read(path)?).unwrap_or_else(lossy))
+}
+
+/// The lines of `text`, which ends them with LF, CRLF or CR. A backslash at the end of a line joins
+/// the next one to it. A byte-order mark is skipped.
+pub(super) fn lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
+    let end = if text.contains('\n') { '\n' } else { '\r' };
+    let mut physical = text.strip_prefix('\u{feff}').unwrap_or(text).split(end).enumerate();
+    std::iter::from_fn(move || {
+        let (before, first) = physical.next()?;
+        let mut text = Cow::Borrowed(first.trim());
+        while let Some(start) = text.strip_suffix('\\').map(str::len) {
+            let joined = text.to_mut();
+            joined.truncate(start);
+            let Some((_, next)) = physical.next() else { break };
+            joined.push(' ');
+            joined.push_str(next.trim());
+        }
+        Some(Line { file, number: before + 1, text })
+    })
+}
+
+/// The words of `text` up to a comment.
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split_whitespace().take_while(|word| !word.starts_with('#'))
+}
+
+/// `word` as a number, if it is one and finite.
+pub(super) fn finite(word: &str) -> Option<f64> {
+    word.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// The start of `text`, short enough for a message.
+pub(super) fn shortened(text: &str) -> Cow<'_, str> {
+    const LONGEST: usize = 60;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
+        None => Cow::Borrowed(text),
+    }
+}
+
+/// Up to eight of `names`, quoted, and how many more there are.
+pub(super) fn quoted<S: AsRef<str>>(names: &[S]) -> String {
+    const SHOWN: usize = 8;
+    let name = |name: &S| format!("'{}'", shortened(name.as_ref()).escape_debug());
+    let mut list = names.iter().take(SHOWN).map(name).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        list += &format!(" and {} more", names.len() - SHOWN);
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn split(text: &str) -> Vec<(usize, String)> {
+        lines(Path::new("x"), text).map(|l| (l.number, l.text.into_owned())).collect()
+    }
+    fn owned(list: &[(usize, &str)]) -> Vec<(usize, String)> {
+        list.iter().map(|&(n, s)| (n, s.to_string())).collect()
+    }
+
+    #[test]
+    fn every_line_end_counts_once() {
+        let three = owned(&[(1, "a"), (2, ""), (3, "b c"), (4, "")]);
+        assert_eq!(split("a\n\nb c\n"), three);
+        assert_eq!(split("a\r\n\r\n b c \r\n"), three);
+        assert_eq!(split("\u{feff}a\r\rb c\r"), three);
+    }
+
+    #[test]
+    fn a_backslash_joins_lines_and_keeps_the_first_number() {
+        assert_eq!(split("f 1 \\\r\n 2\\\n3\nv"), owned(&[(1, "f 1  2 3"), (4, "v")]));
+        assert_eq!(split("a\\"), owned(&[(1, "a")]));
+    }
+
+    #[test]
+    fn messages_stay_short() {
+        assert_eq!(shortened(&"é".repeat(1000)).chars().count(), 61);
+        assert_eq!(quoted(&["a"; 10]), format!("{} and 2 more", ["'a'"; 8].join(", ")));
+    }
+}
