@@ -1,5 +1,6 @@
 //! The contract between whoever makes form-factor rows and whoever uses them.
 
+pub mod analytic;
 pub(crate) mod ray_cast;
 
 use crate::error::{Error, ErrorKind};

@@ -55,7 +55,7 @@ struct Clock {
     seconds_per_tick: f64,
 }
 
-/// Item and depth buffers of a batch take at most this many bytes.
+/// Item buffers of a batch take at most this many bytes, if more than one.
 const BATCH_BYTES: u64 = 64 << 20;
 
 /// Hemicubes in a batch at most.
@@ -92,10 +92,10 @@ impl Hemicubes {
                 format!("this device holds {} and {}", buffer / 4 - 16, buffer / 48),
             );
         }
-        let hemicube_bytes = 3 * u64::from(resolution).pow(2) * 8;
+        let hemicube_bytes = 3 * u64::from(resolution).pow(2) * 4;
         let batch = MAX_BATCH
             .min((BATCH_BYTES / hemicube_bytes).max(1) as u32)
-            .min(texture / resolution)
+            .min(limits.max_texture_array_layers)
             .min(((buffer - 64) / row_bytes) as u32);
         let (low, high) = mesh.scene().bounds();
         let origin = low + (high - low) / 2.0;
@@ -156,8 +156,8 @@ impl Hemicubes {
         let count = patches.len() as u32;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let clock = self.clock.as_ref();
-        self.item_buffer.draw(&self.gpu, &mut encoder, &views, clock.map(Clock::draw));
-        self.reduce.reduce(&mut encoder, count, clock.map(Clock::reduce));
+        self.item_buffer.draw(&self.gpu, &mut encoder, &views, clock.map(|c| &c.queries));
+        self.reduce.reduce(&mut encoder, count, clock.map(|c| &c.queries));
         let bytes = u64::from(count * self.slots) * 4;
         encoder.copy_buffer_to_buffer(&self.reduce.rows, 0, &self.staging, 0, bytes);
         let times = bytes.next_multiple_of(8);
@@ -246,22 +246,6 @@ impl Clock {
         });
         let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         Clock { queries, resolved, seconds_per_tick }
-    }
-
-    fn draw(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        }
-    }
-
-    fn reduce(&self) -> wgpu::ComputePassTimestampWrites<'_> {
-        wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(2),
-            end_of_pass_write_index: Some(3),
-        }
     }
 
     fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {

@@ -9,15 +9,17 @@ use super::layout::{FaceView, ITEM_BUFFER_WGSL};
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
-/// Item buffers of a batch of hemicubes side by side, and what it takes to draw them.
+/// Item buffers of a batch of hemicubes, and what it takes to draw them.
+///
+/// Each is a layer of its own, so that its pixels do not depend on its place in the batch; all
+/// share one depth buffer.
 #[derive(Debug)]
 pub struct ItemBuffer {
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
     views: wgpu::Buffer,
-    pub items: wgpu::TextureView,
-    #[cfg(test)]
-    pub texture: wgpu::Texture,
+    pub items: wgpu::Texture,
+    layers: Vec<wgpu::TextureView>,
     depth: wgpu::TextureView,
     vertices: u32,
     resolution: u32,
@@ -95,13 +97,13 @@ impl ItemBuffer {
                 resource: buffers[k].as_entire_binding(),
             }),
         });
-        let texture = |label, format, usage| {
+        let texture = |label, layers, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: wgpu::Extent3d {
-                    width: batch * resolution,
+                    width: resolution,
                     height: 3 * resolution,
-                    depth_or_array_layers: 1,
+                    depth_or_array_layers: layers,
                 },
                 mip_level_count: 1,
                 sample_count: 1,
@@ -112,63 +114,81 @@ impl ItemBuffer {
             })
         };
         let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let items = texture("items", wgpu::TextureFormat::R32Uint, readable);
-        let depth =
-            texture("depth", wgpu::TextureFormat::Depth32Float, wgpu::TextureUsages::empty());
+        let items = texture("items", batch, wgpu::TextureFormat::R32Uint, readable);
+        let unread = wgpu::TextureUsages::empty();
+        let depth = texture("depth", 1, wgpu::TextureFormat::Depth32Float, unread);
+        let layer = |base_array_layer| {
+            items.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        let layers = (0..batch).map(layer).collect();
         ItemBuffer {
             pipeline,
             bindings,
             views,
-            items: items.create_view(&Default::default()),
-            #[cfg(test)]
-            texture: items,
+            items,
+            layers,
             depth: depth.create_view(&Default::default()),
             vertices: 3 * count as u32,
             resolution,
         }
     }
 
-    /// Records the drawing of the hemicubes that `views` (five each) look out from.
+    /// Records the drawing of the hemicubes that `views` (five each) look out from, with
+    /// timestamps before the first (query 0) and after the last (query 1).
     pub fn draw(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         views: &[FaceView],
-        timestamps: Option<wgpu::RenderPassTimestampWrites>,
+        queries: Option<&wgpu::QuerySet>,
     ) {
         gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(views));
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("item buffer"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.items,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
+        let count = views.len() / 5;
+        for (h, layer) in self.layers[..count].iter().enumerate() {
+            let timestamp_writes = queries.map(|query_set| wgpu::RenderPassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: (h == 0).then_some(0),
+                end_of_pass_write_index: (h + 1 == count).then_some(1),
+            });
+            // wgpu refuses a set of timestamps that writes none.
+            let timestamp_writes = timestamp_writes.filter(|_| h == 0 || h + 1 == count);
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("item buffer"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: layer,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: &self.depth,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(0.0),
+                        store: wgpu::StoreOp::Discard,
+                    }),
+                    stencil_ops: None,
                 }),
-                stencil_ops: None,
-            }),
-            timestamp_writes: timestamps,
-            occlusion_query_set: None,
-            multiview_mask: None,
-        });
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
-        let n = self.resolution;
-        for k in 0..views.len() as u32 {
-            let (hemicube, face) = (k / 5, (k % 5) as usize);
-            let lines = Face::rows(face, n);
-            let (x, y) = ((hemicube * n) as f32, lines.start as f32);
-            pass.set_viewport(x, y, n as f32, lines.len() as f32, 0.0, 1.0);
-            pass.draw(0..self.vertices, k..k + 1);
+                timestamp_writes,
+                occlusion_query_set: None,
+                multiview_mask: None,
+            });
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.bindings, &[]);
+            let n = self.resolution;
+            for face in 0..5 {
+                let (lines, view) = (Face::rows(face, n), (5 * h + face) as u32);
+                let (y, height) = (lines.start as f32, lines.len() as f32);
+                pass.set_viewport(0.0, y, n as f32, height, 0.0, 1.0);
+                pass.draw(0..self.vertices, view..view + 1);
+            }
         }
     }
 }

@@ -65,8 +65,12 @@ impl Reduce {
             compilation_options: Default::default(),
             cache: None,
         });
+        let items = source.items.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
         let resources = [
-            wgpu::BindingResource::TextureView(&source.items),
+            wgpu::BindingResource::TextureView(&items),
             weights.as_entire_binding(),
             rows.as_entire_binding(),
             reduction.as_entire_binding(),
@@ -84,17 +88,22 @@ impl Reduce {
         Ok(Reduce { pipeline, bindings, rows, resolution })
     }
 
-    /// Records the reduction of the first `count` hemicubes.
+    /// Records the reduction of the first `count` hemicubes, with timestamps before (query 2) and
+    /// after (query 3).
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         count: u32,
-        timestamps: Option<wgpu::ComputePassTimestampWrites>,
+        queries: Option<&wgpu::QuerySet>,
     ) {
         encoder.clear_buffer(&self.rows, 0, None);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),
-            timestamp_writes: timestamps,
+            timestamp_writes: queries.map(|query_set| wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: Some(2),
+                end_of_pass_write_index: Some(3),
+            }),
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
