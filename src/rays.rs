@@ -11,6 +11,7 @@ use obvhs::ray::{Ray, RayHit};
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
 /// intersections are in 64.
+#[derive(Debug)]
 pub(crate) struct Rays {
     bvh: CwBvh,
     /// First corner and two edges of each triangle, in the scene's unit.

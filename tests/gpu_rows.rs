@@ -72,16 +72,24 @@ fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, peri
     let (p, q) = (first.map(DVec3::from_array), second.map(DVec3::from_array));
     assert!((polygon_to_polygon(&p, &q) - exact).abs() < 5e-9, "{}", polygon_to_polygon(&p, &q));
     let mesh = Mesh::new(quads(&[(first, GREY()), (second, GREY())]), 0.1).unwrap();
-    let patches: Vec<NodeId> =
-        [0, 1].into_iter().flat_map(|t| mesh.elements_of(mesh.root(t))).map(|e| mesh.element(e)).collect();
+    let patches: Vec<NodeId> = [0, 1]
+        .into_iter()
+        .flat_map(|t| mesh.elements_of(mesh.root(t)))
+        .map(|e| mesh.element(e))
+        .collect();
     let point = |&n: &NodeId| point_to_polygon(mesh.centroid(n), mesh.normal(n), &q) * mesh.area(n);
     let at_points: f64 = patches.iter().map(point).sum();
     assert!((at_points - exact).abs() <= quadrature, "{at_points} {exact}");
     for n in [16, 64, 256, 1024] {
         let rows = rows(&gpu, &mesh, n, &patches);
-        let got: f64 = rows.iter().zip(&patches).map(|(r, &n)| to_group(&mesh, r, 1) * mesh.area(n)).sum();
+        let got: f64 =
+            rows.iter().zip(&patches).map(|(r, &n)| to_group(&mesh, r, 1) * mesh.area(n)).sum();
         let bound = outline_bound(n, perimeter, 12.0);
-        println!("n {n:4}: pixels {:+.2e} within {bound:.1e}, points {:+.2e}", got - at_points, at_points - exact);
+        println!(
+            "n {n:4}: pixels {:+.2e} within {bound:.1e}, points {:+.2e}",
+            got - at_points,
+            at_points - exact
+        );
         assert!((got - at_points).abs() <= bound, "n {n}: {got} {at_points} {bound}");
         assert!((got - exact).abs() <= bound + quadrature);
     }
@@ -127,8 +135,7 @@ fn backs_are_told_from_fronts_and_block() {
     // A screen that shows its back to the floor, close over it, and hides the lid.
     let screen = [[-9., -9., 0.1], [9., -9., 0.1], [9., 9., 0.1], [-9., 9., 0.1]];
     let lid = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
-    let mesh =
-        Mesh::new(quads(&[(floor, GREY()), (screen, GREY()), (lid, GREY())]), 0.5).unwrap();
+    let mesh = Mesh::new(quads(&[(floor, GREY()), (screen, GREY()), (lid, GREY())]), 0.5).unwrap();
     let patches: Vec<NodeId> = mesh.elements_of(mesh.root(0)).map(|e| mesh.element(e)).collect();
     for row in rows(&gpu, &mesh, 64, &patches) {
         assert_eq!(row.entries, []);
@@ -185,7 +192,8 @@ fn hemicubes_agree_with_rays_triangle_by_triangle() {
 fn rows_are_the_same_bits_however_they_are_batched() {
     let Some(gpu) = gpu() else { return };
     let mesh = cornell_box(100.0);
-    let patches: Vec<NodeId> = (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
+    let patches: Vec<NodeId> =
+        (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
     let mut maker = Hemicubes::new(&gpu, &mesh, 64).unwrap();
     let together = maker.rows(&mesh, &patches).unwrap();
     for (row, &p) in together.iter().zip(&patches) {

@@ -14,6 +14,7 @@ use crate::rays::Rays;
 /// Every ray carries the same share of the light, so a form factor is a count: for n rays the
 /// standard error of an entry F is at most √(F(1−F)/n) (independent rays; these are stratified and
 /// do better).
+#[derive(Debug)]
 pub struct RayCast {
     rays: Rays,
     count: u32,
