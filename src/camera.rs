@@ -40,8 +40,7 @@ impl Camera {
     /// Radiance is radiosity over π. Backs of faces and the void are black.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] for a size of 0 or above 32768, no samples, a field of view outside
-    /// (0, 180), or an eye that is not finite or is the target itself.
+    /// Those of [`Camera::check`].
     pub fn image(
         &self,
         surface: &VertexRadiosity,
@@ -82,7 +81,12 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
-    fn check(&self, width: u32, height: u32, samples: u32) -> Result<(), Error> {
+    /// Whether [`Camera::image`] would take these settings: worth asking before a long solve.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a size of 0 or above 32768, no samples, a field of view outside
+    /// (0, 180), or an eye that is not finite or is the target itself.
+    pub fn check(&self, width: u32, height: u32, samples: u32) -> Result<(), Error> {
         let bad = |found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, "camera", found, remedy))
         };

@@ -26,6 +26,9 @@ pub struct Bake {
     pub device: Device,
 }
 
+/// Lines of sight along a pixel's side.
+const SAMPLES: u32 = 4;
+
 /// Who makes rows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Device {
@@ -55,6 +58,8 @@ impl Bake {
         let mut clock = Clock::start();
         let mut seconds = Seconds::default();
         writable(&self.out)?;
+        let (width, height) = self.image;
+        self.camera.iter().try_for_each(|c| c.check(width, height, SAMPLES))?;
         let scene = load_obj(&self.scene)?;
         for warning in scene.warnings() {
             eprintln!("warning: {warning}");
@@ -81,7 +86,7 @@ impl Bake {
 
         write_ply(self.out.with_added_extension("ply"), &surface)?;
         if let Some(camera) = self.camera {
-            let image = camera.image(&surface, self.image.0, self.image.1, 4)?;
+            let image = camera.image(&surface, width, height, SAMPLES)?;
             write_exr(self.out.with_added_extension("exr"), &image)?;
             write_png(self.out.with_added_extension("png"), &image)?;
         }

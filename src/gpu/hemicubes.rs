@@ -260,3 +260,113 @@ impl Clock {
         (span(0), span(2))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::layout::FIRST_CELL;
+    use crate::scene::{Material, Scene, Triangle};
+
+    /// The item buffer of the last hemicube drawn alone, line by line; 64 pixels wide.
+    fn items(h: &Hemicubes) -> Vec<u32> {
+        let size = 64 * 192 * 4;
+        let buffer = h.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            h.item_buffer.items.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(64 * 4),
+                    rows_per_image: None,
+                },
+            },
+            wgpu::Extent3d { width: 64, height: 192, depth_or_array_layers: 1 },
+        );
+        h.gpu.queue.submit([encoder.finish()]);
+        buffer.slice(..).map_async(wgpu::MapMode::Read, |r| r.unwrap());
+        h.gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let bytes = buffer.slice(..).get_mapped_range().unwrap();
+        bytemuck::pod_collect_to_vec(&bytes)
+    }
+
+    /// A patch at the origin that faces +z, and small triangles around each given centre, facing
+    /// the origin or away from it.
+    fn around_origin(centres: &[(DVec3, bool)]) -> Mesh {
+        let mut corners = vec![[DVec3::X, DVec3::Y, -DVec3::X - DVec3::Y].map(|p| p * 0.01)];
+        for &(centre, front) in centres {
+            let (x, y) = centre.normalize().any_orthonormal_pair();
+            let (x, y) = if front { (y, x) } else { (x, y) };
+            let small = centre.length() * 0.1;
+            corners.push([x, -0.5 * x + 0.9 * y, -0.5 * x - 0.9 * y].map(|p| centre + p * small));
+        }
+        let triangles = (0..corners.len() as u32).map(|t| Triangle {
+            corners: [3 * t, 3 * t + 1, 3 * t + 2],
+            group: 0,
+            material: 0,
+        });
+        let triangles = triangles.collect();
+        let materials = vec![Material::grey("grey", 0.5)];
+        let scene = Scene::new(
+            corners.into_iter().flatten().collect(),
+            triangles,
+            vec!["g".into()],
+            materials,
+        );
+        Mesh::new(scene.unwrap(), f64::INFINITY).unwrap()
+    }
+
+    /// The device; a test without one fails unless RADIOSITY_NO_GPU says that none is there.
+    fn gpu() -> Option<Gpu> {
+        let without = std::env::var_os("RADIOSITY_NO_GPU").is_some();
+        (!without).then(|| Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set"))
+    }
+
+    #[test]
+    fn every_face_looks_where_its_frame_says() {
+        let Some(gpu) = gpu() else { return };
+        // Pixels off all symmetries, in each face's own image.
+        let pixels = [(40, 11), (9, 20), (50, 7), (30, 26), (13, 13)];
+        let patch = NodeId(0);
+        let frame = Frame::new(DVec3::Z, rotation(patch));
+        let faces = Face::all(&frame);
+        let toward = |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f % 2 == 0);
+        let mesh = around_origin(&[0, 1, 2, 3, 4].map(toward));
+        let mut h = Hemicubes::new(&gpu, &mesh, 64).unwrap();
+        h.rows(&mesh, &[patch]).unwrap();
+        let items = items(&h);
+        for (f, &(x, y)) in pixels.iter().enumerate() {
+            let line = Face::rows(f, 64).start + y;
+            // Triangle f + 1 has one cell; the patch's own triangle has the first.
+            let want = if f % 2 == 0 { FIRST_CELL + 1 + f as u32 } else { BACK };
+            assert_eq!(items[(line * 64 + x) as usize], want, "face {f}");
+        }
+        // A marker is 0.1 wide at distance 1 or more: below 12 pixels across, so most see nothing.
+        let open = items.iter().filter(|&&i| i == OPEN).count();
+        assert!(open > 192 * 64 - 5 * 12 * 12 && open < 192 * 64, "{open}");
+        assert!(!items.contains(&FIRST_CELL), "its own triangle is never hit");
+    }
+
+    #[test]
+    fn the_nearer_of_two_is_seen() {
+        let Some(gpu) = gpu() else { return };
+        // Same cone of directions, drawn far first and near first.
+        for (near, far) in [(1, 2), (2, 1)] {
+            let at = |k: u32| (DVec3::new(0.3, 0.2, 1.0) * if k == near { 1.0 } else { 2.0 }, true);
+            let mesh = around_origin(&[at(1), at(2)]);
+            let row =
+                &Hemicubes::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &[NodeId(0)]).unwrap()[0];
+            let share = |k: u32| {
+                row.entries.iter().find(|e| e.element == k).map_or(0, |e| u64::from(e.share))
+            };
+            // The far one looks out by the pixels of the outline at most.
+            assert!(share(near) > 10 * share(far), "{} {}", share(near), share(far));
+        }
+    }
+}

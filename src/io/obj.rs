@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::mtl::Library;
-use super::polygon::triangulate;
+use super::polygon::{MOST_CORNERS_TO_CLIP, triangulate};
 use super::text::{self, Line, finite, quoted, words};
 use crate::error::{Error, ErrorKind};
 use crate::scene::{DEFAULT_REFLECTANCE, Material, Scene, Triangle};
@@ -113,7 +113,7 @@ impl Scan {
         let used = match words.len() {
             3 | 4 => &words[..],
             6 => &words[..3],
-            n => return Err(line.refuse(format!("{n} numbers"), "a vertex is `v x y z`")),
+            n => return Err(line.refuse(format!("{n} words after `v`"), "a vertex is `v x y z`")),
         };
         self.geometry.push('v');
         for word in used {
@@ -137,21 +137,14 @@ impl Scan {
 
     /// `f` and its corners: `v`, `v/vt`, `v//vn` or `v/vt/vn` each.
     fn face(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
-        self.geometry.push('f');
-        let (mut corners, mut last) = (0, "");
-        for word in words(rest) {
-            last = self.corner(line, word)?;
-            self.geometry.push(' ');
-            self.geometry.push_str(last);
-            corners += 1;
-        }
-        if corners == 0 {
+        if words(rest).next().is_none() {
             return Err(line.refuse("a face without corners", "write `f` and three or more"));
         }
-        // With one or two corners: a triangle without area, to be counted as such.
-        for _ in corners..3 {
+        self.geometry.push('f');
+        for word in words(rest) {
+            let vertex = self.corner(line, word)?;
             self.geometry.push(' ');
-            self.geometry.push_str(last);
+            self.geometry.push_str(vertex);
         }
         self.geometry.push('\n');
         let group = self.current_group();
@@ -216,39 +209,53 @@ impl Scan {
         let positions: Vec<DVec3> = mesh.positions.chunks_exact(3).map(DVec3::from_slice).collect();
         let mut warnings = self.warnings();
         let used: HashSet<u32> = self.faces.iter().filter_map(|f| f.material).collect();
-        let (mut materials, about) = self.library.into_materials(&used);
+        let (mut materials, about) = std::mem::take(&mut self.library).into_materials(&used);
         warnings.extend(about);
         let default = materials.len() as u32;
         if self.faces.iter().any(|f| f.material.is_none()) {
             materials.push(Material::grey("(default)", DEFAULT_REFLECTANCE));
         }
-        // Faces of any size in order; no sizes are given where all are triangles.
+        let triangles = self.triangles(path, &mesh, &positions, default)?;
+        let scene = Scene::new(positions, triangles, self.groups, materials);
+        let mut scene = scene.map_err(|e| e.inside(path))?;
+        warnings.into_iter().for_each(|warning| scene.warn(warning));
+        Ok(scene)
+    }
+
+    /// The faces as triangles, those without a material with that of index `default`.
+    fn triangles(
+        &self,
+        path: &Path,
+        mesh: &tobj::Mesh,
+        positions: &[DVec3],
+        default: u32,
+    ) -> Result<Vec<Triangle>, Error> {
         let mut rest = &mesh.indices[..];
         let mut triangles = Vec::with_capacity(self.faces.len());
         for (number, face) in self.faces.iter().enumerate() {
+            // No sizes are given where all faces are triangles.
             let size = mesh.face_arities.get(number).map_or(3, |&n| n as usize);
             let (corners, after) = rest.split_at_checked(size).unwrap_or((rest, &[]));
             rest = after;
-            let pieces = cut(corners, &positions).ok_or_else(|| {
+            let points: Vec<DVec3> = corners.iter().map(|&i| positions[i as usize]).collect();
+            let pieces = triangulate(&points).ok_or_else(|| {
                 let group = quoted(&[&self.groups[face.group as usize]]);
                 let found = format!(
                     "face {} ({size} corners, group {group}) cannot be cut into triangles",
                     number + 1
                 );
-                let remedy = "its outline must not cross itself; or give it as triangles";
+                let remedy = format!(
+                    "its outline must not cross itself, and may have {MOST_CORNERS_TO_CLIP} \
+                     corners unless it is convex; triangles always work"
+                );
                 Error::new(ErrorKind::Scene, text::place(path, face.line), found, remedy)
             })?;
             let (group, material) = (face.group, face.material.unwrap_or(default));
-            triangles.extend(pieces.into_iter().map(|corners| Triangle {
-                corners,
-                group,
-                material,
-            }));
+            let triangle =
+                |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), group, material };
+            triangles.extend(pieces.into_iter().map(triangle));
         }
-        let mut scene =
-            Scene::new(positions, triangles, self.groups, materials).map_err(|e| e.inside(path))?;
-        warnings.into_iter().for_each(|warning| scene.warn(warning));
-        Ok(scene)
+        Ok(triangles)
     }
 
     /// What was replaced by a default or passed over in the OBJ file.
@@ -275,7 +282,8 @@ impl Scan {
     }
 }
 
-/// Vertices and faces by the OBJ parser. Only vertices that a face uses are kept.
+/// Vertices and faces by the OBJ parser: the vertices that a face uses, and every face, even of one
+/// corner or two.
 fn parse(path: &Path, geometry: String) -> Result<tobj::Mesh, Error> {
     let none = |_: &Path| Ok(Default::default());
     let parsed = tobj::load_obj_buf(&mut geometry.as_bytes(), &tobj::LoadOptions::default(), none);
@@ -285,22 +293,4 @@ fn parse(path: &Path, geometry: String) -> Result<tobj::Mesh, Error> {
     })?;
     // Without names in it, the geometry is one model.
     Ok(models.into_iter().next().map(|model| model.mesh).unwrap_or_default())
-}
-
-/// The triangles of one face. Corners that repeat the one before them are left out.
-fn cut(corners: &[u32], positions: &[DVec3]) -> Option<Vec<[u32; 3]>> {
-    if let &[a, b, c] = corners {
-        return Some(vec![[a, b, c]]);
-    }
-    let mut ring = corners.to_vec();
-    ring.dedup();
-    while ring.len() > 1 && ring.first() == ring.last() {
-        ring.pop();
-    }
-    if let [a] | [a, _] = ring[..] {
-        return Some(vec![[a, a, a]]);
-    }
-    let points: Vec<DVec3> = ring.iter().map(|&i| positions[i as usize]).collect();
-    let triangles = triangulate(&points)?;
-    Some(triangles.into_iter().map(|t| t.map(|i| ring[i])).collect())
 }

@@ -4,24 +4,22 @@ use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
 
 /// Corners a polygon may have when no fan covers it: ear clipping is quadratic at worst.
-const MOST_CORNERS_TO_CLIP: usize = 20_000;
+pub(super) const MOST_CORNERS_TO_CLIP: usize = 100_000;
 
-/// Parts of the polygon's largest extent squared that rounding may hide: the measure of
-/// [`crate::Scene::new`], which drops triangles below it.
-const LOST: f64 = 4.0 * f64::EPSILON;
+/// Height of a triangle, in units of the polygon's extent, that the rounding of its corners hides.
+const LOST: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
 ///
-/// A fan from the first corner, where that covers it, else from one of the next three, else ear
-/// clipping. A polygon whose corners all lie on a line gives one triangle without area. `None` for
-/// an outline that crosses itself, and for one that neither of the ways covers.
+/// A fan from the first corner where that covers it, else ear clipping. A polygon with fewer than
+/// three corners, or all on a line, gives one triangle without area. `None` when the areas of the
+/// triangles do not sum to that of the outline, as where it crosses itself.
 pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
-    let n = corners.len();
-    if n <= 3 {
-        return (n == 3).then(|| vec![[0, 1, 2]]);
+    let (n, &origin) = (corners.len(), corners.first()?);
+    if n == 3 {
+        return Some(vec![[0, 1, 2]]);
     }
     // Around the first corner and in units of the largest extent, so that neither rounds away.
-    let origin = corners[0];
     let extent = corners.iter().map(|&p| (p - origin).abs().max_element()).fold(0.0, f64::max);
     let points: Vec<DVec3> = corners.iter().map(|&p| (p - origin) / extent).collect();
     if extent == 0.0 || on_a_line(&points) {
@@ -30,22 +28,17 @@ pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     // Newell's normal: its length is twice the area of a flat polygon.
     let newell: DVec3 = (1..n).map(|i| points[i - 1].cross(points[i])).sum();
     let doubled_area = newell.length();
-    // Each of the n products is off by a few ε.
+    // Each of the n products is off by a few ε. What is left may have no front, or not be finite.
     let rounding = 16.0 * f64::EPSILON * n as f64;
     if doubled_area.is_nan() || doubled_area <= rounding {
         return None;
     }
     let up = newell / doubled_area;
-    match (0..4).find(|&start| fan_covers(&points, start, up)) {
-        Some(start) => {
-            Some((1..n - 1).map(|i| [start, (start + i) % n, (start + i + 1) % n]).collect())
-        }
-        None => {
-            // The areas sum to that of the outline unless it crosses itself.
-            let (triangles, covered) = clip(&points, up)?;
-            ((covered - doubled_area).abs() <= rounding).then_some(triangles)
-        }
+    if fan_covers(&points, up) {
+        return Some((1..n - 1).map(|i| [0, i, i + 1]).collect());
     }
+    let (triangles, covered) = clip(&points, up)?;
+    ((covered - doubled_area).abs() <= rounding).then_some(triangles)
 }
 
 /// Whether all corners lie on the line through the first and the one farthest from it.
@@ -55,16 +48,12 @@ fn on_a_line(points: &[DVec3]) -> bool {
     points.iter().all(|p| far.cross(*p).length() <= LOST)
 }
 
-/// Whether the fan from corner `start` covers the polygon once: each triangle turns about `up` and
-/// has area, and all lie within the half-plane left of the first edge.
-fn fan_covers(points: &[DVec3], start: usize, up: DVec3) -> bool {
-    let n = points.len();
-    let spoke = |i: usize| points[(start + i) % n] - points[start];
-    let first = spoke(1);
-    (1..n - 1).all(|i| {
-        let (a, b) = (spoke(i), spoke(i + 1));
-        let longest = a.length().max(b.length()).max((b - a).length());
-        a.cross(b).dot(up) > LOST * longest * longest && first.cross(b).dot(up) > 0.0
+/// Whether each triangle of the fan from the first corner, which is the origin, turns about `up`
+/// and has area.
+fn fan_covers(points: &[DVec3], up: DVec3) -> bool {
+    points[1..].windows(2).all(|edge| {
+        let (a, b) = (edge[0], edge[1]);
+        a.cross(b).dot(up) > LOST * a.length().max(b.length()).max((b - a).length())
     })
 }
 
@@ -86,11 +75,17 @@ fn clip(points: &[DVec3], up: DVec3) -> Option<(Vec<[usize; 3]>, f64)> {
         let mut triangle = [corners[0], corners[1], corners[2]].map(|i| i as usize);
         let [a, b, c] = triangle.map(|i| DVec3::from_array(points[i]));
         let turn = (b - a).cross(c - a).dot(up);
+        covered += turn.abs();
         if turn < 0.0 {
             triangle.swap(1, 2);
         }
-        covered += turn.abs();
-        triangles.push(triangle);
+        // Ears can be flat where corners lie within an edge.
+        if turn.abs() > LOST * (b - a).length().max((c - b).length()).max((a - c).length()) {
+            triangles.push(triangle);
+        }
+    }
+    if triangles.is_empty() {
+        triangles.push([0, 0, 0]);
     }
     Some((triangles, covered))
 }
@@ -175,13 +170,25 @@ mod tests {
             triangulate(&outline.iter().map(|p| DVec3::new(p[0], p[1], 0.0)).collect::<Vec<_>>())
         };
         assert_eq!(flat(&[[0., 0.], [1., 1.], [1., 0.], [0., 1.]]), None);
+        for turn in 0..100 {
+            // Two equal lobes, so that nothing but rounding tells the normal.
+            let frame = DMat3::from_axis_angle(DVec3::new(1., 2., 3.).normalize(), turn as f64);
+            let bow = [[0., 0.], [1., 1.], [1., 0.], [0., 1.]].map(|[x, y]| DVec3::new(x, y, 3.0));
+            assert_eq!(triangulate(&bow.map(|p| frame * p)), None);
+        }
         assert_eq!(flat(&[[0., 0.], [3., 3.], [3., 0.], [0., 1.]]), None);
         let point = |i: usize| [(1.6 * i as f64).cos(), (1.6 * i as f64).sin()];
         let round_thrice: Vec<_> = (0..11).map(point).collect();
         assert_eq!(flat(&round_thrice), None);
         let pentagram = [0., 2., 4., 1., 3.].map(|i: f64| [(1.2566 * i).cos(), (1.2566 * i).sin()]);
         assert_eq!(flat(&pentagram), None);
-        // All on a line: without area, rather than wrong.
+        // All on a line, or too few: without area, rather than wrong.
+        for few in [&[[1., 2.]][..], &[[0., 0.], [1., 1.]], &[[1., 2.]; 4]] {
+            assert_eq!(flat(few), Some(vec![[0, 0, 0]]));
+        }
+        assert_eq!(flat(&[]), None);
+        // Too far apart to measure.
+        assert_eq!(flat(&[[-1e308, 0.], [1e308, 0.], [1e308, 1e308], [0., 1e308]]), None);
         assert_eq!(flat(&[[0., 0.], [1., 1.], [3., 3.], [2., 2.]]), Some(vec![[0, 0, 0]]));
     }
 }

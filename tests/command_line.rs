@@ -1,0 +1,145 @@
+//! The examples as commands: what they write, and how they refuse.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An example beside this test's own binary.
+fn example(name: &str) -> Command {
+    let mut path = std::env::current_exe().expect("the test's own path");
+    path.pop();
+    path.pop();
+    path.push("examples");
+    path.push(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    assert!(path.exists(), "{} is missing: cargo build --examples", path.display());
+    Command::new(path)
+}
+
+fn run(name: &str, args: &[&str]) -> Output {
+    example(name).args(args).output().expect("the example starts")
+}
+
+/// The command fails, prints one error that contains every one of `words`, and writes no PLY.
+fn refused(args: &[&str], words: &[&str]) {
+    let out = run("bake", args);
+    let error = String::from_utf8_lossy(&out.stderr);
+    assert!(!out.status.success(), "{args:?}");
+    assert!(!error.contains("panicked"), "{error}");
+    for word in words {
+        assert!(error.contains(word), "{args:?}: '{word}' not in: {error}");
+    }
+}
+
+fn cornell() -> &'static str {
+    concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a scratch file");
+    path
+}
+
+/// `--cpu` where the tests are told to do without a GPU.
+fn device() -> &'static [&'static str] {
+    match std::env::var_os("RADIOSITY_NO_GPU") {
+        Some(_) => &["--cpu"],
+        None => &[],
+    }
+}
+
+#[test]
+fn bake_writes_all_it_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("box.one");
+    let mut args = vec![cornell(), "--out", stem.to_str().unwrap(), "--element-size", "150"];
+    args.extend(["--hemicube", "32", "--unshot", "0.01", "--row-memory", "16"]);
+    args.extend(["--camera", "278,273,-800,278,273,0,39.3077", "--image", "24,16"]);
+    args.extend(device());
+    let out = run("bake", &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("adapter") && said.contains("elements"), "{said}");
+    let size =
+        |ending| std::fs::metadata(folder.path().join(format!("box.one.{ending}"))).unwrap().len();
+    assert!(size("ply") > 1000 && size("exr") > 24 * 16 * 4 && size("png") > 100);
+    let json = std::fs::read(folder.path().join("box.one.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["triangles"], 32);
+    assert_eq!(json["settings"]["hemicube"], 32);
+    assert!(json["ledger"]["emitted"][0].as_f64().unwrap() > 0.0);
+    assert!(json["seconds"]["total"].as_f64().unwrap() > 0.0);
+    // Two runs, the same bytes.
+    let first = std::fs::read(folder.path().join("box.one.ply")).unwrap();
+    assert!(run("bake", &args).status.success());
+    assert!(first == std::fs::read(folder.path().join("box.one.ply")).unwrap());
+}
+
+#[test]
+fn view_factors_writes_a_matrix_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let plates = "o low\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n\
+                  o high\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
+    let scene = write(folder.path(), "plates.obj", plates);
+    let mut args = vec![scene.to_str().unwrap(), "--element-size", "0.2", "--hemicube", "64"];
+    args.extend(device());
+    let out = run("view_factors", &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let csv = std::fs::read_to_string(folder.path().join("plates.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows[0], ["from", "low", "high", "open", "back"]);
+    assert_eq!(rows[1][0], "low");
+    // 0.19982; elements of 0.18 at distance 1 and pixels of 1/32 cost well under 0.01.
+    assert!((rows[1][2].parse::<f64>().unwrap() - 0.19982).abs() < 0.01, "{csv}");
+    assert!((rows[2][3].parse::<f64>().unwrap() - 0.80018).abs() < 0.01, "{csv}");
+}
+
+#[test]
+fn bad_scenes_are_refused_with_their_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let bad = |name: &str, text: &str| write(folder.path(), name, text).display().to_string();
+    refused(&["no_such.obj"], &["no_such.obj"]);
+    let empty = bad("empty.obj", "# nothing\n");
+    refused(&[&empty], &["empty.obj"]);
+    let flat = bad("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    refused(&[&flat], &["flat.obj", "area"]);
+    let nan = bad("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    refused(&[&nan], &["nan.obj:1"]);
+    let lib = bad("lib.obj", &format!("mtllib gone.mtl\n{triangle}usemtl a\nf 1 2 3\n"));
+    refused(&[&lib], &["lib.obj:1", "gone.mtl"]);
+    bad("some.mtl", "newmtl chalk\nKd 0.5 0.5 0.5\n");
+    let name = bad("name.obj", &format!("mtllib some.mtl\n{triangle}usemtl cheese\nf 1 2 3\n"));
+    refused(&[&name], &["name.obj:5", "cheese", "chalk"]);
+    for (k, kd) in ["1 0.5 0.5", "0.5 1.7 0.5", "0.5 0.5 -0.1"].iter().enumerate() {
+        bad(&format!("kd{k}.mtl"), &format!("newmtl m\nKd {kd}\n"));
+        let text = format!("mtllib kd{k}.mtl\n{triangle}usemtl m\nf 1 2 3\n");
+        refused(&[&bad(&format!("kd{k}.obj"), &text)], &[&format!("kd{k}.mtl:2"), "reflectance"]);
+    }
+}
+
+#[test]
+fn bad_settings_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("x").display().to_string();
+    let with = |more: &[&str], words: &[&str]| {
+        let mut args = vec![cornell(), "--out", &stem];
+        args.extend(device());
+        args.extend(more);
+        refused(&args, words);
+        assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "wrote nothing");
+    };
+    with(&["--hemicube", "0"], &["hemicube resolution 0", "even"]);
+    with(&["--hemicube", "-2"], &["-2"]);
+    with(&["--element-size", "0"], &["element size 0"]);
+    with(&["--element-size", "nan"], &["element size NaN"]);
+    with(&["--element-size", "1e-9"], &["elements"]);
+    with(&["--unshot", "2"], &["unshot share 2"]);
+    with(&["--camera", "1,2,3"], &["camera", "7"]);
+    with(&["--image", "0,5", "--camera", "278,273,-800,278,273,0,39"], &["0 × 5"]);
+    with(&["--what"], &["--what"]);
+    refused(&[], &["usage"]);
+    refused(&[cornell(), "--out", "no/such/folder/x"], &["no/such/folder"]);
+    if device().is_empty() {
+        with(&["--adapter", "no such thing"], &["no such thing", "there are"]);
+    }
+}
