@@ -21,7 +21,7 @@ pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 2..=4096;
 /// # Errors
 /// [`ErrorKind::Setting`] otherwise.
 pub fn check_resolution(n: u32) -> Result<(), Error> {
-    if RESOLUTIONS.contains(&n) && n % 2 == 0 {
+    if RESOLUTIONS.contains(&n) && n.is_multiple_of(2) {
         return Ok(());
     }
     let remedy = format!(

@@ -1,3 +1,51 @@
+//! Radiosity: diffuse light settled in a scene, per vertex.
+//!
+//! The crate draws a hemicube per patch with wgpu, on any Vulkan, Metal or DX12 device (software
+//! Vulkan included), turns it into form factors, lets progressive shooting on the CPU spread the
+//! light, and gives radiosity at the vertices of a mesh. The path, in one line:
+//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file.
+//!
+//! ```no_run
+//! use radiosity::{Go, Gpu, Hemicubes, Mesh, Shooting, VertexRadiosity, load_obj, write_ply};
+//!
+//! # fn main() -> Result<(), radiosity::Error> {
+//! let scene = load_obj("scenes/cornell_box.obj")?;
+//! let mesh = Mesh::new(scene, 30.0)?; // no element edge over 30 units of the file
+//! let gpu = Gpu::new(None)?;
+//! let mut rows = Hemicubes::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
+//! let solution = Shooting::default().solve(&mesh, &mut rows, |progress| {
+//!     println!("{:.2} % unshot", 100.0 * progress.unshot_share);
+//!     Go::Continue(())
+//! })?;
+//! let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+//! write_ply("cornell_box.ply", &surface)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Conventions
+//!
+//! | quantity | name | unit | meaning |
+//! |---|---|---|---|
+//! | B | `radiosity` | W/m² per channel | all flux leaving a surface, per area: emitted plus reflected |
+//! | E | `exitance` | W/m² per channel | the emitted part of B; radiance of a diffuse surface is B/π |
+//! | ρ | `reflectance` | 1, in [0, 1) | diffuse hemispherical reflectance per channel |
+//! | F_ij | form factor | 1 | fraction of the flux leaving i that arrives at j: first index leaves, second receives |
+//! | ΔB·A | `unshot` | W per channel | what was emitted or received and is not yet passed on |
+//!
+//! - Channels are linear (r, g, b); for radiometry use them as any three bands.
+//! - Lengths are in the scene's own unit. Radiosity does not depend on it; W are W/m² times that
+//!   unit squared.
+//! - A face's front is where its corners run counter-clockwise. The front reflects and emits; both
+//!   sides block; light that meets a back is lost there, and counted.
+//! - Shares of light are whole numbers of 1/[`Row::TOTAL`], so rows sum to one exactly and a solve
+//!   gives the same bits on every run with the same adapter.
+//!
+//! # What it does not model
+//!
+//! Specular or glossy reflection, transparency, textures, participating media, polarisation, time.
+//! Light leaves and arrives diffusely, and an emitter is a surface.
+
 mod camera;
 mod error;
 pub mod form_factor;
@@ -24,3 +72,8 @@ pub use solve::{Go, Ledger, Progress, Shooting, Solution, Stop};
 pub use tone::ToneCurve;
 pub use vertex::VertexRadiosity;
 pub use view_factors::ViewFactors;
+
+/// The README's code compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,4 +1,6 @@
 //! What the examples share: the whole path from a scene file to the files that come out.
+// Each example uses a part of it.
+#![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -336,7 +336,7 @@ mod tests {
         let patch = NodeId(0);
         let frame = Frame::new(DVec3::Z, rotation(patch));
         let faces = Face::all(&frame);
-        let toward = |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f % 2 == 0);
+        let toward = |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f.is_multiple_of(2));
         let mesh = around_origin(&[0, 1, 2, 3, 4].map(toward));
         let mut h = Hemicubes::new(&gpu, &mesh, 64).unwrap();
         h.rows(&mesh, &[patch]).unwrap();
@@ -344,7 +344,7 @@ mod tests {
         for (f, &(x, y)) in pixels.iter().enumerate() {
             let line = Face::rows(f, 64).start + y;
             // Triangle f + 1 has one cell; the patch's own triangle has the first.
-            let want = if f % 2 == 0 { FIRST_CELL + 1 + f as u32 } else { BACK };
+            let want = if f.is_multiple_of(2) { FIRST_CELL + 1 + f as u32 } else { BACK };
             assert_eq!(items[(line * 64 + x) as usize], want, "face {f}");
         }
         // A marker is 0.1 wide at distance 1 or more: below 12 pixels across, so most see nothing.

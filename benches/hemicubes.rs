@@ -1,0 +1,73 @@
+//! Stages of making form-factor rows with hemicubes: draw, reduce, read back; over resolution and
+//! elements, on the Cornell box. The adapter's name is printed first.
+//!
+//! Criterion's own figure, `all`, is wall time from asking to rows. `draw` and `reduce` are the
+//! device's timestamps of the very same hemicubes, and `readback` the rest. Throughput is in
+//! hemicubes. Every iteration draws a full batch of other patches; nothing is kept.
+
+use std::time::{Duration, Instant};
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use radiosity::{FormFactors, Gpu, Hemicubes, Mesh, NodeId, StageSeconds, load_obj};
+
+fn stages(c: &mut Criterion) {
+    let gpu = Gpu::new(None).expect("a graphics adapter");
+    let adapter = gpu.adapter();
+    println!("adapter: {} ({}), {}", adapter.name, adapter.kind, adapter.driver);
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+    for size in [60.0, 30.0, 15.0] {
+        let mesh = Mesh::new(load_obj(path).expect("the scene"), size).expect("a mesh");
+        for resolution in [64, 128, 256, 512] {
+            measure(c, &gpu, &mesh, resolution);
+        }
+    }
+}
+
+fn measure(c: &mut Criterion, gpu: &Gpu, mesh: &Mesh, resolution: u32) {
+    let mut hemicubes = Hemicubes::new(gpu, mesh, resolution).expect("hemicubes");
+    let batch = hemicubes.batch();
+    let mut group = c.benchmark_group(format!("cornell_box/{} elements", mesh.element_count()));
+    group.throughput(Throughput::Elements(batch as u64));
+    let mut next = 0;
+    let mut draw_batch = |hemicubes: &mut Hemicubes| {
+        let patches: Vec<NodeId> =
+            (next..next + batch).map(|k| mesh.element(k * 7919 % mesh.element_count())).collect();
+        next += batch;
+        let (before, start) = (hemicubes.seconds(), Instant::now());
+        hemicubes.rows(mesh, &patches).expect("rows");
+        (start.elapsed(), before, hemicubes.seconds())
+    };
+    type Part = fn(&StageSeconds) -> f64;
+    let parts: [(&str, Option<Part>); 4] = [
+        ("all", None),
+        ("draw", Some(|s| s.draw)),
+        ("reduce", Some(|s| s.reduce)),
+        ("readback", Some(|s| s.readback)),
+    ];
+    for (name, part) in parts {
+        group.bench_function(BenchmarkId::new(name, format!("{resolution} px")), |b| {
+            b.iter_custom(|iterations| {
+                (0..iterations)
+                    .map(|_| {
+                        let (wall, before, after) = draw_batch(&mut hemicubes);
+                        part.map_or(wall, |of| {
+                            // A stage below the clock's tick still took some time.
+                            Duration::from_secs_f64((of(&after) - of(&before)).max(1e-9))
+                        })
+                    })
+                    .sum()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(1));
+    targets = stages
+}
+criterion_main!(benches);

@@ -1,0 +1,74 @@
+//! Shooting on stored rows: the arithmetic of the solver alone. No GPU is used; rows of the Cornell
+//! box are cast as rays once, before anything is timed.
+//!
+//! Throughput is in shots. Every iteration is a whole solve from the emitted light to 0.1 %
+//! unshot; what it asks for is handed out of memory.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use radiosity::{
+    Error, FormFactors, Go, Mesh, NodeId, RayCast, Row, Shooting, VertexRadiosity, load_obj,
+};
+
+/// Hands out rows that were made before.
+struct Stored<'a>(&'a HashMap<NodeId, Row>);
+
+impl FormFactors for Stored<'_> {
+    fn rows(&mut self, _: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        Ok(patches.iter().map(|p| self.0[p].clone()).collect())
+    }
+
+    fn batch(&self) -> usize {
+        16
+    }
+}
+
+/// Makes rows and remembers them.
+struct Recording(RayCast, HashMap<NodeId, Row>);
+
+impl FormFactors for Recording {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        let rows = self.0.rows(mesh, patches)?;
+        self.1.extend(patches.iter().copied().zip(rows.iter().cloned()));
+        Ok(rows)
+    }
+
+    fn batch(&self) -> usize {
+        16
+    }
+}
+
+fn shooting(c: &mut Criterion) {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+    let scene = load_obj(path).expect("the scene");
+    let mut group = c.benchmark_group("cornell_box");
+    for size in [120.0, 60.0] {
+        let mesh = Mesh::new(scene.clone(), size).expect("a mesh");
+        let rays = RayCast::new(&mesh, 1 << 14).expect("rays");
+        let mut recording = Recording(rays, HashMap::new());
+        let go = |_: &_| Go::Continue(());
+        let solution = Shooting::default().solve(&mesh, &mut recording, go).expect("a solution");
+        let elements = mesh.element_count();
+        group.throughput(Throughput::Elements(solution.shots));
+        group.bench_function(BenchmarkId::new("shoot to 0.1 %", elements), |b| {
+            b.iter(|| Shooting::default().solve(&mesh, &mut Stored(&recording.1), go));
+        });
+        group.throughput(Throughput::Elements(elements as u64));
+        group.bench_function(BenchmarkId::new("elements to vertices", elements), |b| {
+            b.iter(|| VertexRadiosity::new(&mesh, &solution.radiosity));
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(2));
+    targets = shooting
+}
+criterion_main!(benches);
