@@ -223,6 +223,17 @@ mod tests {
     }
 
     #[test]
+    fn faces_look_where_the_layout_says() {
+        let f = Frame { tangent: DVec3::X, bitangent: DVec3::Y, normal: DVec3::Z };
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        // Forward, right, up; seen from above, the sides' right is to the clockwise.
+        let want = [(z, x, -y), (x, -y, z), (-x, y, z), (y, x, z), (-y, -x, z)];
+        let got = Face::all(&f).map(|face| (face.forward, face.right, face.up));
+        assert_eq!(got, want);
+        assert_eq!(Face::all(&f).map(|face| face.bottom), [-1.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
     fn faces_cover_the_hemisphere_once() {
         // Every direction above the horizon falls on exactly one face, and the pixel that it falls
         // on looks back along it within a pixel's diagonal.

@@ -336,7 +336,8 @@ mod tests {
         let patch = NodeId(0);
         let frame = Frame::new(DVec3::Z, rotation(patch));
         let faces = Face::all(&frame);
-        let toward = |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f.is_multiple_of(2));
+        let toward =
+            |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f.is_multiple_of(2));
         let mesh = around_origin(&[0, 1, 2, 3, 4].map(toward));
         let mut h = Hemicubes::new(&gpu, &mesh, 64).unwrap();
         h.rows(&mesh, &[patch]).unwrap();
