@@ -9,9 +9,10 @@ const STRIP: u32 = 16u;
 struct Reduction {
     resolution: u32,      // N: an item buffer is N wide and 3N high
     slots: u32,           // words of a row: open, back, then one an element
+    stride: u32,          // words from line to line of an item buffer, at least N
 }
 
-@group(0) @binding(0) var items: texture_2d_array<u32>;   // a layer a hemicube
+@group(0) @binding(0) var<storage, read> items: array<u32>;
 @group(0) @binding(1) var<storage, read> weights: array<u32>;
 @group(0) @binding(2) var<storage, read_write> rows: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> reduction: Reduction;
@@ -25,11 +26,12 @@ fn reduce(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let base = id.z * reduction.slots;
-    let end = min(id.y * STRIP + STRIP, 3u * n);
-    var item = textureLoad(items, vec2u(x, id.y * STRIP), id.z, 0).x;
+    let line = id.z * 3u * n;
+    let start = id.y * STRIP;
+    var item = items[(line + start) * reduction.stride + x];
     var sum = 0u;
-    for (var y = id.y * STRIP; y < end; y++) {
-        let next = textureLoad(items, vec2u(x, y), id.z, 0).x;
+    for (var y = start; y < min(start + STRIP, 3u * n); y++) {
+        let next = items[(line + y) * reduction.stride + x];
         if next != item {
             atomicAdd(&rows[base + slots[item]], sum);
             sum = 0u;

@@ -11,7 +11,7 @@ use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
 use super::reduce::Reduce;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row};
-use crate::hemicube::{self, Face, Frame};
+use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::{Mesh, NodeId};
 
 /// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
@@ -42,7 +42,7 @@ pub struct Hemicubes {
 pub struct StageSeconds {
     /// Rendering item buffers.
     pub draw: f64,
-    /// Adding up pixel weights.
+    /// Adding up pixel weights, the copy of the item buffers to plain memory included.
     pub reduce: f64,
     /// Recording, waiting, copying and making rows sparse.
     pub readback: f64,
@@ -74,14 +74,16 @@ impl Hemicubes {
             Err(Error::new(ErrorKind::Setting, place, found, remedy))
         };
         let texture = limits.max_texture_dimension_2d;
-        if 3 * resolution > texture {
+        let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let fits = |n: &u32| 3 * n <= texture && Reduce::items_bytes(*n) <= buffer;
+        if !fits(&resolution) {
+            let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
             return setting(
                 format!("hemicube resolution {resolution}"),
-                format!("an item buffer {} pixels high", 3 * resolution),
-                format!("this device allows resolutions up to {}", texture / 6 * 2),
+                format!("an item buffer of {resolution} × {} pixels", 3 * resolution),
+                format!("this device allows resolutions up to {most}"),
             );
         }
-        let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
         let triangles = mesh.scene().triangles().len() as u64;
         let (row_bytes, items) = (u64::from(slots) * 4, Cells::count(mesh));
@@ -92,16 +94,17 @@ impl Hemicubes {
                 format!("this device holds {} and {}", buffer / 4 - 16, buffer / 48),
             );
         }
-        let hemicube_bytes = 3 * u64::from(resolution).pow(2) * 4;
+        let item_bytes = Reduce::items_bytes(resolution);
         let batch = MAX_BATCH
-            .min((BATCH_BYTES / hemicube_bytes).max(1) as u32)
+            .min((BATCH_BYTES / item_bytes).max(1) as u32)
             .min(limits.max_texture_array_layers)
+            .min((buffer / item_bytes) as u32)
             .min(((buffer - 64) / row_bytes) as u32);
         let (low, high) = mesh.scene().bounds();
         let origin = low + (high - low) / 2.0;
         let cells = Cells::new(mesh);
         let item_buffer = ItemBuffer::new(gpu, mesh, &cells, origin, resolution, batch);
-        let reduce = Reduce::new(gpu, &item_buffer, &cells, resolution, slots, batch)?;
+        let reduce = Reduce::new(gpu, &cells, resolution, slots, batch)?;
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),
             size: reduce.rows.size().next_multiple_of(8) + Clock::BYTES,
@@ -157,7 +160,7 @@ impl Hemicubes {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let clock = self.clock.as_ref();
         self.item_buffer.draw(&self.gpu, &mut encoder, &views, clock.map(|c| &c.queries));
-        self.reduce.reduce(&mut encoder, count, clock.map(|c| &c.queries));
+        self.reduce.reduce(&mut encoder, &self.item_buffer, count, clock.map(|c| &c.queries));
         let bytes = u64::from(count * self.slots) * 4;
         encoder.copy_buffer_to_buffer(&self.reduce.rows, 0, &self.staging, 0, bytes);
         let times = bytes.next_multiple_of(8);
@@ -229,14 +232,14 @@ fn sparse(dense: &[u32]) -> Row {
 }
 
 impl Clock {
-    /// Room for the four ticks in the staging buffer.
-    const BYTES: u64 = 32;
+    /// Room for the three ticks in the staging buffer.
+    const BYTES: u64 = 24;
 
     fn new(gpu: &Gpu) -> Clock {
         let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("clock"),
             ty: wgpu::QueryType::Timestamp,
-            count: 4,
+            count: 3,
         });
         let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("clock"),
@@ -249,15 +252,15 @@ impl Clock {
     }
 
     fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
-        encoder.resolve_query_set(&self.queries, 0..4, &self.resolved, 0);
+        encoder.resolve_query_set(&self.queries, 0..3, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, to, offset, Clock::BYTES);
     }
 
-    /// Seconds of draw and reduce.
+    /// Seconds of draw, and from there to the end of reduce.
     fn read(&self, bytes: &[u8]) -> (f64, f64) {
         let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes[..Clock::BYTES as usize]);
         let span = |a: usize| ticks[a + 1].saturating_sub(ticks[a]) as f64 * self.seconds_per_tick;
-        (span(0), span(2))
+        (span(0), span(1))
     }
 }
 

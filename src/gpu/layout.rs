@@ -30,6 +30,7 @@ pub struct TriangleCells {
 pub struct Reduction {
     pub resolution: u32,
     pub slots: u32,
+    pub stride: u32,
 }
 
 /// What a pixel shows: nothing, the back of a triangle, or from here on a cell of a front. Slots
@@ -106,7 +107,7 @@ mod tests {
         );
         assert_eq!(
             wgsl_layout(&reduce, "Reduction"),
-            rust_layout!(Reduction { resolution, slots })
+            rust_layout!(Reduction { resolution, slots, stride })
         );
     }
 

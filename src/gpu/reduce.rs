@@ -14,16 +14,23 @@ use crate::hemicube;
 pub struct Reduce {
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroup,
+    /// The item buffers once more, as plain memory: reading them as a texture costs more than the
+    /// copy does.
+    items: wgpu::Buffer,
     /// Dense rows of the batch, `slots` words each.
     pub rows: wgpu::Buffer,
     resolution: u32,
 }
 
 impl Reduce {
-    /// For `batch` hemicubes of `resolution` in `source`, to rows of `slots` words.
+    /// Bytes of one item buffer in memory.
+    pub fn items_bytes(resolution: u32) -> u64 {
+        u64::from(stride(resolution)) * u64::from(3 * resolution) * 4
+    }
+
+    /// For `batch` hemicubes of `resolution`, to rows of `slots` words.
     pub fn new(
         gpu: &Gpu,
-        source: &ItemBuffer,
         cells: &Cells,
         resolution: u32,
         slots: u32,
@@ -42,7 +49,8 @@ impl Reduce {
             buffer("weights", bytemuck::cast_slice(&weights), wgpu::BufferUsages::STORAGE);
         let slot_of =
             buffer("slots", bytemuck::cast_slice(&cells.slots), wgpu::BufferUsages::STORAGE);
-        let reduction = Reduction { resolution, slots };
+        let stride = stride(resolution);
+        let reduction = Reduction { resolution, slots, stride };
         let reduction =
             buffer("reduction", bytemuck::bytes_of(&reduction), wgpu::BufferUsages::UNIFORM);
         let rows = device.create_buffer(&wgpu::BufferDescriptor {
@@ -65,12 +73,14 @@ impl Reduce {
             compilation_options: Default::default(),
             cache: None,
         });
-        let items = source.items.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
+        let items = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("items"),
+            size: Reduce::items_bytes(resolution) * u64::from(batch),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
         let resources = [
-            wgpu::BindingResource::TextureView(&items),
+            items.as_entire_binding(),
             weights.as_entire_binding(),
             rows.as_entire_binding(),
             reduction.as_entire_binding(),
@@ -85,29 +95,48 @@ impl Reduce {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Ok(Reduce { pipeline, bindings, rows, resolution })
+        Ok(Reduce { pipeline, bindings, items, rows, resolution })
     }
 
-    /// Records the reduction of the first `count` hemicubes, with timestamps before (query 2) and
-    /// after (query 3).
+    /// Records the reduction of the first `count` hemicubes of `source`, with a timestamp after it
+    /// (query 2).
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
+        source: &ItemBuffer,
         count: u32,
         queries: Option<&wgpu::QuerySet>,
     ) {
+        let n = self.resolution;
         encoder.clear_buffer(&self.rows, 0, None);
+        encoder.copy_texture_to_buffer(
+            source.items.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.items,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(stride(n) * 4),
+                    rows_per_image: Some(3 * n),
+                },
+            },
+            wgpu::Extent3d { width: n, height: 3 * n, depth_or_array_layers: count },
+        );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),
             timestamp_writes: queries.map(|query_set| wgpu::ComputePassTimestampWrites {
                 query_set,
-                beginning_of_pass_write_index: Some(2),
-                end_of_pass_write_index: Some(3),
+                beginning_of_pass_write_index: None,
+                end_of_pass_write_index: Some(2),
             }),
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
-        let n = self.resolution;
         pass.dispatch_workgroups(n.div_ceil(WORKGROUP), (3 * n).div_ceil(STRIP), count);
     }
+}
+
+/// Words from one line of an item buffer in memory to the next: lines start at multiples of 256
+/// bytes.
+fn stride(resolution: u32) -> u32 {
+    resolution.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4)
 }
