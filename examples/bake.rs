@@ -15,7 +15,7 @@ use support::{Bake, Device};
 const USAGE: &str = "\
 usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--unshot F] [--shots N]
             [--row-memory MB] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--adapter NAME | --cpu]
+            [--image W,H] [--elements] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
@@ -28,6 +28,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --patch-level N   a patch is 4^N elements [1]
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
+  --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes, N squared a row";
 
@@ -79,6 +80,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
                 bake.camera = Some(Camera { eye, target, vertical_fov });
             }
             Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
+            Long("elements") => bake.elements = true,
             Long("adapter") => bake.device = Device::Gpu(Some(args.value()?.string()?)),
             Long("cpu") => bake.device = Device::Cpu,
             Value(path) if scene.is_none() => scene = Some(path),

@@ -53,7 +53,7 @@ fn bake_writes_all_it_says() {
     let stem = folder.path().join("box.one");
     let mut args = vec![cornell(), "--out", stem.to_str().unwrap(), "--element-size", "150"];
     args.extend(["--hemicube", "32", "--unshot", "0.01", "--row-memory", "16"]);
-    args.extend(["--camera", "278,273,-800,278,273,0,39.3077", "--image", "24,16"]);
+    args.extend(["--camera", "278,273,-800,278,273,0,39.3077", "--image", "24,16", "--elements"]);
     args.extend(device());
     let out = run("bake", &args);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
@@ -62,6 +62,7 @@ fn bake_writes_all_it_says() {
     let size =
         |ending| std::fs::metadata(folder.path().join(format!("box.one.{ending}"))).unwrap().len();
     assert!(size("ply") > 1000 && size("exr") > 24 * 16 * 4 && size("png") > 100);
+    assert!(size("elements.ply") > size("ply"), "corners of elements are not shared");
     let json = std::fs::read(folder.path().join("box.one.json")).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(json["triangles"], 32);

@@ -25,6 +25,8 @@ pub struct Bake {
     pub shooting: Shooting,
     pub camera: Option<Camera>,
     pub image: (u32, u32),
+    /// Whether to write the elements' own values too.
+    pub elements: bool,
     pub device: Device,
 }
 
@@ -51,6 +53,7 @@ impl Bake {
             shooting: Shooting::default(),
             camera: None,
             image: (512, 512),
+            elements: false,
             device: Device::Gpu(None),
         }
     }
@@ -87,6 +90,10 @@ impl Bake {
         seconds.vertices = clock.lap();
 
         write_ply(self.out.with_added_extension("ply"), &surface)?;
+        if self.elements {
+            let flat = VertexRadiosity::flat(&mesh, &solution.radiosity);
+            write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
+        }
         if let Some(camera) = self.camera {
             let image = camera.image(&surface, width, height, SAMPLES)?;
             write_exr(self.out.with_added_extension("exr"), &image)?;
