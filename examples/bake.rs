@@ -13,15 +13,17 @@ use radiosity::Camera;
 use support::{Bake, Device};
 
 const USAGE: &str = "\
-usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--unshot F] [--shots N]
-            [--row-memory MB] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--elements] [--adapter NAME | --cpu]
+usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R] [--unshot F]
+            [--shots N] [--row-memory MB] [--patch-level N]
+            [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--elements]
+            [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
 
   --element-size X  longest edge of an element, in the scene's unit [diagonal / 32]
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
+  --near R          closed forms for receivers within R patch diameters; -1 for none [1]
   --unshot F        stop at this share of unshot flux [0.001]
   --shots N         stop after this many shots
   --row-memory MB   memory for form-factor rows that are kept [1024]
@@ -67,6 +69,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("out") => out = Some(args.value()?),
             Long("element-size") => bake.element_size = Some(args.value()?.parse()?),
             Long("hemicube") => bake.hemicube = args.value()?.parse()?,
+            Long("near") => bake.near = args.value()?.parse()?,
             Long("unshot") => bake.shooting.unshot = args.value()?.parse()?,
             Long("shots") => bake.shooting.shots = Some(args.value()?.parse()?),
             Long("row-memory") => {

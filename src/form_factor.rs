@@ -1,6 +1,7 @@
 //! The contract between whoever makes form-factor rows and whoever uses them.
 
 pub mod analytic;
+pub(crate) mod near;
 pub(crate) mod ray_cast;
 
 use crate::error::{Error, ErrorKind};
@@ -51,6 +52,25 @@ impl Row {
     /// Bytes that keeping this row takes.
     pub fn bytes(&self) -> usize {
         size_of::<Row>() + self.entries.len() * size_of::<Entry>()
+    }
+
+    /// Gives the entries, then `open` and `back`, these form factors, which sum to 1 but for
+    /// rounding; rounded by their running sum, so that the shares sum to [`Row::TOTAL`]. Entries
+    /// that round to nothing go.
+    pub(crate) fn set_factors(&mut self, factors: &[f64]) {
+        let (mut sum, mut given) = (0.0, 0);
+        let slots = self.entries.iter_mut().map(|e| &mut e.share);
+        for (slot, factor) in slots.chain([&mut self.open, &mut self.back]).zip(factors) {
+            sum += factor;
+            let upto = (sum * f64::from(Row::TOTAL)).round() as u32;
+            *slot = upto - given;
+            given = upto;
+        }
+        // The largest slot can take what rounding of the sum has left.
+        let slots = self.entries.iter_mut().map(|e| &mut e.share);
+        let largest = slots.chain([&mut self.open, &mut self.back]).max_by_key(|s| **s);
+        largest.into_iter().for_each(|s| *s += Row::TOTAL - given);
+        self.entries.retain(|e| e.share > 0);
     }
 
     /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.

@@ -6,13 +6,16 @@
 //! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file.
 //!
 //! ```no_run
-//! use radiosity::{Go, Gpu, Hemicubes, Mesh, Shooting, VertexRadiosity, load_obj, write_ply};
+//! use radiosity::{
+//!     Go, Gpu, Hemicubes, Mesh, NearRepair, Shooting, VertexRadiosity, load_obj, write_ply,
+//! };
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let scene = load_obj("scenes/cornell_box.obj")?;
 //! let mesh = Mesh::new(scene, 30.0)?; // no element edge over 30 units of the file
 //! let gpu = Gpu::new(None)?;
-//! let mut rows = Hemicubes::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
+//! let hemicubes = Hemicubes::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
+//! let mut rows = NearRepair::new(hemicubes, &mesh, 1.0); // mends what is within one diameter
 //! let solution = Shooting::default().solve(&mesh, &mut rows, |progress| {
 //!     println!("{:.2} % unshot", 100.0 * progress.unshot_share);
 //!     Go::Continue(())
@@ -62,6 +65,7 @@ mod view_factors;
 
 pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
+pub use form_factor::near::NearRepair;
 pub use form_factor::ray_cast::RayCast;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gpu::{Adapter, Gpu, Hemicubes, StageSeconds};

@@ -7,9 +7,9 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
-    Camera, Error, ErrorKind, FormFactors, Go, Gpu, Hemicubes, Mesh, NodeId, Progress, RayCast,
-    Report, Row, Scene, Seconds, Shooting, VertexRadiosity, load_obj, write_exr, write_ply,
-    write_png,
+    Camera, Error, ErrorKind, FormFactors, Go, Gpu, Hemicubes, Mesh, NearRepair, NodeId, Progress,
+    RayCast, Report, Row, Scene, Seconds, Shooting, VertexRadiosity, load_obj, write_exr,
+    write_ply, write_png,
 };
 use serde_json::json;
 
@@ -22,6 +22,8 @@ pub struct Bake {
     /// Longest element edge, scene unit; by default a 32nd of the scene's diagonal.
     pub element_size: Option<f64>,
     pub hemicube: u32,
+    /// Receivers within this many patch diameters get closed forms; below 0 none.
+    pub near: f64,
     pub shooting: Shooting,
     pub camera: Option<Camera>,
     pub image: (u32, u32),
@@ -50,6 +52,7 @@ impl Bake {
             scene,
             element_size: None,
             hemicube: 128,
+            near: 1.0,
             shooting: Shooting::default(),
             camera: None,
             image: (512, 512),
@@ -74,15 +77,17 @@ impl Bake {
 
         let element_size = self.element_size.unwrap_or_else(|| default_element_size(&scene));
         let mesh = Mesh::new(scene, element_size)?;
-        let mut maker = Maker::new(&self.device, &mesh, self.hemicube)?;
+        let maker = Maker::new(&self.device, &mesh, self.hemicube)?;
+        let mut rows = NearRepair::new(maker, &mesh, self.near);
         seconds.mesh = clock.lap();
 
         let bar = bar();
-        let solution = self.shooting.solve(&mesh, &mut maker, |p| {
+        let solution = self.shooting.solve(&mesh, &mut rows, |p| {
             show(&bar, p, self.shooting.unshot);
             Go::Continue(())
         })?;
         bar.finish_and_clear();
+        let maker = rows.inner();
         (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
         seconds.solve = clock.lap() - maker.seconds;
 
@@ -108,6 +113,7 @@ impl Bake {
             settings: vec![
                 ("element_size".into(), json!(element_size)),
                 ("hemicube".into(), json!(self.hemicube)),
+                ("near".into(), json!(self.near)),
                 ("unshot".into(), json!(self.shooting.unshot)),
                 ("shots".into(), json!(self.shooting.shots)),
                 ("row_memory".into(), json!(self.shooting.row_memory)),
@@ -118,6 +124,7 @@ impl Bake {
             vertices: surface.positions.len(),
             shots: solution.shots,
             hemicubes: solution.rows_made,
+            near_moved: rows.moved(),
             stop: solution.stop.to_string(),
             ledger: solution.ledger,
             seconds,

@@ -29,6 +29,8 @@ pub struct Report {
     pub shots: u64,
     /// Rows made: hemicubes drawn, or fans of rays cast.
     pub hemicubes: u64,
+    /// Share of a row that the proximity repair moved, in the mean; see `NearRepair`.
+    pub near_moved: f64,
     /// Why the solver stopped.
     pub stop: String,
     /// Where the light went.
@@ -40,7 +42,7 @@ pub struct Report {
 }
 
 /// Seconds of wall time by stage. Draw, reduce and read-back are parts of making rows; `solve` is
-/// the rest of the shooting.
+/// the rest of the shooting, repairs of rows included.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seconds {
     /// Reading the scene.
@@ -79,6 +81,7 @@ impl Report {
             "vertices": self.vertices,
             "shots": self.shots,
             "hemicubes": self.hemicubes,
+            "near_moved": self.near_moved,
             "stop": self.stop,
             "ledger": {
                 "emitted": channels(emitted),

@@ -1,6 +1,8 @@
 //! What the integration tests share: scenes with known answers, and the device.
 #![allow(dead_code)]
 
+pub mod closed_forms;
+
 use glam::DVec3;
 use radiosity::{Gpu, Material, Mesh, Scene, Triangle};
 
