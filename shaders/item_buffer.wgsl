@@ -10,7 +10,7 @@ struct FaceView {
     right: vec3f,         // unit vectors of the view, right x up = -forward
     bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
     up: vec3f,
-    own_triangle: u32,    // the patch's own triangle is never drawn
+    own_triangle: u32,    // place of the patch's own triangle, which is never drawn
     forward: vec3f,
     padding: u32,
 }
@@ -34,7 +34,7 @@ struct Varying {
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index: u32) -> Varying {
     let view = views[view_index];
-    let triangle = index / 3u;
+    let triangle = index / 3u;   // its place in the drawing order
     let corner = index % 3u;
     let d = corners[index].xyz - view.eye;
     let x = dot(d, view.right);

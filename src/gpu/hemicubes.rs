@@ -5,8 +5,9 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::cells::Cells;
+use super::chunks::Chunks;
 use super::device::Gpu;
-use super::item_buffer::ItemBuffer;
+use super::item_buffer::{ItemBuffer, View};
 use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
 use super::reduce::Reduce;
 use crate::error::{Error, ErrorKind};
@@ -23,6 +24,7 @@ use crate::mesh::{Mesh, NodeId};
 #[derive(Debug)]
 pub struct Hemicubes {
     gpu: Gpu,
+    chunks: Chunks,
     item_buffer: ItemBuffer,
     reduce: Reduce,
     staging: wgpu::Buffer,
@@ -102,8 +104,9 @@ impl Hemicubes {
             .min(((buffer - 64) / row_bytes) as u32);
         let (low, high) = mesh.scene().bounds();
         let origin = low + (high - low) / 2.0;
-        let cells = Cells::new(mesh);
-        let item_buffer = ItemBuffer::new(gpu, mesh, &cells, origin, resolution, batch);
+        let (cells, chunks) = (Cells::new(mesh), Chunks::new(mesh.scene()));
+        let item_buffer =
+            ItemBuffer::new(gpu, mesh, &cells, &chunks.order, origin, resolution, batch);
         let reduce = Reduce::new(gpu, &cells, resolution, slots, batch)?;
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),
@@ -115,6 +118,7 @@ impl Hemicubes {
         gpu.check()?;
         Ok(Hemicubes {
             gpu: gpu.clone(),
+            chunks,
             item_buffer,
             reduce,
             staging,
@@ -137,25 +141,30 @@ impl Hemicubes {
         self.drawn
     }
 
-    fn views(&self, mesh: &Mesh, patch: NodeId) -> [FaceView; 5] {
+    fn views(&self, mesh: &Mesh, patch: NodeId) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), rotation(patch));
         let near = (mesh.area(patch).sqrt() * NEAR) as f32;
-        let eye = (mesh.centroid(patch) - self.origin).as_vec3().to_array();
-        Face::all(&frame).map(|face| FaceView {
-            eye,
-            near,
-            right: face.right.as_vec3().to_array(),
-            bottom: face.bottom as f32,
-            up: face.up.as_vec3().to_array(),
-            own_triangle: mesh.triangle(patch) as u32,
-            forward: face.forward.as_vec3().to_array(),
-            padding: 0,
+        let centre = mesh.centroid(patch);
+        let eye = (centre - self.origin).as_vec3().to_array();
+        let own_triangle = self.chunks.places[mesh.triangle(patch)];
+        Face::all(&frame).map(|face| View {
+            face: FaceView {
+                eye,
+                near,
+                right: face.right.as_vec3().to_array(),
+                bottom: face.bottom as f32,
+                up: face.up.as_vec3().to_array(),
+                own_triangle,
+                forward: face.forward.as_vec3().to_array(),
+                padding: 0,
+            },
+            places: self.chunks.in_view(centre, &face),
         })
     }
 
     fn draw_batch(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
-        let views: Vec<FaceView> = patches.iter().flat_map(|&p| self.views(mesh, p)).collect();
+        let views: Vec<View> = patches.iter().flat_map(|&p| self.views(mesh, p)).collect();
         let count = patches.len() as u32;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let clock = self.clock.as_ref();

@@ -1,11 +1,13 @@
 //! The render pass: the scene's triangles over every face of a batch of hemicubes.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
 use super::cells::Cells;
 use super::device::Gpu;
-use super::layout::{FaceView, ITEM_BUFFER_WGSL};
+use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
@@ -21,26 +23,35 @@ pub struct ItemBuffer {
     pub items: wgpu::Texture,
     layers: Vec<wgpu::TextureView>,
     depth: wgpu::TextureView,
-    vertices: u32,
     resolution: u32,
 }
 
+/// One face of a hemicube, and the places in the drawing order that it can see.
+pub struct View {
+    pub face: FaceView,
+    pub places: Vec<Range<u32>>,
+}
+
 impl ItemBuffer {
-    /// For the triangles of `mesh`, relative to `origin`; `batch` hemicubes of `resolution`.
+    /// For the triangles of `mesh` in drawing order, relative to `origin`; `batch` hemicubes of
+    /// `resolution`.
     pub fn new(
         gpu: &Gpu,
         mesh: &Mesh,
         cells: &Cells,
+        order: &[u32],
         origin: DVec3,
         resolution: u32,
         batch: u32,
     ) -> Self {
         let device = &gpu.device;
-        let count = mesh.scene().triangles().len();
-        let corners: Vec<[f32; 4]> = (0..count)
-            .flat_map(|t| mesh.scene().corners(t))
+        let corners: Vec<[f32; 4]> = order
+            .iter()
+            .flat_map(|&t| mesh.scene().corners(t as usize))
             .map(|p| (p - origin).as_vec3().extend(1.0).to_array())
             .collect();
+        let triangles: Vec<TriangleCells> =
+            order.iter().map(|&t| cells.triangles[t as usize]).collect();
         let storage = |label, contents: &[u8]| {
             let usage = wgpu::BufferUsages::STORAGE;
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -50,7 +61,7 @@ impl ItemBuffer {
             })
         };
         let corners = storage("corners", bytemuck::cast_slice(&corners));
-        let triangles = storage("triangles", bytemuck::cast_slice(&cells.triangles));
+        let triangles = storage("triangles", bytemuck::cast_slice(&triangles));
         let views = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("views"),
             size: u64::from(batch) * 5 * size_of::<FaceView>() as u64,
@@ -133,7 +144,6 @@ impl ItemBuffer {
             items,
             layers,
             depth: depth.create_view(&Default::default()),
-            vertices: 3 * count as u32,
             resolution,
         }
     }
@@ -144,10 +154,11 @@ impl ItemBuffer {
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
-        views: &[FaceView],
+        views: &[View],
         queries: Option<&wgpu::QuerySet>,
     ) {
-        gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(views));
+        let faces: Vec<FaceView> = views.iter().map(|v| v.face).collect();
+        gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(&faces));
         let count = views.len() / 5;
         for (h, layer) in self.layers[..count].iter().enumerate() {
             let timestamp_writes = queries.map(|query_set| wgpu::RenderPassTimestampWrites {
@@ -184,10 +195,12 @@ impl ItemBuffer {
             pass.set_bind_group(0, &self.bindings, &[]);
             let n = self.resolution;
             for face in 0..5 {
-                let (lines, view) = (Face::rows(face, n), (5 * h + face) as u32);
+                let (lines, view) = (Face::rows(face, n), 5 * h + face);
                 let (y, height) = (lines.start as f32, lines.len() as f32);
                 pass.set_viewport(0.0, y, n as f32, height, 0.0, 1.0);
-                pass.draw(0..self.vertices, view..view + 1);
+                for run in &views[view].places {
+                    pass.draw(3 * run.start..3 * run.end, view as u32..view as u32 + 1);
+                }
             }
         }
     }
