@@ -19,7 +19,7 @@ pub use image::{write_exr, write_png};
 pub use obj::load_obj;
 pub use ply::write_ply;
 pub use report::{Report, Seconds};
-pub use table::write_view_factors;
+pub use table::{write_matrix_market, write_view_factor_list, write_view_factors};
 
 /// Creates `path` and hands it to `write`; any failure names the file.
 fn write_file(

@@ -69,13 +69,16 @@ pub use form_factor::near::NearRepair;
 pub use form_factor::ray_cast::RayCast;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gpu::{Adapter, Gpu, Hemicubes, StageSeconds};
-pub use io::{Report, Seconds, load_obj, write_exr, write_ply, write_png, write_view_factors};
+pub use io::{
+    Report, Seconds, load_obj, write_exr, write_matrix_market, write_ply, write_png,
+    write_view_factor_list, write_view_factors,
+};
 pub use mesh::{CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solve::{Go, Ledger, Progress, Shooting, Solution, Stop};
 pub use tone::ToneCurve;
 pub use vertex::VertexRadiosity;
-pub use view_factors::ViewFactors;
+pub use view_factors::{Absent, Checks, Correction, Estimate, Factor, ViewFactors, Worst};
 
 /// The README's code compiles.
 #[cfg(doctest)]

@@ -81,13 +81,14 @@ fn view_factors_writes_a_matrix_a_file() {
     let plates = "o low\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n\
                   o high\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
     let scene = write(folder.path(), "plates.obj", plates);
-    let mut args = vec![scene.to_str().unwrap(), "--element-size", "0.2", "--hemicube", "64"];
+    let mut args = vec![scene.to_str().unwrap(), "--sampled"];
+    args.extend(["--element-size", "0.2", "--hemicube", "64"]);
     args.extend(device());
     let out = run("view_factors", &args);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let csv = std::fs::read_to_string(folder.path().join("plates.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
-    assert_eq!(rows[0], ["from", "low", "high", "open", "back"]);
+    assert_eq!(rows[0], ["F from row to column", "low", "high", "open", "back", "area"]);
     assert_eq!(rows[1][0], "low");
     // 0.19982; elements of 0.18 at distance 1 and pixels of 1/32 cost well under 0.01.
     assert!((rows[1][2].parse::<f64>().unwrap() - 0.19982).abs() < 0.01, "{csv}");

@@ -161,7 +161,7 @@ fn edges(polygon: &[DVec3]) -> impl Iterator<Item = Edge> {
 }
 
 /// Normal towards the front, as long as the area is large.
-fn area_vector(polygon: &[DVec3]) -> DVec3 {
+pub(crate) fn area_vector(polygon: &[DVec3]) -> DVec3 {
     let Some((&apex, rest)) = polygon.split_first() else { return DVec3::ZERO };
     rest.windows(2).map(|pair| 0.5 * (pair[0] - apex).cross(pair[1] - apex)).sum()
 }
@@ -174,7 +174,7 @@ fn extent(polygon: &[DVec3], origin: DVec3) -> f64 {
 /// What of a convex polygon is before the plane through `origin` with unit `normal`; corners in
 /// contact with the plane stay, a polygon with none beyond vanishes (I. E. Sutherland,
 /// G. W. Hodgman, "Reentrant polygon clipping", CACM 17, 1974).
-fn clip(polygon: &[DVec3], origin: DVec3, normal: DVec3) -> Vec<DVec3> {
+pub(crate) fn clip(polygon: &[DVec3], origin: DVec3, normal: DVec3) -> Vec<DVec3> {
     let contact = CONTACT * extent(polygon, origin);
     let height = |corner: DVec3| {
         let height = normal.dot(corner - origin);
@@ -197,7 +197,7 @@ fn clip(polygon: &[DVec3], origin: DVec3, normal: DVec3) -> Vec<DVec3> {
 }
 
 /// Lambert's formula, for a polygon that is all above the horizon.
-fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
+pub(crate) fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let along_normal = |edge: Edge| {
         let (a, b) = (edge.start - point, edge.end - point);
         let across = a.cross(b - a);

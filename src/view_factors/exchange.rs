@@ -1,0 +1,82 @@
+//! Flux between two convex pieces: nothing, in closed form, or past others by cubature.
+
+use glam::DVec3;
+
+use super::Estimate;
+use super::creases::{creases, fan, parts_between, standing_on};
+use super::cubature::{Cell, Partial, mix};
+use super::far::{FAR_ERROR, far_exchange};
+use super::pieces::Piece;
+use super::shaft::{Shaft, Tree, covers, distinct};
+use super::visible::Eye;
+use crate::form_factor::analytic::{clip, polygon_area, polygon_to_polygon};
+
+/// What the closed form errs by at most, as a share of the flux from the smaller piece into the
+/// whole hemisphere (see [`polygon_to_polygon`]).
+const CLOSED_FORM_ERROR: f64 = 1e-13;
+
+/// What is known of the flux between two pieces before any refinement.
+pub(super) enum Link {
+    /// Neither sees the other.
+    Nothing,
+    /// All of each sees all of the other: in closed form.
+    Whole(Estimate),
+    /// Others stand between.
+    Partial(Box<Partial>),
+}
+
+/// Links two pieces; `seed` makes cuts differ from pair to pair. The smaller piece is gathered
+/// over, or the one on which fewer blockers stand: from there, less changes at once.
+pub(super) fn link(s: &Piece, t: &Piece, blockers: &Tree, eye: &mut Eye, seed: u64) -> Link {
+    let (Some(&at_s), Some(&at_t)) = (s.corners.first(), t.corners.first()) else {
+        return Link::Nothing;
+    };
+    let faces = |from: &Piece, at: DVec3, to: &Piece| {
+        to.corners.iter().any(|&p| from.normal.dot(p - at) > 0.0)
+    };
+    if !faces(s, at_s, t) || !faces(t, at_t, s) {
+        return Link::Nothing;
+    }
+    let mut a = clip(&s.corners, at_t, t.normal);
+    let mut b = clip(&t.corners, at_s, s.normal);
+    distinct(&mut a);
+    distinct(&mut b);
+    if a.len() < 3 || b.len() < 3 {
+        return Link::Nothing;
+    }
+    let between = blockers.within(&Shaft::new(&a, s.normal, &b, t.normal));
+    if between.is_empty() {
+        return Link::Whole(unblocked(&a, s.normal, &b, t.normal));
+    }
+    if between.iter().any(|blocker| covers(blocker, &a, &b)) {
+        return Link::Nothing;
+    }
+    let on_a = standing_on(&a, s.normal, &between);
+    let on_b = standing_on(&b, t.normal, &between);
+    let a_first = (on_a.len(), polygon_area(&a)) <= (on_b.len(), polygon_area(&b));
+    let (a, b) = ((a, s.normal, on_a), (b, t.normal, on_b));
+    let (domain, target) = if a_first { (a, b) } else { (b, a) };
+    let mut partial = Partial {
+        area: polygon_area(&domain.0),
+        normal: domain.1,
+        creases: creases(&target.0, &between, &domain.0),
+        target: target.0,
+        target_normal: target.1,
+        cells: Vec::new(),
+    };
+    let parts = parts_between(domain.0, &domain.2);
+    for (corners, k) in parts.iter().flat_map(|part| fan(part)).zip(0..) {
+        let cell = Cell::new(&partial, corners, &between, mix(seed.wrapping_add(k)), eye);
+        partial.cells.push(cell);
+    }
+    Link::Partial(Box::new(partial))
+}
+
+fn unblocked(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Estimate {
+    if let Some(value) = far_exchange(a, a_normal, b, b_normal) {
+        return Estimate { value, error: FAR_ERROR * value };
+    }
+    let area = polygon_area(a);
+    let error = CLOSED_FORM_ERROR * area.min(polygon_area(b));
+    Estimate { value: polygon_to_polygon(a, b) * area, error }
+}

@@ -1,0 +1,309 @@
+//! Who can stand between two polygons.
+
+use glam::DVec3;
+
+use super::pieces::Piece;
+use crate::form_factor::analytic::clip;
+
+/// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
+/// and above what pieces may be off their own planes ([`super::pieces::PLANAR`]).
+const CONTACT: f64 = 1e-12;
+
+/// An edge shorter than this share of the shaft has a direction too uncertain to lean on: rounding of
+/// its ends, 1e-16, moves the plane by up to [`CONTACT`] at the far end.
+const SHORT: f64 = 1e-4;
+
+/// Corners closer than this share of a polygon's extent are one: the line through both is too
+/// uncertain to cut by.
+const ONE: f64 = 1e-9;
+
+/// Pieces in one leaf of the tree.
+const LEAF: usize = 4;
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Bounds {
+    fn around<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Bounds {
+        let nothing = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+        points.into_iter().fold(nothing, |b, &p| Bounds { low: b.low.min(p), high: b.high.max(p) })
+    }
+
+    fn meets(&self, other: &Bounds) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+}
+
+/// The plane of all points with n·p = offset; its upper side is where n, a unit vector, points.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+impl Plane {
+    fn through(point: DVec3, normal: DVec3) -> Plane {
+        Plane { normal, offset: normal.dot(point) }
+    }
+
+    fn height(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) - self.offset
+    }
+
+    /// Largest height in a box.
+    fn highest(&self, bounds: &Bounds) -> f64 {
+        let up = self.normal.cmpge(DVec3::ZERO);
+        self.height(DVec3::select(up, bounds.high, bounds.low))
+    }
+}
+
+/// The convex hull of two polygons that are all before one another: every segment between them.
+pub(super) struct Shaft {
+    planes: Vec<Plane>,
+    bounds: Bounds,
+}
+
+impl Shaft {
+    /// Of the hull's faces, the two polygons themselves and the one beside each of their edges,
+    /// which leans on a corner of the other polygon. These are all.
+    pub fn new(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Shaft {
+        let bounds = Bounds::around(a.iter().chain(b));
+        let mut planes = Vec::with_capacity(a.len() + b.len() + 2);
+        planes.extend(a.first().map(|&p| Plane::through(p, a_normal)));
+        planes.extend(b.first().map(|&p| Plane::through(p, b_normal)));
+        lean(a, a_normal, b, &mut planes);
+        lean(b, b_normal, a, &mut planes);
+        Shaft { planes, bounds }
+    }
+
+    /// What of `polygon` is strictly within the shaft; nothing if that has no area.
+    pub fn clip(&self, polygon: &[DVec3]) -> Option<Vec<DVec3>> {
+        for plane in &self.planes {
+            if polygon.iter().all(|&p| plane.height(p) <= CONTACT) {
+                return None;
+            }
+        }
+        let mut kept = polygon.to_vec();
+        for plane in &self.planes {
+            if kept.iter().any(|&p| plane.height(p) < -CONTACT) {
+                let origin = plane.normal * plane.offset;
+                kept = clip(&kept, origin, plane.normal);
+            }
+            if kept.len() < 3 || kept.iter().all(|&p| plane.height(p) <= CONTACT) {
+                return None;
+            }
+        }
+        distinct(&mut kept);
+        (kept.len() > 2).then_some(kept)
+    }
+
+    fn meets(&self, bounds: &Bounds) -> bool {
+        self.bounds.meets(bounds) && self.planes.iter().all(|plane| plane.highest(bounds) > CONTACT)
+    }
+}
+
+/// Leaves one of corners that are one.
+pub(super) fn distinct(polygon: &mut Vec<DVec3>) {
+    let Some(&first) = polygon.first() else { return };
+    let near = ONE * polygon.iter().map(|p| p.distance(first)).fold(0.0, f64::max);
+    polygon.dedup_by(|a, b| a.distance(*b) <= near);
+    while polygon.len() > 1 && polygon[polygon.len() - 1].distance(first) <= near {
+        polygon.pop();
+    }
+}
+
+/// The planes along the edges of `a`, `b` before it, that have both on their upper side. None along
+/// an edge that has a corner of `b` beside it in the plane of `a`: there that plane is the hull's.
+fn lean(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
+    let Some(&origin) = a.first() else { return };
+    let size = a.iter().chain(b).map(|p| p.distance(origin)).fold(0.0, f64::max);
+    let (flat, raised): (Vec<DVec3>, Vec<DVec3>) =
+        b.iter().partition(|p| normal.dot(**p - origin) <= CONTACT);
+    for (k, &start) in a.iter().enumerate() {
+        let edge = a[(k + 1) % a.len()] - start;
+        if edge.length() < SHORT * size {
+            continue;
+        }
+        let along = edge.normalize_or_zero();
+        let outwards = along.cross(normal);
+        if flat.iter().any(|p| outwards.dot(p - start) > CONTACT) {
+            continue;
+        }
+        let upright = |p: DVec3| (p - start).cross(along).normalize_or_zero();
+        let mut n = DVec3::ZERO;
+        for &p in &raised {
+            if n == DVec3::ZERO || n.dot(p - start) < 0.0 {
+                n = upright(p);
+            }
+        }
+        if n != DVec3::ZERO {
+            planes.push(Plane::through(start, n));
+        }
+    }
+}
+
+/// A convex polygon that stands in the way, and its unit normal.
+#[derive(Clone, Debug)]
+pub(super) struct Blocker {
+    pub corners: Vec<DVec3>,
+    pub normal: DVec3,
+}
+
+/// Whether every segment between `a` and `b` crosses `blocker`: those between corners tell.
+pub(super) fn covers(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
+    let Blocker { corners: blocker, normal } = blocker;
+    let Some(&p) = blocker.first() else { return false };
+    let reach = a.iter().chain(b).map(|v| v.distance(p)).fold(0.0, f64::max);
+    let contact = CONTACT * reach;
+    let above = |v: &DVec3| normal.dot(*v - p) >= -contact;
+    let below = |v: &DVec3| normal.dot(*v - p) <= contact;
+    let (front, rear) = if a.iter().all(above) && b.iter().all(below) {
+        (a, b)
+    } else if a.iter().all(below) && b.iter().all(above) {
+        (b, a)
+    } else {
+        return false;
+    };
+    front.iter().all(|&eye| {
+        (0..blocker.len()).all(|k| {
+            let (u, v) = (blocker[k] - eye, blocker[(k + 1) % blocker.len()] - eye);
+            // Seen from its front the blocker runs counter-clockwise: inwards is v × u.
+            let across = v.cross(u);
+            let least = -CONTACT * across.length() * reach;
+            rear.iter().all(|&w| across.dot(w - eye) >= least)
+        })
+    })
+}
+
+/// Whether two pieces face the same way in the same plane.
+fn lies_on(piece: &Piece, other: &Piece) -> bool {
+    let Some(&origin) = other.corners.first() else { return false };
+    let size = piece.corners.iter().map(|p| p.distance(origin)).fold(0.0, f64::max);
+    let flat = |p: &DVec3| other.normal.dot(*p - origin).abs() <= 1e-9 * size;
+    piece.normal.dot(other.normal) > 0.0 && piece.corners.iter().all(flat)
+}
+
+/// What `cover`, convex and in the same plane, leaves of a convex polygon, in convex parts.
+fn minus(polygon: &[DVec3], cover: &Piece) -> Vec<Vec<DVec3>> {
+    let mut parts = Vec::new();
+    let mut inside = polygon.to_vec();
+    for (k, &a) in cover.corners.iter().enumerate() {
+        let b = cover.corners[(k + 1) % cover.corners.len()];
+        let outwards = (b - a).cross(cover.normal).normalize_or_zero();
+        let outside = clip(&inside, a, outwards);
+        if outside.len() > 2 {
+            parts.push(outside);
+        }
+        inside = clip(&inside, a, -outwards);
+    }
+    // Nothing inside: no overlap, and no need to have cut.
+    if inside.len() > 2 { parts } else { vec![polygon.to_vec()] }
+}
+
+/// Pieces in a tree of boxes.
+pub(super) struct Tree {
+    pieces: Vec<Piece>,
+    /// The root is the last.
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    bounds: Bounds,
+    kind: Kind,
+}
+
+enum Kind {
+    Inner(usize, usize),
+    /// Range of pieces.
+    Leaf(usize, usize),
+}
+
+impl Tree {
+    pub fn new(pieces: Vec<Piece>) -> Tree {
+        let mut tree = Tree { pieces, nodes: Vec::new() };
+        let count = tree.pieces.len();
+        if count > 0 {
+            tree.build(0, count);
+        }
+        tree
+    }
+
+    /// Halves a range of pieces at the median along the longest side of their box.
+    fn build(&mut self, start: usize, end: usize) -> usize {
+        let pieces = &mut self.pieces[start..end];
+        let bounds = Bounds::around(pieces.iter().flat_map(|piece| &piece.corners));
+        let kind = if pieces.len() <= LEAF {
+            Kind::Leaf(start, end)
+        } else {
+            let size = bounds.high - bounds.low;
+            let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);
+            let key = |piece: &Piece| {
+                let b = Bounds::around(&piece.corners);
+                (b.low + b.high)[axis]
+            };
+            pieces.sort_by(|p, q| key(p).total_cmp(&key(q)));
+            let middle = start + pieces.len() / 2;
+            Kind::Inner(self.build(start, middle), self.build(middle, end))
+        };
+        self.nodes.push(Node { bounds, kind });
+        self.nodes.len() - 1
+    }
+
+    /// The backs of all pieces, less what is hidden right there by a piece of `fronts` that lies on
+    /// it: such a plate has two fronts.
+    pub fn backs(&self, fronts: &Tree) -> Vec<Piece> {
+        let mut backs = Vec::new();
+        for piece in &self.pieces {
+            let back = piece.reversed();
+            let mut parts = vec![back.corners.clone()];
+            for front in fronts.nearby(&Bounds::around(&piece.corners)) {
+                if lies_on(front, &back) {
+                    parts = parts.iter().flat_map(|part| minus(part, front)).collect();
+                }
+            }
+            backs.extend(parts.into_iter().filter_map(|part| Piece::new(part, piece.group)));
+        }
+        backs
+    }
+
+    /// The pieces in boxes of the tree that meet `bounds`, and perhaps some more.
+    fn nearby(&self, bounds: &Bounds) -> impl Iterator<Item = &Piece> {
+        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
+        let mut ranges = Vec::new();
+        while let Some(node) = open.pop() {
+            match self.nodes[node].kind {
+                _ if !self.nodes[node].bounds.meets(bounds) => {}
+                Kind::Inner(a, b) => open.extend([b, a]),
+                Kind::Leaf(start, end) => ranges.push(start..end),
+            }
+        }
+        ranges.into_iter().flat_map(|range| &self.pieces[range])
+    }
+
+    /// What of the pieces is strictly within `shaft`.
+    pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
+        let mut found = Vec::new();
+        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
+        while let Some(node) = open.pop() {
+            let Node { bounds, kind } = &self.nodes[node];
+            if !shaft.meets(bounds) {
+                continue;
+            }
+            match *kind {
+                Kind::Inner(a, b) => open.extend([b, a]),
+                Kind::Leaf(start, end) => {
+                    let pieces = &self.pieces[start..end];
+                    found.extend(pieces.iter().filter_map(|piece| {
+                        let corners = shaft.clip(&piece.corners)?;
+                        Some(Blocker { corners, normal: piece.normal })
+                    }));
+                }
+            }
+        }
+        found
+    }
+}
