@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::scene::Rgb;
 pub use shooting::Shooting;
+pub(crate) use shooting::shooters;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]

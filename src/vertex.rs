@@ -1,6 +1,7 @@
 //! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
 
 mod boundary;
+mod meeting;
 
 use std::collections::HashMap;
 
@@ -44,10 +45,11 @@ impl VertexRadiosity {
     /// Radiosity at the vertices of `mesh` from that of its elements, one value an element.
     ///
     /// First the area-weighted mean of the elements around each vertex (Cohen and Greenberg 1985),
-    /// at the boundary of a smooth surface a linear fit to them instead. That smooths: the mean
-    /// over an element's corners is no longer the element's value. One step of van Cittert's (1931)
-    /// iteration gives most of it back, by adding the area-weighted mean of the differences. No
-    /// value is let below zero.
+    /// at the boundary of a smooth surface a linear fit to them instead, with what is known not to
+    /// be linear kept out of it: light from surfaces that meet this one there. That smooths: the
+    /// mean over an element's corners is no longer the element's value. One step of van Cittert's
+    /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
+    /// No value is let below zero.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
         let Builder { positions, rims, .. } = Builder::build(mesh);
         let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();

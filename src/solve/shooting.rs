@@ -108,14 +108,14 @@ impl Shooting {
 
 /// A patch that shoots, and the elements that it shoots for.
 #[derive(Clone, Debug)]
-struct Shooter {
-    patch: NodeId,
-    elements: Range<usize>,
+pub(crate) struct Shooter {
+    pub patch: NodeId,
+    pub elements: Range<usize>,
 }
 
 /// The nodes that shoot: `level` above the elements where the tree is that deep everywhere below,
 /// the elements themselves on emitters. Together they cover every element once.
-fn shooters(mesh: &Mesh, level: u32) -> Vec<Shooter> {
+pub(crate) fn shooters(mesh: &Mesh, level: u32) -> Vec<Shooter> {
     fn height(mesh: &Mesh, node: NodeId) -> u32 {
         mesh.children(node).map_or(0, |c| 1 + c.iter().map(|&k| height(mesh, k)).max().unwrap_or(0))
     }

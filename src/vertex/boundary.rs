@@ -4,8 +4,9 @@
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
-use super::Rims;
+use super::{Rims, meeting};
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
@@ -13,8 +14,9 @@ use crate::scene::Rgb;
 const FEWEST: usize = 4;
 
 /// Replaces in `radiosity` the value of every boundary vertex by that of a linear fit to the
-/// elements around it and around its neighbours, weighted by area and nearness. Vertices with too
-/// few elements, or all of them on a line, keep what they have. No value is let below zero.
+/// elements around it and around its neighbours, weighted by area and nearness, mended by what it
+/// gets from surfaces that meet there. Vertices with too few elements, or all of them on a line,
+/// keep what they have. No value is let below zero.
 pub(super) fn extrapolate(
     mesh: &Mesh,
     rims: &Rims,
@@ -23,35 +25,73 @@ pub(super) fn extrapolate(
     element_radiosity: &[Rgb],
     radiosity: &mut [Rgb],
 ) {
-    let around = elements_around(rims, positions.len());
-    for v in boundary(rims) {
-        let rings = around[v].iter().flat_map(|&e| rims.of(e as usize));
-        let mut near: Vec<u32> = rings.flat_map(|&w| &around[w as usize]).copied().collect();
-        near.sort_unstable();
-        near.dedup();
-        if near.len() < FEWEST {
-            continue;
-        }
-        let (tangent, bitangent) = normals[v].any_orthonormal_pair();
-        // Normal equations of B ≈ a + g·(x − x_v) in the tangent plane; a is what is wanted.
-        let (mut matrix, mut right) = (DMat3::ZERO, [Rgb::ZERO; 3]);
-        for &e in &near {
-            let node = mesh.element(e as usize);
-            let (offset, area) = (mesh.centroid(node) - positions[v], mesh.area(node));
-            let weight = area / (offset.length_squared() + area);
-            let scale = 1.0 / area.sqrt();
-            let x = DVec3::new(1.0, offset.dot(tangent) * scale, offset.dot(bitangent) * scale);
-            matrix += DMat3::from_cols(x * x.x, x * x.y, x * x.z) * weight;
-            for (k, sum) in right.iter_mut().enumerate() {
-                *sum += element_radiosity[e as usize] * (x[k] * weight);
-            }
-        }
-        let row = matrix.inverse().row(0);
-        let value = right[0] * row.x + right[1] * row.y + right[2] * row.z;
+    let ends = ends(mesh, rims, positions, normals);
+    let fitted = |end: &End| {
+        let terms = end.fit.iter().map(|&(e, weight)| element_radiosity[e as usize] * weight);
+        if end.fit.is_empty() { radiosity[end.vertex] } else { terms.sum() }
+    };
+    let fitted: Vec<Rgb> = ends.iter().map(fitted).collect();
+    let mended = meeting::mend(mesh, &ends, element_radiosity, &fitted);
+    for (end, value) in ends.iter().zip(mended) {
         if value.is_finite() {
-            radiosity[v] = value.max(Rgb::ZERO);
+            radiosity[end.vertex] = value;
         }
     }
+}
+
+/// A boundary vertex, where a surface ends.
+pub(super) struct End {
+    pub vertex: usize,
+    pub position: DVec3,
+    /// Elements and their weights in the linear fit; nothing where there is no fit.
+    pub fit: Vec<(u32, f64)>,
+    /// Elements of this surface within three rings, ascending.
+    pub wide: Vec<u32>,
+}
+
+/// The ends of all surfaces, by ascending vertex.
+pub(super) fn ends(mesh: &Mesh, rims: &Rims, positions: &[DVec3], normals: &[DVec3]) -> Vec<End> {
+    let around = elements_around(rims, positions.len());
+    let end = |vertex: usize| {
+        let near = ring(rims, &around, &around[vertex]);
+        let wide = ring(rims, &around, &near);
+        let position = positions[vertex];
+        End { vertex, position, fit: fit(mesh, near, position, normals[vertex]), wide }
+    };
+    boundary(rims).into_par_iter().map(end).collect()
+}
+
+/// Weights with which values at the centroids of `near` sum up to that of their linear fit at `at`;
+/// none if they do not define one.
+fn fit(mesh: &Mesh, near: Vec<u32>, at: DVec3, normal: DVec3) -> Vec<(u32, f64)> {
+    if near.len() < FEWEST {
+        return vec![];
+    }
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    // Normal equations of B ≈ a + g·(x − x_v) in the tangent plane; a is what is wanted.
+    let mut matrix = DMat3::ZERO;
+    let row_of = |e: u32| {
+        let node = mesh.element(e as usize);
+        let (offset, area) = (mesh.centroid(node) - at, mesh.area(node));
+        let weight = area / (offset.length_squared() + area);
+        let scale = 1.0 / area.sqrt();
+        let x = DVec3::new(1.0, offset.dot(tangent) * scale, offset.dot(bitangent) * scale);
+        matrix += DMat3::from_cols(x * x.x, x * x.y, x * x.z) * weight;
+        (e, x * weight)
+    };
+    let rows: Vec<(u32, DVec3)> = near.into_iter().map(row_of).collect();
+    let first = matrix.inverse().row(0);
+    let weights = rows.into_iter().map(|(e, x)| (e, first.dot(x)));
+    if first.is_finite() { weights.collect() } else { vec![] }
+}
+
+/// The elements that share a vertex with one of `elements`, those included, ascending.
+fn ring(rims: &Rims, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
+    let vertices = elements.iter().flat_map(|&e| rims.of(e as usize));
+    let mut ring: Vec<u32> = vertices.flat_map(|&v| &around[v as usize]).copied().collect();
+    ring.sort_unstable();
+    ring.dedup();
+    ring
 }
 
 /// Vertices on a side that only one element has, ascending.
