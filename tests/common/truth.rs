@@ -11,6 +11,8 @@ use serde_json::Value;
 #[derive(Clone, Copy, Debug)]
 pub struct Errors {
     pub count: usize,
+    /// Mean of (|B| − |truth|)/|truth|.
+    pub bias: f64,
     pub rms: f64,
     pub median: f64,
     pub worst: f64,
@@ -20,23 +22,30 @@ pub struct Errors {
 /// point lies on no face.
 pub fn compare(surface: &VertexRadiosity, truth: &str) -> BTreeMap<String, Errors> {
     let truth: Value = serde_json::from_str(truth).expect("JSON");
-    let mut errors: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut errors: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
     for point in truth["points"].as_array().expect("points") {
         let vector = |key: &str| {
             DVec3::from_array([0, 1, 2].map(|k| point[key][k].as_f64().expect("a number")))
         };
         let (wanted, got) = (vector("B"), at(surface, vector("p"), vector("n")));
-        let error = got.expect("a face at the point").distance(wanted) / wanted.length();
-        errors.entry(point["kind"].as_str().expect("a kind").into()).or_default().push(error);
+        let got = got.expect("a face at the point");
+        let error = got.distance(wanted) / wanted.length();
+        let signed = got.length() / wanted.length() - 1.0;
+        errors
+            .entry(point["kind"].as_str().expect("a kind").into())
+            .or_default()
+            .push((error, signed));
     }
     errors.into_iter().map(|(kind, list)| (kind, summary(list))).collect()
 }
 
-fn summary(mut errors: Vec<f64>) -> Errors {
-    errors.sort_by(f64::total_cmp);
+fn summary(errors: Vec<(f64, f64)>) -> Errors {
     let count = errors.len();
+    let bias = errors.iter().map(|e| e.1).sum::<f64>() / count as f64;
+    let mut errors: Vec<f64> = errors.into_iter().map(|e| e.0).collect();
+    errors.sort_by(f64::total_cmp);
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt();
-    Errors { count, rms, median: errors[count / 2], worst: errors[count - 1] }
+    Errors { count, bias, rms, median: errors[count / 2], worst: errors[count - 1] }
 }
 
 /// Interpolated radiosity at `p` with unit normal `n`, in the nearest face that faces alike.

@@ -1,0 +1,104 @@
+//! What each repair of form factors costs and gains, on the Cornell box.
+//!
+//!     cargo run --release --example repairs [-- ELEMENT_SIZE [HEMICUBE]]
+//!
+//! Per configuration: raw reciprocity over all pairs of elements, A_i F_ij against A_j F_ji, as an
+//! error of the smaller one's factor; then a bake, its hemicubes and seconds, and its errors at
+//! points of path-traced truth.
+
+#[path = "../tests/common/truth.rs"]
+mod truth;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use radiosity::{
+    Error, FormFactors, Go, Gpu, Hemicubes, Mesh, NearRepair, NodeId, Row, Shooting,
+    VertexRadiosity, load_obj,
+};
+
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+const TRUTH: &str = include_str!("../tests/data/cornell_box.truth.json");
+
+fn main() -> ExitCode {
+    let mut args = std::env::args().skip(1);
+    let mut number = |default: f64| args.next().map_or(Ok(default), |a| a.parse::<f64>());
+    let (Ok(size), Ok(resolution)) = (number(30.0), number(128.0)) else {
+        eprintln!("usage: repairs [ELEMENT_SIZE [HEMICUBE]]");
+        return ExitCode::from(2);
+    };
+    match run(size, resolution as u32) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(size: f64, resolution: u32) -> Result<(), Error> {
+    let mesh = Mesh::new(load_obj(SCENE)?, size)?;
+    let gpu = Gpu::new(None)?;
+    let adapter = gpu.adapter();
+    println!("Cornell box, {} elements, hemicube {resolution}", mesh.element_count());
+    println!("{} ({}), {}", adapter.name, adapter.kind, adapter.driver);
+    println!(
+        "{:14} {:>9} {:>9} {:>9} | {:>8} {:>6} | {:>7} {:>7} {:>7} {:>7}",
+        "rows", "RMS", "worst", "moved", "hemicub.", "s", "area", "median", "edge", "bias"
+    );
+    for (name, reach) in [("plain", -1.0), ("near 1", 1.0), ("near 3", 3.0)] {
+        let hemicubes = || Hemicubes::new(&gpu, &mesh, resolution);
+        let mut rows = NearRepair::new(hemicubes()?, &mesh, reach);
+        let (rms, worst) = reciprocity(&mesh, &mut rows)?;
+        let moved = rows.moved();
+
+        let start = Instant::now();
+        let mut rows = NearRepair::new(hemicubes()?, &mesh, reach);
+        let solution = Shooting::default().solve(&mesh, &mut rows, |_| Go::Continue(()))?;
+        let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+        let seconds = start.elapsed().as_secs_f64();
+        let errors = truth::compare(&surface, TRUTH);
+        let (area, edge) = (errors["area"], errors["edge"]);
+        println!(
+            "{name:14} {rms:9.2e} {worst:9.2e} {moved:9.2e} | {:8} {seconds:6.1} | {:6.2}% {:6.2}% \
+             {:6.2}% {:+6.2}%",
+            rows.inner().drawn(),
+            100.0 * area.rms,
+            100.0 * area.median,
+            100.0 * edge.median,
+            100.0 * edge.bias
+        );
+    }
+    Ok(())
+}
+
+/// Root of the mean square and the largest of (A_i F_ij − A_j F_ji) / min(A_i, A_j), over pairs of
+/// elements of which one sees the other.
+fn reciprocity(mesh: &Mesh, maker: &mut dyn FormFactors) -> Result<(f64, f64), Error> {
+    let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
+    let mut rows: Vec<Row> = Vec::with_capacity(elements.len());
+    for batch in elements.chunks(maker.batch()) {
+        rows.extend(maker.rows(mesh, batch)?);
+    }
+    let flux = |i: usize, j: usize| {
+        let found = rows[i].entries.binary_search_by_key(&(j as u32), |e| e.element);
+        let share = found.map_or(0, |k| rows[i].entries[k].share);
+        mesh.area(elements[i]) * Row::form_factor(share)
+    };
+    let (mut squares, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
+    for (i, row) in rows.iter().enumerate() {
+        for entry in &row.entries {
+            let j = entry.element as usize;
+            let (here, there) = (flux(i, j), flux(j, i));
+            // Met from both sides: once.
+            if there > 0.0 && j < i {
+                continue;
+            }
+            let error = (here - there) / mesh.area(elements[i]).min(mesh.area(elements[j]));
+            squares += error * error;
+            count += 1.0;
+            worst = worst.max(error.abs());
+        }
+    }
+    Ok((f64::sqrt(squares / f64::max(count, 1.0)), worst))
+}
