@@ -79,7 +79,11 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Nothing over nothing is nothing: a group without area neither gives nor takes.
     fn over(self, area: f64) -> Estimate {
+        if area == 0.0 {
+            return Estimate::default();
+        }
         Estimate { value: self.value / area, error: self.error / area }
     }
 }
@@ -152,8 +156,11 @@ impl ViewFactors {
 
     /// What is left of rows when all that is known is taken off, as `open`.
     fn with_open_left(mut self) -> ViewFactors {
-        let rows = self.factors.iter().zip(&self.back);
-        let left = |(row, back): (&Vec<Factor>, &Estimate)| {
+        let rows = self.factors.iter().zip(&self.back).zip(&self.areas);
+        let left = |((row, back), area): ((&Vec<Factor>, &Estimate), &f64)| {
+            if *area == 0.0 {
+                return Estimate::default();
+            }
             let sum: f64 = row.iter().map(|f| f.value).sum();
             let squares: f64 = row.iter().map(|f| f.error.powi(2)).sum();
             Estimate { value: 1.0 - sum - back.value, error: (squares + back.error.powi(2)).sqrt() }

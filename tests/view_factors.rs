@@ -105,6 +105,26 @@ fn a_whole_matrix_of_an_enclosure() {
 }
 
 #[test]
+fn what_stands_between_only_takes_away() {
+    let scene = load_obj(data("view_factors/occ-box-offset-w_x0-b_x0.obj")).unwrap();
+    let m = exact(&scene, 1e-4);
+    let mut less = 0;
+    for (i, j) in (0..12).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        let pair = |t: &&radiosity::Triangle| [i, j].contains(&(t.group as usize));
+        let triangles = scene.triangles().iter().filter(pair).copied().collect();
+        let (positions, groups) = (scene.positions().to_vec(), scene.groups().to_vec());
+        let alone = Scene::new(positions, triangles, groups, scene.materials().to_vec());
+        let (Ok(alone), got) = (alone, m.factor(i, j)) else { continue };
+        let alone = exact(&alone, 1e-4);
+        assert!(alone.leaks().iter().all(|&k| k == i || k == j), "groups without area do not leak");
+        let free = alone.factor(i, j);
+        assert!(got.value <= free.value + 3.0 * got.error + 1e-12, "{i} {j}");
+        less += usize::from(got.value < free.value - 1e-3);
+    }
+    assert!(less > 10, "the box hides much: {less}");
+}
+
+#[test]
 fn neither_size_nor_place_matters() {
     let scene = load_obj(data("view_factors/chap-plate-in-box-y0-y1.obj")).unwrap();
     let here = exact(&scene, 1e-4);

@@ -9,7 +9,8 @@ use crate::view_factors::{Absent, Estimate, ViewFactors};
 
 /// Writes the matrix as CSV: a header row and a first column of names, row leaves, column receives;
 /// then `open`, what leaves the scene, `back`, what meets the backs of surfaces, and the `area` of
-/// each row's group. Values have nine decimals; below 1e-5, five digits.
+/// each row's group. Values have nine decimals; below 1e-5, five digits. Zero is `0`; what is merely
+/// not seen is left empty.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -23,6 +24,7 @@ pub fn write_view_factors(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resul
             for j in 0..names.len() as u32 {
                 match row.next_if(|f| f.to == j) {
                     Some(f) => write!(out, ",{}", Printed::of(f.value))?,
+                    None if matrix.absent == Absent::NotSeen => write!(out, ",")?,
                     None => write!(out, ",0")?,
                 }
             }
