@@ -85,7 +85,8 @@ impl Cell {
         // Visible and whole, by either rule.
         let (mut five, mut two) = ([0.0; 2], [0.0; 2]);
         let mut add = |point: DVec3, weights: (f64, f64)| {
-            let seen = eye.look(point, pair.normal, &pair.target, &cell.blockers);
+            let seen =
+                eye.look(point, pair.normal, &pair.target, pair.target_normal, &cell.blockers);
             for (k, value) in [seen.visible, seen.whole].into_iter().enumerate() {
                 five[k] += area * weights.0 * value;
                 two[k] += area * weights.1 * value;

@@ -22,18 +22,30 @@ const LEAF: usize = 4;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+pub(super) struct Bounds {
     low: DVec3,
     high: DVec3,
 }
 
 impl Bounds {
-    fn around<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Bounds {
-        let nothing = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
-        points.into_iter().fold(nothing, |b, &p| Bounds { low: b.low.min(p), high: b.high.max(p) })
+    pub const NOTHING: Bounds = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    pub const EVERYTHING: Bounds = Bounds { low: DVec3::NEG_INFINITY, high: DVec3::INFINITY };
+
+    pub fn around<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Bounds {
+        let mut bounds = Bounds::NOTHING;
+        points.into_iter().for_each(|&p| bounds.include(p));
+        bounds
     }
 
-    fn meets(&self, other: &Bounds) -> bool {
+    pub fn include(&mut self, point: DVec3) {
+        (self.low, self.high) = (self.low.min(point), self.high.max(point));
+    }
+
+    pub fn grown(self, margin: f64) -> Bounds {
+        Bounds { low: self.low - margin, high: self.high + margin }
+    }
+
+    pub fn meets(&self, other: &Bounds) -> bool {
         self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }
 }

@@ -1,42 +1,30 @@
 //! What a point sees of a polygon past others: exact, by clipping.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
-use super::shaft::Blocker;
+use super::shaft::{Blocker, Bounds};
 use crate::form_factor::analytic::lambert;
 
 /// Corners off a plane through the eye by less than this share of the reach are in it.
 const CONTACT: f64 = 1e-13;
 
-/// Convex polygons, their corners in one row.
-#[derive(Default)]
-struct Polygons {
-    corners: Vec<DVec3>,
-    ends: Vec<usize>,
-}
+/// Shadow boxes are larger than shadows by this share of the reach: well above rounding.
+const MARGIN: f64 = 1e-9;
 
-impl Polygons {
-    fn clear(&mut self) {
-        self.corners.clear();
-        self.ends.clear();
-    }
-
-    fn push(&mut self, polygon: impl IntoIterator<Item = DVec3>) {
-        self.corners.extend(polygon);
-        self.ends.push(self.corners.len());
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.corners[start..end])
-    }
+/// A convex part of what is seen: its corners, as a range of all, and the box around them.
+struct Part {
+    corners: Range<usize>,
+    bounds: Bounds,
 }
 
 /// An eye on a surface, and room to work in.
 #[derive(Default)]
 pub(super) struct Eye {
-    seen: Polygons,
-    left: Polygons,
+    /// Corners of parts, also of those that are gone.
+    corners: Vec<DVec3>,
+    parts: Vec<Part>,
     /// Planes through the eye along a blocker's edges, unit normals inwards.
     cone: Vec<DVec3>,
     inside: Vec<DVec3>,
@@ -53,9 +41,9 @@ pub(super) struct Seen {
 }
 
 impl Eye {
-    /// Form factors from the surface element at `point` with unit `normal` to `target`, past
-    /// `blockers`, all of them convex, before the element's plane, and between it and the target's
-    /// plane.
+    /// Form factors from the surface element at `point` with unit `normal` to `target`, whose unit
+    /// normal is `facing`, past `blockers`, all of them convex, before the element's plane, and
+    /// between it and the target's plane.
     ///
     /// A blocker's shadow is what of the target lies within the cone from the point over the
     /// blocker. Shadows are cut off the convex parts seen so far, one blocker after another; what
@@ -65,25 +53,37 @@ impl Eye {
         point: DVec3,
         normal: DVec3,
         target: &[DVec3],
+        facing: DVec3,
         blockers: &[Blocker],
     ) -> Seen {
-        self.seen.clear();
-        self.seen.push(target.iter().map(|corner| corner - point));
+        self.corners.clear();
+        self.parts.clear();
+        self.corners.extend(target.iter().map(|corner| corner - point));
+        self.keep(0);
         let see = |part: &[DVec3]| lambert(DVec3::ZERO, normal, part);
-        let whole = see(&self.seen.corners);
-        let reach = self.seen.corners.iter().map(|v| v.length_squared()).fold(0.0, f64::max);
-        let contact = CONTACT * reach.sqrt();
-        let mut touched = false;
+        let whole = see(&self.corners);
+        let reach = self.corners.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let depth = self.corners.first().map_or(0.0, |v| -facing.dot(*v));
         for blocker in blockers {
             if self.set_cone(point, blocker) {
-                touched |= self.cut(contact);
-                if self.seen.ends.is_empty() {
+                let shadow = shadow(point, blocker, facing, depth, MARGIN * reach);
+                self.cut(&shadow, CONTACT * reach);
+                if self.parts.is_empty() {
                     return Seen { visible: 0.0, whole };
                 }
             }
         }
-        let visible = if touched { self.seen.iter().map(see).sum() } else { whole };
+        let visible = self.parts.iter().map(|part| see(&self.corners[part.corners.clone()])).sum();
         Seen { visible, whole }
+    }
+
+    /// Makes a part of all corners from `start`, if there are enough.
+    fn keep(&mut self, start: usize) {
+        if self.corners.len() < start + 3 {
+            return self.corners.truncate(start);
+        }
+        let bounds = Bounds::around(&self.corners[start..]);
+        self.parts.push(Part { corners: start..self.corners.len(), bounds });
     }
 
     /// The cone from `point` over `blocker`; false if that is seen edge on.
@@ -105,40 +105,52 @@ impl Eye {
         facing != 0.0 && self.cone.len() > 2
     }
 
-    /// Cuts the cone off all parts seen; false if none is touched.
-    fn cut(&mut self, contact: f64) -> bool {
-        let mut touched = false;
-        self.left.clear();
-        for part in self.seen.iter() {
-            let beyond = |n: &DVec3| part.iter().all(|v| n.dot(*v) <= contact);
-            if self.cone.iter().any(beyond) {
-                self.left.push(part.iter().copied());
+    /// Cuts the cone, and so all that is in `shadow`, off all parts.
+    fn cut(&mut self, shadow: &Bounds, contact: f64) {
+        // From the last: what takes the place of a part that is gone has been dealt with.
+        for k in (0..self.parts.len()).rev() {
+            if !self.parts[k].bounds.meets(shadow) {
                 continue;
             }
-            touched = true;
+            let part = &self.corners[self.parts[k].corners.clone()];
+            let beyond = |n: &DVec3| part.iter().all(|v| n.dot(*v) <= contact);
+            if self.cone.iter().any(beyond) {
+                continue;
+            }
             self.inside.clear();
             self.inside.extend_from_slice(part);
-            for &n in &self.cone {
+            self.parts.swap_remove(k);
+            for plane in 0..self.cone.len() {
+                let n = self.cone[plane];
                 if self.inside.iter().all(|v| n.dot(*v) >= -contact) {
                     continue;
                 }
                 self.rest.clear();
-                let start = self.left.corners.len();
-                split(&self.inside, n, contact, &mut self.rest, &mut self.left.corners);
-                if self.left.corners.len() > start + 2 {
-                    self.left.ends.push(self.left.corners.len());
-                } else {
-                    self.left.corners.truncate(start);
-                }
+                let start = self.corners.len();
+                split(&self.inside, n, contact, &mut self.rest, &mut self.corners);
+                self.keep(start);
                 std::mem::swap(&mut self.inside, &mut self.rest);
                 if self.inside.len() < 3 {
                     break;
                 }
             }
         }
-        std::mem::swap(&mut self.seen, &mut self.left);
-        touched
     }
+}
+
+/// A box around what `blocker` hides, from `point`, of a plane at `depth` before it that faces
+/// `facing`; everything where a part of the blocker is beside the point or behind it.
+fn shadow(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Bounds {
+    let mut bounds = Bounds::NOTHING;
+    for corner in &blocker.corners {
+        let v = corner - point;
+        let down = -facing.dot(v);
+        if down <= MARGIN * depth {
+            return Bounds::EVERYTHING;
+        }
+        bounds.include(v * (depth / down));
+    }
+    bounds.grown(margin)
 }
 
 /// Splits a convex polygon by the plane through the origin with unit normal `n`.
