@@ -13,10 +13,10 @@ use radiosity::Camera;
 use support::{Bake, Device};
 
 const USAGE: &str = "\
-usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R] [--unshot F]
-            [--shots N] [--row-memory MB] [--patch-level N]
-            [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--elements]
-            [--adapter NAME | --cpu]
+usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
+            [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
+            [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H]
+            [--elements] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
@@ -24,6 +24,10 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --element-size X  longest edge of an element, in the scene's unit [diagonal / 32]
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
   --near R          closed forms for receivers within R patch diameters; -1 for none [1]
+  --viewpoints TOL  see a patch from its parts too, and go down to the elements where more than
+                    this share of its light lands on other triangles by them; four times the
+                    hemicubes or more, so best with --patch-level 2 [not done]
+  --rotations K     hemicubes a viewpoint, each turned further, averaged [1]
   --unshot F        stop at this share of unshot flux [0.001]
   --shots N         stop after this many shots
   --row-memory MB   memory for form-factor rows that are kept [1024]
@@ -32,7 +36,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --image W,H       size of the picture in pixels [512,512]
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
-  --cpu             rays on the CPU instead of hemicubes, N squared a row";
+  --cpu             rays on the CPU instead of hemicubes, K N squared a row";
 
 fn main() -> ExitCode {
     let bake = match parse(lexopt::Parser::from_env()) {
@@ -70,6 +74,8 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("element-size") => bake.element_size = Some(args.value()?.parse()?),
             Long("hemicube") => bake.hemicube = args.value()?.parse()?,
             Long("near") => bake.near = args.value()?.parse()?,
+            Long("viewpoints") => bake.viewpoints = Some(args.value()?.parse()?),
+            Long("rotations") => bake.rotations = args.value()?.parse()?,
             Long("unshot") => bake.shooting.unshot = args.value()?.parse()?,
             Long("shots") => bake.shooting.shots = Some(args.value()?.parse()?),
             Long("row-memory") => {

@@ -6,6 +6,7 @@ mod support;
 
 use std::fs::File;
 use std::io::BufWriter;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -124,7 +125,7 @@ impl Settings {
             Method::Sampled { element_size, hemicube, device } => {
                 let size = element_size.unwrap_or_else(|| support::default_element_size(&scene));
                 let mesh = Mesh::new(scene, size)?;
-                let mut maker = Maker::new(device, &mesh, *hemicube)?;
+                let mut maker = Maker::new(device, &mesh, *hemicube, NonZeroU32::MIN)?;
                 let [name, kind, _] = maker.adapter();
                 println!("{} elements, {name} ({kind})", mesh.element_count());
                 ViewFactors::sampled(&mesh, &mut maker, progress)?

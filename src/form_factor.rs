@@ -3,6 +3,7 @@
 pub mod analytic;
 pub(crate) mod near;
 pub(crate) mod ray_cast;
+pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
 use crate::mesh::{Mesh, NodeId};
@@ -71,6 +72,31 @@ impl Row {
         let largest = slots.chain([&mut self.open, &mut self.back]).max_by_key(|s| **s);
         largest.into_iter().for_each(|s| *s += Row::TOTAL - given);
         self.entries.retain(|e| e.share > 0);
+    }
+
+    /// The mean of `rows`, each of which sums to [`Row::TOTAL`]: so does the mean, exactly, and every
+    /// share of it is off by less than one unit. No rows make the row of nothing.
+    pub(crate) fn mean(rows: &[&Row]) -> Row {
+        let count = rows.len().max(1) as u64;
+        let mut seen: Vec<Entry> = rows.iter().flat_map(|r| r.entries.iter().copied()).collect();
+        // Runs in order already: a stable sort merges them.
+        seen.sort_by_key(|e| e.element);
+        let (mut sum, mut given) = (0, 0);
+        let mut part = |shares: &mut dyn Iterator<Item = u32>| {
+            sum += shares.map(u64::from).sum::<u64>();
+            let upto = (sum / count) as u32;
+            let share = upto - given;
+            given = upto;
+            share
+        };
+        let runs = seen.chunk_by(|a, b| a.element == b.element);
+        let mean = |run: &[Entry]| Entry {
+            element: run[0].element,
+            share: part(&mut run.iter().map(|e| e.share)),
+        };
+        let entries = runs.map(mean).filter(|e| e.share > 0).collect();
+        let open = part(&mut rows.iter().map(|r| r.open));
+        Row { entries, open, back: part(&mut rows.iter().map(|r| r.back)) }
     }
 
     /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.

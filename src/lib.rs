@@ -67,6 +67,7 @@ pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
 pub use form_factor::near::NearRepair;
 pub use form_factor::ray_cast::RayCast;
+pub use form_factor::viewpoints::Viewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gpu::{Adapter, Gpu, Hemicubes, StageSeconds};
 pub use io::{

@@ -2,14 +2,15 @@
 // Each example uses a part of it.
 #![allow(dead_code)]
 
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
     Camera, Error, ErrorKind, FormFactors, Go, Gpu, Hemicubes, Mesh, NearRepair, NodeId, Progress,
-    RayCast, Report, Row, Scene, Seconds, Shooting, VertexRadiosity, load_obj, write_exr,
-    write_ply, write_png,
+    RayCast, Report, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj,
+    write_exr, write_ply, write_png,
 };
 use serde_json::json;
 
@@ -24,6 +25,11 @@ pub struct Bake {
     pub hemicube: u32,
     /// Receivers within this many patch diameters get closed forms; below 0 none.
     pub near: f64,
+    /// Patches whose parts disagree by more than this share of light are seen from finer parts; with
+    /// none, each only from its centroid.
+    pub viewpoints: Option<f64>,
+    /// Hemicubes a viewpoint.
+    pub rotations: NonZeroU32,
     pub shooting: Shooting,
     pub camera: Option<Camera>,
     pub image: (u32, u32),
@@ -53,6 +59,8 @@ impl Bake {
             element_size: None,
             hemicube: 128,
             near: 1.0,
+            viewpoints: None,
+            rotations: NonZeroU32::MIN,
             shooting: Shooting::default(),
             camera: None,
             image: (512, 512),
@@ -77,8 +85,10 @@ impl Bake {
 
         let element_size = self.element_size.unwrap_or_else(|| default_element_size(&scene));
         let mesh = Mesh::new(scene, element_size)?;
-        let maker = Maker::new(&self.device, &mesh, self.hemicube)?;
-        let mut rows = NearRepair::new(maker, &mesh, self.near);
+        let maker = Maker::new(&self.device, &mesh, self.hemicube, self.rotations)?;
+        let near = NearRepair::new(maker, &mesh, self.near);
+        let levels = if self.viewpoints.is_some() { u32::MAX } else { 0 };
+        let mut rows = Viewpoints::new(near, self.viewpoints.unwrap_or(1.0), levels);
         seconds.mesh = clock.lap();
 
         let bar = bar();
@@ -87,7 +97,7 @@ impl Bake {
             Go::Continue(())
         })?;
         bar.finish_and_clear();
-        let maker = rows.inner();
+        let (near, maker) = (rows.inner(), rows.inner().inner());
         (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
         seconds.solve = clock.lap() - maker.seconds;
 
@@ -114,6 +124,8 @@ impl Bake {
                 ("element_size".into(), json!(element_size)),
                 ("hemicube".into(), json!(self.hemicube)),
                 ("near".into(), json!(self.near)),
+                ("viewpoints".into(), json!(self.viewpoints)),
+                ("rotations".into(), json!(self.rotations.get())),
                 ("unshot".into(), json!(self.shooting.unshot)),
                 ("shots".into(), json!(self.shooting.shots)),
                 ("row_memory".into(), json!(self.shooting.row_memory)),
@@ -123,8 +135,8 @@ impl Bake {
             elements: mesh.element_count(),
             vertices: surface.positions.len(),
             shots: solution.shots,
-            hemicubes: solution.rows_made,
-            near_moved: rows.moved(),
+            hemicubes: (solution.rows_made + rows.extra()) * u64::from(self.rotations.get()),
+            near_moved: near.moved(),
             stop: solution.stop.to_string(),
             ledger: solution.ledger,
             seconds,
@@ -165,16 +177,24 @@ enum Rows {
 }
 
 impl Maker {
-    pub fn new(device: &Device, mesh: &Mesh, hemicube: u32) -> Result<Maker, Error> {
+    pub fn new(
+        device: &Device,
+        mesh: &Mesh,
+        hemicube: u32,
+        rotations: NonZeroU32,
+    ) -> Result<Maker, Error> {
         let rows = match device {
             Device::Gpu(name) => {
                 let gpu = Gpu::new(name.as_deref())?;
-                let hemicubes = Hemicubes::new(&gpu, mesh, hemicube)?;
+                let hemicubes = Hemicubes::new(&gpu, mesh, hemicube)?.with_rotations(rotations);
                 Rows::Gpu(gpu, Box::new(hemicubes))
             }
             Device::Cpu => {
                 radiosity::hemicube::check_resolution(hemicube)?;
-                Rows::Cpu(RayCast::new(mesh, hemicube * hemicube)?)
+                Rows::Cpu(RayCast::new(
+                    mesh,
+                    (hemicube * hemicube).saturating_mul(rotations.get()),
+                )?)
             }
         };
         Ok(Maker { rows, seconds: 0.0 })

@@ -59,19 +59,29 @@ impl<M: FormFactors> NearRepair<M> {
     pub fn moved(&self) -> f64 {
         if self.made == 0 { 0.0 } else { self.moved / self.made as f64 }
     }
-}
 
-impl<M: FormFactors> FormFactors for NearRepair<M> {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        let mut rows = self.rows.rows(mesh, patches)?;
+    /// The maker's own rows, nothing mended.
+    pub(super) fn raw(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        self.rows.rows(mesh, patches)
+    }
+
+    /// Mends `rows` as seen from the centroids of `patches`.
+    pub(super) fn mend(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
         if self.near.reach < 0.0 {
-            return Ok(rows);
+            return;
         }
         let near = &self.near;
         let pairs = rows.par_iter_mut().zip(patches);
         let moved: Vec<f64> = pairs.map(|(row, &patch)| near.mend(mesh, patch, row)).collect();
         self.made += moved.len() as u64;
         self.moved += moved.iter().sum::<f64>();
+    }
+}
+
+impl<M: FormFactors> FormFactors for NearRepair<M> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+        let mut rows = self.raw(mesh, patches)?;
+        self.mend(mesh, patches, &mut rows);
         Ok(rows)
     }
 

@@ -1,8 +1,11 @@
 //! Form-factor rows from hemicubes: batches drawn, reduced and read back.
 
+use std::f64::consts::FRAC_PI_2;
+use std::num::NonZeroU32;
 use std::time::Instant;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::chunks::Chunks;
@@ -32,6 +35,7 @@ pub struct Hemicubes {
     origin: DVec3,
     slots: u32,
     batch: u32,
+    rotations: NonZeroU32,
     seconds: StageSeconds,
     drawn: u64,
 }
@@ -126,9 +130,21 @@ impl Hemicubes {
             origin,
             slots,
             batch,
+            rotations: NonZeroU32::MIN,
             seconds: StageSeconds::default(),
             drawn: 0,
         })
+    }
+
+    /// A row from this many hemicubes at the patch's centroid, each turned a further 90°/`rotations`
+    /// about the normal, and their mean taken; one unless set.
+    ///
+    /// This is for the aliasing assumption of Baum, Rushmeier and Winget (1989): a pixel is in an
+    /// element or not, by its centre. Pixels that straddle a border err independently from one turn
+    /// to the next, so the error of an entry falls with the square root of `rotations`, and the
+    /// time grows in proportion to them. What is off because the patch is seen from one point stays.
+    pub fn with_rotations(self, rotations: NonZeroU32) -> Hemicubes {
+        Hemicubes { rotations, ..self }
     }
 
     /// Time spent so far.
@@ -136,13 +152,14 @@ impl Hemicubes {
         self.seconds
     }
 
-    /// Hemicubes drawn so far.
+    /// Hemicubes drawn so far, each rotation of one counted.
     pub fn drawn(&self) -> u64 {
         self.drawn
     }
 
-    fn views(&self, mesh: &Mesh, patch: NodeId) -> [View; 5] {
-        let frame = Frame::new(mesh.normal(patch), rotation(patch));
+    /// The faces of the hemicube over `patch`, turned by `angle` (radians).
+    fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
+        let frame = Frame::new(mesh.normal(patch), angle);
         let near = (mesh.area(patch).sqrt() * NEAR) as f32;
         let centre = mesh.centroid(patch);
         let eye = (centre - self.origin).as_vec3().to_array();
@@ -162,9 +179,11 @@ impl Hemicubes {
         })
     }
 
-    fn draw_batch(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+    /// One hemicube a patch, each with its turn.
+    fn draw_batch(&mut self, mesh: &Mesh, patches: &[(NodeId, f64)]) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
-        let views: Vec<View> = patches.iter().flat_map(|&p| self.views(mesh, p)).collect();
+        let views: Vec<View> =
+            patches.iter().flat_map(|&(p, turn)| self.views(mesh, p, turn)).collect();
         let count = patches.len() as u32;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let clock = self.clock.as_ref();
@@ -204,11 +223,19 @@ impl Hemicubes {
 
 impl FormFactors for Hemicubes {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        let mut rows = Vec::with_capacity(patches.len());
-        for batch in patches.chunks(self.batch as usize) {
+        let count = self.rotations.get();
+        let step = FRAC_PI_2 / f64::from(count);
+        let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
+        let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
+        let mut rows = Vec::with_capacity(turned.len());
+        for batch in turned.chunks(self.batch as usize) {
             rows.extend(self.draw_batch(mesh, batch)?);
         }
-        Ok(rows)
+        if count == 1 {
+            return Ok(rows);
+        }
+        let mean = |turns: &[Row]| Row::mean(&turns.iter().collect::<Vec<_>>());
+        Ok(rows.par_chunks(count as usize).map(mean).collect())
     }
 
     fn batch(&self) -> usize {
@@ -227,7 +254,7 @@ fn rotation(patch: NodeId) -> f64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
-    unit * std::f64::consts::FRAC_PI_2
+    unit * FRAC_PI_2
 }
 
 fn sparse(dense: &[u32]) -> Row {
