@@ -138,3 +138,39 @@ pub trait FormFactors {
         1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_of_rows_is_exact() {
+        let row = |entries: &[(u32, u32)], open: u32| {
+            let entries = entries.iter().map(|&(element, share)| Entry { element, share });
+            let row = Row { entries: entries.collect(), open, back: 0 };
+            Row { back: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
+        };
+        // Remainders of 1, 2 and 3 in four, an entry that is in one row only, one that is lost.
+        let rows = [
+            row(&[(1, 5), (3, 7), (4, 1)], 9),
+            row(&[(1, 4), (7, 1 << 31)], 0),
+            row(&[(0, 2), (3, 4)], u32::MAX - 6),
+            row(&[(3, 4)], 3),
+        ];
+        let mean = Row::mean(&rows.each_ref());
+        assert_eq!(mean.sum(), u64::from(Row::TOTAL));
+        assert!(mean.entries.windows(2).all(|w| w[0].element < w[1].element));
+        assert!(mean.entries.iter().all(|e| e.share > 0));
+        let share =
+            |r: &Row, k: u32| r.entries.iter().find(|e| e.element == k).map_or(0, |e| e.share);
+        let near = |got: u32, all: [u32; 4]| {
+            let want = all.iter().map(|&s| f64::from(s)).sum::<f64>() / 4.0;
+            assert!((f64::from(got) - want).abs() < 1.0, "{got} {want}");
+        };
+        (0..8).for_each(|k| near(share(&mean, k), rows.each_ref().map(|r| share(r, k))));
+        near(mean.open, rows.each_ref().map(|r| r.open));
+        near(mean.back, rows.each_ref().map(|r| r.back));
+        // Of equal rows, the row.
+        assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
+    }
+}

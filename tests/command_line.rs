@@ -138,6 +138,8 @@ fn bad_settings_are_refused() {
     with(&["--unshot", "2"], &["unshot share 2"]);
     with(&["--camera", "1,2,3"], &["camera", "7"]);
     with(&["--image", "0,5", "--camera", "278,273,-800,278,273,0,39"], &["0 × 5"]);
+    with(&["--rotations", "0"], &["zero"]);
+    with(&["--viewpoints", "much"], &["much"]);
     with(&["--what"], &["--what"]);
     refused(&[], &["usage"]);
     refused(&[cornell(), "--out", "no/such/folder/x"], &["no/such/folder"]);
