@@ -26,7 +26,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --near R          closed forms for receivers within R patch diameters; -1 for none [1]
   --viewpoints TOL  see a patch from its parts too, and go down to the elements where more than
                     this share of its light lands on other triangles by them; four times the
-                    hemicubes or more, so best with --patch-level 2 [not done]
+                    hemicubes or more [not done]
   --rotations K     hemicubes a viewpoint, each turned further, averaged [1]
   --unshot F        stop at this share of unshot flux [0.001]
   --shots N         stop after this many shots

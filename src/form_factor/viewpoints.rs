@@ -25,8 +25,16 @@ use crate::mesh::{Mesh, NodeId};
 /// occluder moves about within one scene triangle goes unseen.
 ///
 /// **What it costs**: the middle child of a patch has the patch's centroid, so the patch's row is
-/// the middle child's too. Three more rows a patch are made to compare, disagreement or not, and
-/// twelve more for each patch or part that is gone down into; see [`Viewpoints::extra`].
+/// the middle child's too. Three more rows a patch are made to compare; once made they are used,
+/// disagreement or not. Twelve more come for each patch or part that is gone down into; see
+/// [`Viewpoints::extra`].
+///
+/// **What it is worth** (Cornell box in elements of 30 mm, hemicubes of 128 pixels, against rays
+/// from all over the patch; share of a row on the wrong triangle, over 60 patches): patches of 16
+/// elements err by an RMS of 0.066 (median 0.0042) from one viewpoint, 0.022 (0.0019) from four,
+/// 0.008 (0.0019) with a tolerance of 0.02, which takes 15 % more hemicubes than four each. Patches
+/// of four elements gain in the median, 0.0020 to 0.0008, hardly in the RMS: most of that is in
+/// patches whose elements are themselves cut by an occluder.
 ///
 /// **Where the proximity repair goes**: inside, since near factors are those of the node that was
 /// seen from; that is why this takes a [`NearRepair`] (with a reach below 0 for none). Each part's
