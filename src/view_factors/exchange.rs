@@ -7,13 +7,16 @@ use super::creases::{creases, fan, parts_between, standing_on};
 use super::cubature::{Cell, Partial, mix};
 use super::far::{FAR_ERROR, far_exchange};
 use super::pieces::Piece;
-use super::shaft::{Shaft, Tree, covers, distinct};
+use super::shaft::{CONTACT, Shaft, Tree, covers, distinct};
 use super::visible::Eye;
 use crate::form_factor::analytic::{clip, polygon_area, polygon_to_polygon};
 
 /// What the closed form errs by at most, as a share of the flux from the smaller piece into the
 /// whole hemisphere (see [`polygon_to_polygon`]).
 const CLOSED_FORM_ERROR: f64 = 1e-13;
+
+/// Pieces are unlike in length if the ratio is below this.
+const UNLIKE: f64 = 0.25;
 
 /// What is known of the flux between two pieces before any refinement.
 pub(super) enum Link {
@@ -25,14 +28,15 @@ pub(super) enum Link {
     Partial(Box<Partial>),
 }
 
-/// Links two pieces; `seed` makes cuts differ from pair to pair. The smaller piece is gathered
-/// over, or the one on which fewer blockers stand: from there, less changes at once.
+/// Links two pieces; `seed` makes cuts differ from pair to pair. The piece on which fewer blockers
+/// stand is gathered over, for from there less changes at once, else the smaller; and always one
+/// that is much shorter: all it could receive may come from a spot of the other that no cell finds.
 pub(super) fn link(s: &Piece, t: &Piece, blockers: &Tree, eye: &mut Eye, seed: u64) -> Link {
     let (Some(&at_s), Some(&at_t)) = (s.corners.first(), t.corners.first()) else {
         return Link::Nothing;
     };
     let faces = |from: &Piece, at: DVec3, to: &Piece| {
-        to.corners.iter().any(|&p| from.normal.dot(p - at) > 0.0)
+        to.corners.iter().any(|&p| from.normal.dot(p - at) > CONTACT)
     };
     if !faces(s, at_s, t) || !faces(t, at_t, s) {
         return Link::Nothing;
@@ -53,7 +57,12 @@ pub(super) fn link(s: &Piece, t: &Piece, blockers: &Tree, eye: &mut Eye, seed: u
     }
     let on_a = standing_on(&a, s.normal, &between);
     let on_b = standing_on(&b, t.normal, &between);
-    let a_first = (on_a.len(), polygon_area(&a)) <= (on_b.len(), polygon_area(&b));
+    let (long_a, long_b) = (length(&a), length(&b));
+    let a_first = if long_a.min(long_b) < UNLIKE * long_a.max(long_b) {
+        long_a <= long_b
+    } else {
+        (on_a.len(), polygon_area(&a)) <= (on_b.len(), polygon_area(&b))
+    };
     let (a, b) = ((a, s.normal, on_a), (b, t.normal, on_b));
     let (domain, target) = if a_first { (a, b) } else { (b, a) };
     let mut partial = Partial {
@@ -70,6 +79,11 @@ pub(super) fn link(s: &Piece, t: &Piece, blockers: &Tree, eye: &mut Eye, seed: u
         partial.cells.push(cell);
     }
     Link::Partial(Box::new(partial))
+}
+
+/// Distance of the farthest corner from the first: the extent, or half of it at least.
+fn length(polygon: &[DVec3]) -> f64 {
+    polygon.iter().map(|p| p.distance(polygon[0])).fold(0.0, f64::max)
 }
 
 fn unblocked(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Estimate {

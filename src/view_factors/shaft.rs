@@ -3,15 +3,19 @@
 use glam::DVec3;
 
 use super::pieces::Piece;
-use crate::form_factor::analytic::clip;
+use crate::form_factor::analytic::{clip, polygon_area};
 
 /// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
 /// and above what pieces may be off their own planes ([`super::pieces::PLANAR`]).
-const CONTACT: f64 = 1e-12;
+pub(super) const CONTACT: f64 = 1e-12;
 
 /// An edge shorter than this share of the shaft has a direction too uncertain to lean on: rounding of
 /// its ends, 1e-16, moves the plane by up to [`CONTACT`] at the far end.
 const SHORT: f64 = 1e-4;
+
+/// What is left of a piece within a shaft is only contact if its area is less than its length times
+/// this: its edges may be out of order.
+const SLIVER: f64 = 4.0 * CONTACT;
 
 /// Corners closer than this share of a polygon's extent are one: the line through both is too
 /// uncertain to cut by.
@@ -110,7 +114,8 @@ impl Shaft {
             }
         }
         distinct(&mut kept);
-        (kept.len() > 2).then_some(kept)
+        let size = kept.iter().map(|p| p.distance(kept[0])).fold(0.0, f64::max);
+        (polygon_area(&kept) > SLIVER * size).then_some(kept)
     }
 
     fn meets(&self, bounds: &Bounds) -> bool {
@@ -145,7 +150,11 @@ fn lean(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
         if flat.iter().any(|p| outwards.dot(p - start) > CONTACT) {
             continue;
         }
-        let upright = |p: DVec3| (p - start).cross(along).normalize_or_zero();
+        // Upright to the edge first: its length times an error of angle is far above contact.
+        let upright = |p: DVec3| {
+            let n = (p - start).cross(along).normalize_or_zero();
+            n.reject_from_normalized(along).normalize_or_zero()
+        };
         let mut n = DVec3::ZERO;
         for &p in &raised {
             if n == DVec3::ZERO || n.dot(p - start) < 0.0 {
