@@ -328,3 +328,93 @@ impl Tree {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// G. Marsaglia's xorshift64, in (-1, 1).
+    fn random(state: &mut u64) -> f64 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn triangle(height: f64, spread: f64, up: bool, state: &mut u64) -> ([DVec3; 3], DVec3) {
+        let tilt = spread * random(state);
+        let mut corner = || DVec3::new(random(state), random(state), 0.0);
+        let mut corners =
+            [corner(), corner(), corner()].map(|p| p + (height + tilt * p.x) * DVec3::Z);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        if (normal.z > 0.0) != up {
+            corners.swap(1, 2);
+        }
+        (corners, (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize())
+    }
+
+    /// A point of a triangle, its corners included.
+    fn within(t: &[DVec3; 3], state: &mut u64) -> DVec3 {
+        let (u, v) = (random(state).abs(), random(state).abs());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
+    }
+
+    #[test]
+    fn every_segment_is_in_the_shaft_and_clipping_keeps_what_it_meets() {
+        let mut state = 88_172_645_463_325_252;
+        let mut met = 0;
+        for _ in 0..300 {
+            // Tilts of 0.3 over 2 across never reach the other's plane, 2 above.
+            let (a, up) = triangle(-1.0, 0.3, true, &mut state);
+            let (b, down) = triangle(1.0, 0.3, false, &mut state);
+            let (c, n) = triangle(0.0, 0.9, true, &mut state);
+            let shaft = Shaft::new(&a, up, &b, down);
+            let kept = shaft.clip(&c);
+            for _ in 0..50 {
+                let (p, q) = (within(&a, &mut state), within(&b, &mut state));
+                let middle = p.lerp(q, random(&mut state).abs());
+                // Rounding of a few operations on lengths below 4.
+                assert!(shaft.planes.iter().all(|plane| plane.height(middle) > -1e-14));
+                let hit = p + (q - p) * (n.dot(c[0] - p) / n.dot(q - p));
+                let inside = |t: &[DVec3], least: f64| {
+                    let side = |k: usize| n.cross(t[(k + 1) % t.len()] - t[k]).dot(hit - t[k]);
+                    (0..t.len()).all(|k| side(k) >= least)
+                };
+                if inside(&c, 1e-9) {
+                    met += 1;
+                    assert!(kept.as_ref().is_some_and(|kept| inside(kept, -1e-11)));
+                }
+            }
+        }
+        assert!(met > 500, "{met}");
+    }
+
+    #[test]
+    fn what_covers_is_crossed_by_every_segment() {
+        let mut state = 88_172_645_463_325_252;
+        let mut covered = 0;
+        for _ in 0..2000 {
+            let (mut a, _) = triangle(-1.0, 0.3, true, &mut state);
+            let (mut b, _) = triangle(1.0, 0.3, false, &mut state);
+            for p in a.iter_mut().chain(&mut b) {
+                *p *= DVec3::new(0.3, 0.3, 1.0);
+            }
+            let (corners, normal) = triangle(0.0, 0.5, true, &mut state);
+            let blocker = Blocker { corners: corners.to_vec(), normal };
+            if !covers(&blocker, &a, &b) {
+                continue;
+            }
+            covered += 1;
+            for _ in 0..50 {
+                let (p, q) = (within(&a, &mut state), within(&b, &mut state));
+                let hit = p + (q - p) * (normal.dot(corners[0] - p) / normal.dot(q - p));
+                for k in 0..3 {
+                    let edge = corners[(k + 1) % 3] - corners[k];
+                    assert!(normal.cross(edge).dot(hit - corners[k]) > -1e-11);
+                }
+            }
+        }
+        assert!(covered > 50, "{covered}");
+    }
+}
