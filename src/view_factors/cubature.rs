@@ -132,7 +132,7 @@ impl Cell {
         let middle = self.corners.iter().sum::<DVec3>() / 3.0;
         let other = |corner: &DVec3| {
             let at = corner.lerp(middle, WITHIN);
-            let seen = eye.look(at, pair.normal, &pair.target, &self.blockers);
+            let seen = eye.look(at, pair.normal, &pair.target, pair.target_normal, &self.blockers);
             if visible > nothing { seen.whole - seen.visible } else { seen.visible }
         };
         self.corners.iter().map(other).fold(0.0, f64::max)

@@ -214,7 +214,7 @@ mod tests {
                 sum += area * ray.z * ray.z / (std::f64::consts::PI * ray.length_squared().powi(2));
             }
         }
-        let seen = Eye::default().look(eye, DVec3::Z, &target, &blockers);
+        let seen = Eye::default().look(eye, DVec3::Z, &target, DVec3::NEG_Z, &blockers);
         // Rims of the shadows, below 10 long, pass through squares of side 1/200 and kernel below
         // 0.08: if all were off by half a square the same way, 0.002; they are not.
         assert!((seen.visible - sum).abs() < 5e-4, "{} {sum}", seen.visible);
