@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::Estimate;
 use super::creases::{Crease, most_even};
+use super::exchange::unblocked;
 use super::shaft::{Blocker, Shaft, covers};
 use super::visible::Eye;
 
@@ -90,6 +91,11 @@ impl Cell {
         if blockers.iter().any(|b| covers(b, &corners, &pair.target)) {
             return cell;
         }
+        if blockers.is_empty() {
+            let flux = unblocked(&corners, pair.normal, &pair.target, pair.target_normal);
+            (cell.flux, cell.cautious, cell.likely) = (flux.value, flux.error, flux.error);
+            return cell;
+        }
         cell.blockers = blockers;
         let [a, b, c] = corners;
         let area = 0.5 * (b - a).cross(c - a).length();
@@ -112,12 +118,10 @@ impl Cell {
         let [visible, whole] = [0, 1].map(|k| five[k] - two[k]);
         cell.flux = five[0];
         cell.cautious = visible.abs();
-        if !cell.blockers.is_empty() {
-            let crossed = most_even(&pair.creases, &corners).map_or(0.0, |(even, _)| even);
-            let margin = cell.margin(pair, five, eye);
-            let doubt = DOUBT * five[1] * crossed.max(area / pair.area) + MARGIN * area * margin;
-            cell.cautious += (whole - visible).abs() + doubt;
-        }
+        let crossed = most_even(&pair.creases, &corners).map_or(0.0, |(even, _)| even);
+        let margin = cell.margin(pair, five, eye);
+        let doubt = DOUBT * five[1] * crossed.max(area / pair.area) + MARGIN * area * margin;
+        cell.cautious += (whole - visible).abs() + doubt;
         cell.likely = cell.cautious;
         cell
     }

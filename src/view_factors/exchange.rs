@@ -86,7 +86,8 @@ fn length(polygon: &[DVec3]) -> f64 {
     polygon.iter().map(|p| p.distance(polygon[0])).fold(0.0, f64::max)
 }
 
-fn unblocked(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Estimate {
+/// Flux between two pieces with nothing between, all before one another.
+pub(super) fn unblocked(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Estimate {
     if let Some(value) = far_exchange(a, a_normal, b, b_normal) {
         return Estimate { value, error: FAR_ERROR * value };
     }
