@@ -182,6 +182,14 @@ fn judge(m: &ViewFactors) {
     } else {
         println!("bounds: kept");
     }
+    if let Some(&worst) = m.overfull().first() {
+        eprintln!(
+            "warning: more than all of {}'s flux arrives, {:.3e} too much: are two surfaces in one \
+             place?",
+            name(worst),
+            -m.open[worst].value
+        );
+    }
     let leaks = m.leaks();
     if let Some(&worst) = leaks.first() {
         eprintln!(

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use common::{cube, quads};
 use glam::DVec3;
+use radiosity::form_factor::analytic::polygon_to_polygon;
 use radiosity::{
     Absent, ErrorKind, Factor, Go, Material, Mesh, RayCast, Scene, ViewFactors, load_obj,
     write_matrix_market, write_view_factor_list,
@@ -337,6 +338,43 @@ fn a_leak_is_found_and_named() {
     let leaky = exact(&scene, 1e-4);
     assert_eq!(leaky.leaks().len(), 6);
     assert!(leaky.open[leaky.leaks()[0]].value > 1e-4);
+}
+
+#[test]
+fn a_poster_in_the_plane_of_its_wall_is_found() {
+    let poster = [[0.3, 0.3, 0.], [0.7, 0.3, 0.], [0.7, 0.7, 0.], [0.3, 0.7, 0.]];
+    let room = cube(&GREY());
+    let mut walls: Vec<([[f64; 3]; 4], Material)> = (0..6)
+        .map(|k| ([0, 1, 2, 3].map(|c| room.positions()[4 * k + c].to_array()), GREY()))
+        .collect();
+    walls.push((poster, GREY()));
+    let twice = exact(&quads(&walls), 1e-4);
+    // The ceiling sees the poster's part of the floor a second time.
+    assert_eq!(twice.overfull().first(), Some(&5));
+    assert!(twice.checks().closure.worst > 0.03);
+    assert!(exact(&room, 1e-4).overfull().is_empty());
+    // Lifted off the wall by a millionth, it hides what is behind it.
+    walls[6].0.iter_mut().for_each(|p| p[2] = 1e-6);
+    let lifted = exact(&quads(&walls), 1e-4);
+    assert!(lifted.overfull().is_empty() && lifted.checks().closure.worst < 1e-5);
+    assert!((lifted.back[4].value - 0.16).abs() < 1e-5, "{:?}", lifted.back[4]);
+}
+
+#[test]
+fn a_long_floor_and_a_narrow_face_that_sees_a_spot_of_it() {
+    // All that a small face gets of a floor five hundred times as long comes from next to it; a wall
+    // stands between by rounding alone, so that the closed form is right all the same.
+    let scene = load_obj(data("long_room.obj")).unwrap();
+    let m = exact(&scene, 1e-4);
+    let quad = |name: &str| {
+        let first = |t: &&radiosity::Triangle| t.group as usize == index(&m, name);
+        let all: Vec<_> = scene.triangles().iter().filter(first).collect();
+        let [a, b, c] = all[0].corners;
+        [a, b, c, all[1].corners[2]].map(|k| scene.positions()[k as usize])
+    };
+    let want = polygon_to_polygon(&quad("bx1"), &quad("wz0"));
+    let got = m.factor(index(&m, "bx1"), index(&m, "wz0"));
+    assert!((got.value - want).abs() < 2e-6, "{got:?} for {want}");
 }
 
 #[test]

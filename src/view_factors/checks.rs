@@ -84,6 +84,16 @@ impl ViewFactors {
         leaks
     }
 
+    /// The groups whose flux arrives more than once, beyond three standard errors: something they see
+    /// is there twice, such as a poster in the plane of its wall. The worst come first.
+    pub fn overfull(&self) -> Vec<usize> {
+        let excess = |i: usize| -self.open[i].value;
+        let over = |i: &usize| excess(*i) > SURE.0 * self.open[*i].error + SURE.1;
+        let mut overfull: Vec<usize> = (0..self.open.len()).filter(over).collect();
+        overfull.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
+        overfull
+    }
+
     pub(super) fn is_closed(&self, i: usize) -> bool {
         self.open[i].value <= SURE.0 * self.open[i].error + SURE.1
     }
