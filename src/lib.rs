@@ -52,6 +52,7 @@
 mod camera;
 mod error;
 pub mod form_factor;
+mod gather;
 mod gpu;
 pub mod hemicube;
 mod io;
@@ -69,6 +70,8 @@ pub use form_factor::near::NearRepair;
 pub use form_factor::ray_cast::RayCast;
 pub use form_factor::viewpoints::Viewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
+pub use gather::rays::RayGather;
+pub use gather::{Gather, Gathered, Place, Sources};
 pub use gpu::{Adapter, Gpu, Hemicubes, StageSeconds};
 pub use io::{
     Report, Seconds, load_obj, write_exr, write_matrix_market, write_ply, write_png,

@@ -146,6 +146,10 @@ impl Mesh {
         &self.scene
     }
 
+    pub(crate) fn shared_scene(&self) -> Arc<Scene> {
+        self.scene.clone()
+    }
+
     /// How many elements there are.
     pub fn element_count(&self) -> usize {
         self.elements.len()

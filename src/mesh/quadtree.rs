@@ -69,6 +69,15 @@ impl Cell {
         }
     }
 
+    /// Barycentric position in this cell (weights of its second and third corner) of (u, v) in the
+    /// triangle.
+    pub fn local(self, u: f64, v: f64) -> [f64; 2] {
+        let side = f64::from(1u32 << self.level);
+        let [[i, j], ..] = self.lattice_corners();
+        let (u, v) = (u * side - f64::from(i), v * side - f64::from(j));
+        if self.flipped { [-u, -v] } else { [u, v] }
+    }
+
     /// The cell of `level` at barycentric (u, v); positions outside are brought inside.
     pub fn at(level: u32, u: f64, v: f64) -> Cell {
         let side = 1u32 << level;

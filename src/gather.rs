@@ -1,0 +1,68 @@
+//! The contract between whoever gathers the settled light at places and whoever uses it.
+
+pub(crate) mod lights;
+pub(crate) mod rays;
+
+use glam::DVec3;
+
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+/// A place on a surface at which light is gathered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Where, in the scene's unit: a little above the surface, so that nothing hides it.
+    pub position: DVec3,
+    /// Unit normal; what is above its plane is seen.
+    pub normal: DVec3,
+    /// Nothing nearer than this is seen, scene unit.
+    pub near: f64,
+}
+
+/// What arrives at a [`Place`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gathered {
+    /// Irradiance, W/m² per channel: Σ F_pj B_j over all that is seen.
+    pub irradiance: Rgb,
+    /// The part of it that comes straight from lights which were looked at one by one.
+    pub direct: Rgb,
+    /// Share of the hemisphere's form factor in which nothing is seen.
+    pub open: f64,
+    /// Share in which backs of surfaces are seen.
+    pub back: f64,
+    /// Mean of 1/distance over the hemisphere, weighted by form factor; what is open counts 0.
+    pub nearness: f64,
+}
+
+/// The settled light: what every point of the scene's fronts reflects, interpolated linearly from
+/// the corners of the elements. What they emit is known from their materials.
+#[derive(Clone, Copy, Debug)]
+pub struct Sources<'a> {
+    /// The scene, cut into elements.
+    pub mesh: &'a Mesh,
+    /// Per element, where its three corners' values are in `reflected`.
+    pub corners: &'a [[u32; 3]],
+    /// Reflected radiosity B − E, W/m² per channel.
+    pub reflected: &'a [Rgb],
+}
+
+/// Someone who gathers: hemicubes on a GPU, rays on the CPU.
+pub trait Gather {
+    /// What arrives at each of `places`, in their order.
+    ///
+    /// # Errors
+    /// Whatever keeps the gatherer from it, [`crate::ErrorKind::Device`] above all.
+    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error>;
+}
+
+impl Sources<'_> {
+    /// Reflected radiosity at barycentric position (`u`, `v`) of triangle `t`.
+    pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
+        let element = self.mesh.element_at(t, u, v);
+        let cell = self.mesh.cell(self.mesh.element(element));
+        let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);
+        let [u, v] = cell.local(u, v);
+        a * (1.0 - u - v) + b * u + c * v
+    }
+}
