@@ -7,6 +7,7 @@
 mod quadtree;
 mod smooth;
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -93,10 +94,11 @@ impl Mesh {
                 ),
             ));
         }
-        Ok(Mesh::with_depths(scene, depths))
+        Ok(Mesh::grown(scene, |t, cell| cell.level < depths[t]))
     }
 
-    fn with_depths(scene: Arc<Scene>, depths: Vec<u32>) -> Mesh {
+    /// Every triangle split wherever `deeper` says so of a triangle and a cell of it.
+    fn grown(scene: Arc<Scene>, deeper: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
         let normals = (0..count).map(|t| scene.normal(t)).collect();
         let areas = (0..count).map(|t| scene.area(t)).collect();
@@ -112,19 +114,39 @@ impl Mesh {
             };
             mesh.nodes.push(root);
         }
-        for (t, &depth) in depths.iter().enumerate() {
-            mesh.grow(t, depth);
-        }
-        mesh.depths = depths;
+        mesh.depths = vec![0; count];
+        (0..count).for_each(|t| mesh.grow(t, &deeper));
         mesh
     }
 
-    /// Builds the subtree of node `n` down to `depth` and numbers its elements.
-    fn grow(&mut self, n: usize, depth: u32) {
+    /// The same scene with each of `elements` split into four more.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when one of them is [`MAX_DEPTH`] levels deep, or when there would be
+    /// more than [`MAX_ELEMENTS`].
+    pub fn split(&self, elements: &[usize]) -> Result<Mesh, Error> {
+        let wanted = self.element_count() + 3 * elements.len();
+        let deep = |&&e: &&usize| self.cell(self.element(e)).level >= MAX_DEPTH;
+        if wanted > MAX_ELEMENTS || elements.iter().any(|e| deep(&e)) {
+            let found = format!("{wanted} elements, or one with {MAX_DEPTH} levels above it");
+            let remedy = format!("at most {MAX_ELEMENTS} elements and {MAX_DEPTH} splits");
+            return Err(Error::new(ErrorKind::Setting, "mesh to be split", found, remedy));
+        }
+        let inner = |n: &&Node| n.children != LEAF;
+        let split = elements.iter().map(|&e| self.node(self.element(e)));
+        let inner = self.nodes.iter().filter(inner).chain(split);
+        let inner: HashSet<(u32, Cell)> = inner.map(|n| (n.triangle, n.cell)).collect();
+        Ok(Mesh::grown(self.scene.clone(), |t, cell| inner.contains(&(t as u32, cell))))
+    }
+
+    /// Builds the subtree of node `n` as far as `deeper` says, and numbers its elements.
+    fn grow(&mut self, n: usize, deeper: &impl Fn(usize, Cell) -> bool) {
         let Node { triangle, cell, .. } = self.nodes[n];
         let first_element = self.elements.len() as u32;
         self.nodes[n].first_element = first_element;
-        if cell.level == depth {
+        if !deeper(triangle as usize, cell) {
+            let depth = &mut self.depths[triangle as usize];
+            *depth = cell.level.max(*depth);
             self.elements.push(NodeId(n as u32));
         } else {
             let children = self.nodes.len();
@@ -135,7 +157,7 @@ impl Mesh {
                 self.nodes.push(node);
             }
             for k in children..children + 4 {
-                self.grow(k, depth);
+                self.grow(k, deeper);
             }
         }
         self.nodes[n].element_count = self.elements.len() as u32 - first_element;

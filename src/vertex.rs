@@ -2,13 +2,13 @@
 
 mod boundary;
 mod meeting;
-
-use std::collections::HashMap;
+pub(crate) mod vertices;
 
 use glam::DVec3;
 
-use crate::mesh::{Cell, Mesh, Side, Smooth};
+use crate::mesh::{Mesh, Smooth};
 use crate::scene::Rgb;
+use vertices::{Rims, Vertices};
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
@@ -30,17 +30,6 @@ pub struct VertexRadiosity {
     pub elements: Vec<u32>,
 }
 
-/// Steps along a triangle's side on the lattice that all depths share.
-const FINEST: u32 = 1 << crate::mesh::MAX_DEPTH;
-
-/// What makes a vertex: the same key, the same vertex.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Key {
-    Corner(u32),
-    Side { id: u32, step: u32 },
-    Inside { triangle: u32, i: u32, j: u32 },
-}
-
 impl VertexRadiosity {
     /// Radiosity at the vertices of `mesh` from that of its elements, one value an element.
     ///
@@ -51,7 +40,7 @@ impl VertexRadiosity {
     /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
     /// No value is let below zero.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
-        let Builder { positions, rims, .. } = Builder::build(mesh);
+        let Vertices { positions, rims, .. } = Vertices::new(mesh, &Smooth::new(mesh.scene()));
         let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
         let mut around = vec![0.0; positions.len()];
         rims.iter().for_each(|(e, rim)| rim.iter().for_each(|&v| around[v as usize] += areas[e]));
@@ -120,107 +109,10 @@ impl VertexRadiosity {
     }
 }
 
-/// The vertices around each element: its corners, and what finer neighbours put between them.
-#[derive(Default)]
-struct Rims {
-    ends: Vec<usize>,
-    vertices: Vec<u32>,
-}
-
-impl Rims {
-    fn of(&self, e: usize) -> &[u32] {
-        let start = if e == 0 { 0 } else { self.ends[e - 1] };
-        &self.vertices[start..self.ends[e]]
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
-        (0..self.ends.len()).map(|e| (e, self.of(e)))
-    }
-}
-
-/// Finds vertices: places on lattices that are the same place, on one smooth surface.
-struct Builder<'m> {
-    mesh: &'m Mesh,
-    smooth: Smooth,
-    vertices: HashMap<Key, u32>,
-    positions: Vec<DVec3>,
-    rims: Rims,
-}
-
-impl<'m> Builder<'m> {
-    fn build(mesh: &'m Mesh) -> Builder<'m> {
-        let smooth = Smooth::new(mesh.scene());
-        let (vertices, positions, rims) = Default::default();
-        let mut builder = Builder { mesh, smooth, vertices, positions, rims };
-        (0..mesh.element_count()).for_each(|e| builder.add_corners(e));
-        (0..mesh.element_count()).for_each(|e| builder.add_rim(e));
-        builder
-    }
-
-    fn add_corners(&mut self, e: usize) {
-        let node = self.mesh.element(e);
-        let corners = self.mesh.corners(node);
-        for (point, position) in self.lattice(e).into_iter().zip(corners) {
-            let key = self.key(self.mesh.triangle(node), point);
-            self.vertices.entry(key).or_insert_with(|| {
-                self.positions.push(position);
-                self.positions.len() as u32 - 1
-            });
-        }
-    }
-
-    fn add_rim(&mut self, e: usize) {
-        let triangle = self.mesh.triangle(self.mesh.element(e));
-        let corners = self.lattice(e);
-        let mut rim = std::mem::take(&mut self.rims.vertices);
-        for k in 0..3 {
-            rim.extend(self.vertices.get(&self.key(triangle, corners[k])));
-            self.add_between(triangle, corners[k], corners[(k + 1) % 3], &mut rim);
-        }
-        self.rims.ends.push(rim.len());
-        self.rims.vertices = rim;
-    }
-
-    /// Vertices strictly between lattice points `a` and `b`, in order: midpoints of midpoints, for
-    /// as long as there are any.
-    fn add_between(&self, triangle: usize, a: [u32; 2], b: [u32; 2], rim: &mut Vec<u32>) {
-        if a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1])) < 2 {
-            return;
-        }
-        let middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
-        if let Some(&vertex) = self.vertices.get(&self.key(triangle, middle)) {
-            self.add_between(triangle, a, middle, rim);
-            rim.push(vertex);
-            self.add_between(triangle, middle, b, rim);
-        }
-    }
-
-    /// Corners of element `e` on the finest lattice of its triangle.
-    fn lattice(&self, e: usize) -> [[u32; 2]; 3] {
-        let cell: Cell = self.mesh.cell(self.mesh.element(e));
-        cell.lattice_corners().map(|c| c.map(|k| k * (FINEST >> cell.level)))
-    }
-
-    fn key(&self, triangle: usize, [i, j]: [u32; 2]) -> Key {
-        let corner = |k: usize| Key::Corner(self.smooth.corners[triangle][k]);
-        let side = |k: usize, step: u32| {
-            let Side { id, reversed } = self.smooth.sides[triangle][k];
-            Key::Side { id, step: if reversed { FINEST - step } else { step } }
-        };
-        match (i, j) {
-            (0, 0) => corner(0),
-            (FINEST, 0) => corner(1),
-            (0, FINEST) => corner(2),
-            (i, 0) => side(0, i),
-            (i, j) if i + j == FINEST => side(1, j),
-            (0, j) => side(2, FINEST - j),
-            (i, j) => Key::Inside { triangle: triangle as u32, i, j },
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::HashMap;
+
     use super::*;
     use crate::scene::{Material, Scene, Triangle};
 

@@ -116,8 +116,9 @@ fn exchanges(mesh: &Mesh, ends: &[End], k: usize, others: &[usize], shot: &[Rgb]
 #[cfg(test)]
 mod tests {
     use super::super::boundary::{ends, extrapolate};
-    use super::super::{Builder, Rims};
+    use super::super::{Rims, Vertices};
     use super::*;
+    use crate::mesh::Smooth;
     use crate::scene::{Material, Scene, Triangle};
 
     const SIDE: f64 = 1.0 / 16.0;
@@ -161,7 +162,7 @@ mod tests {
 
     /// The floor's value at the middle of the edge: as the plain fit has it, and mended.
     fn at_the_edge(mesh: &Mesh, values: &[Rgb]) -> [f64; 2] {
-        let Builder { positions, rims, .. } = Builder::build(mesh);
+        let Vertices { positions, rims, .. } = Vertices::new(mesh, &Smooth::new(mesh.scene()));
         let on_floor = first_at(&positions, DVec3::new(0.0, 1.0, 0.0));
         let normals: Vec<DVec3> = normals(mesh, &rims, positions.len());
         let value = |values: &[Rgb]| {
@@ -225,7 +226,7 @@ mod tests {
     #[test]
     fn no_end_sees_more_than_everything() {
         let mesh = corner(0.8);
-        let Builder { positions, rims, .. } = Builder::build(&mesh);
+        let Vertices { positions, rims, .. } = Vertices::new(&mesh, &Smooth::new(mesh.scene()));
         let ends = ends(&mesh, &rims, &positions, &normals(&mesh, &rims, positions.len()));
         let middle = |p: &End| p.position.distance(DVec3::Y) < 1e-9;
         let [k, other] =
@@ -243,7 +244,7 @@ mod tests {
     fn the_bright_foot_of_a_wall_brings_nothing_below_zero() {
         let mesh = corner(0.8);
         let values = lit(&mesh, &|p| if p.z < SIDE { 0.0 } else { 1e6 });
-        let Builder { positions, rims, .. } = Builder::build(&mesh);
+        let Vertices { positions, rims, .. } = Vertices::new(&mesh, &Smooth::new(mesh.scene()));
         let normals = normals(&mesh, &rims, positions.len());
         let mut out = vec![Rgb::ZERO; positions.len()];
         extrapolate(&mesh, &rims, &positions, &normals, &values, &mut out);
