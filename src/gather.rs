@@ -1,5 +1,6 @@
 //! The contract between whoever gathers the settled light at places and whoever uses it.
 
+pub(crate) mod light_view;
 pub(crate) mod lights;
 pub(crate) mod rays;
 

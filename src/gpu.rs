@@ -1,12 +1,21 @@
-//! The one room that knows wgpu: device, item buffer, reduction; hemicubes come out as rows.
+//! The one room that knows wgpu: device, item buffer, reduction; hemicubes come out as
+//! rows, or as the light that they gather.
 
 mod cells;
 mod chunks;
 mod device;
+mod gather;
 mod hemicubes;
 mod item_buffer;
+mod layers;
 mod layout;
+mod radiance;
+mod readback;
 mod reduce;
+mod sources;
+mod sum;
 
 pub use device::{Adapter, Gpu};
-pub use hemicubes::{Hemicubes, StageSeconds};
+pub use gather::HemicubeGather;
+pub use hemicubes::Hemicubes;
+pub use readback::StageSeconds;

@@ -172,6 +172,11 @@ impl Mesh {
         self.scene.clone()
     }
 
+    /// How many nodes all quadtrees have.
+    pub(crate) fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// How many elements there are.
     pub fn element_count(&self) -> usize {
         self.elements.len()

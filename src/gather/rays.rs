@@ -128,7 +128,7 @@ fn radical_inverse(k: u32) -> f64 {
 }
 
 /// A turn in [0, 1) that differs from place to place: a hash of where it is.
-fn turn(p: DVec3) -> f64 {
+pub(crate) fn turn(p: DVec3) -> f64 {
     let mix = |h: u64, x: f64| {
         // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
         let mut z = (h ^ x.to_bits()).wrapping_add(0x9e37_79b9_7f4a_7c15);

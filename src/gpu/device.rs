@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
+use wgpu::util::DeviceExt;
+
 use crate::error::{Error, ErrorKind};
 
 /// What is known of a graphics adapter.
@@ -124,6 +126,21 @@ impl Gpu {
         let place = format!("graphics adapter '{}'", self.adapter.name);
         let remedy = "try a smaller hemicube or fewer elements, another adapter, or the CPU";
         Error::new(ErrorKind::Device, place, found, remedy)
+    }
+
+    /// A buffer that shaders read as an array.
+    pub(super) fn storage(&self, label: &str, contents: &[u8]) -> wgpu::Buffer {
+        self.buffer(label, contents, wgpu::BufferUsages::STORAGE)
+    }
+
+    /// A buffer that shaders read as one value.
+    pub(super) fn uniform(&self, label: &str, contents: &[u8]) -> wgpu::Buffer {
+        self.buffer(label, contents, wgpu::BufferUsages::UNIFORM)
+    }
+
+    fn buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let label = Some(label);
+        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
     }
 
     pub(super) fn timestamps(&self) -> bool {

@@ -12,6 +12,7 @@ use super::chunks::Chunks;
 use super::device::Gpu;
 use super::item_buffer::{ItemBuffer, View};
 use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
+use super::readback::{Readback, StageSeconds};
 use super::reduce::Reduce;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row};
@@ -30,35 +31,13 @@ pub struct Hemicubes {
     chunks: Chunks,
     item_buffer: ItemBuffer,
     reduce: Reduce,
-    staging: wgpu::Buffer,
-    clock: Option<Clock>,
+    readback: Readback,
     origin: DVec3,
     slots: u32,
     batch: u32,
     rotations: NonZeroU32,
     seconds: StageSeconds,
     drawn: u64,
-}
-
-/// Time spent in the stages of making rows, in seconds.
-///
-/// Draw and reduce are the device's own timestamps where it has them; else all is in `readback`,
-/// which is the rest of the time from submission to finished rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageSeconds {
-    /// Rendering item buffers.
-    pub draw: f64,
-    /// Adding up pixel weights, the copy of the item buffers to plain memory included.
-    pub reduce: f64,
-    /// Recording, waiting, copying and making rows sparse.
-    pub readback: f64,
-}
-
-#[derive(Debug)]
-struct Clock {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    seconds_per_tick: f64,
 }
 
 /// Item buffers of a batch take at most this many bytes, if more than one.
@@ -112,21 +91,14 @@ impl Hemicubes {
         let item_buffer =
             ItemBuffer::new(gpu, mesh, &cells, &chunks.order, origin, resolution, batch);
         let reduce = Reduce::new(gpu, &cells, resolution, slots, batch)?;
-        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: reduce.rows.size().next_multiple_of(8) + Clock::BYTES,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let clock = gpu.timestamps().then(|| Clock::new(gpu));
+        let readback = Readback::new(gpu, reduce.rows.size());
         gpu.check()?;
         Ok(Hemicubes {
             gpu: gpu.clone(),
             chunks,
             item_buffer,
             reduce,
-            staging,
-            clock,
+            readback,
             origin,
             slots,
             batch,
@@ -186,37 +158,16 @@ impl Hemicubes {
             patches.iter().flat_map(|&(p, turn)| self.views(mesh, p, turn)).collect();
         let count = patches.len() as u32;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let clock = self.clock.as_ref();
-        self.item_buffer.draw(&self.gpu, &mut encoder, &views, clock.map(|c| &c.queries));
-        self.reduce.reduce(&mut encoder, &self.item_buffer, count, clock.map(|c| &c.queries));
-        let bytes = u64::from(count * self.slots) * 4;
-        encoder.copy_buffer_to_buffer(&self.reduce.rows, 0, &self.staging, 0, bytes);
-        let times = bytes.next_multiple_of(8);
-        if let Some(clock) = clock {
-            clock.resolve(&mut encoder, &self.staging, times);
-        }
-        self.gpu.queue.submit([encoder.finish()]);
-
-        let slice = self.staging.slice(..times + Clock::BYTES);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
-        let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
-        self.gpu.check()?;
-        waited.map_err(|e| self.gpu.failed(e.to_string()))?;
-        let mapped = receiver.try_recv();
-        if !matches!(mapped, Ok(Ok(()))) {
-            return Err(self.gpu.failed("rows could not be read back".into()));
-        }
-        let view = slice.get_mapped_range().map_err(|e| self.gpu.failed(e.to_string()))?;
-        let dense: &[u32] = bytemuck::cast_slice(&view[..bytes as usize]);
-        let rows = dense.chunks_exact(self.slots as usize).map(sparse).collect();
-        let (draw, reduce) = clock.map_or((0.0, 0.0), |c| c.read(&view[times as usize..]));
-        drop(view);
-        self.staging.unmap();
+        let queries = self.readback.queries();
+        self.item_buffer.draw(&self.gpu, &mut encoder, &views, queries);
+        self.reduce.reduce(&mut encoder, &self.item_buffer, count, queries);
+        let source = (&self.reduce.rows, u64::from(count * self.slots) * 4);
+        let time = (start, &mut self.seconds);
+        let rows = self.readback.finish(&self.gpu, encoder, source, time, |bytes| {
+            let dense: &[u32] = bytemuck::cast_slice(bytes);
+            dense.chunks_exact(self.slots as usize).map(sparse).collect()
+        })?;
         self.drawn += u64::from(count);
-        self.seconds.draw += draw;
-        self.seconds.reduce += reduce;
-        self.seconds.readback += (start.elapsed().as_secs_f64() - draw - reduce).max(0.0);
         Ok(rows)
     }
 }
@@ -267,39 +218,6 @@ fn sparse(dense: &[u32]) -> Row {
     Row { entries, open: dense[OPEN as usize], back: dense[BACK as usize] }
 }
 
-impl Clock {
-    /// Room for the three ticks in the staging buffer.
-    const BYTES: u64 = 24;
-
-    fn new(gpu: &Gpu) -> Clock {
-        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("clock"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 3,
-        });
-        let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("clock"),
-            size: Clock::BYTES,
-            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
-        Clock { queries, resolved, seconds_per_tick }
-    }
-
-    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
-        encoder.resolve_query_set(&self.queries, 0..3, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, to, offset, Clock::BYTES);
-    }
-
-    /// Seconds of draw, and from there to the end of reduce.
-    fn read(&self, bytes: &[u8]) -> (f64, f64) {
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes[..Clock::BYTES as usize]);
-        let span = |a: usize| ticks[a + 1].saturating_sub(ticks[a]) as f64 * self.seconds_per_tick;
-        (span(0), span(1))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -317,7 +235,7 @@ mod tests {
         });
         let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            h.item_buffer.items.as_image_copy(),
+            h.item_buffer.layers.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout {

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::gather::lights::APART;
+
 /// One face of one hemicube, as `item_buffer.wgsl` draws it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -33,6 +35,72 @@ pub struct Reduction {
     pub stride: u32,
 }
 
+/// One face of one hemicube, or the tile of a light, as `radiance.wgsl` draws it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RadianceView {
+    pub eye: [f32; 3],
+    pub near: f32,
+    pub right: [f32; 3],
+    pub bottom: f32,
+    pub up: [f32; 3],
+    pub light: u32,
+    pub forward: [f32; 3],
+    pub apart: u32,
+    pub lights: [u32; APART],
+}
+
+/// What a triangle emits, and where its quadtree starts.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RadianceTriangle {
+    pub exitance: [f32; 3],
+    pub light: u32,
+    pub root: u32,
+    pub padding: [u32; 3],
+}
+
+/// What `gather.wgsl` needs to know of a batch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Summation {
+    pub resolution: u32,
+    pub stride: u32,
+    pub lines: u32,
+    pub slots: u32,
+}
+
+/// Where the pixels of a light's tile look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Tile {
+    pub middle: [f32; 3],
+    pub scale: f32,
+    pub right: [f32; 3],
+    pub padding: u32,
+    pub up: [f32; 3],
+    pub padding_2: u32,
+}
+
+/// What a place receives, but for the exitance of the lights apart: form factors of what is seen of
+/// each, and of all of it as if nothing were in between.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Sums {
+    pub radiosity: [f32; 3],
+    pub open: f32,
+    pub back: f32,
+    pub nearness: f32,
+    pub padding: [f32; 2],
+    pub lights: [[f32; 2]; APART],
+}
+
+/// Pixels along an edge of a light's tile.
+pub const TILE: u32 = 32;
+
+/// A node with children: this plus the first of the four. A leaf holds its element.
+pub const INNER: u32 = 1 << 31;
+
 /// What a pixel shows: nothing, the back of a triangle, or from here on a cell of a front. Slots
 /// of a row start alike: open, back, then the elements.
 pub const OPEN: u32 = 0;
@@ -46,6 +114,8 @@ pub const WORKGROUP: u32 = 64;
 
 pub const ITEM_BUFFER_WGSL: &str = include_str!("../../shaders/item_buffer.wgsl");
 pub const REDUCE_WGSL: &str = include_str!("../../shaders/reduce.wgsl");
+pub const RADIANCE_WGSL: &str = include_str!("../../shaders/radiance.wgsl");
+pub const GATHER_WGSL: &str = include_str!("../../shaders/gather.wgsl");
 
 #[cfg(test)]
 mod tests {
@@ -109,6 +179,33 @@ mod tests {
             wgsl_layout(&reduce, "Reduction"),
             rust_layout!(Reduction { resolution, slots, stride })
         );
+        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(GATHER_WGSL));
+        assert_eq!(
+            wgsl_layout(&radiance, "RadianceView"),
+            rust_layout!(RadianceView {
+                eye,
+                near,
+                right,
+                bottom,
+                up,
+                light,
+                forward,
+                apart,
+                lights
+            })
+        );
+        assert_eq!(
+            wgsl_layout(&radiance, "RadianceTriangle"),
+            rust_layout!(RadianceTriangle { exitance, light, root, padding })
+        );
+        assert_eq!(
+            wgsl_layout(&gather, "Summation"),
+            rust_layout!(Summation { resolution, stride, lines, slots })
+        );
+        assert_eq!(
+            wgsl_layout(&gather, "Tile"),
+            rust_layout!(Tile { middle, scale, right, padding, up, padding_2 })
+        );
     }
 
     #[test]
@@ -125,6 +222,14 @@ mod tests {
         assert_eq!(constant(&item, "BACK"), BACK);
         assert_eq!(constant(&reduce, "STRIP"), STRIP);
         assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
+        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(GATHER_WGSL));
+        assert_eq!(constant(&radiance, "INNER"), INNER);
+        assert_eq!(constant(&radiance, "APART"), APART as u32);
+        assert_eq!(constant(&gather, "TILE"), TILE);
+        // The shader writes a place's numbers one after the other.
+        assert_eq!(constant(&gather, "WORDS") as usize * 4, size_of::<Sums>());
+        let (nearness, lights) = (offset_of!(Sums, nearness), offset_of!(Sums, lights));
+        assert_eq!((nearness, lights), (5 * 4, 8 * 4));
         // OPEN is the clear value of the item buffer: wgpu clears to zero.
         assert_eq!(OPEN, 0);
     }

@@ -1,7 +1,5 @@
 //! The compute pass: item buffers to dense rows in fixed point.
 
-use wgpu::util::DeviceExt;
-
 use super::cells::Cells;
 use super::device::Gpu;
 use super::item_buffer::ItemBuffer;
@@ -37,22 +35,12 @@ impl Reduce {
         batch: u32,
     ) -> Result<Self, Error> {
         let device = &gpu.device;
-        let buffer = |label, contents: &[u8], usage| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            })
-        };
         let weights = hemicube::weights(resolution)?;
-        let weights =
-            buffer("weights", bytemuck::cast_slice(&weights), wgpu::BufferUsages::STORAGE);
-        let slot_of =
-            buffer("slots", bytemuck::cast_slice(&cells.slots), wgpu::BufferUsages::STORAGE);
+        let weights = gpu.storage("weights", bytemuck::cast_slice(&weights));
+        let slot_of = gpu.storage("slots", bytemuck::cast_slice(&cells.slots));
         let stride = stride(resolution);
         let reduction = Reduction { resolution, slots, stride };
-        let reduction =
-            buffer("reduction", bytemuck::bytes_of(&reduction), wgpu::BufferUsages::UNIFORM);
+        let reduction = gpu.uniform("reduction", bytemuck::bytes_of(&reduction));
         let rows = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("rows"),
             size: u64::from(batch) * u64::from(slots) * 4,
@@ -109,18 +97,7 @@ impl Reduce {
     ) {
         let n = self.resolution;
         encoder.clear_buffer(&self.rows, 0, None);
-        encoder.copy_texture_to_buffer(
-            source.items.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &self.items,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(stride(n) * 4),
-                    rows_per_image: Some(3 * n),
-                },
-            },
-            wgpu::Extent3d { width: n, height: 3 * n, depth_or_array_layers: count },
-        );
+        source.layers.copy(encoder, &self.items, stride(n) * 4, count);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),
             timestamp_writes: queries.map(|query_set| wgpu::ComputePassTimestampWrites {

@@ -1,0 +1,111 @@
+// Draws the scene's own triangles as they shine: over one face of a hemicube, or over a tile that
+// fits a light which is looked at apart. The element that a pixel sees is found by descending the
+// triangle's quadtree.
+
+const INNER: u32 = 0x80000000u;
+const APART: u32 = 8u;
+
+struct RadianceView {
+    eye: vec3f,           // the place, scene unit from the local origin
+    near: f32,            // near plane, scene unit
+    right: vec3f,         // dot products with these three are clip x, y and w
+    bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
+    up: vec3f,
+    light: u32,           // the light that a tile looks for
+    forward: vec3f,
+    apart: u32,           // how many lights shine apart
+    lights: array<u32, APART>,   // and which: their exitance is not counted here
+}
+
+struct RadianceTriangle {
+    exitance: vec3f,      // W/m² per channel
+    light: u32,           // the light that it belongs to, if any
+    root: u32,            // its node
+    padding: array<u32, 3>,
+}
+
+@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+@group(0) @binding(1) var<storage, read> triangles: array<RadianceTriangle>;
+@group(0) @binding(2) var<storage, read> views: array<RadianceView>;
+@group(0) @binding(3) var<storage, read> nodes: array<u32>;   // INNER + first of four children, or an element
+@group(0) @binding(4) var<storage, read> elements: array<vec4f>;   // reflected radiosity at three corners each, W/m²
+
+struct Varying {
+    @builtin(position) position: vec4f,
+    @location(0) barycentric: vec2f,   // weights of the second and third corner
+    @location(1) @interpolate(flat) exitance: vec3f,
+    @location(2) @interpolate(flat) root: u32,
+    @location(3) @interpolate(flat) sought: f32,   // 1 on the light that the view looks for
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index: u32) -> Varying {
+    let triangle = triangles[index / 3u];
+    let corner = index % 3u;
+    let d = corners[index].xyz - views[view_index].eye;
+    let x = dot(d, views[view_index].right);
+    let y = dot(d, views[view_index].up);
+    let w = dot(d, views[view_index].forward);
+    // Lines from `bottom` to 1 fill the viewport; depth near/w is reversed, its far end infinite.
+    let bottom = views[view_index].bottom;
+    let height = (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom);
+    var out: Varying;
+    out.position = vec4f(x, height, views[view_index].near, w);
+    out.barycentric = vec2f(f32(corner == 1u), f32(corner == 2u));
+    out.exitance = triangle.exitance;
+    for (var k = 0u; k < views[view_index].apart; k++) {
+        if views[view_index].lights[k] == triangle.light {
+            out.exitance = vec3f(0.0);
+        }
+    }
+    out.root = triangle.root;
+    out.sought = f32(triangle.light == views[view_index].light);
+    return out;
+}
+
+// Reflected radiosity of the element at a barycentric position, linear between its corners.
+fn reflected(root: u32, barycentric: vec2f) -> vec3f {
+    // The middle of a pixel is in the triangle but for the rounding of its corners.
+    let inside = max(barycentric, vec2f(0.0));
+    var p = inside / max(inside.x + inside.y, 1.0);
+    var node = nodes[root];
+    // What lies out of the arrays reads as 0, an element: the descent ends.
+    while (node & INNER) != 0u {
+        node &= ~INNER;
+        if p.x > 0.5 {
+            node += 1u;
+            p = vec2f(2.0 * p.x - 1.0, 2.0 * p.y);
+        } else if p.y > 0.5 {
+            node += 2u;
+            p = vec2f(2.0 * p.x, 2.0 * p.y - 1.0);
+        } else if p.x + p.y > 0.5 {
+            node += 3u;
+            p = 1.0 - 2.0 * p;
+        } else {
+            p = 2.0 * p;
+        }
+        node = nodes[node];
+    }
+    let element = 3u * node;
+    let a = elements[element].rgb;
+    let b = elements[element + 1u].rgb;
+    let c = elements[element + 2u].rgb;
+    return a + (b - a) * p.x + (c - a) * p.y;
+}
+
+// Radiosity, and the reciprocal of the depth along the face's axis: negative for a back, whose
+// light is not seen. The clear value 0 is for nothing.
+@fragment
+fn radiance(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    if !front {
+        return vec4f(0.0, 0.0, 0.0, -in.position.w);
+    }
+    return vec4f(reflected(in.root, in.barycentric) + in.exitance, in.position.w);
+}
+
+// Whether the light that a tile looks for is seen: red where all is drawn, alpha where the light
+// is drawn alone. Each is masked out where the other is drawn.
+@fragment
+fn sought(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    return vec4f(select(0.0, in.sought, front));
+}

@@ -1,0 +1,248 @@
+//! Gathering with hemicubes: batches drawn, added up and read back.
+
+use std::f64::consts::FRAC_PI_2;
+use std::time::Instant;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::chunks::Chunks;
+use super::device::Gpu;
+use super::layout::{RadianceTriangle, RadianceView, Sums, TILE, Tile};
+use super::radiance::{Radiance, View, image_size};
+use super::readback::{Readback, StageSeconds};
+use super::sources::SourceBuffers;
+use super::sum::Sum;
+use crate::error::{Error, ErrorKind};
+use crate::gather::light_view::LightView;
+use crate::gather::lights::{APART, Lights, NO_LIGHT};
+use crate::gather::rays::turn;
+use crate::gather::{Gather, Gathered, Place, Sources};
+use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
+use crate::mesh::Mesh;
+use crate::scene::{Rgb, Scene};
+
+/// Gathers with hemicubes (Cohen and Greenberg 1985) on a graphics device, one a place.
+///
+/// A pixel sees a point of the scene and takes the radiosity there times its exact form factor.
+/// Lights get an image of their own, that they fill: what comes straight from one is its closed
+/// form times the share of that image in which nothing hides it.
+#[derive(Debug)]
+pub struct HemicubeGather {
+    gpu: Gpu,
+    chunks: Chunks,
+    lights: Lights,
+    radiance: Radiance,
+    sum: Sum,
+    readback: Readback,
+    origin: DVec3,
+    triangles: usize,
+    slots: u32,
+    batch: u32,
+    seconds: StageSeconds,
+    drawn: u64,
+}
+
+/// What one place looks at: views to draw, and the lights apart with their form factors as if
+/// nothing were in between.
+struct Look {
+    views: Vec<View>,
+    tiles: Vec<Tile>,
+    apart: Vec<(u32, f64)>,
+}
+
+/// Images of a batch take at most this many bytes, if more than one.
+const BATCH_BYTES: u64 = 64 << 20;
+
+/// Places in a batch at most.
+const MAX_BATCH: u32 = 64;
+
+impl HemicubeGather {
+    /// Hemicubes with a top face of `resolution` × `resolution` pixels in the scene of `mesh`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a
+    /// scene that does not fit the device; [`ErrorKind::Device`] when the device fails.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeGather, Error> {
+        hemicube::check_resolution(resolution)?;
+        let scene = mesh.scene();
+        let lights = Lights::new(mesh.shared_scene());
+        let slots = lights.lights.len().min(APART) as u32;
+        let batch = batch(gpu, scene, resolution, slots)?;
+        let (low, high) = scene.bounds();
+        let origin = low + (high - low) / 2.0;
+        let chunks = Chunks::new(scene);
+        let order = (&chunks.order[..], origin);
+        let radiance = Radiance::new(gpu, scene, &lights, order, (resolution, slots, batch));
+        let sum = Sum::new(gpu, resolution, slots, batch)?;
+        let readback = Readback::new(gpu, sum.sums.size());
+        gpu.check()?;
+        Ok(HemicubeGather {
+            gpu: gpu.clone(),
+            chunks,
+            lights,
+            radiance,
+            sum,
+            readback,
+            origin,
+            triangles: scene.triangles().len(),
+            slots,
+            batch,
+            seconds: StageSeconds::default(),
+            drawn: 0,
+        })
+    }
+
+    /// Time spent so far.
+    pub fn seconds(&self) -> StageSeconds {
+        self.seconds
+    }
+
+    /// Hemicubes drawn so far.
+    pub fn drawn(&self) -> u64 {
+        self.drawn
+    }
+
+    fn look(&self, scene: &Scene, place: &Place) -> Look {
+        let mut apart = self.lights.apart(place);
+        let mut fits = vec![];
+        apart.retain(|&(light, _)| {
+            let triangles = self.lights.lights[light as usize].triangles.iter();
+            let view = LightView::new(place, triangles.map(|&t| scene.corners(t as usize)));
+            fits.extend(view);
+            view.is_some()
+        });
+        let frame = Frame::new(place.normal, turn(place.position) * FRAC_PI_2);
+        let mut lights = [NO_LIGHT; APART];
+        lights.iter_mut().zip(&apart).for_each(|(l, a)| *l = a.0);
+        let eye = (place.position - self.origin).as_vec3().to_array();
+        let view = |face: Face, light: u32| View {
+            view: RadianceView {
+                eye,
+                near: place.near as f32,
+                right: face.right.as_vec3().to_array(),
+                bottom: face.bottom as f32,
+                up: face.up.as_vec3().to_array(),
+                light,
+                forward: face.forward.as_vec3().to_array(),
+                apart: apart.len() as u32,
+                lights,
+            },
+            places: self.chunks.in_view(place.position, &face),
+        };
+        let faces = Face::all(&frame).into_iter().map(|face| view(face, NO_LIGHT));
+        let of_lights = fits.iter().zip(&apart).map(|(fit, a)| view(fit.face, a.0));
+        let views = faces.chain(of_lights).collect();
+        let mut tiles: Vec<Tile> = fits.iter().map(|fit| tile(fit, &frame)).collect();
+        tiles.resize(self.slots as usize, Tile::default());
+        Look { views, tiles, apart }
+    }
+
+    fn gathered(&self, sums: &Sums, look: &Look) -> Gathered {
+        let mut direct = Rgb::ZERO;
+        for (&(light, factor), &[seen, whole]) in look.apart.iter().zip(&sums.lights) {
+            let (light, seen) = (&self.lights.lights[light as usize], f64::from(seen));
+            direct += light.exitance
+                * match light.convex {
+                    true => factor * seen / f64::from(whole).max(f64::MIN_POSITIVE),
+                    false => seen,
+                };
+        }
+        let [r, g, b] = sums.radiosity.map(f64::from);
+        Gathered {
+            irradiance: Rgb::new(r, g, b) + direct,
+            direct,
+            open: sums.open.into(),
+            back: sums.back.into(),
+            nearness: sums.nearness.into(),
+        }
+    }
+
+    fn gather_batch(
+        &mut self,
+        scene: &Scene,
+        bindings: &wgpu::BindGroup,
+        places: &[Place],
+    ) -> Result<Vec<Gathered>, Error> {
+        let start = Instant::now();
+        let looks: Vec<Look> = places.par_iter().map(|p| self.look(scene, p)).collect();
+        let views: Vec<&[View]> = looks.iter().map(|l| &l.views[..]).collect();
+        let tiles: Vec<Tile> = looks.iter().flat_map(|l| &l.tiles).copied().collect();
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let queries = self.readback.queries();
+        self.radiance.draw(&self.gpu, &mut encoder, bindings, &views, queries);
+        let images = (&self.radiance.layers, places.len() as u32);
+        self.sum.sum(&self.gpu, &mut encoder, images, &tiles, queries);
+        let source = (&self.sum.sums, size_of::<Sums>() as u64 * places.len() as u64);
+        let mut seconds = self.seconds;
+        let time = (start, &mut seconds);
+        let gathered = self.readback.finish(&self.gpu, encoder, source, time, |bytes| {
+            let sums: &[Sums] = bytemuck::cast_slice(bytes);
+            sums.iter().zip(&looks).map(|(s, look)| self.gathered(s, look)).collect()
+        })?;
+        self.seconds = seconds;
+        self.drawn += places.len() as u64;
+        Ok(gathered)
+    }
+}
+
+impl Gather for HemicubeGather {
+    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
+        let buffers = SourceBuffers::new(&self.gpu, sources, self.triangles)?;
+        let bindings = self.radiance.bindings(&self.gpu, &buffers);
+        let mut gathered = Vec::with_capacity(places.len());
+        for batch in places.chunks(self.batch as usize) {
+            gathered.extend(self.gather_batch(sources.mesh.scene(), &bindings, batch)?);
+        }
+        Ok(gathered)
+    }
+}
+
+/// How many places fit a batch on this device, if it can do any.
+fn batch(gpu: &Gpu, scene: &Scene, resolution: u32, slots: u32) -> Result<u32, Error> {
+    let limits = gpu.device.limits();
+    let setting = |place: String, found: String, remedy: String| {
+        Err(Error::new(ErrorKind::Setting, place, found, remedy))
+    };
+    let texture = limits.max_texture_dimension_2d;
+    let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let fits =
+        |n: &u32| image_size(*n, slots)[1] <= texture && Sum::image_bytes(*n, slots) <= buffer;
+    if !fits(&resolution) {
+        let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
+        return setting(
+            format!("hemicube resolution {resolution}"),
+            format!("an image of {} lines", image_size(resolution, slots)[1]),
+            format!("this device allows resolutions up to {most}"),
+        );
+    }
+    // Lights are there twice; corners take 48 bytes a triangle.
+    let each = size_of::<RadianceTriangle>().max(48) as u64;
+    let triangles = scene.triangles().len() as u64;
+    if 2 * triangles * each > buffer {
+        let (found, most) = (format!("{triangles} triangles"), buffer / each / 2);
+        return setting("scene".into(), found, format!("this device holds {most}"));
+    }
+    let image = Sum::image_bytes(resolution, slots);
+    Ok(MAX_BATCH
+        .min((BATCH_BYTES / image).max(1) as u32)
+        .min(limits.max_texture_array_layers)
+        .min((buffer / image) as u32))
+}
+
+/// Where the pixels of a light's tile look, in the place's frame.
+fn tile(fit: &LightView, frame: &Frame) -> Tile {
+    let Frame { tangent, bitangent, normal } = *frame;
+    let local =
+        |d: DVec3| DVec3::new(d.dot(tangent), d.dot(bitangent), d.dot(normal)).as_vec3().to_array();
+    // All of the image spans twice its half axes each way.
+    let area = 4.0 * fit.right.cross(fit.up).dot(fit.face.forward).abs();
+    Tile {
+        middle: local(fit.middle),
+        scale: (area / f64::from(TILE * TILE)) as f32,
+        right: local(fit.right),
+        padding: 0,
+        up: local(fit.up),
+        padding_2: 0,
+    }
+}

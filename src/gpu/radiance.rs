@@ -1,0 +1,180 @@
+//! The render pass of a gather: what a batch of places sees, and tiles of the lights apart.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::device::Gpu;
+use super::layers::{Layers, Shown};
+use super::layout::{RADIANCE_WGSL, RadianceTriangle, RadianceView, TILE};
+use super::sources::SourceBuffers;
+use crate::gather::lights::Lights;
+use crate::hemicube::Face;
+use crate::scene::Scene;
+
+/// Images of a batch of places, and what it takes to draw them: the hemicube, then tiles below it.
+#[derive(Debug)]
+pub struct Radiance {
+    layout: wgpu::BindGroupLayout,
+    /// The faces of hemicubes, the scene in a tile, a light alone in a tile.
+    faces: wgpu::RenderPipeline,
+    seen: wgpu::RenderPipeline,
+    alone: wgpu::RenderPipeline,
+    corners: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+    views: wgpu::Buffer,
+    pub layers: Layers,
+    /// Where each light's triangles are drawn once more.
+    lights: Vec<Range<u32>>,
+    resolution: u32,
+}
+
+/// One face of a hemicube or one tile, and the places in the drawing order that it can see.
+#[derive(Debug)]
+pub struct View {
+    pub view: RadianceView,
+    pub places: Vec<Range<u32>>,
+}
+
+/// Width and height in pixels of a place's image: the hemicube, and below it so many tiles, line
+/// by line.
+pub fn image_size(resolution: u32, slots: u32) -> [u32; 2] {
+    let width = resolution.max(TILE);
+    [width, 3 * resolution + slots.div_ceil(width / TILE) * TILE]
+}
+
+impl Radiance {
+    /// For the triangles of `scene` in drawing order, relative to `origin`; images of `batch`
+    /// places with `slots` tiles each.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        lights: &Lights,
+        (order, origin): (&[u32], DVec3),
+        (resolution, slots, batch): (u32, u32, u32),
+    ) -> Radiance {
+        let mut drawn = order.to_vec();
+        let mut again = vec![];
+        for light in &lights.lights {
+            let start = drawn.len() as u32;
+            drawn.extend(&light.triangles);
+            again.push(start..drawn.len() as u32);
+        }
+        let corners = drawn.iter().flat_map(|&t| scene.corners(t as usize));
+        let corners: Vec<[f32; 4]> =
+            corners.map(|p| (p - origin).as_vec3().extend(1.0).to_array()).collect();
+        let triangle = |&t: &u32| RadianceTriangle {
+            exitance: scene.material(t as usize).exitance.as_vec3().to_array(),
+            light: lights.of_triangle[t as usize],
+            root: t,
+            padding: [0; 3],
+        };
+        let triangles: Vec<RadianceTriangle> = drawn.iter().map(triangle).collect();
+        let device = &gpu.device;
+        let views = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("views"),
+            size: u64::from(batch * (5 + slots)) * size_of::<RadianceView>() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("radiance.wgsl"),
+            source: wgpu::ShaderSource::Wgsl(RADIANCE_WGSL.into()),
+        });
+        let entry = |binding: u32| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: match binding {
+                0..3 => wgpu::ShaderStages::VERTEX,
+                _ => wgpu::ShaderStages::FRAGMENT,
+            },
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("radiance"),
+            entries: &[0, 1, 2, 3, 4].map(entry),
+        });
+        let pipelines = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("radiance"),
+            bind_group_layouts: &[Some(&layout)],
+            ..Default::default()
+        });
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let pipeline = |fragment, write_mask, shown| {
+            let target = wgpu::ColorTargetState { format, blend: None, write_mask };
+            Layers::pipeline(gpu, &module, Some(&pipelines), fragment, target, shown)
+        };
+        Radiance {
+            faces: pipeline("radiance", wgpu::ColorWrites::ALL, Shown::Nearest),
+            seen: pipeline("sought", wgpu::ColorWrites::RED, Shown::Nearest),
+            alone: pipeline("sought", wgpu::ColorWrites::ALPHA, Shown::AnyFront),
+            layout,
+            corners: gpu.storage("corners", bytemuck::cast_slice(&corners)),
+            triangles: gpu.storage("triangles", bytemuck::cast_slice(&triangles)),
+            views,
+            layers: Layers::new(gpu, format, image_size(resolution, slots), batch),
+            lights: again,
+            resolution,
+        }
+    }
+
+    /// What the pass reads when it draws `sources`.
+    pub fn bindings(&self, gpu: &Gpu, sources: &SourceBuffers) -> wgpu::BindGroup {
+        let buffers =
+            [&self.corners, &self.triangles, &self.views, &sources.nodes, &sources.elements];
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("radiance"),
+            layout: &self.layout,
+            entries: &[0, 1, 2, 3, 4].map(|k: usize| wgpu::BindGroupEntry {
+                binding: k as u32,
+                resource: buffers[k].as_entire_binding(),
+            }),
+        })
+    }
+
+    /// Records the drawing of what `places` see, each with five faces and then its tiles, with
+    /// timestamps before the first (query 0) and after the last (query 1).
+    pub fn draw(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        bindings: &wgpu::BindGroup,
+        places: &[&[View]],
+        queries: Option<&wgpu::QuerySet>,
+    ) {
+        let views: Vec<RadianceView> = places.iter().copied().flatten().map(|v| v.view).collect();
+        gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(&views));
+        let (n, mut index) = (self.resolution, 0);
+        for (h, views) in places.iter().enumerate() {
+            let mut pass = self.layers.pass(encoder, h, places.len(), queries);
+            pass.set_bind_group(0, bindings, &[]);
+            for (k, View { view, places }) in views.iter().enumerate() {
+                let draw = |pass: &mut wgpu::RenderPass, places: &Range<u32>| {
+                    pass.draw(3 * places.start..3 * places.end, index..index + 1);
+                };
+                if k < 5 {
+                    let lines = Face::rows(k, n);
+                    let (y, height) = (lines.start as f32, lines.len() as f32);
+                    pass.set_viewport(0.0, y, n as f32, height, 0.0, 1.0);
+                    if k == 0 {
+                        pass.set_pipeline(&self.faces);
+                    }
+                } else {
+                    let (slot, columns) = (k as u32 - 5, n.max(TILE) / TILE);
+                    let (x, y) = (slot % columns * TILE, 3 * n + slot / columns * TILE);
+                    let size = TILE as f32;
+                    pass.set_viewport(x as f32, y as f32, size, size, 0.0, 1.0);
+                    pass.set_pipeline(&self.alone);
+                    draw(&mut pass, &self.lights[view.light as usize]);
+                    pass.set_pipeline(&self.seen);
+                }
+                places.iter().for_each(|run| draw(&mut pass, run));
+                index += 1;
+            }
+        }
+    }
+}
