@@ -82,6 +82,7 @@ pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solve::{Go, Ledger, Progress, Shooting, Solution, Stop};
 pub use tone::ToneCurve;
 pub use vertex::VertexRadiosity;
+pub use vertex::gathering::{GatherProgress, GatheredRadiosity, Gathering};
 pub use view_factors::{Absent, Checks, Correction, Estimate, Factor, ViewFactors, Worst};
 
 /// The README's code compiles.

@@ -67,6 +67,8 @@ pub enum Stop {
     Converged,
     /// The number of shots asked for is done.
     Shots,
+    /// There are as many elements as there may be.
+    Elements,
     /// The progress callback said so; the solution is what was reached.
     Cancelled,
 }
@@ -76,6 +78,7 @@ impl fmt::Display for Stop {
         f.write_str(match self {
             Stop::Converged => "converged",
             Stop::Shots => "shots",
+            Stop::Elements => "elements",
             Stop::Cancelled => "cancelled",
         })
     }

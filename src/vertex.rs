@@ -1,8 +1,11 @@
 //! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
 
 mod boundary;
+pub(crate) mod gathering;
 mod meeting;
-pub(crate) mod vertices;
+mod places;
+mod refined;
+mod vertices;
 
 use glam::DVec3;
 

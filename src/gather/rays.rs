@@ -43,7 +43,7 @@ impl RayGather {
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
         let (tangent, bitangent) = place.normal.any_orthonormal_pair();
         let share = 1.0 / f64::from(self.count);
-        let turn = turn(place.position);
+        let turn = if std::env::var("TURN").is_ok() { turn(place.position) } else { 0.25 };
         let mut out = Gathered::default();
         for k in 0..self.count {
             // Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley points.

@@ -11,14 +11,14 @@ const FINEST: u32 = 1 << MAX_DEPTH;
 
 /// What makes a vertex: the same key, the same vertex, in all meshes of one scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Key {
+pub(super) enum Key {
     Corner(u32),
     Side { id: u32, step: u32 },
     Inside { triangle: u32, i: u32, j: u32 },
 }
 
 /// The vertices of a mesh.
-pub(crate) struct Vertices {
+pub(super) struct Vertices {
     /// What each vertex is.
     pub keys: Vec<Key>,
     /// Where it is, scene unit.
@@ -32,7 +32,7 @@ pub(crate) struct Vertices {
 
 /// The vertices around each element: its corners, and what finer neighbours put between them.
 #[derive(Default)]
-pub(crate) struct Rims {
+pub(super) struct Rims {
     ends: Vec<usize>,
     vertices: Vec<u32>,
 }
@@ -101,9 +101,14 @@ impl Vertices {
     }
 }
 
+/// The vertices at the corners of a cell of triangle `t`.
+pub(super) fn corners(smooth: &Smooth, t: usize, cell: Cell) -> [Key; 3] {
+    lattice(cell).map(|place| key(smooth, t, place))
+}
+
 /// The vertices that splitting a cell of triangle `t` makes: in the middle of the sides from its
 /// first to its second corner, and so on. None at the finest level.
-pub(crate) fn middles(smooth: &Smooth, t: usize, cell: Cell) -> Option<[Key; 3]> {
+pub(super) fn middles(smooth: &Smooth, t: usize, cell: Cell) -> Option<[Key; 3]> {
     let [a, b, c] = lattice(cell);
     let at = |p, q| Some(key(smooth, t, middle(p, q)?));
     Some([at(a, b)?, at(b, c)?, at(c, a)?])

@@ -1,0 +1,142 @@
+//! Where surfaces touch: elements there are cut small, since the light on them jumps.
+
+use glam::{DVec2, DVec3};
+
+use super::{Cell, MAX_DEPTH, Mesh};
+use crate::scene::Scene;
+
+/// Of an element's size: what comes this close to its plane touches it.
+const TOUCH: f64 = 0.05;
+
+/// Of an element's size: lines have to come this far into it to part it.
+const INSIDE: f64 = 0.02;
+
+/// Lines on a triangle along which other triangles touch or cross it, as pairs of points by
+/// barycentric weights of its second and third corner.
+type Lines = Vec<[DVec2; 2]>;
+
+impl Mesh {
+    /// The same mesh with elements that others' edges or faces touch within split further, `levels`
+    /// times: an element that straddles a wall's foot is light on one side and hidden on the other
+    /// (the discontinuities of order zero of Heckbert, "Discontinuity meshing for radiosity", 1992).
+    ///
+    /// What comes within 5 % of an element's size of it touches it; levels that would go beyond
+    /// [`MAX_DEPTH`] are left out.
+    pub fn split_at_contacts(&self, levels: u32) -> Mesh {
+        let lines = lines(self);
+        let deeper = |t: usize, cell: Cell| {
+            let base = self.level_at(t, cell);
+            cell.level < base
+                || cell.level < (base + levels).min(MAX_DEPTH) && parted(cell, &lines[t])
+        };
+        Mesh::grown(self.scene.clone(), deeper)
+    }
+
+    /// Level of this mesh's elements at the middle of `cell` of triangle `t`.
+    fn level_at(&self, t: usize, cell: Cell) -> u32 {
+        let c = cell.corners();
+        let middle = |k: usize| (c[0][k] + c[1][k] + c[2][k]) / 3.0;
+        self.cell(self.element(self.element_at(t, middle(0), middle(1)))).level
+    }
+}
+
+/// Whether one of `lines` comes into `cell`, by more than a margin.
+fn parted(cell: Cell, lines: &[[DVec2; 2]]) -> bool {
+    lines.iter().any(|line| {
+        // In the cell's own weights; all three are at least `INSIDE` well within.
+        let [a, b] = line.map(|p| {
+            let [u, v] = cell.local(p.x, p.y);
+            [1.0 - u - v, u, v]
+        });
+        let (mut from, mut to) = (0.0f64, 1.0f64);
+        for k in 0..3 {
+            let (start, end) = (a[k] - INSIDE, b[k] - INSIDE);
+            if start < 0.0 && end < 0.0 {
+                return false;
+            }
+            let at = start / (start - end);
+            if start < 0.0 {
+                from = from.max(at);
+            } else if end < 0.0 {
+                to = to.min(at);
+            }
+        }
+        from < to
+    })
+}
+
+/// For every triangle, the lines along which others touch it.
+fn lines(mesh: &Mesh) -> Vec<Lines> {
+    let scene = mesh.scene();
+    let count = scene.triangles().len();
+    let slack: Vec<f64> = (0..count)
+        .map(|t| TOUCH * (scene.area(t) / f64::from(1u32 << (2 * mesh.depth(t)))).sqrt())
+        .collect();
+    let boxes: Vec<[DVec3; 2]> = (0..count)
+        .map(|t| {
+            let [a, b, c] = scene.corners(t);
+            [a.min(b).min(c) - slack[t], a.max(b).max(c) + slack[t]]
+        })
+        .collect();
+    // Sweep along x: of the boxes that have begun, those that have not ended.
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_unstable_by(|&s, &t| boxes[s][0].x.total_cmp(&boxes[t][0].x).then(s.cmp(&t)));
+    let mut out = vec![vec![]; count];
+    let mut begun: Vec<usize> = vec![];
+    for t in order {
+        begun.retain(|&s| boxes[s][1].x >= boxes[t][0].x);
+        for &s in &begun {
+            let apart = boxes[s][0].cmpgt(boxes[t][1]) | boxes[t][0].cmpgt(boxes[s][1]);
+            if !apart.any() {
+                touch(scene, t, s, slack[t], &mut out[t]);
+                touch(scene, s, t, slack[s], &mut out[s]);
+            }
+        }
+        begun.push(t);
+    }
+    out
+}
+
+/// Adds the lines along which triangle `s` touches or crosses `t`: the parts of its edges that lie
+/// within `slack` of the plane of `t`, and its cut with that plane.
+fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Lines) {
+    let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
+    let corners = scene.corners(s);
+    let height = corners.map(|p| normal.dot(p - a));
+    if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
+        return;
+    }
+    let (e1, e2) = (b - a, c - a);
+    let flat = |p: DVec3| {
+        let n = e1.cross(e2);
+        let d = p - a;
+        DVec2::new(d.cross(e2).dot(n), e1.cross(d).dot(n)) / n.length_squared()
+    };
+    let at = |k: usize, l: usize, h: f64| {
+        let share = (h - height[k]) / (height[l] - height[k]);
+        corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
+    };
+    let mut cut = vec![];
+    for (k, l) in [(0, 1), (1, 2), (2, 0)] {
+        let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
+        if low <= slack && high >= -slack {
+            let within = |k: usize, l: usize| {
+                if height[k].abs() <= slack {
+                    corners[k]
+                } else {
+                    at(k, l, slack * height[k].signum())
+                }
+            };
+            let line = [within(k, l), within(l, k)].map(flat);
+            if line[0].distance_squared(line[1]) > 0.0 {
+                lines.push(line);
+            }
+        }
+        if low < 0.0 && high > 0.0 {
+            cut.push(flat(at(k, l, 0.0)));
+        }
+    }
+    if let [p, q] = cut[..] {
+        lines.push([p, q]);
+    }
+}

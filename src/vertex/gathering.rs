@@ -1,0 +1,143 @@
+//! Vertices that gather: each looks at the settled light for itself, and elements are split where
+//! what lies between their corners is not what the corners say.
+
+use super::VertexRadiosity;
+use super::refined::Refined;
+use crate::error::{Error, ErrorKind};
+use crate::gather::Gather;
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+use crate::solve::{Go, Stop};
+
+/// Settings of gathering at vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gathering {
+    /// An element is split where the middle of a side is off the mean of the side's ends by more
+    /// than this share of its radiosity, in (0, 1]. What is left then is about a quarter of it.
+    /// Smaller elements are allowed more: √2 times as much for every halving below the largest.
+    pub tolerance: f64,
+    /// Elements whose longest edge is no longer than this, in the scene's unit, are not split.
+    pub smallest: f64,
+    /// How many elements there may be. The worst are split first.
+    pub elements: usize,
+    /// Levels that every element is split before the light has a say.
+    pub everywhere: u32,
+}
+
+/// How far gathering is, told after every batch of vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GatherProgress {
+    /// Times that elements have been split.
+    pub level: u32,
+    /// Elements so far.
+    pub elements: usize,
+    /// Vertices that have gathered since they were split last.
+    pub gathered: usize,
+    /// Vertices that are to gather before they are split again.
+    pub of: usize,
+}
+
+/// A scene cut where the light asks for it, and the radiosity that its vertices gathered.
+#[derive(Clone, Debug)]
+pub struct GatheredRadiosity {
+    /// The mesh given, split further.
+    pub mesh: Mesh,
+    /// Radiosity at its vertices.
+    pub surface: VertexRadiosity,
+    /// Places at which light was gathered.
+    pub gathers: u64,
+    /// Area-weighted mean of what gathering changed of the radiosity that vertices of the mesh given
+    /// had from its elements: its root mean square over that radiosity.
+    pub change: f64,
+    /// Whether more elements were to be split than there may be.
+    pub stop: Stop,
+}
+
+impl Gathering {
+    /// Splits to elements of `smallest` (scene unit) where sides bend by 3 %, a million elements at
+    /// most.
+    pub fn new(smallest: f64) -> Gathering {
+        Gathering { tolerance: 0.03, smallest, elements: 1 << 20, everywhere: 0 }
+    }
+
+    /// Lets the vertices of `mesh` gather, given the radiosity of its elements (W/m², one value an
+    /// element), splits elements, lets the new vertices gather, and so on: B = E + ρ Σ F_vj B_j, with
+    /// B_j as known so far. No light is shot again.
+    ///
+    /// The estimate is the hierarchical surplus (Yserentant 1986): how far a new vertex is from the
+    /// mean of the two that it lies between. Vertices under something that touches their surface
+    /// see no light; they get what those around them have, so that no darkness leaks out.
+    /// `progress` is told of every batch of vertices and may stop it; what was reached is returned.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when a setting is out of range or `radiosity` has not one value an
+    /// element; whatever `gather` fails with.
+    pub fn gather(
+        &self,
+        mesh: &Mesh,
+        radiosity: &[Rgb],
+        gather: &mut dyn Gather,
+        mut progress: impl FnMut(&GatherProgress) -> Go,
+    ) -> Result<GatheredRadiosity, Error> {
+        self.check(mesh, radiosity)?;
+        let mut state = Refined::new(mesh.clone(), radiosity);
+        let before = state.reflected().to_vec();
+        let mut change = None;
+        let mut fresh: Vec<u32> = (0..before.len() as u32).collect();
+        let mut young: Vec<usize> = (0..mesh.element_count()).collect();
+        let (mut level, mut crowded) = (0, false);
+        let stop = loop {
+            let elements = state.mesh().element_count();
+            let mut told =
+                |gathered, of| progress(&GatherProgress { level, elements, gathered, of });
+            if state.gather(&fresh, gather, &mut told)?.is_break() {
+                break Stop::Cancelled;
+            }
+            change.get_or_insert_with(|| state.change(&before));
+            let room = self.elements.saturating_sub(elements) / 3;
+            let mut bent: Vec<(f64, usize)> =
+                young.iter().map(|&e| (state.bend(e, self), e)).filter(|b| b.0 > 1.0).collect();
+            if level < self.everywhere {
+                bent = young.iter().map(|&e| (1.0, e)).filter(|b| state.splits(b.1)).collect();
+            }
+            if bent.is_empty() {
+                break if crowded { Stop::Elements } else { Stop::Converged };
+            }
+            if bent.len() > room {
+                crowded = true;
+                bent.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                bent.truncate(room);
+            }
+            if bent.is_empty() {
+                break Stop::Elements;
+            }
+            let mut split: Vec<usize> = bent.into_iter().map(|b| b.1).collect();
+            split.sort_unstable();
+            (fresh, young) = state.split(&split)?;
+            level += 1;
+        };
+        let (gathers, change) = (state.gathers(), change.unwrap_or(0.0));
+        let surface = state.surface();
+        Ok(GatheredRadiosity { mesh: state.into_mesh(), surface, gathers, change, stop })
+    }
+
+    fn check(&self, mesh: &Mesh, radiosity: &[Rgb]) -> Result<(), Error> {
+        let bad = |place: String, found: &str, remedy: String| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
+            let place = format!("tolerance {}", self.tolerance);
+            return bad(place, "out of range", "use a share above 0 and up to 1".into());
+        }
+        if self.smallest.is_nan() || self.smallest <= 0.0 {
+            let place = format!("smallest element {}", self.smallest);
+            return bad(place, "not above 0", "use a length in the scene's unit".into());
+        }
+        if radiosity.len() != mesh.element_count() {
+            let place = format!("{} values of radiosity", radiosity.len());
+            let remedy = format!("give one for each of the {} elements", mesh.element_count());
+            return bad(place, "not one an element", remedy);
+        }
+        Ok(())
+    }
+}

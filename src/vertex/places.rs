@@ -1,0 +1,95 @@
+//! Where vertices stand when they gather.
+
+use glam::DVec3;
+
+use super::vertices::Vertices;
+use crate::gather::{Gathered, Place};
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+/// The elements around every vertex, and what they say of it.
+pub(super) struct Stands<'a> {
+    mesh: &'a Mesh,
+    vertices: &'a Vertices,
+    /// Elements with a corner at each vertex: from `first[v]` to `first[v + 1]`.
+    around: Vec<u32>,
+    first: Vec<u32>,
+    normals: Vec<DVec3>,
+    /// Square root of the smallest element's area around each vertex, scene unit.
+    sizes: Vec<f64>,
+    /// No place is nearer to its surface than this, scene unit: several steps of a 32-bit coordinate.
+    least: f64,
+}
+
+/// How far into an element a vertex steps, of the way to its centroid: off the seams where surfaces
+/// meet, whose two sides see different things.
+const INWARDS: f64 = 0.02;
+
+/// How far above its surface it stands, in units of the smallest element's size.
+const LIFT: f64 = 1e-4;
+
+/// Elements around a vertex that it tries to stand in, at most.
+const ATTEMPTS: usize = 6;
+
+/// A place that sees more than this share of backs is under something, if that is near.
+const UNDER: f64 = 0.9;
+
+impl<'a> Stands<'a> {
+    pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> Stands<'a> {
+        let count = vertices.positions.len();
+        let mut first = vec![0u32; count + 1];
+        vertices.corners.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
+        (0..count).for_each(|v| first[v + 1] += first[v]);
+        let mut next = first.clone();
+        let mut around = vec![0; 3 * vertices.corners.len()];
+        let mut normals = vec![DVec3::ZERO; count];
+        let mut sizes = vec![f64::INFINITY; count];
+        for (e, corners) in vertices.corners.iter().enumerate() {
+            let node = mesh.element(e);
+            let area = mesh.area(node);
+            for v in corners.iter().map(|&v| v as usize) {
+                around[next[v] as usize] = e as u32;
+                next[v] += 1;
+                normals[v] += mesh.normal(node) * area;
+                sizes[v] = sizes[v].min(area.sqrt());
+            }
+        }
+        normals.iter_mut().for_each(|n| *n = n.normalize_or(DVec3::Z));
+        let (low, high) = mesh.scene().bounds();
+        let least = 16.0 * f64::from(f32::EPSILON) * (high - low).max_element();
+        Stands { mesh, vertices, around, first, normals, sizes, least }
+    }
+
+    fn around(&self, v: u32) -> &[u32] {
+        let v = v as usize;
+        &self.around[self.first[v] as usize..self.first[v + 1] as usize]
+    }
+
+    /// Reflectance of the surface that vertex `v` is on.
+    pub fn reflectance(&self, v: u32) -> Rgb {
+        self.mesh.material(self.mesh.element(self.around(v)[0] as usize)).reflectance
+    }
+
+    /// Where vertex `v` stands at its `attempt`: in another element around it each time.
+    pub fn place(&self, v: u32, attempt: usize) -> Place {
+        let around = self.around(v);
+        let step = around.len().div_ceil(ATTEMPTS);
+        let element = self.mesh.element(around[attempt * step % around.len()] as usize);
+        let (position, normal) = (self.vertices.positions[v as usize], self.normals[v as usize]);
+        let inwards = (self.mesh.centroid(element) - position) * INWARDS;
+        let lift = (LIFT * self.sizes[v as usize]).max(self.least);
+        Place { position: position + inwards + normal * lift, normal, near: lift / 4.0 }
+    }
+
+    /// Whether there is another element to stand in after `attempt`.
+    pub fn has_more(&self, v: u32, attempt: usize) -> bool {
+        let around = self.around(v).len();
+        attempt + 1 < around.div_ceil(around.div_ceil(ATTEMPTS))
+    }
+
+    /// Whether what vertex `v` found is the inside of something that touches its surface: backs
+    /// almost everywhere, nearer than the elements are large.
+    pub fn is_covered(&self, v: u32, found: &Gathered) -> bool {
+        found.back > UNDER && found.nearness * self.sizes[v as usize] > 1.0
+    }
+}

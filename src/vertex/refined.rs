@@ -1,0 +1,361 @@
+//! The state of gathering: a mesh that grows finer, and what its vertices reflect.
+
+use glam::{DMat3, DVec3};
+
+use super::VertexRadiosity;
+use super::gathering::Gathering;
+use super::places::Stands;
+use super::vertices::{Key, Vertices, corners, middles};
+use crate::error::Error;
+use crate::gather::{Gather, Place, Sources};
+use crate::mesh::{MAX_DEPTH, Mesh, Smooth};
+use crate::scene::Rgb;
+use crate::solve::Go;
+
+pub(super) struct Refined {
+    mesh: Mesh,
+    smooth: Smooth,
+    vertices: Vertices,
+    /// Reflected radiosity at the vertices, W/m².
+    reflected: Vec<Rgb>,
+    /// Whether a vertex lies under something that touches its surface.
+    covered: Vec<bool>,
+    /// Where all vertices are gathered at.
+    gathers: u64,
+    /// Radiosity that is as good as none, W/m².
+    dim: f64,
+    /// Longest edge of the elements to begin with, scene unit.
+    largest: f64,
+}
+
+/// Vertices that gather at once: progress is told of after each batch.
+const BATCH: usize = 1024;
+
+/// Radiosity below this share of the mean is not worth an element.
+const DIM: f64 = 1e-3;
+
+/// Middles off by more than this share are at a jump, where a parabola says nothing.
+const JUMP: f64 = 0.2;
+
+impl Refined {
+    /// Starts from the radiosity of the elements of `mesh`, one value an element.
+    pub fn new(mesh: Mesh, radiosity: &[Rgb]) -> Refined {
+        let smooth = Smooth::new(mesh.scene());
+        let vertices = Vertices::new(&mesh, &smooth);
+        let elements = || (0..mesh.element_count()).map(|e| (e, mesh.element(e)));
+        let mut reflected = VertexRadiosity::new(&mesh, radiosity).radiosity;
+        reflected.truncate(vertices.positions.len());
+        let mut exitance = vec![Rgb::ZERO; reflected.len()];
+        for (e, node) in elements() {
+            let emitted = mesh.material(node).exitance;
+            vertices.corners[e].iter().for_each(|&v| exitance[v as usize] = emitted);
+        }
+        let all = reflected.iter_mut().zip(exitance);
+        all.for_each(|(b, emitted)| *b = (*b - emitted).max(Rgb::ZERO));
+        let area: f64 = elements().map(|(_, n)| mesh.area(n)).sum();
+        let flux: f64 = elements().map(|(e, n)| radiosity[e].length() * mesh.area(n)).sum();
+        let largest = elements().map(|(_, n)| longest(&mesh.corners(n))).fold(0.0, f64::max);
+        let covered = vec![false; reflected.len()];
+        let dim = DIM * flux / area;
+        Refined { mesh, smooth, vertices, reflected, covered, gathers: 0, dim, largest }
+    }
+
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    pub fn into_mesh(self) -> Mesh {
+        self.mesh
+    }
+
+    pub fn reflected(&self) -> &[Rgb] {
+        &self.reflected
+    }
+
+    pub fn gathers(&self) -> u64 {
+        self.gathers
+    }
+
+    /// Root mean square over the elements of how far their vertices are from `before`, relative.
+    pub fn change(&self, before: &[Rgb]) -> f64 {
+        let (mut off, mut all) = (0.0, 0.0);
+        for (e, corners) in self.vertices.corners.iter().enumerate() {
+            let area = self.mesh.area(self.mesh.element(e));
+            for &v in corners {
+                off += area * (self.reflected[v as usize] - before[v as usize]).length_squared();
+                all += area * self.reflected[v as usize].length_squared();
+            }
+        }
+        if all > 0.0 { (off / all).sqrt() } else { 0.0 }
+    }
+
+    /// Lets the vertices `fresh` gather.
+    pub fn gather(
+        &mut self,
+        fresh: &[u32],
+        gather: &mut dyn Gather,
+        told: &mut dyn FnMut(usize, usize) -> Go,
+    ) -> Result<Go, Error> {
+        let stands = Stands::new(&self.mesh, &self.vertices);
+        // What reflects nothing need not look.
+        let reflects = |&v: &u32| stands.reflectance(v) != Rgb::ZERO;
+        let mut left: Vec<u32> = fresh.iter().copied().filter(reflects).collect();
+        let seen = self.seen();
+        let sources =
+            Sources { mesh: &self.mesh, corners: &self.vertices.corners, reflected: &seen };
+        let (of, mut gathered) = (left.len(), 0);
+        for attempt in 0.. {
+            let mut again = vec![];
+            for batch in left.chunks(BATCH) {
+                let places: Vec<Place> = batch.iter().map(|&v| stands.place(v, attempt)).collect();
+                self.gathers += places.len() as u64;
+                for (&v, found) in batch.iter().zip(gather.gather(&sources, &places)?) {
+                    let covered = stands.is_covered(v, &found);
+                    self.covered[v as usize] = covered;
+                    if covered && stands.has_more(v, attempt) {
+                        again.push(v);
+                    } else {
+                        gathered += 1;
+                    }
+                    if !covered {
+                        self.reflected[v as usize] = stands.reflectance(v) * found.irradiance;
+                    }
+                }
+                if told(gathered, of).is_break() {
+                    return Ok(Go::Break(()));
+                }
+            }
+            left = again;
+            if left.is_empty() {
+                break;
+            }
+        }
+        self.uncover();
+        Ok(Go::Continue(()))
+    }
+
+    /// What the vertices reflect, as others are to see it: raised or lowered so that the mean over
+    /// an element is that of the parabola through its parent's corners and middles, not of the plane
+    /// through its own corners. Light is brightest where it is convex, so planes lose some.
+    fn seen(&self) -> Vec<Rgb> {
+        let mut sums = vec![(Rgb::ZERO, 0.0); self.reflected.len()];
+        for (e, corners) in self.vertices.corners.iter().enumerate() {
+            let area = self.mesh.area(self.mesh.element(e));
+            let bend = self.sides(e).map_or(Rgb::ZERO, |sides| {
+                let mean = |f: fn(&Side) -> Rgb| sides.iter().map(f).sum::<Rgb>() / 3.0;
+                let (bend, middle) = (mean(Side::bend), mean(|s| s.middle));
+                let smooth = sides.iter().all(|s| s.known);
+                let smooth = smooth && bend.length() < JUMP * middle.length();
+                // Half the size bends a quarter as much.
+                if smooth { bend / 4.0 } else { Rgb::ZERO }
+            });
+            for &v in corners {
+                sums[v as usize].0 += bend * area;
+                sums[v as usize].1 += area;
+            }
+        }
+        let all = self.reflected.iter().zip(sums);
+        all.map(|(&b, (bend, area))| (b + bend / area).max(Rgb::ZERO)).collect()
+    }
+
+    /// The sides of element `e`'s parent, if all three have a vertex in their middle.
+    fn sides(&self, e: usize) -> Option<[Side; 3]> {
+        let node = self.mesh.element(e);
+        let (t, cell) = (self.mesh.triangle(node), self.mesh.cell(node));
+        let parent = cell.ancestor(cell.level.checked_sub(1)?);
+        let find = |key: &Key| self.vertices.find(key).map(|v| v as usize);
+        let ends = corners(&self.smooth, t, parent).each_ref().map(find);
+        let middles = middles(&self.smooth, t, parent)?.each_ref().map(find);
+        let side = |k: usize| {
+            let (a, m, b) = (ends[k]?, middles[k]?, ends[(k + 1) % 3]?);
+            let known = ![a, m, b].iter().any(|&v| self.covered[v]);
+            let [a, middle, b] = [a, m, b].map(|v| self.reflected[v]);
+            Some(Side { mean: (a + b) / 2.0, middle, lit: !self.covered[m], known })
+        };
+        Some([side(0)?, side(1)?, side(2)?])
+    }
+
+    /// Whether element `e` can be split at all.
+    pub fn splits(&self, e: usize) -> bool {
+        let node = self.mesh.element(e);
+        self.mesh.cell(node).level < MAX_DEPTH && self.mesh.material(node).reflectance != Rgb::ZERO
+    }
+
+    /// How much the light on element `e` bends, in units of what is allowed; 0 where it is not to be
+    /// split. An element without a parent is taken for bent where its corners differ by four times
+    /// as much.
+    pub fn bend(&self, e: usize, settings: &Gathering) -> f64 {
+        let node = self.mesh.element(e);
+        let size = longest(&self.mesh.corners(node));
+        if !self.splits(e) || size <= settings.smallest {
+            return 0.0;
+        }
+        let emitted = self.mesh.material(node).exitance;
+        let allowed = settings.tolerance * (self.largest / size).powf(std::env::var("POW").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5));
+        let off = |value: Rgb, other: Rgb| {
+            let whole = (value + emitted).length().max(self.dim);
+            if whole > 0.0 { (value - other).length() / whole / allowed } else { 0.0 }
+        };
+        let at = |v: u32| (self.reflected[v as usize], self.covered[v as usize]);
+        let corners = self.vertices.corners[e].map(at);
+        let pairs = [(0, 1), (1, 2), (2, 0)].map(|(k, l)| (corners[k], corners[l]));
+        let step = |(a, b): ((Rgb, bool), (Rgb, bool))| off(a.0, b.0) / 4.0;
+        match self.sides(e) {
+            Some(sides) => {
+                let lit = sides.iter().filter(|s| s.lit);
+                let bent = lit.map(|s| off(s.middle, s.mean)).fold(0.0, f64::max);
+                // What a covered corner was given should be what its element has.
+                let given = pairs.into_iter().filter(|(a, b)| a.1 != b.1);
+                given.map(step).fold(bent, f64::max)
+            }
+            None => pairs.into_iter().filter(|(a, b)| !(a.1 && b.1)).map(step).fold(0.0, f64::max),
+        }
+    }
+
+    /// Splits `elements`, which ascend. Gives the vertices that are new, with the mean of those that
+    /// they lie between, and the elements that are.
+    pub fn split(&mut self, elements: &[usize]) -> Result<(Vec<u32>, Vec<usize>), Error> {
+        let finer = self.mesh.split(elements)?;
+        let vertices = Vertices::new(&finer, &self.smooth);
+        let count = vertices.positions.len();
+        let (mut reflected, mut covered) = (vec![Rgb::ZERO; count], vec![false; count]);
+        let mut fresh = vec![];
+        for (v, key) in vertices.keys.iter().enumerate() {
+            match self.vertices.find(key) {
+                Some(old) => {
+                    reflected[v] = self.reflected[old as usize];
+                    covered[v] = self.covered[old as usize];
+                }
+                None => fresh.push(v as u32),
+            }
+        }
+        let is_new = |v: usize| self.vertices.find(&vertices.keys[v]).is_none();
+        let mut young = vec![];
+        for (k, &e) in elements.iter().enumerate() {
+            // Each split before this one has put four elements in the place of one.
+            young.extend(e + 3 * k..e + 3 * k + 4);
+            let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
+            // The corners of the fourth part are the middles of the sides opposite a, b and c.
+            let middles = vertices.corners[e + 3 * k + 3].map(|v| v as usize);
+            for (m, mean) in middles.into_iter().zip([b + c, c + a, a + b]) {
+                if is_new(m) {
+                    reflected[m] = mean / 2.0;
+                }
+            }
+        }
+        (self.mesh, self.vertices) = (finer, vertices);
+        (self.reflected, self.covered) = (reflected, covered);
+        Ok((fresh, young))
+    }
+
+    /// Gives covered vertices what their neighbours in the light say, extrapolated along the slope
+    /// that the light has there; the nearest first.
+    fn uncover(&mut self) {
+        let mut known: Vec<bool> = self.covered.iter().map(|c| !c).collect();
+        if known.iter().all(|&k| k) {
+            return;
+        }
+        let position = |v: u32| self.vertices.positions[v as usize];
+        let slopes = self.slopes();
+        for ring in 0..RINGS {
+            let mut sums = vec![(Rgb::ZERO, 0.0); known.len()];
+            for (_, rim) in self.vertices.rims.iter() {
+                for &v in rim.iter().filter(|&&v| !known[v as usize]) {
+                    for &w in rim.iter().filter(|&&w| known[w as usize]) {
+                        let (from, step) = (self.reflected[w as usize], position(v) - position(w));
+                        let rise = if ring == 0 { slopes[w as usize] * step } else { Rgb::ZERO };
+                        let value = (from + rise).clamp(from * 0.5, from * 2.0);
+                        sums[v as usize].0 += value / step.length();
+                        sums[v as usize].1 += 1.0 / step.length();
+                    }
+                }
+            }
+            for (v, (sum, weight)) in sums.into_iter().enumerate() {
+                if weight > 0.0 {
+                    self.reflected[v] = sum / weight;
+                    known[v] = true;
+                }
+            }
+        }
+    }
+
+    /// Gradient of the reflected radiosity at each vertex, W/m² per scene unit: a matrix that takes
+    /// a step to a change. From the elements around it that are in the light, weighted by area.
+    fn slopes(&self) -> Vec<DMat3> {
+        let mut sums = vec![(DMat3::ZERO, 0.0); self.reflected.len()];
+        for (e, corners) in self.vertices.corners.iter().enumerate() {
+            if corners.iter().any(|&v| self.covered[v as usize]) {
+                continue;
+            }
+            let [a, b, c] = corners.map(|v| self.vertices.positions[v as usize]);
+            let [p, q, r] = corners.map(|v| self.reflected[v as usize]);
+            let (u, v) = (b - a, c - a);
+            let n = u.cross(v);
+            // The dual basis of the two edges: 1 along its own, 0 along the other.
+            let (du, dv) = (v.cross(n) / n.length_squared(), n.cross(u) / n.length_squared());
+            let outer = |x: Rgb, y: DVec3| DMat3::from_cols(x * y.x, x * y.y, x * y.z);
+            let slope = outer(q - p, du) + outer(r - p, dv);
+            let area = self.mesh.area(self.mesh.element(e));
+            for &v in corners {
+                sums[v as usize].0 += slope * area;
+                sums[v as usize].1 += area;
+            }
+        }
+        sums.into_iter().map(|(s, area)| if area > 0.0 { s * (1.0 / area) } else { s }).collect()
+    }
+
+    /// The mesh with what its vertices emit and reflect.
+    pub fn surface(&self) -> VertexRadiosity {
+        let count = self.vertices.positions.len();
+        let mut out = VertexRadiosity {
+            positions: self.vertices.positions.clone(),
+            normals: vec![DVec3::ZERO; count],
+            radiosity: vec![Rgb::ZERO; count],
+            ..Default::default()
+        };
+        for (e, rim) in self.vertices.rims.iter() {
+            let node = self.mesh.element(e);
+            let emitted = self.mesh.material(node).exitance;
+            for v in rim.iter().map(|&v| v as usize) {
+                out.normals[v] += self.mesh.normal(node) * self.mesh.area(node);
+                out.radiosity[v] = emitted + self.reflected[v];
+            }
+        }
+        out.normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+        for (e, rim) in self.vertices.rims.iter() {
+            match *rim {
+                [a, b, c] => out.add_face([a, b, c], e),
+                _ => {
+                    let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
+                    out.add_fan(&self.mesh, rim, e, corners.iter().sum::<Rgb>() / 3.0);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// How far from the light covered vertices are filled: as far as elements that reach it have.
+const RINGS: usize = 3;
+
+/// A side of an element's parent.
+struct Side {
+    /// Mean of its ends, W/m².
+    mean: Rgb,
+    /// At its middle, W/m².
+    middle: Rgb,
+    /// Whether the middle is in the light.
+    lit: bool,
+    /// Whether all three are.
+    known: bool,
+}
+
+impl Side {
+    fn bend(&self) -> Rgb {
+        self.middle - self.mean
+    }
+}
+
+fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
+    (*b - *a).length().max((*c - *b).length()).max((*a - *c).length())
+}
