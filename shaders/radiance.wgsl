@@ -1,9 +1,10 @@
 // Draws the scene's own triangles as they shine: over one face of a hemicube, or over a tile that
-// fits a light which is looked at apart. The element that a pixel sees is found by descending the
-// triangle's quadtree.
+// fits a light which is looked at apart. The element that a pixel sees is found in the triangle's
+// quadtree: in a lattice of nodes at the deepest level that it is complete to, then by descent.
 
 const INNER: u32 = 0x80000000u;
 const APART: u32 = 8u;
+const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
 
 struct RadianceView {
     eye: vec3f,           // the place, scene unit from the local origin
@@ -20,22 +21,29 @@ struct RadianceView {
 struct RadianceTriangle {
     exitance: vec3f,      // W/m² per channel
     light: u32,           // the light that it belongs to, if any
-    root: u32,            // its node
+    index: u32,           // which of the scene's it is
     padding: array<u32, 3>,
+}
+
+struct Lattice {
+    first: u32,           // its first node
+    side: u32,            // cells along an edge, a power of two
 }
 
 @group(0) @binding(0) var<storage, read> corners: array<vec4f>;
 @group(0) @binding(1) var<storage, read> triangles: array<RadianceTriangle>;
 @group(0) @binding(2) var<storage, read> views: array<RadianceView>;
-@group(0) @binding(3) var<storage, read> nodes: array<u32>;   // INNER + first of four children, or an element
-@group(0) @binding(4) var<storage, read> elements: array<vec4f>;   // reflected radiosity at three corners each, W/m²
+@group(0) @binding(3) var<storage, read> lattices: array<Lattice>;   // one a triangle of the scene
+@group(0) @binding(4) var<storage, read> nodes: array<u32>;   // INNER + first of four children, or an element
+@group(0) @binding(5) var elements: texture_2d<f32>;   // reflected radiosity at their corners, W/m²
 
 struct Varying {
     @builtin(position) position: vec4f,
-    @location(0) barycentric: vec2f,   // weights of the second and third corner
+    @location(0) lattice: vec2f,   // weights of the second and third corner, times the side
     @location(1) @interpolate(flat) exitance: vec3f,
-    @location(2) @interpolate(flat) root: u32,
-    @location(3) @interpolate(flat) sought: f32,   // 1 on the light that the view looks for
+    @location(2) @interpolate(flat) first: u32,
+    @location(3) @interpolate(flat) side: u32,
+    @location(4) @interpolate(flat) sought: f32,   // 1 on the light that the view looks for
 }
 
 @vertex
@@ -51,24 +59,35 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     let height = (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom);
     var out: Varying;
     out.position = vec4f(x, height, views[view_index].near, w);
-    out.barycentric = vec2f(f32(corner == 1u), f32(corner == 2u));
+    let lattice = lattices[triangle.index];
+    out.lattice = f32(lattice.side) * vec2f(f32(corner == 1u), f32(corner == 2u));
+    out.first = lattice.first;
+    out.side = lattice.side;
     out.exitance = triangle.exitance;
     for (var k = 0u; k < views[view_index].apart; k++) {
         if views[view_index].lights[k] == triangle.light {
             out.exitance = vec3f(0.0);
         }
     }
-    out.root = triangle.root;
     out.sought = f32(triangle.light == views[view_index].light);
     return out;
 }
 
-// Reflected radiosity of the element at a barycentric position, linear between its corners.
-fn reflected(root: u32, barycentric: vec2f) -> vec3f {
+// Reflected radiosity at a position of a triangle's lattice, linear between the element's corners.
+fn reflected(lattice: vec2f, first: u32, side: u32) -> vec3f {
     // The middle of a pixel is in the triangle but for the rounding of its corners.
-    let inside = max(barycentric, vec2f(0.0));
-    var p = inside / max(inside.x + inside.y, 1.0);
-    var node = nodes[root];
+    let inside = max(lattice, vec2f(0.0));
+    let at = inside * min(f32(side) / max(inside.x + inside.y, 1e-30), 1.0);
+    let i = min(u32(at.x), side - 1u);
+    let j = min(u32(at.y), side - 1u - i);
+    // A square of the lattice holds an upright cell and, beyond its diagonal, a flipped one.
+    var p = at - vec2f(f32(i), f32(j));
+    let beyond = p.x + p.y > 1.0 && i + j + 1u < side;
+    if beyond {
+        p = 1.0 - p;
+    }
+    // Weights of the second and third corner of the node.
+    var node = nodes[first + i * (2u * side - i) + 2u * j + u32(beyond)];
     // What lies out of the arrays reads as 0, an element: the descent ends.
     while (node & INNER) != 0u {
         node &= ~INNER;
@@ -86,10 +105,11 @@ fn reflected(root: u32, barycentric: vec2f) -> vec3f {
         }
         node = nodes[node];
     }
-    let element = 3u * node;
-    let a = elements[element].rgb;
-    let b = elements[element + 1u].rgb;
-    let c = elements[element + 2u].rgb;
+    // The corners of an element lie below one another.
+    let at_a = vec2u(node % ELEMENTS_A_LINE, node / ELEMENTS_A_LINE * 3u);
+    let a = textureLoad(elements, at_a, 0).rgb;
+    let b = textureLoad(elements, at_a + vec2u(0u, 1u), 0).rgb;
+    let c = textureLoad(elements, at_a + vec2u(0u, 2u), 0).rgb;
     return a + (b - a) * p.x + (c - a) * p.y;
 }
 
@@ -100,7 +120,7 @@ fn radiance(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     if !front {
         return vec4f(0.0, 0.0, 0.0, -in.position.w);
     }
-    return vec4f(reflected(in.root, in.barycentric) + in.exitance, in.position.w);
+    return vec4f(reflected(in.lattice, in.first, in.side) + in.exitance, in.position.w);
 }
 
 // Whether the light that a tile looks for is seen: red where all is drawn, alpha where the light

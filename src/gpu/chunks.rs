@@ -9,7 +9,11 @@ use crate::hemicube::Face;
 use crate::scene::Scene;
 
 /// Triangles in a chunk at most: below this, testing a box costs more than drawing what is in it.
-const CHUNK: usize = 64;
+const CHUNK: usize = 16;
+
+/// Triangles in a run after which another begins: software devices handle a draw with anything to
+/// clip in time that grows with its square.
+const RUN: usize = 128;
 
 /// An order of drawing, and the box around each run of it.
 #[derive(Debug)]
@@ -52,7 +56,7 @@ impl Chunks {
         Chunks { order, places, chunks }
     }
 
-    /// Places whose triangles can be seen by `face` from `eye`, in as few runs as they make.
+    /// Places whose triangles can be seen by `face` from `eye`, in few runs.
     pub fn in_view(&self, eye: DVec3, face: &Face) -> Vec<Range<u32>> {
         let Face { right, up, forward, bottom } = *face;
         // Inward normals of the five planes through the eye that bound the view.
@@ -66,7 +70,7 @@ impl Chunks {
                 continue;
             }
             match runs.last_mut() {
-                Some(run) if run.end == places.start => run.end = places.end,
+                Some(run) if run.end == places.start && run.len() < RUN => run.end = places.end,
                 _ => runs.push(places.clone()),
             }
         }

@@ -74,7 +74,7 @@ impl HemicubeGather {
         let chunks = Chunks::new(scene);
         let order = (&chunks.order[..], origin);
         let radiance = Radiance::new(gpu, scene, &lights, order, (resolution, slots, batch));
-        let sum = Sum::new(gpu, resolution, slots, batch)?;
+        let sum = Sum::new(gpu, &radiance.layers, resolution, slots)?;
         let readback = Readback::new(gpu, sum.sums.size());
         gpu.check()?;
         Ok(HemicubeGather {
@@ -171,8 +171,7 @@ impl HemicubeGather {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let queries = self.readback.queries();
         self.radiance.draw(&self.gpu, &mut encoder, bindings, &views, queries);
-        let images = (&self.radiance.layers, places.len() as u32);
-        self.sum.sum(&self.gpu, &mut encoder, images, &tiles, queries);
+        self.sum.sum(&self.gpu, &mut encoder, places.len() as u32, &tiles, queries);
         let source = (&self.sum.sums, size_of::<Sums>() as u64 * places.len() as u64);
         let mut seconds = self.seconds;
         let time = (start, &mut seconds);
@@ -206,8 +205,7 @@ fn batch(gpu: &Gpu, scene: &Scene, resolution: u32, slots: u32) -> Result<u32, E
     };
     let texture = limits.max_texture_dimension_2d;
     let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let fits =
-        |n: &u32| image_size(*n, slots)[1] <= texture && Sum::image_bytes(*n, slots) <= buffer;
+    let fits = |n: &u32| image_size(*n, slots)[1] <= texture;
     if !fits(&resolution) {
         let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
         return setting(
@@ -223,11 +221,10 @@ fn batch(gpu: &Gpu, scene: &Scene, resolution: u32, slots: u32) -> Result<u32, E
         let (found, most) = (format!("{triangles} triangles"), buffer / each / 2);
         return setting("scene".into(), found, format!("this device holds {most}"));
     }
-    let image = Sum::image_bytes(resolution, slots);
-    Ok(MAX_BATCH
-        .min((BATCH_BYTES / image).max(1) as u32)
-        .min(limits.max_texture_array_layers)
-        .min((buffer / image) as u32))
+    // Four floats of colour a pixel.
+    let [width, height] = image_size(resolution, slots);
+    let image = u64::from(width) * u64::from(height) * 16;
+    Ok(MAX_BATCH.min((BATCH_BYTES / image).max(1) as u32).min(limits.max_texture_array_layers))
 }
 
 /// Where the pixels of a light's tile look, in the place's frame.

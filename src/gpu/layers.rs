@@ -39,7 +39,8 @@ impl Layers {
                 view_formats: &[],
             })
         };
-        let image = texture("layers", count, format, wgpu::TextureUsages::COPY_SRC);
+        let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let image = texture("layers", count, format, readable);
         let unread = wgpu::TextureUsages::empty();
         let depth = texture("depth", 1, wgpu::TextureFormat::Depth32Float, unread);
         let layer = |base_array_layer| {

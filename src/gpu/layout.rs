@@ -50,14 +50,22 @@ pub struct RadianceView {
     pub lights: [u32; APART],
 }
 
-/// What a triangle emits, and where its quadtree starts.
+/// What a triangle emits, and which of the scene's it is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RadianceTriangle {
     pub exitance: [f32; 3],
     pub light: u32,
-    pub root: u32,
+    pub index: u32,
     pub padding: [u32; 3],
+}
+
+/// A triangle's nodes at the deepest level that its quadtree is complete to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Lattice {
+    pub first: u32,
+    pub side: u32,
 }
 
 /// What `gather.wgsl` needs to know of a batch.
@@ -65,8 +73,6 @@ pub struct RadianceTriangle {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Summation {
     pub resolution: u32,
-    pub stride: u32,
-    pub lines: u32,
     pub slots: u32,
 }
 
@@ -97,6 +103,12 @@ pub struct Sums {
 
 /// Pixels along an edge of a light's tile.
 pub const TILE: u32 = 32;
+
+/// Elements side by side in the texture of their corners' radiosity.
+pub const ELEMENTS_A_LINE: u32 = 2048;
+
+/// Threads of `gather.wgsl` that add up a place's pixels.
+pub const LANES: u32 = 64;
 
 /// A node with children: this plus the first of the four. A leaf holds its element.
 pub const INNER: u32 = 1 << 31;
@@ -196,11 +208,12 @@ mod tests {
         );
         assert_eq!(
             wgsl_layout(&radiance, "RadianceTriangle"),
-            rust_layout!(RadianceTriangle { exitance, light, root, padding })
+            rust_layout!(RadianceTriangle { exitance, light, index, padding })
         );
+        assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));
         assert_eq!(
             wgsl_layout(&gather, "Summation"),
-            rust_layout!(Summation { resolution, stride, lines, slots })
+            rust_layout!(Summation { resolution, slots })
         );
         assert_eq!(
             wgsl_layout(&gather, "Tile"),
@@ -224,8 +237,11 @@ mod tests {
         assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
         let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(GATHER_WGSL));
         assert_eq!(constant(&radiance, "INNER"), INNER);
+        assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
         assert_eq!(constant(&radiance, "APART"), APART as u32);
+        assert_eq!(constant(&gather, "APART"), APART as u32);
         assert_eq!(constant(&gather, "TILE"), TILE);
+        assert_eq!(constant(&gather, "LANES"), LANES);
         // The shader writes a place's numbers one after the other.
         assert_eq!(constant(&gather, "WORDS") as usize * 4, size_of::<Sums>());
         let (nearness, lights) = (offset_of!(Sums, nearness), offset_of!(Sums, lights));

@@ -66,7 +66,7 @@ impl Radiance {
         let triangle = |&t: &u32| RadianceTriangle {
             exitance: scene.material(t as usize).exitance.as_vec3().to_array(),
             light: lights.of_triangle[t as usize],
-            root: t,
+            index: t,
             padding: [0; 3],
         };
         let triangles: Vec<RadianceTriangle> = drawn.iter().map(triangle).collect();
@@ -81,22 +81,28 @@ impl Radiance {
             label: Some("radiance.wgsl"),
             source: wgpu::ShaderSource::Wgsl(RADIANCE_WGSL.into()),
         });
+        let buffer = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: true },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let texture = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
         let entry = |binding: u32| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: match binding {
-                0..3 => wgpu::ShaderStages::VERTEX,
+                0..4 => wgpu::ShaderStages::VERTEX,
                 _ => wgpu::ShaderStages::FRAGMENT,
             },
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: true },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
+            ty: if binding == 5 { texture } else { buffer },
             count: None,
         };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("radiance"),
-            entries: &[0, 1, 2, 3, 4].map(entry),
+            entries: &[0, 1, 2, 3, 4, 5].map(entry),
         });
         let pipelines = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("radiance"),
@@ -124,15 +130,23 @@ impl Radiance {
 
     /// What the pass reads when it draws `sources`.
     pub fn bindings(&self, gpu: &Gpu, sources: &SourceBuffers) -> wgpu::BindGroup {
-        let buffers =
-            [&self.corners, &self.triangles, &self.views, &sources.nodes, &sources.elements];
+        let SourceBuffers { lattices, nodes, elements } = sources;
+        let resources = [
+            self.corners.as_entire_binding(),
+            self.triangles.as_entire_binding(),
+            self.views.as_entire_binding(),
+            lattices.as_entire_binding(),
+            nodes.as_entire_binding(),
+            wgpu::BindingResource::TextureView(elements),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("radiance"),
             layout: &self.layout,
-            entries: &[0, 1, 2, 3, 4].map(|k: usize| wgpu::BindGroupEntry {
-                binding: k as u32,
-                resource: buffers[k].as_entire_binding(),
-            }),
+            entries: &entries,
         })
     }
 

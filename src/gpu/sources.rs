@@ -1,23 +1,24 @@
 //! The settled light on the device: quadtrees, and the radiosity at their elements' corners.
 
 use rayon::prelude::*;
+use wgpu::util::DeviceExt;
 
 use super::device::Gpu;
-use super::layout::INNER;
+use super::layout::{ELEMENTS_A_LINE, INNER, Lattice};
 use crate::error::{Error, ErrorKind};
 use crate::gather::Sources;
-use crate::mesh::NodeId;
+use crate::mesh::{Mesh, NodeId};
 
-/// Bytes of an element's three corners, four floats each.
-const ELEMENT_BYTES: u64 = 48;
-
-/// Two arrays that `radiance.wgsl` reads.
+/// Arrays that `radiance.wgsl` reads.
 #[derive(Debug)]
 pub struct SourceBuffers {
+    /// Per triangle, where in `nodes` those of its deepest complete level are.
+    pub lattices: wgpu::Buffer,
     /// Per node, [`INNER`] plus the first of its four children, or its element.
     pub nodes: wgpu::Buffer,
-    /// Per element, the reflected radiosity at its three corners, W/m² per channel, and a zero.
-    pub elements: wgpu::Buffer,
+    /// Per element, the reflected radiosity at its three corners, W/m² per channel, one below the
+    /// other; [`ELEMENTS_A_LINE`] side by side.
+    pub elements: wgpu::TextureView,
 }
 
 impl SourceBuffers {
@@ -25,18 +26,69 @@ impl SourceBuffers {
     pub fn new(gpu: &Gpu, sources: &Sources, triangles: usize) -> Result<SourceBuffers, Error> {
         check(gpu, sources, triangles)?;
         let Sources { mesh, corners, reflected } = *sources;
-        let first_child = |n: usize| mesh.children(NodeId(n as u32)).map_or(0, |c| INNER | c[0].0);
-        let mut nodes: Vec<u32> = (0..mesh.node_count()).map(first_child).collect();
-        for e in 0..mesh.element_count() {
-            nodes[mesh.element(e).0 as usize] = e as u32;
-        }
+        let (lattices, nodes) = quadtrees(mesh);
         let value = |k: u32| reflected[k as usize].as_vec3().extend(0.0).to_array();
-        let elements: Vec<[[f32; 4]; 3]> = corners.par_iter().map(|c| c.map(value)).collect();
+        let line = ELEMENTS_A_LINE as usize;
+        let lines = corners.len().div_ceil(line);
+        let mut texels = vec![[0f32; 4]; lines * 3 * line];
+        texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(
+            |(texels, corners)| {
+                for (x, corner) in corners.iter().enumerate() {
+                    (0..3).for_each(|k| texels[k * line + x] = value(corner[k]));
+                }
+            },
+        );
+        let descriptor = wgpu::TextureDescriptor {
+            label: Some("elements"),
+            size: wgpu::Extent3d {
+                width: ELEMENTS_A_LINE,
+                height: 3 * lines as u32,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let order = wgpu::util::TextureDataOrder::LayerMajor;
+        let texels = bytemuck::cast_slice(&texels);
+        let elements = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, texels);
         Ok(SourceBuffers {
+            lattices: gpu.storage("lattices", bytemuck::cast_slice(&lattices)),
             nodes: gpu.storage("nodes", bytemuck::cast_slice(&nodes)),
-            elements: gpu.storage("elements", bytemuck::cast_slice(&elements)),
+            elements: elements.create_view(&Default::default()),
         })
     }
+}
+
+/// All quadtrees' nodes as numbers, and once more those of each triangle's deepest complete level.
+fn quadtrees(mesh: &Mesh) -> (Vec<Lattice>, Vec<u32>) {
+    let first_child = |n: usize| mesh.children(NodeId(n as u32)).map_or(0, |c| INNER | c[0].0);
+    let mut nodes: Vec<u32> = (0..mesh.node_count()).map(first_child).collect();
+    let mut complete = vec![u32::MAX; mesh.scene().triangles().len()];
+    for e in 0..mesh.element_count() {
+        let node = mesh.element(e);
+        nodes[node.0 as usize] = e as u32;
+        let level = &mut complete[mesh.triangle(node)];
+        *level = mesh.cell(node).level.min(*level);
+    }
+    let mut lattices = Vec::with_capacity(complete.len());
+    for (t, level) in complete.into_iter().enumerate() {
+        let first = nodes.len();
+        nodes.resize(first + (1 << (2 * level)), 0);
+        let mut level_nodes = vec![mesh.root(t)];
+        for _ in 0..level {
+            level_nodes =
+                level_nodes.into_iter().filter_map(|n| mesh.children(n)).flatten().collect();
+        }
+        for node in level_nodes {
+            nodes[first + mesh.cell(node).index() as usize] = nodes[node.0 as usize];
+        }
+        lattices.push(Lattice { first: first as u32, side: 1 << level });
+    }
+    (lattices, nodes)
 }
 
 fn check(gpu: &Gpu, sources: &Sources, triangles: usize) -> Result<(), Error> {
@@ -58,9 +110,10 @@ fn check(gpu: &Gpu, sources: &Sources, triangles: usize) -> Result<(), Error> {
     }
     let limits = gpu.device.limits();
     let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if elements as u64 * ELEMENT_BYTES > buffer {
-        let remedy = format!("this device holds {}", buffer / ELEMENT_BYTES);
-        return setting(format!("{elements} elements"), remedy);
+    // There are fewer than three nodes an element: less than 4/3 in trees and one in lattices.
+    let most = u64::from(limits.max_texture_dimension_2d / 3 * ELEMENTS_A_LINE).min(buffer / 12);
+    if elements as u64 > most {
+        return setting(format!("{elements} elements"), format!("this device holds {most}"));
     }
     Ok(())
 }
