@@ -10,18 +10,27 @@ use std::process::ExitCode;
 use glam::DVec3;
 use lexopt::prelude::*;
 use radiosity::Camera;
-use support::{Bake, Device};
+use support::{Bake, Device, Gathers};
 
 const USAGE: &str = "\
 usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
             [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
             [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H]
-            [--elements] [--adapter NAME | --cpu]
+            [--elements] [--gather none|needed|all] [--tolerance T]
+            [--smallest X] [--max-elements N] [--ambient] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
 
-  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32]
+  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32; / 16 if
+                    vertices gather]
+  --gather WHO      vertices that look at the settled light for themselves: none, those needed
+                    for the light to be linear in between (elements are split where it is not),
+                    or all of twice finer elements [none]
+  --tolerance T     split where a side's middle is off by this share of its radiosity [0.02]
+  --smallest X      elements with no longer edge are not split [element size / 24]
+  --max-elements N  elements there may be [1048576]
+  --ambient         add the light not yet shot, spread evenly; the files say so
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
   --near R          closed forms for receivers within R patch diameters; -1 for none [1]
   --viewpoints TOL  see a patch from its parts too, and go down to the elements where more than
@@ -90,6 +99,11 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             }
             Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
             Long("elements") => bake.elements = true,
+            Long("gather") => bake.gather = args.value()?.parse_with(gathers)?,
+            Long("tolerance") => bake.tolerance = args.value()?.parse()?,
+            Long("smallest") => bake.smallest = Some(args.value()?.parse()?),
+            Long("max-elements") => bake.max_elements = args.value()?.parse()?,
+            Long("ambient") => bake.ambient = true,
             Long("adapter") => bake.device = Device::Gpu(Some(args.value()?.string()?)),
             Long("cpu") => bake.device = Device::Cpu,
             Value(path) if scene.is_none() => scene = Some(path),
@@ -99,6 +113,15 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
     bake.scene = scene.ok_or("no scene given")?.into();
     bake.out = out.map_or_else(|| bake.scene.with_extension(""), Into::into);
     Ok(Some(bake))
+}
+
+fn gathers(text: &str) -> Result<Gathers, String> {
+    match text {
+        "none" => Ok(Gathers::None),
+        "needed" => Ok(Gathers::Needed),
+        "all" => Ok(Gathers::All),
+        other => Err(format!("'{other}' is not one of none, needed, all")),
+    }
 }
 
 /// Exactly `N` numbers with commas between.

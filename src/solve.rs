@@ -7,6 +7,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use crate::mesh::Mesh;
 use crate::scene::Rgb;
 pub use shooting::Shooting;
 pub(crate) use shooting::shooters;
@@ -46,6 +47,24 @@ impl Ledger {
     pub fn imbalance(&self) -> f64 {
         let accounted = self.absorbed + self.left + self.back + self.unshot;
         largest_share((self.emitted - accounted).abs(), self.emitted)
+    }
+
+    /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
+    /// fell evenly on all surfaces, again and again: the ambient term of Cohen, Chen, Wallace and
+    /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing of
+    /// where that would have gone. Gives the ambient radiosity, per unit of reflectance.
+    pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
+        let (mut area, mut reflects) = (0.0, Rgb::ZERO);
+        for e in 0..mesh.element_count() {
+            let node = mesh.element(e);
+            area += mesh.area(node);
+            reflects += mesh.material(node).reflectance * mesh.area(node);
+        }
+        let ambient = self.unshot / area / (Rgb::ONE - reflects / area);
+        for (e, b) in radiosity.iter_mut().enumerate() {
+            *b += mesh.material(mesh.element(e)).reflectance * ambient;
+        }
+        ambient
     }
 
     /// Share of the emitted flux that is unshot: the worst channel. 0 when nothing is emitted.

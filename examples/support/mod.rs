@@ -8,9 +8,10 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
-    Camera, Error, ErrorKind, FormFactors, Go, Gpu, Hemicubes, Mesh, NearRepair, NodeId, Progress,
-    RayCast, Report, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj,
-    write_exr, write_ply, write_png,
+    Camera, Error, ErrorKind, FormFactors, Gather, GatherProgress, GatheredRadiosity, Gathering,
+    Go, Gpu, HemicubeGather, Hemicubes, Mesh, NearRepair, NodeId, Progress, RayCast, RayGather,
+    Report, Rgb, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj, write_exr,
+    write_ply, write_png,
 };
 use serde_json::json;
 
@@ -20,8 +21,19 @@ pub struct Bake {
     pub scene: PathBuf,
     /// Path of the output without its ending.
     pub out: PathBuf,
-    /// Longest element edge, scene unit; by default a 32nd of the scene's diagonal.
+    /// Longest element edge, scene unit; by default a share of the scene's diagonal.
     pub element_size: Option<f64>,
+    /// Which vertices gather.
+    pub gather: Gathers,
+    /// Elements are split where sides bend by more than this share.
+    pub tolerance: f64,
+    /// Longest edge of an element that is not split any more, scene unit; by default a share of the
+    /// element size.
+    pub smallest: Option<f64>,
+    /// How many elements there may be.
+    pub max_elements: usize,
+    /// Whether the light not yet shot is added, spread evenly.
+    pub ambient: bool,
     pub hemicube: u32,
     /// Receivers within this many patch diameters get closed forms; below 0 none.
     pub near: f64,
@@ -37,6 +49,26 @@ pub struct Bake {
     pub elements: bool,
     pub device: Device,
 }
+
+/// Which vertices look at the settled light for themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gathers {
+    /// None: vertices get what the elements around them have.
+    None,
+    /// Those of the mesh, and more where the light between them bends.
+    Needed,
+    /// As needed, after splitting every element once.
+    All,
+}
+
+/// Levels that elements are split which others touch.
+const CONTACT_LEVELS: u32 = 3;
+
+/// Element size over that of the smallest that gathering makes.
+const SMALLEST: f64 = 24.0;
+
+/// Hemicubes that gather have this share of the pixels along an edge of those that shoot.
+const GATHER_PIXELS: u32 = 2;
 
 /// Lines of sight along a pixel's side.
 const SAMPLES: u32 = 4;
@@ -57,6 +89,11 @@ impl Bake {
             out: scene.with_extension(""),
             scene,
             element_size: None,
+            gather: Gathers::None,
+            tolerance: 0.02,
+            smallest: None,
+            max_elements: 1 << 20,
+            ambient: false,
             hemicube: 128,
             near: 1.0,
             viewpoints: None,
@@ -83,8 +120,12 @@ impl Bake {
         let warnings = scene.warnings().to_vec();
         seconds.load = clock.lap();
 
-        let element_size = self.element_size.unwrap_or_else(|| default_element_size(&scene));
-        let mesh = Mesh::new(scene, element_size)?;
+        let by_default = || match self.gather {
+            Gathers::None => default_element_size(&scene),
+            _ => 2.0 * default_element_size(&scene),
+        };
+        let element_size = self.element_size.unwrap_or_else(by_default);
+        let mesh = Mesh::new(scene, element_size)?.split_at_contacts(CONTACT_LEVELS);
         let maker = Maker::new(&self.device, &mesh, self.hemicube, self.rotations)?;
         let near = NearRepair::new(maker, &mesh, self.near);
         let levels = if self.viewpoints.is_some() { u32::MAX } else { 0 };
@@ -101,12 +142,20 @@ impl Bake {
         (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
         seconds.solve = clock.lap() - maker.seconds;
 
-        let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+        let mut radiosity = solution.radiosity;
+        if self.ambient {
+            solution.ledger.add_ambient(&mesh, &mut radiosity);
+        }
+        let gathered = self.gathered(&mesh, &radiosity, maker)?;
+        let surface = match &gathered {
+            Some(gathered) => gathered.surface.clone(),
+            None => VertexRadiosity::new(&mesh, &radiosity),
+        };
         seconds.vertices = clock.lap();
 
         write_ply(self.out.with_added_extension("ply"), &surface)?;
         if self.elements {
-            let flat = VertexRadiosity::flat(&mesh, &solution.radiosity);
+            let flat = VertexRadiosity::flat(&mesh, &radiosity);
             write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
         }
         if let Some(camera) = self.camera {
@@ -130,12 +179,20 @@ impl Bake {
                 ("shots".into(), json!(self.shooting.shots)),
                 ("row_memory".into(), json!(self.shooting.row_memory)),
                 ("patch_level".into(), json!(self.shooting.level)),
+                ("gather".into(), json!(format!("{:?}", self.gather).to_lowercase())),
+                ("tolerance".into(), json!(self.tolerance)),
+                ("smallest".into(), json!(self.smallest)),
+                ("max_elements".into(), json!(self.max_elements)),
+                ("ambient".into(), json!(self.ambient)),
             ],
             triangles: mesh.scene().triangles().len(),
-            elements: mesh.element_count(),
+            shot_elements: mesh.element_count(),
+            elements: gathered.as_ref().map_or(&mesh, |g| &g.mesh).element_count(),
             vertices: surface.positions.len(),
             shots: solution.shots,
             hemicubes: (solution.rows_made + rows.extra()) * u64::from(self.rotations.get()),
+            gathers: gathered.as_ref().map_or(0, |g| g.gathers),
+            gather_change: gathered.as_ref().map_or(0.0, |g| g.change),
             near_moved: near.moved(),
             stop: solution.stop.to_string(),
             ledger: solution.ledger,
@@ -151,6 +208,39 @@ impl Bake {
 pub fn default_element_size(scene: &Scene) -> f64 {
     let (low, high) = scene.bounds();
     (high - low).length() / 32.0
+}
+
+impl Bake {
+    /// Lets vertices gather, if they are to.
+    fn gathered(
+        &self,
+        mesh: &Mesh,
+        radiosity: &[Rgb],
+        maker: &Maker,
+    ) -> Result<Option<GatheredRadiosity>, Error> {
+        if self.gather == Gathers::None {
+            return Ok(None);
+        }
+        let longest = |e| {
+            let [a, b, c] = mesh.corners(mesh.element(e));
+            (b - a).length().max((c - b).length()).max((a - c).length())
+        };
+        let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
+        let settings = Gathering {
+            tolerance: self.tolerance,
+            elements: self.max_elements,
+            everywhere: u32::from(self.gather == Gathers::All),
+            ..Gathering::new(self.smallest.unwrap_or(largest / SMALLEST))
+        };
+        let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
+        let bar = bar();
+        let gathered = settings.gather(mesh, radiosity, &mut *gather, |p| {
+            show_gathering(&bar, p);
+            Go::Continue(())
+        })?;
+        bar.finish_and_clear();
+        Ok(Some(gathered))
+    }
 }
 
 /// Refuses an output that could not be written before any work is done for it.
@@ -198,6 +288,15 @@ impl Maker {
             }
         };
         Ok(Maker { rows, seconds: 0.0 })
+    }
+
+    /// Who gathers: on the same device as the rows were made, with as many rays where there is none as
+    /// a hemicube's top face of `resolution` has pixels.
+    fn gather(&self, mesh: &Mesh, resolution: u32) -> Result<Box<dyn Gather>, Error> {
+        Ok(match &self.rows {
+            Rows::Gpu(gpu, _) => Box::new(HemicubeGather::new(gpu, mesh, resolution)?),
+            Rows::Cpu(_) => Box::new(RayGather::new(mesh, resolution * resolution)?),
+        })
     }
 
     /// Name, type and driver.
@@ -255,11 +354,20 @@ fn show(bar: &ProgressBar, p: &Progress, wanted: f64) {
     let done = p.unshot_share.max(1e-16).ln() / wanted.clamp(1e-16, 0.999).ln();
     bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
     bar.set_message(format!(
-        "{:.3} % unshot, {} shots, {} hemicubes, {:.1} s",
+        "shooting, {:.3} % unshot, {} shots, {} hemicubes, {:.1} s",
         100.0 * p.unshot_share,
         p.shots,
         p.rows_made,
         p.elapsed.as_secs_f64()
+    ));
+}
+
+/// The bar fills with the vertices of a level.
+fn show_gathering(bar: &ProgressBar, p: &GatherProgress) {
+    bar.set_position((1000 * p.gathered / p.of.max(1)) as u64);
+    bar.set_message(format!(
+        "gathering, split {} times, {} of {} vertices, {} elements",
+        p.level, p.gathered, p.of, p.elements
     ));
 }
 
@@ -296,12 +404,17 @@ pub fn table(report: &Report) -> String {
     [
         format!("adapter    {name} ({kind}), {driver}"),
         format!(
-            "mesh       {} triangles, {} elements, {} vertices",
-            report.triangles, report.elements, report.vertices
+            "mesh       {} triangles, {} elements that shot, {} in the end, {} vertices",
+            report.triangles, report.shot_elements, report.elements, report.vertices
         ),
         format!(
             "shooting   {} shots, {} hemicubes, {}",
             report.shots, report.hemicubes, report.stop
+        ),
+        format!(
+            "gathering  {} places, changed the vertices by {:.2} %",
+            report.gathers,
+            100.0 * report.gather_change
         ),
         format!(
             "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",

@@ -21,7 +21,9 @@ pub struct Report {
     pub settings: Vec<(String, Value)>,
     /// Triangles with area.
     pub triangles: usize,
-    /// Elements of the mesh.
+    /// Elements of the mesh that light was shot on.
+    pub shot_elements: usize,
+    /// Elements of the mesh exported: more where vertices gathered and elements were split.
     pub elements: usize,
     /// Vertices exported.
     pub vertices: usize,
@@ -29,6 +31,10 @@ pub struct Report {
     pub shots: u64,
     /// Rows made: hemicubes drawn, or fans of rays cast.
     pub hemicubes: u64,
+    /// Places at which vertices gathered.
+    pub gathers: u64,
+    /// What gathering changed of the vertices; see `GatheredRadiosity`.
+    pub gather_change: f64,
     /// Share of a row that the proximity repair moved, in the mean; see `NearRepair`.
     pub near_moved: f64,
     /// Why the solver stopped.
@@ -57,7 +63,7 @@ pub struct Seconds {
     pub readback: f64,
     /// Shooting on rows.
     pub solve: f64,
-    /// Elements to vertices.
+    /// Elements to vertices, gathering and splitting included.
     pub vertices: f64,
     /// Drawing the camera image and writing all other files.
     pub write: f64,
@@ -77,10 +83,13 @@ impl Report {
             "adapter": { "name": name, "type": kind, "driver": driver },
             "settings": self.settings.iter().cloned().collect::<Map<String, Value>>(),
             "triangles": self.triangles,
+            "shot_elements": self.shot_elements,
             "elements": self.elements,
             "vertices": self.vertices,
             "shots": self.shots,
             "hemicubes": self.hemicubes,
+            "gathers": self.gathers,
+            "gather_change": self.gather_change,
             "near_moved": self.near_moved,
             "stop": self.stop,
             "ledger": {

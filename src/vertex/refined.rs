@@ -191,7 +191,9 @@ impl Refined {
             return 0.0;
         }
         let emitted = self.mesh.material(node).exitance;
-        let allowed = settings.tolerance * (self.largest / size).powf(std::env::var("POW").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5));
+        let allowed = settings.tolerance
+            * (self.largest / size)
+                .powf(std::env::var("POW").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5));
         let off = |value: Rgb, other: Rgb| {
             let whole = (value + emitted).length().max(self.dim);
             if whole > 0.0 { (value - other).length() / whole / allowed } else { 0.0 }
