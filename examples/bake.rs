@@ -15,9 +15,9 @@ use support::{Bake, Device, Gathers};
 const USAGE: &str = "\
 usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
             [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
-            [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H]
-            [--elements] [--gather none|needed|all] [--tolerance T]
-            [--smallest X] [--max-elements N] [--ambient] [--adapter NAME | --cpu]
+            [--patch-tolerance X] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
+            [--image W,H] [--elements] [--gather none|needed|all] [--bend T] [--smallest X]
+            [--max-elements N] [--ambient] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
@@ -27,7 +27,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --gather WHO      vertices that look at the settled light for themselves: none, those needed
                     for the light to be linear in between (elements are split where it is not),
                     or all of twice finer elements [none]
-  --tolerance T     split where a side's middle is off by this share of its radiosity [0.02]
+  --bend T          split where a side's middle is off by this share of its radiosity [0.02]
   --smallest X      elements with no longer edge are not split [element size / 24]
   --max-elements N  elements there may be [1048576]
   --ambient         add the light not yet shot, spread evenly; the files say so
@@ -40,7 +40,9 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --unshot F        stop at this share of unshot flux [0.001]
   --shots N         stop after this many shots
   --row-memory MB   memory for form-factor rows that are kept [1024]
-  --patch-level N   a patch is 4^N elements [1]
+  --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
+                    patches as small as they can be [0.008]
+  --patch-level N   the smallest patches are 4^N elements [0]
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
@@ -91,6 +93,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
                 let megabytes: usize = args.value()?.parse()?;
                 bake.shooting.row_memory = megabytes.saturating_mul(1 << 20);
             }
+            Long("patch-tolerance") => bake.shooting.tolerance = args.value()?.parse()?,
             Long("patch-level") => bake.shooting.level = args.value()?.parse()?,
             Long("camera") => {
                 let [a, b, c, d, e, f, vertical_fov] = args.value()?.parse_with(numbers)?;
@@ -100,7 +103,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
             Long("elements") => bake.elements = true,
             Long("gather") => bake.gather = args.value()?.parse_with(gathers)?,
-            Long("tolerance") => bake.tolerance = args.value()?.parse()?,
+            Long("bend") => bake.bend = args.value()?.parse()?,
             Long("smallest") => bake.smallest = Some(args.value()?.parse()?),
             Long("max-elements") => bake.max_elements = args.value()?.parse()?,
             Long("ambient") => bake.ambient = true,

@@ -4,6 +4,7 @@
 //! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
 //! a patch is one contiguous range of elements, however unequal the depths below it.
 
+mod clusters;
 mod contacts;
 mod quadtree;
 mod smooth;
@@ -16,6 +17,7 @@ use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Scene};
+pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
 pub use smooth::CREASE_DEGREES;
 pub(crate) use smooth::{Side, Smooth};

@@ -1,16 +1,16 @@
 //! What a solver gives back and tells on its way: solution, energy ledger, progress.
 
 mod kept_rows;
+mod shooters;
 mod shooting;
 
 use std::fmt;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::time::Duration;
 
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 pub use shooting::Shooting;
-pub(crate) use shooting::shooters;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]
@@ -73,8 +73,34 @@ impl Ledger {
     }
 }
 
+/// Flux of the elements, W per channel.
+struct Flux {
+    /// Emitted by all.
+    emitted: Rgb,
+    /// Received or emitted by each and not yet passed on.
+    unshot: Vec<Rgb>,
+    /// Emitted or reflected by each, shot or not.
+    leaving: Vec<Rgb>,
+}
+
+impl Flux {
+    /// What is unshot in `elements`, as a share of the emitted: the worst channel.
+    fn unshot_share(&self, elements: &[Range<usize>]) -> f64 {
+        largest_share(sum(&self.unshot, elements), self.emitted)
+    }
+
+    /// What leaves `elements`, as a share of the emitted: the worst channel.
+    fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
+        largest_share(sum(&self.leaving, elements), self.emitted)
+    }
+}
+
+fn sum(flux: &[Rgb], elements: &[Range<usize>]) -> Rgb {
+    elements.iter().map(|run| flux[run.clone()].iter().sum::<Rgb>()).sum()
+}
+
 /// Largest ratio part/whole over the channels in which the whole is above zero.
-pub(crate) fn largest_share(part: Rgb, whole: Rgb) -> f64 {
+fn largest_share(part: Rgb, whole: Rgb) -> f64 {
     let share = |(p, w): (f64, f64)| if w > 0.0 { p / w } else { 0.0 };
     part.to_array().into_iter().zip(whole.to_array()).map(share).fold(0.0, f64::max)
 }

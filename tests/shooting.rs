@@ -69,7 +69,7 @@ fn unequal_areas_exchange_by_reciprocity() {
 fn white_furnace_with_exact_rows_is_exact_at_every_element() {
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
         let mesh = Mesh::new(cube(&material(rho, 1.0)), 0.36).unwrap();
-        let settings = Shooting { unshot: 1e-7, level: 0, ..Default::default() };
+        let settings = Shooting { unshot: 1e-7, tolerance: 0.0, ..Default::default() };
         let s = settings.solve(&mesh, &mut exact(), go).unwrap();
         let (mean, worst) = mean_and_worst(&mesh, &s, Rgb::splat(answer));
         println!("ρ {rho}: mean {}, worst {worst:.1e}, {} shots", mean.x, s.shots);
@@ -149,7 +149,7 @@ fn a_kept_row_is_made_once_and_budget_changes_nothing_but_the_work() {
     let mesh = Mesh::new(cube(&material(0.8, 1.0)), 0.36).unwrap();
     let solve = |row_memory: usize| {
         let mut maker = exact();
-        let settings = Shooting { unshot: 1e-3, row_memory, level: 0, ..Default::default() };
+        let settings = Shooting { unshot: 1e-3, row_memory, tolerance: 0.0, ..Default::default() };
         let s = settings.solve(&mesh, &mut maker, go).unwrap();
         assert_eq!(maker.made, s.rows_made);
         s
@@ -184,7 +184,9 @@ fn patches_and_elements_shoot_the_same_light() {
     };
     let solve = |level| {
         let mut rays = RayCast::new(&lit, 4096).unwrap();
-        Shooting { unshot: 1e-4, level, ..Default::default() }.solve(&lit, &mut rays, go).unwrap()
+        Shooting { unshot: 1e-4, tolerance: 0.0, level, ..Default::default() }
+            .solve(&lit, &mut rays, go)
+            .unwrap()
     };
     let (fine, coarse) = (solve(0), solve(2));
     assert!(coarse.rows_made * 4 < fine.rows_made, "{} {}", coarse.rows_made, fine.rows_made);

@@ -26,7 +26,7 @@ pub struct Bake {
     /// Which vertices gather.
     pub gather: Gathers,
     /// Elements are split where sides bend by more than this share.
-    pub tolerance: f64,
+    pub bend: f64,
     /// Longest edge of an element that is not split any more, scene unit; by default a share of the
     /// element size.
     pub smallest: Option<f64>,
@@ -90,7 +90,7 @@ impl Bake {
             scene,
             element_size: None,
             gather: Gathers::None,
-            tolerance: 0.02,
+            bend: 0.02,
             smallest: None,
             max_elements: 1 << 20,
             ambient: false,
@@ -178,9 +178,10 @@ impl Bake {
                 ("unshot".into(), json!(self.shooting.unshot)),
                 ("shots".into(), json!(self.shooting.shots)),
                 ("row_memory".into(), json!(self.shooting.row_memory)),
+                ("patch_tolerance".into(), json!(self.shooting.tolerance)),
                 ("patch_level".into(), json!(self.shooting.level)),
                 ("gather".into(), json!(format!("{:?}", self.gather).to_lowercase())),
-                ("tolerance".into(), json!(self.tolerance)),
+                ("bend".into(), json!(self.bend)),
                 ("smallest".into(), json!(self.smallest)),
                 ("max_elements".into(), json!(self.max_elements)),
                 ("ambient".into(), json!(self.ambient)),
@@ -227,7 +228,7 @@ impl Bake {
         };
         let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
         let settings = Gathering {
-            tolerance: self.tolerance,
+            tolerance: self.bend,
             elements: self.max_elements,
             everywhere: u32::from(self.gather == Gathers::All),
             ..Gathering::new(self.smallest.unwrap_or(largest / SMALLEST))

@@ -20,9 +20,8 @@ use rayon::prelude::*;
 
 use super::boundary::End;
 use crate::form_factor::analytic::point_to_polygon;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
-use crate::solve::{Shooting, shooters};
 
 /// Vertices nearer than this share of the scene's extent are at one place. A power of two, so that
 /// places at binary fractions of the extent lie well inside a cell, not where rounding decides.
@@ -71,14 +70,21 @@ fn meeting(mesh: &Mesh, ends: &[End]) -> Vec<Vec<usize>> {
 }
 
 /// Radiosity as the solver shot it: patches send the mean of their elements. The elements' values
-/// came about by this, and so only this can be taken out of them again.
+/// came about by this, and so only this can be taken out of them again. Emitters shoot as elements; where surfaces meet, patches
+/// are small; four elements is a guess at them.
 fn as_shot(mesh: &Mesh, elements: &[Rgb]) -> Vec<Rgb> {
-    let mut shot = elements.to_vec();
-    for shooter in shooters(mesh, Shooting::default().level) {
-        let area = |e: usize| mesh.area(mesh.element(e));
-        let flux: Rgb = shooter.elements.clone().map(|e| elements[e] * area(e)).sum();
-        shot[shooter.elements].fill(flux / mesh.area(shooter.patch));
+    fn smooth(mesh: &Mesh, node: NodeId, shot: &mut [Rgb]) {
+        let Some(children) = mesh.children(node) else { return };
+        if children.iter().any(|&k| mesh.children(k).is_some()) {
+            return children.iter().for_each(|&k| smooth(mesh, k, shot));
+        }
+        let four = &mut shot[mesh.elements_of(node)];
+        four.fill(four.iter().sum::<Rgb>() / 4.0);
     }
+    let mut shot = elements.to_vec();
+    let dark = |t: &usize| mesh.scene().material(*t).exitance == Rgb::ZERO;
+    let triangles = (0..mesh.scene().triangles().len()).filter(dark);
+    triangles.for_each(|t| smooth(mesh, mesh.root(t), &mut shot));
     shot
 }
 

@@ -1,0 +1,300 @@
+//! Who shoots: a cut through clusters, triangles and their quadtrees, finer where more is at stake.
+//!
+//! A shooter is a cluster of triangles, a triangle, or a node of its quadtree. It shoots for all
+//! elements below it along one row, seen from one place. That is off by how far its light is from
+//! that place, beside how far its receivers are: a share q of what it sends, by first and second
+//! moments of position, normal and brightness. With a share s of the emitted light, it adds s q²
+//! to the mean square of q over all light; where √s q is above the tolerance, its parts shoot. So
+//! effort follows flux, and is spread evenly (Hanrahan, Salzman and Aupperle 1991 refine by
+//! brightness likewise, there the links between two patches).
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::Flux;
+use crate::form_factor::Row;
+use crate::mesh::{Clusters, Mesh, NodeId};
+use crate::scene::Rgb;
+
+/// The shooters. Together they cover every element once, and they only ever get smaller.
+pub(super) struct Shooters<'m> {
+    mesh: &'m Mesh,
+    clusters: Clusters,
+    /// Centroid of each element.
+    centroids: Vec<DVec3>,
+    cut: Vec<Shooter>,
+    /// Most that √s q may be.
+    tolerance: f64,
+    /// Quadtree levels above the elements that are not gone below.
+    level: u32,
+}
+
+/// One that shoots.
+struct Shooter {
+    source: Source,
+    elements: Vec<Range<usize>>,
+    /// The node whose row this shoots along, once it has shot or is about to.
+    patch: Option<NodeId>,
+    near: Near,
+    /// Emits and has not shot yet.
+    fresh: bool,
+}
+
+#[derive(Clone, Copy)]
+enum Source {
+    Cluster(u32),
+    Node(NodeId),
+}
+
+/// Means of 1/r and 1/r² over what a patch sees, r from its centroid; 1/length unit, and squared.
+#[derive(Clone, Copy)]
+struct Near {
+    first: f64,
+    second: f64,
+}
+
+/// A shot to be taken.
+pub(super) struct Shot {
+    /// Place in the cut.
+    shooter: usize,
+    /// The node whose row it goes along.
+    pub patch: NodeId,
+    /// The elements that are shot for.
+    pub elements: Vec<Range<usize>>,
+}
+
+impl<'m> Shooters<'m> {
+    /// The largest there are; but emitters shoot by their elements, since what is nearest a lamp
+    /// depends most on its shape.
+    pub fn new(mesh: &'m Mesh, tolerance: f64, level: u32) -> Shooters<'m> {
+        let clusters = Clusters::new(mesh.scene());
+        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
+        let centroids = elements.map(|n| mesh.centroid(n)).collect();
+        let mut all = Shooters { mesh, clusters, centroids, cut: vec![], tolerance, level };
+        // As in the middle of a cube of that area.
+        let area: f64 = (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum();
+        let near = Near { first: (6.0 / area).sqrt(), second: 6.0 / area };
+        for &root in all.clusters.roots() {
+            let triangles = all.clusters.triangles(root);
+            if mesh.scene().material(triangles[0] as usize).exitance == Rgb::ZERO {
+                all.cut.push(all.shooter(Source::Cluster(root), near));
+                continue;
+            }
+            let below = triangles.iter().flat_map(|&t| mesh.elements_of(mesh.root(t as usize)));
+            let one = |e| all.shooter(Source::Node(mesh.element(e)), near);
+            let emitter = |e| Shooter { fresh: true, ..one(e) };
+            let emitters: Vec<Shooter> = below.map(emitter).collect();
+            all.cut.extend(emitters);
+        }
+        all
+    }
+
+    /// The next shots, by unshot flux, most first; emitters before all others. Ends at `rows`
+    /// patches whose row is missing, at `most` shots, or where the flux falls far below the first's,
+    /// so that no dim patch shoots before a bright one is lit.
+    pub fn brightest(
+        &mut self,
+        flux: &Flux,
+        rows: usize,
+        most: u64,
+        missing: impl Fn(NodeId) -> bool,
+    ) -> Vec<Shot> {
+        // Positive floats are in the order of their bits; of equals the first in the cut.
+        let entry = |s: &Shooter, k: usize| {
+            let share = flux.unshot_share(&s.elements);
+            (share > 0.0).then(|| (s.fresh, share.to_bits(), Reverse(k)))
+        };
+        let mut bright: BinaryHeap<_> =
+            self.cut.iter().zip(0..).filter_map(|(s, k)| entry(s, k)).collect();
+        let (mut wanted, mut shots, mut floor) = (rows.max(1), Vec::<Shot>::new(), None);
+        while let Some((fresh, bits, Reverse(k))) = bright.pop() {
+            let share = f64::from_bits(bits);
+            let (first, least) = *floor.get_or_insert((fresh, share * BATCH_FALL));
+            if fresh != first || share < least || shots.len() as u64 >= most {
+                break;
+            }
+            let parts = self.cut.len();
+            if self.split(k, flux) {
+                let parts = [k].into_iter().chain(parts..self.cut.len());
+                bright.extend(parts.filter_map(|k| entry(&self.cut[k], k)));
+                // The floor is that of a patch that shoots.
+                floor = floor.filter(|_| !shots.is_empty());
+                continue;
+            }
+            let patch = self.viewpoint(&self.cut[k], flux);
+            let draws = missing(patch);
+            if draws && wanted == 0 {
+                break;
+            }
+            // A patch that stands for two shooters is drawn for one of them first.
+            if draws && shots.iter().any(|s| s.patch == patch) {
+                continue;
+            }
+            wanted -= usize::from(draws);
+            let shooter = &mut self.cut[k];
+            (shooter.patch, shooter.fresh) = (Some(patch), false);
+            shots.push(Shot { shooter: k, patch, elements: shooter.elements.clone() });
+        }
+        shots
+    }
+
+    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is to be
+    /// taken still; if not, the shooter has been split.
+    pub fn confirm(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
+        let eye = self.mesh.centroid(shot.patch);
+        let mut near = Near { first: 0.0, second: 0.0 };
+        for entry in &row.entries {
+            let factor = Row::form_factor(entry.share);
+            let distance = self.centroids[entry.element as usize].distance(eye);
+            near.first += factor / distance;
+            near.second += factor / (distance * distance);
+        }
+        self.cut[shot.shooter].near = near;
+        !self.split(shot.shooter, flux)
+    }
+
+    /// Replaces shooter `k` by its parts where it is too coarse, and these by theirs. Parts take on
+    /// what is known of their whole.
+    fn split(&mut self, k: usize, flux: &Flux) -> bool {
+        let mut open = vec![k];
+        let mut split = false;
+        while let Some(k) = open.pop() {
+            let Shooter { source, near, .. } = self.cut[k];
+            let parts = self.parts(source);
+            if parts.is_empty() || self.error(&self.cut[k], flux) < self.tolerance {
+                continue;
+            }
+            split = true;
+            let mut parts = parts.into_iter().map(|part| self.shooter(part, near));
+            let first = parts.next();
+            let rest: Vec<Shooter> = parts.collect();
+            open.push(k);
+            open.extend(self.cut.len()..self.cut.len() + rest.len());
+            self.cut.extend(rest);
+            first.into_iter().for_each(|part| self.cut[k] = part);
+        }
+        split
+    }
+
+    /// √s q of a shooter.
+    fn error(&self, shooter: &Shooter, flux: &Flux) -> f64 {
+        let mesh = self.mesh;
+        let share = flux.leaving_share(&shooter.elements);
+        if share == 0.0 {
+            return 0.0;
+        }
+        let patch = self.viewpoint(shooter, flux);
+        let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
+        let (mut whole, mut area) = (0.0, 0.0);
+        let (mut place, mut extent) = (DVec3::ZERO, 0.0);
+        let (mut turn, mut bend) = (DVec3::ZERO, 0.0);
+        for e in all(&shooter.elements) {
+            let node = mesh.element(e);
+            let (off, turned) = (self.centroids[e] - eye, mesh.normal(node) - normal);
+            let light = flux.leaving[e].element_sum();
+            whole += light;
+            area += mesh.area(node);
+            place += light * off;
+            extent += light * off.length_squared();
+            turn += light * turned;
+            bend += light * turned.length_squared();
+        }
+        let even = |e: usize| whole / area * mesh.area(mesh.element(e));
+        let uneven = |e: usize| (flux.leaving[e].element_sum() - even(e)).abs();
+        let uneven = all(&shooter.elements).map(uneven).sum::<f64>() / whole;
+        let Near { first, second } = shooter.near;
+        // The angle that the patch is seen under, squared.
+        let wide = extent / whole * second;
+        let off = place.length() / whole * first + wide + UNEVEN * uneven * wide.sqrt();
+        share.sqrt() * (off + (turn.length() + bend) / whole).min(1.0)
+    }
+
+    /// The node whose row `shooter` is to shoot along: itself, where its middle is lit; else, as
+    /// for a cluster, the lit element nearest to where its light is. What no light comes to may lie
+    /// in other geometry, such as the floor under a block.
+    fn viewpoint(&self, shooter: &Shooter, flux: &Flux) -> NodeId {
+        let mesh = self.mesh;
+        if let Some(patch) = shooter.patch {
+            return patch;
+        }
+        let area = |e: usize| mesh.area(mesh.element(e));
+        let light = |e: usize| flux.leaving[e].element_sum();
+        let elements = || all(&shooter.elements);
+        let whole: f64 = elements().map(light).sum();
+        let mean = whole / elements().map(area).sum::<f64>();
+        let lit = |&e: &usize| light(e) >= LIT * mean * area(e);
+        if let Source::Node(node) = shooter.source {
+            let mut middle = node;
+            while let Some([.., part]) = mesh.children(middle) {
+                middle = part;
+            }
+            if mesh.elements_of(middle).all(|e| lit(&e)) {
+                return node;
+            }
+        }
+        let middle = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / whole;
+        let off = |e: &usize| self.centroids[*e].distance_squared(middle);
+        let nearest = elements().filter(lit).min_by(|a, b| off(a).total_cmp(&off(b)));
+        mesh.element(nearest.unwrap_or(shooter.elements[0].start))
+    }
+
+    fn shooter(&self, source: Source, near: Near) -> Shooter {
+        let mesh = self.mesh;
+        let (source, triangles) = match source {
+            Source::Cluster(c) if self.clusters.parts(c).is_some() => {
+                (source, self.clusters.triangles(c))
+            }
+            Source::Cluster(t) => (Source::Node(mesh.root(t as usize)), vec![]),
+            Source::Node(_) => (source, vec![]),
+        };
+        let mut elements = match source {
+            Source::Node(node) => vec![mesh.elements_of(node)],
+            Source::Cluster(_) => {
+                triangles.iter().map(|&t| mesh.elements_of(mesh.root(t as usize))).collect()
+            }
+        };
+        elements.dedup_by(|next, run| {
+            let joins = run.end == next.start;
+            if joins {
+                run.end = next.end;
+            }
+            joins
+        });
+        Shooter { source, elements, patch: None, near, fresh: false }
+    }
+
+    fn parts(&self, source: Source) -> Vec<Source> {
+        match source {
+            Source::Cluster(c) => {
+                self.clusters.parts(c).into_iter().flatten().map(Source::Cluster).collect()
+            }
+            Source::Node(node) => match self.mesh.children(node) {
+                Some(children) if height(self.mesh, node) > self.level => {
+                    children.map(Source::Node).to_vec()
+                }
+                _ => vec![],
+            },
+        }
+    }
+}
+
+/// A batch ends where the flux is below this share of its brightest patch.
+const BATCH_FALL: f64 = 0.25;
+
+/// An element is lit from this share of its shooter's mean radiosity.
+const LIT: f64 = 0.5;
+
+/// Weight of uneven light: a corner of the patch sends to what is next to it, not to the mean.
+const UNEVEN: f64 = 3.0;
+
+fn all(elements: &[Range<usize>]) -> impl Iterator<Item = usize> {
+    elements.iter().cloned().flatten()
+}
+
+/// Levels below `node`, at most.
+fn height(mesh: &Mesh, node: NodeId) -> u32 {
+    mesh.children(node).map_or(0, |c| 1 + c.iter().map(|&k| height(mesh, k)).max().unwrap_or(0))
+}
