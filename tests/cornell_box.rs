@@ -5,7 +5,7 @@ mod common;
 mod truth;
 
 use common::{cornell_box, gpu};
-use radiosity::{Go, Hemicubes, Mesh, RayCast, Shooting, Solution, VertexRadiosity};
+use radiosity::{Go, Hemicubes, Mesh, NearRepair, RayCast, Shooting, Solution, VertexRadiosity};
 
 const TRUTH: &str = include_str!("data/cornell_box.truth.json");
 
@@ -36,11 +36,11 @@ fn thirty_millimetre_elements_err_by_five_per_cent_at_most() {
     // straddle a shadow or a block's foot.
     let mesh = cornell_box(30.0);
     assert_eq!(mesh.element_count(), 13_184);
-    let mut hemicubes = Hemicubes::new(&gpu, &mesh, 128).unwrap();
-    let solution = solve(&mesh, &mut hemicubes);
+    let rows = || NearRepair::new(Hemicubes::new(&gpu, &mesh, 128).unwrap(), &mesh, 1.0);
+    let solution = solve(&mesh, &mut rows());
     check(&mesh, &solution, 0.05, 0.01);
     // Same input, same adapter: the same bits, also from a new device.
-    let again = solve(&mesh, &mut Hemicubes::new(&gpu, &mesh, 128).unwrap());
+    let again = solve(&mesh, &mut rows());
     assert!(again.radiosity == solution.radiosity && again.ledger == solution.ledger);
 }
 

@@ -162,3 +162,141 @@ fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
     }
     beside
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Triangle};
+
+    /// A surface over a grid of `n` × `m` quads, each two triangles; group and material by row.
+    fn grid(
+        n: u32,
+        m: u32,
+        at: impl Fn(f64, f64) -> DVec3,
+        kind: impl Fn(u32) -> [u32; 2],
+    ) -> Scene {
+        let place = |k: u32| {
+            at(f64::from(k % (n + 1)) / f64::from(n), f64::from(k / (n + 1)) / f64::from(m))
+        };
+        let mut triangles = vec![];
+        for j in 0..m {
+            for i in 0..n {
+                let (a, b) = (j * (n + 1) + i, (j + 1) * (n + 1) + i);
+                let [group, material] = kind(j);
+                for corners in [[a, a + 1, b + 1], [a, b + 1, b]] {
+                    triangles.push(Triangle { corners, group, material });
+                }
+            }
+        }
+        let names = ["g", "h"].map(String::from).to_vec();
+        let materials = ["m", "n"].map(|name| Material::grey(name, 0.5)).to_vec();
+        Scene::new((0..(n + 1) * (m + 1)).map(place).collect(), triangles, names, materials)
+            .unwrap()
+    }
+
+    fn turned(u: f64) -> (f64, f64) {
+        // Exactly closed: the last column is the first.
+        (u.fract() * std::f64::consts::TAU).sin_cos()
+    }
+
+    fn cylinder() -> Scene {
+        let at = |u: f64, v: f64| DVec3::new(turned(u).1, turned(u).0, 3.0 * v);
+        grid(48, 24, at, |_| [0, 0])
+    }
+
+    fn sphere() -> Scene {
+        let at = |u: f64, v: f64| {
+            // The same bits all round at the poles.
+            let (sin, cos) = (std::f64::consts::PI * v).sin_cos();
+            let r = if v == 0.0 || v == 1.0 { 0.0 } else { sin };
+            DVec3::new(r * turned(u).1, r * turned(u).0, -cos)
+        };
+        grid(64, 32, at, |_| [0, 0])
+    }
+
+    fn disc() -> Scene {
+        let at = |u: f64, v: f64| DVec3::new(v * turned(u).0, v * turned(u).1, 0.0);
+        grid(90, 1, at, |_| [0, 0])
+    }
+
+    fn striped() -> Scene {
+        let at = |u: f64, v: f64| DVec3::new(u, v, 0.0);
+        grid(8, 16, at, |j| [j / 4 % 2, j / 8 % 2])
+    }
+
+    #[test]
+    fn every_cluster_is_its_parts_and_the_roots_are_all() {
+        for scene in [cylinder(), sphere(), disc(), striped()] {
+            let clusters = Clusters::new(&scene);
+            let mut all: Vec<u32> =
+                clusters.roots().iter().flat_map(|&c| clusters.triangles(c)).collect();
+            all.sort();
+            assert_eq!(all, (0..scene.triangles().len() as u32).collect::<Vec<_>>());
+            for c in 0..clusters.clusters.len() as u32 {
+                let Some(parts) = clusters.parts(c) else {
+                    assert_eq!(clusters.triangles(c), [c]);
+                    continue;
+                };
+                let mut both = parts.map(|p| clusters.triangles(p)).concat();
+                both.sort();
+                assert_eq!(both, clusters.triangles(c));
+                let area: f64 = both.iter().map(|&t| scene.area(t as usize)).sum();
+                assert!((clusters.clusters[c as usize].area / area - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn normals_spread_as_far_as_they_may_and_no_further() {
+        for scene in [cylinder(), sphere()] {
+            let clusters = Clusters::new(&scene);
+            let mut widest = 0.0_f64;
+            for c in 0..clusters.clusters.len() as u32 {
+                let axis = clusters.clusters[c as usize].axis;
+                for t in clusters.triangles(c) {
+                    widest = widest.max(axis.angle_between(scene.normal(t as usize)));
+                }
+            }
+            // An angle from an arc cosine of 1 − ε is off by √(2ε).
+            let widest = widest.to_degrees();
+            assert!(widest <= SPREAD_DEGREES + 1e-5 && widest > SPREAD_DEGREES / 3.0, "{widest}");
+        }
+    }
+
+    #[test]
+    fn a_smooth_surface_is_few_clusters() {
+        let roots = |scene: &Scene| Clusters::new(scene).roots().len();
+        assert_eq!(roots(&disc()), 1);
+        // Bands of 70° at most: six are needed around a cylinder, and greedy bands that are half as
+        // wide as they could be make twice that. Their height is free, but compact clusters that
+        // met first may stand in one another's way: as much again.
+        let (around, ball) = (roots(&cylinder()), roots(&sphere()));
+        println!("cylinder {around}, sphere {ball}");
+        assert!((6..=24).contains(&around), "{around}");
+        // Caps of 35° hold 1.14 of 12.57 sr: twelve at least. Of half that angle 43, or 52 hexagons,
+        // which fill 83 % of their caps.
+        assert!((12..=52).contains(&ball), "{ball}");
+    }
+
+    #[test]
+    fn a_cluster_has_one_group_and_one_material() {
+        let scene = striped();
+        let clusters = Clusters::new(&scene);
+        // Four stripes, each with its own pair.
+        assert_eq!(clusters.roots().len(), 4);
+        for &c in clusters.roots() {
+            let kind = |t: u32| {
+                let t = scene.triangles()[t as usize];
+                (t.group, t.material)
+            };
+            let triangles = clusters.triangles(c);
+            assert!(triangles.iter().all(|&t| kind(t) == kind(triangles[0])));
+        }
+    }
+
+    #[test]
+    fn the_same_clusters_every_time() {
+        let [one, two] = [0, 1].map(|_| Clusters::new(&sphere()));
+        assert_eq!((one.parts, one.roots), (two.parts, two.roots));
+    }
+}

@@ -29,7 +29,8 @@ pub struct Shooting {
     /// wrong, as far as can be told from its size, from how near its receivers are and from how
     /// uneven it is. Patches are as large as this lets them be, from clusters of many triangles down
     /// to elements. 0 makes every patch as small as `level` allows. Elements of emitters always
-    /// shoot by themselves.
+    /// shoot by themselves. Rows are taken to be right for near receivers: see
+    /// [`NearRepair`](crate::NearRepair).
     pub tolerance: f64,
     /// The smallest patches are this many quadtree levels above the elements: 4ᵏ elements, or a
     /// triangle.
