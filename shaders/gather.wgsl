@@ -4,7 +4,6 @@
 // fixed order.
 
 const LANES: u32 = 64u;
-const APART: u32 = 8u;
 const TILE: u32 = 32u;    // pixels along an edge of a light's tile
 const WORDS: u32 = 24u;   // numbers that a place receives
 const PI: f32 = 3.14159265358979;

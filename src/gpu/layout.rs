@@ -239,7 +239,6 @@ mod tests {
         assert_eq!(constant(&radiance, "INNER"), INNER);
         assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
         assert_eq!(constant(&radiance, "APART"), APART as u32);
-        assert_eq!(constant(&gather, "APART"), APART as u32);
         assert_eq!(constant(&gather, "TILE"), TILE);
         assert_eq!(constant(&gather, "LANES"), LANES);
         // The shader writes a place's numbers one after the other.

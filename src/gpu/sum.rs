@@ -78,7 +78,8 @@ impl Sum {
         Ok(Sum { steps, tiles, sums })
     }
 
-    /// Records the summation over the first `count` layers, whose tiles are `tiles`, with a timestamp after it (query 2).
+    /// Records the summation over the first `count` layers, whose tiles are `tiles`, with a
+    /// timestamp after it (query 2).
     pub fn sum(
         &self,
         gpu: &Gpu,
