@@ -113,7 +113,7 @@ fn hemicubes_agree_with_rays() {
         // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half of
         // the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump there,
         // 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
-        let error = (indirect(got) - indirect(&want)).abs().max_element();
+        let error = (indirect(got) - indirect(want)).abs().max_element();
         assert!(error < 6.0 * 1.8e-3, "{place:?}: {error}");
         // Hit or miss of outlines, 3 half faces long or 300 pixels: 6 · √(300/12) · 3e-5 = 9e-4; a
         // fifth of 2¹⁵ rays might hit either way: 6 · √(0.2 · 0.8 / 2¹⁵) = 1.3e-2 for each bare
