@@ -122,7 +122,7 @@ impl Bake {
 
         let by_default = || match self.gather {
             Gathers::None => default_element_size(&scene),
-            _ => 2.0 * default_element_size(&scene),
+            _ => 1.6 * default_element_size(&scene),
         };
         let element_size = self.element_size.unwrap_or_else(by_default);
         let mesh = Mesh::new(scene, element_size)?.split_at_contacts(CONTACT_LEVELS);

@@ -5,29 +5,37 @@ use glam::{DVec2, DVec3};
 use super::{Cell, MAX_DEPTH, Mesh};
 use crate::scene::Scene;
 
-/// Of an element's size: what comes this close to its plane touches it.
-const TOUCH: f64 = 0.05;
+/// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
+const TOUCH: f64 = 0.15;
 
 /// Of an element's size: lines have to come this far into it to part it.
 const INSIDE: f64 = 0.02;
 
-/// Lines on a triangle along which other triangles touch or cross it, as pairs of points by
-/// barycentric weights of its second and third corner.
-type Lines = Vec<[DVec2; 2]>;
+/// A line on a triangle along which another triangle touches or crosses it.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    /// From where to where, by barycentric weights of the second and third corner.
+    ends: [DVec2; 2],
+    /// How near the other comes, scene unit.
+    gap: f64,
+}
 
 impl Mesh {
     /// The same mesh with elements that others' edges or faces touch within split further, `levels`
     /// times: an element that straddles a wall's foot is light on one side and hidden on the other
     /// (the discontinuities of order zero of Heckbert, "Discontinuity meshing for radiosity", 1992).
     ///
-    /// What comes within 5 % of an element's size of it touches it; levels that would go beyond
-    /// [`MAX_DEPTH`] are left out.
+    /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
+    /// would go beyond [`MAX_DEPTH`] are left out.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
         let lines = lines(self);
         let deeper = |t: usize, cell: Cell| {
             let base = self.level_at(t, cell);
+            let reach = TOUCH * (self.scene.area(t) / f64::from(1u32 << (2 * cell.level))).sqrt();
+            let near = |l: &&Line| l.gap <= reach;
             cell.level < base
-                || cell.level < (base + levels).min(MAX_DEPTH) && parted(cell, &lines[t])
+                || cell.level < (base + levels).min(MAX_DEPTH)
+                    && lines[t].iter().filter(near).any(|l| parts(l, cell))
         };
         Mesh::grown(self.scene.clone(), deeper)
     }
@@ -40,33 +48,31 @@ impl Mesh {
     }
 }
 
-/// Whether one of `lines` comes into `cell`, by more than a margin.
-fn parted(cell: Cell, lines: &[[DVec2; 2]]) -> bool {
-    lines.iter().any(|line| {
-        // In the cell's own weights; all three are at least `INSIDE` well within.
-        let [a, b] = line.map(|p| {
-            let [u, v] = cell.local(p.x, p.y);
-            [1.0 - u - v, u, v]
-        });
-        let (mut from, mut to) = (0.0f64, 1.0f64);
-        for k in 0..3 {
-            let (start, end) = (a[k] - INSIDE, b[k] - INSIDE);
-            if start < 0.0 && end < 0.0 {
-                return false;
-            }
-            let at = start / (start - end);
-            if start < 0.0 {
-                from = from.max(at);
-            } else if end < 0.0 {
-                to = to.min(at);
-            }
+/// Whether `line` comes into `cell`, by more than a margin.
+fn parts(line: &Line, cell: Cell) -> bool {
+    // In the cell's own weights; all three are at least `INSIDE` well within.
+    let [a, b] = line.ends.map(|p| {
+        let [u, v] = cell.local(p.x, p.y);
+        [1.0 - u - v, u, v]
+    });
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for k in 0..3 {
+        let (start, end) = (a[k] - INSIDE, b[k] - INSIDE);
+        if start < 0.0 && end < 0.0 {
+            return false;
         }
-        from < to
-    })
+        let at = start / (start - end);
+        if start < 0.0 {
+            from = from.max(at);
+        } else if end < 0.0 {
+            to = to.min(at);
+        }
+    }
+    from < to
 }
 
 /// For every triangle, the lines along which others touch it.
-fn lines(mesh: &Mesh) -> Vec<Lines> {
+fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
     let scene = mesh.scene();
     let count = scene.triangles().len();
     let slack: Vec<f64> = (0..count)
@@ -99,7 +105,7 @@ fn lines(mesh: &Mesh) -> Vec<Lines> {
 
 /// Adds the lines along which triangle `s` touches or crosses `t`: the parts of its edges that lie
 /// within `slack` of the plane of `t`, and its cut with that plane.
-fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Lines) {
+fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Vec<Line>) {
     let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
     let corners = scene.corners(s);
     let height = corners.map(|p| normal.dot(p - a));
@@ -127,9 +133,11 @@ fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Lines) {
                     at(k, l, slack * height[k].signum())
                 }
             };
-            let line = [within(k, l), within(l, k)].map(flat);
-            if line[0].distance_squared(line[1]) > 0.0 {
-                lines.push(line);
+            let ends = [within(k, l), within(l, k)].map(flat);
+            let crosses = low < 0.0 && high > 0.0;
+            let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
+            if ends[0] != ends[1] {
+                lines.push(Line { ends, gap });
             }
         }
         if low < 0.0 && high > 0.0 {
@@ -137,6 +145,6 @@ fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Lines) {
         }
     }
     if let [p, q] = cut[..] {
-        lines.push([p, q]);
+        lines.push(Line { ends: [p, q], gap: 0.0 });
     }
 }
