@@ -291,12 +291,14 @@ impl Maker {
         Ok(Maker { rows, seconds: 0.0 })
     }
 
-    /// Who gathers: on the same device as the rows were made, with as many rays where there is none as
-    /// a hemicube's top face of `resolution` has pixels.
+    /// Who gathers: the device that makes the rows, or the CPU where that is the device: half as many
+    /// rays as a hemicube's top face of `resolution` has pixels take less time there than drawing.
     fn gather(&self, mesh: &Mesh, resolution: u32) -> Result<Box<dyn Gather>, Error> {
         Ok(match &self.rows {
-            Rows::Gpu(gpu, _) => Box::new(HemicubeGather::new(gpu, mesh, resolution)?),
-            Rows::Cpu(_) => Box::new(RayGather::new(mesh, resolution * resolution)?),
+            Rows::Gpu(gpu, _) if gpu.adapter().kind != "CPU" => {
+                Box::new(HemicubeGather::new(gpu, mesh, resolution)?)
+            }
+            _ => Box::new(RayGather::new(mesh, (resolution * resolution / 2).max(16))?),
         })
     }
 

@@ -11,7 +11,7 @@ use crate::scene::Rgb;
 pub(super) struct Stands<'a> {
     mesh: &'a Mesh,
     vertices: &'a Vertices,
-    /// Elements with a corner at each vertex: from `first[v]` to `first[v + 1]`.
+    /// Elements with each vertex on their rim: from `first[v]` to `first[v + 1]`.
     around: Vec<u32>,
     first: Vec<u32>,
     normals: Vec<DVec3>,
@@ -38,16 +38,17 @@ impl<'a> Stands<'a> {
     pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> Stands<'a> {
         let count = vertices.positions.len();
         let mut first = vec![0u32; count + 1];
-        vertices.corners.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
+        let rims = || vertices.rims.iter();
+        rims().for_each(|(_, rim)| rim.iter().for_each(|&v| first[v as usize + 1] += 1));
         (0..count).for_each(|v| first[v + 1] += first[v]);
         let mut next = first.clone();
-        let mut around = vec![0; 3 * vertices.corners.len()];
+        let mut around = vec![0; first[count] as usize];
         let mut normals = vec![DVec3::ZERO; count];
         let mut sizes = vec![f64::INFINITY; count];
-        for (e, corners) in vertices.corners.iter().enumerate() {
+        for (e, rim) in rims() {
             let node = mesh.element(e);
             let area = mesh.area(node);
-            for v in corners.iter().map(|&v| v as usize) {
+            for v in rim.iter().map(|&v| v as usize) {
                 around[next[v] as usize] = e as u32;
                 next[v] += 1;
                 normals[v] += mesh.normal(node) * area;
