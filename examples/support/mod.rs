@@ -65,7 +65,7 @@ pub enum Gathers {
 const CONTACT_LEVELS: u32 = 3;
 
 /// Element size over that of the smallest that gathering makes.
-const SMALLEST: f64 = 24.0;
+const SMALLEST: f64 = 32.0;
 
 /// Hemicubes that gather have this share of the pixels along an edge of those that shoot.
 const GATHER_PIXELS: u32 = 2;
@@ -92,7 +92,7 @@ impl Bake {
             gather: Gathers::None,
             bend: 0.02,
             smallest: None,
-            max_elements: 1 << 20,
+            max_elements: 1 << 18,
             ambient: false,
             hemicube: 128,
             near: 1.0,

@@ -14,7 +14,7 @@ use crate::solve::{Go, Stop};
 pub struct Gathering {
     /// An element is split where the middle of a side is off the mean of the side's ends by more
     /// than this share of its radiosity, in (0, 1]. What is left then is about a quarter of it.
-    /// Smaller elements are allowed more: √2 times as much for every halving below the largest.
+    /// Smaller elements are allowed more: 1.7 times as much for every halving below the largest.
     pub tolerance: f64,
     /// Elements whose longest edge is no longer than this, in the scene's unit, are not split.
     pub smallest: f64,
@@ -54,10 +54,10 @@ pub struct GatheredRadiosity {
 }
 
 impl Gathering {
-    /// Splits to elements of `smallest` (scene unit) where sides bend by 3 %, a million elements at
+    /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, 2¹⁸ elements at
     /// most.
     pub fn new(smallest: f64) -> Gathering {
-        Gathering { tolerance: 0.03, smallest, elements: 1 << 20, everywhere: 0 }
+        Gathering { tolerance: 0.02, smallest, elements: 1 << 18, everywhere: 0 }
     }
 
     /// Lets the vertices of `mesh` gather, given the radiosity of its elements (W/m², one value an

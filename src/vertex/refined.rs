@@ -8,7 +8,7 @@ use super::places::Stands;
 use super::vertices::{Key, Vertices, corners, middles};
 use crate::error::Error;
 use crate::gather::{Gather, Place, Sources};
-use crate::mesh::{MAX_DEPTH, Mesh, Smooth};
+use crate::mesh::{MAX_DEPTH, Mesh, NodeId, Smooth};
 use crate::scene::Rgb;
 use crate::solve::Go;
 
@@ -31,8 +31,13 @@ pub(super) struct Refined {
 /// Vertices that gather at once: progress is told of after each batch.
 const BATCH: usize = 1024;
 
-/// Radiosity below this share of the mean is not worth an element.
-const DIM: f64 = 1e-3;
+/// Where less than this share of the mean is reflected, errors are weighed against the share: the
+/// insides of gaps are not worth most of the elements.
+const DIM: f64 = 0.05;
+
+/// Of two elements, one half as long may be off by two to this power times as much: between equal
+/// errors, which would cut contacts to dust, and equal errors times length.
+const SMALL: f64 = 0.75;
 
 /// Middles off by more than this share are at a jump, where a parabola says nothing.
 const JUMP: f64 = 0.2;
@@ -53,7 +58,10 @@ impl Refined {
         let all = reflected.iter_mut().zip(exitance);
         all.for_each(|(b, emitted)| *b = (*b - emitted).max(Rgb::ZERO));
         let area: f64 = elements().map(|(_, n)| mesh.area(n)).sum();
-        let flux: f64 = elements().map(|(e, n)| radiosity[e].length() * mesh.area(n)).sum();
+        let lit = |(e, n): (usize, NodeId)| {
+            (radiosity[e] - mesh.material(n).exitance).length() * mesh.area(n)
+        };
+        let flux: f64 = elements().map(lit).sum();
         let largest = elements().map(|(_, n)| longest(&mesh.corners(n))).fold(0.0, f64::max);
         let covered = vec![false; reflected.len()];
         let dim = DIM * flux / area;
@@ -191,9 +199,7 @@ impl Refined {
             return 0.0;
         }
         let emitted = self.mesh.material(node).exitance;
-        let allowed = settings.tolerance
-            * (self.largest / size)
-                .powf(std::env::var("POW").ok().and_then(|s| s.parse().ok()).unwrap_or(0.5));
+        let allowed = settings.tolerance * (self.largest / size).powf(SMALL);
         let off = |value: Rgb, other: Rgb| {
             let whole = (value + emitted).length().max(self.dim);
             if whole > 0.0 { (value - other).length() / whole / allowed } else { 0.0 }
