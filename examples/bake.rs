@@ -28,7 +28,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
                     for the light to be linear in between (elements are split where it is not),
                     or all of twice finer elements [none]
   --bend T          split where a side's middle is off by this share of its radiosity [0.02]
-  --smallest X      elements with no longer edge are not split [largest edge / 32]
+  --smallest X      elements with no longer edge are not split [largest edge / 24]
   --max-elements N  elements there may be [262144]
   --ambient         add the light not yet shot, spread evenly; the files say so
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]

@@ -65,7 +65,7 @@ pub enum Gathers {
 const CONTACT_LEVELS: u32 = 3;
 
 /// Element size over that of the smallest that gathering makes.
-const SMALLEST: f64 = 32.0;
+const SMALLEST: f64 = 24.0;
 
 /// Hemicubes that gather have this share of the pixels along an edge of those that shoot.
 const GATHER_PIXELS: u32 = 2;
