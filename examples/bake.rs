@@ -17,18 +17,19 @@ usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
             [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
             [--patch-tolerance X] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
             [--image W,H] [--elements] [--gather none|needed|all] [--bend T] [--smallest X]
-            [--max-elements N] [--ambient] [--adapter NAME | --cpu]
+            [--max-elements N] [--contacts N] [--ambient] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
 
-  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32; / 16 if
+  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32; / 20 if
                     vertices gather]
   --gather WHO      vertices that look at the settled light for themselves: none, those needed
                     for the light to be linear in between (elements are split where it is not),
                     or all of twice finer elements [none]
   --bend T          split where a side's middle is off by this share of its radiosity [0.02]
   --smallest X      elements with no longer edge are not split [largest edge / 24]
+  --contacts N      levels that elements are split which other surfaces touch [3]
   --max-elements N  elements there may be [262144]
   --ambient         add the light not yet shot, spread evenly; the files say so
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
@@ -37,7 +38,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
                     this share of its light lands on other triangles by them; four times the
                     hemicubes or more [not done]
   --rotations K     hemicubes a viewpoint, each turned further, averaged [1]
-  --unshot F        stop at this share of unshot flux [0.001]
+  --unshot F        stop at this share of unshot flux [0.0001]
   --shots N         stop after this many shots
   --row-memory MB   memory for form-factor rows that are kept [1024]
   --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
@@ -105,6 +106,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("gather") => bake.gather = args.value()?.parse_with(gathers)?,
             Long("bend") => bake.bend = args.value()?.parse()?,
             Long("smallest") => bake.smallest = Some(args.value()?.parse()?),
+            Long("contacts") => bake.contacts = args.value()?.parse()?,
             Long("max-elements") => bake.max_elements = args.value()?.parse()?,
             Long("ambient") => bake.ambient = true,
             Long("adapter") => bake.device = Device::Gpu(Some(args.value()?.string()?)),

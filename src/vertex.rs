@@ -31,6 +31,8 @@ pub struct VertexRadiosity {
     pub faces: Vec<[u32; 3]>,
     /// The element that each face is (a part of).
     pub elements: Vec<u32>,
+    /// What a reader of the file should know, one line each.
+    pub comments: Vec<String>,
 }
 
 impl VertexRadiosity {

@@ -23,6 +23,8 @@ pub struct Bake {
     pub out: PathBuf,
     /// Longest element edge, scene unit; by default a share of the scene's diagonal.
     pub element_size: Option<f64>,
+    /// Levels that elements are split which others touch.
+    pub contacts: u32,
     /// Which vertices gather.
     pub gather: Gathers,
     /// Elements are split where sides bend by more than this share.
@@ -61,9 +63,6 @@ pub enum Gathers {
     All,
 }
 
-/// Levels that elements are split which others touch.
-const CONTACT_LEVELS: u32 = 3;
-
 /// Element size over that of the smallest that gathering makes.
 const SMALLEST: f64 = 24.0;
 
@@ -89,6 +88,7 @@ impl Bake {
             out: scene.with_extension(""),
             scene,
             element_size: None,
+            contacts: 3,
             gather: Gathers::None,
             bend: 0.02,
             smallest: None,
@@ -98,7 +98,7 @@ impl Bake {
             near: 1.0,
             viewpoints: None,
             rotations: NonZeroU32::MIN,
-            shooting: Shooting::default(),
+            shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
             camera: None,
             image: (512, 512),
             elements: false,
@@ -125,7 +125,7 @@ impl Bake {
             _ => 1.6 * default_element_size(&scene),
         };
         let element_size = self.element_size.unwrap_or_else(by_default);
-        let mesh = Mesh::new(scene, element_size)?.split_at_contacts(CONTACT_LEVELS);
+        let mesh = Mesh::new(scene, element_size)?.split_at_contacts(self.contacts);
         let maker = Maker::new(&self.device, &mesh, self.hemicube, self.rotations)?;
         let near = NearRepair::new(maker, &mesh, self.near);
         let levels = if self.viewpoints.is_some() { u32::MAX } else { 0 };
@@ -143,14 +143,19 @@ impl Bake {
         seconds.solve = clock.lap() - maker.seconds;
 
         let mut radiosity = solution.radiosity;
+        let mut comments = vec![];
         if self.ambient {
-            solution.ledger.add_ambient(&mesh, &mut radiosity);
+            let [r, g, b] = solution.ledger.add_ambient(&mesh, &mut radiosity).to_array();
+            comments.push(format!(
+                "ambient term of the unshot light added: reflectance times {r:e} {g:e} {b:e} W/m2"
+            ));
         }
         let gathered = self.gathered(&mesh, &radiosity, maker)?;
-        let surface = match &gathered {
+        let mut surface = match &gathered {
             Some(gathered) => gathered.surface.clone(),
             None => VertexRadiosity::new(&mesh, &radiosity),
         };
+        surface.comments = comments;
         seconds.vertices = clock.lap();
 
         write_ply(self.out.with_added_extension("ply"), &surface)?;
@@ -180,6 +185,7 @@ impl Bake {
                 ("row_memory".into(), json!(self.shooting.row_memory)),
                 ("patch_tolerance".into(), json!(self.shooting.tolerance)),
                 ("patch_level".into(), json!(self.shooting.level)),
+                ("contacts".into(), json!(self.contacts)),
                 ("gather".into(), json!(format!("{:?}", self.gather).to_lowercase())),
                 ("bend".into(), json!(self.bend)),
                 ("smallest".into(), json!(self.smallest)),
@@ -194,6 +200,7 @@ impl Bake {
             hemicubes: (solution.rows_made + rows.extra()) * u64::from(self.rotations.get()),
             gathers: gathered.as_ref().map_or(0, |g| g.gathers),
             gather_change: gathered.as_ref().map_or(0.0, |g| g.change),
+            gather_stop: gathered.as_ref().map_or("none".into(), |g| g.stop.to_string()),
             near_moved: near.moved(),
             stop: solution.stop.to_string(),
             ledger: solution.ledger,
@@ -415,8 +422,9 @@ pub fn table(report: &Report) -> String {
             report.shots, report.hemicubes, report.stop
         ),
         format!(
-            "gathering  {} places, changed the vertices by {:.2} %",
+            "gathering  {} places, {}, changed the vertices by {:.2} %",
             report.gathers,
+            report.gather_stop,
             100.0 * report.gather_change
         ),
         format!(

@@ -12,7 +12,8 @@ use crate::vertex::VertexRadiosity;
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
 /// (float, W/m² per channel, linear), `red green blue` (uchar, tone-mapped for viewers). Faces:
-/// `vertex_indices`, triangles, counter-clockwise from the front.
+/// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
+/// header.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -21,6 +22,11 @@ pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<()
     write_file(path.as_ref(), |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
         writeln!(out, "comment radiosity in W/m2 per channel, linear BT.709")?;
+        for comment in &surface.comments {
+            // A header is ASCII, a line an entry.
+            let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
+            writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
+        }
         writeln!(out, "element vertex {}", surface.positions.len())?;
         for name in ["x", "y", "z", "nx", "ny", "nz"] {
             writeln!(out, "property float {name}")?;

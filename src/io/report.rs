@@ -35,6 +35,8 @@ pub struct Report {
     pub gathers: u64,
     /// What gathering changed of the vertices; see `GatheredRadiosity`.
     pub gather_change: f64,
+    /// Why gathering stopped.
+    pub gather_stop: String,
     /// Share of a row that the proximity repair moved, in the mean; see `NearRepair`.
     pub near_moved: f64,
     /// Why the solver stopped.
@@ -90,6 +92,7 @@ impl Report {
             "hemicubes": self.hemicubes,
             "gathers": self.gathers,
             "gather_change": self.gather_change,
+            "gather_stop": self.gather_stop,
             "near_moved": self.near_moved,
             "stop": self.stop,
             "ledger": {
