@@ -42,7 +42,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --shots N         stop after this many shots
   --row-memory MB   memory for form-factor rows that are kept [1024]
   --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
-                    patches as small as they can be [0.008]
+                    patches as small as they can be [0.004]
   --patch-level N   the smallest patches are 4^N elements [0]
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]

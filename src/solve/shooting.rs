@@ -39,7 +39,7 @@ pub struct Shooting {
 
 impl Default for Shooting {
     fn default() -> Self {
-        Shooting { unshot: 1e-3, shots: None, row_memory: 1 << 30, tolerance: 8e-3, level: 0 }
+        Shooting { unshot: 1e-3, shots: None, row_memory: 1 << 30, tolerance: 4e-3, level: 0 }
     }
 }
 

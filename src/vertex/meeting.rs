@@ -74,8 +74,8 @@ fn meeting(mesh: &Mesh, ends: &[End]) -> Vec<Vec<usize>> {
 }
 
 /// Radiosity as the solver shot it: patches send the mean of their elements. The elements' values
-/// came about by this, and so only this can be taken out of them again. Emitters shoot as elements; where surfaces meet, patches
-/// are small; this takes them for [`PATCH`].
+/// came about by this, and so only this can be taken out of them again. Emitters shoot as elements;
+/// where surfaces meet, patches are small; this takes them for [`PATCH`].
 fn as_shot(mesh: &Mesh, elements: &[Rgb]) -> Vec<Rgb> {
     fn smooth(mesh: &Mesh, node: NodeId, shot: &mut [Rgb]) {
         let elements = mesh.elements_of(node);
