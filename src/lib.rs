@@ -3,7 +3,9 @@
 //! The crate draws a hemicube per patch with wgpu, on any Vulkan, Metal or DX12 device (software
 //! Vulkan included), turns it into form factors, lets progressive shooting on the CPU spread the
 //! light, and gives radiosity at the vertices of a mesh. The path, in one line:
-//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file.
+//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file. For exact
+//! vertices, [`Gathering`] stands before the last: each sees the settled light for itself, and the
+//! mesh grows finer where the light asks for it.
 //!
 //! ```no_run
 //! use radiosity::{

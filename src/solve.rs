@@ -129,7 +129,7 @@ impl fmt::Display for Stop {
     }
 }
 
-/// How far a solver is, told after every shot.
+/// How far a solver is, told after every shot or row.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Patches shot so far.

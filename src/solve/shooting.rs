@@ -52,7 +52,8 @@ const LEAST_UNSHOT: f64 = 1e-16;
 impl Shooting {
     /// Spreads the light that `mesh` emits, with rows from `form_factors`, brightest patch first.
     ///
-    /// `progress` is told of every shot and may stop the solver; what was reached is returned.
+    /// `progress` is told of every shot, and of every row that was made in vain, and may stop the
+    /// solver; what was reached is returned.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1] or `tolerance` not at least 0;
@@ -99,18 +100,21 @@ impl Shooting {
             let mut made = made.into_iter();
             for shot in batch {
                 match kept.get(shot.patch) {
-                    Some(row) => state.shoot(&shot.elements, row),
+                    Some(row) => {
+                        state.shoot(&shot.elements, row);
+                        shots += 1;
+                    }
                     None => {
                         let Some(row) = made.next() else { break };
                         row.check(mesh, shot.patch)?;
-                        if !shooters.confirm(&shot, &row, &state.flux) {
-                            continue;
+                        // Else the patch is too large, and its parts shoot.
+                        if shooters.confirm(&shot, &row, &state.flux) {
+                            state.shoot(&shot.elements, &row);
+                            kept.keep(shot.patch, row);
+                            shots += 1;
                         }
-                        state.shoot(&shot.elements, &row);
-                        kept.keep(shot.patch, row);
                     }
                 }
-                shots += 1;
                 let unshot_share = state.ledger.unshot_share();
                 let told = Progress { shots, rows_made, unshot_share, elapsed: start.elapsed() };
                 if progress(&told).is_break() {

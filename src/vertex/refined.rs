@@ -29,7 +29,7 @@ pub(super) struct Refined {
 }
 
 /// Vertices that gather at once: progress is told of after each batch.
-const BATCH: usize = 1024;
+const BATCH: usize = 256;
 
 /// Where less than this share of the mean is reflected, errors are weighed against the share: the
 /// insides of gaps are not worth most of the elements.
