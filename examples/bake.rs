@@ -16,8 +16,9 @@ const USAGE: &str = "\
 usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
             [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
             [--patch-tolerance X] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--elements] [--gather none|needed|all] [--bend T] [--smallest X]
-            [--max-elements N] [--contacts N] [--ambient] [--adapter NAME | --cpu]
+            [--image W,H] [--pixel-gather] [--elements] [--gather none|needed|all] [--bend T]
+            [--smallest X] [--max-elements N] [--contacts N] [--ambient]
+            [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
 (linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
@@ -46,6 +47,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --patch-level N   the smallest patches are 4^N elements [0]
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
+  --pixel-gather    every pixel of the picture looks at the settled light for itself
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes, K N squared a row";
@@ -102,6 +104,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
                 bake.camera = Some(Camera { eye, target, vertical_fov });
             }
             Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
+            Long("pixel-gather") => bake.pixel_gather = true,
             Long("elements") => bake.elements = true,
             Long("gather") => bake.gather = args.value()?.parse_with(gathers)?,
             Long("bend") => bake.bend = args.value()?.parse()?,

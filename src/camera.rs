@@ -1,10 +1,12 @@
 //! The camera image: radiance interpolated over the mesh, antialiased.
 
+mod gathered;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::rays::Rays;
+use crate::rays::{Hit, Rays};
 use crate::scene::Rgb;
 use crate::vertex::VertexRadiosity;
 
@@ -48,26 +50,10 @@ impl Camera {
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        self.check(width, height, samples)?;
-        let [right, up, forward] = self.frame();
-        let corner = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let rays = Rays::new(surface.faces.iter().map(corner));
-        let tangent = (self.vertical_fov.to_radians() / 2.0).tan();
-        let step = 2.0 * tangent / f64::from(height);
-        let radiance = |x: f64, y: f64| {
-            let h = (x - f64::from(width) / 2.0) * step;
-            let v = (f64::from(height) / 2.0 - y) * step;
-            let hit = rays.nearest(self.eye, right * h + up * v + forward, 0.0, None);
-            let Some(hit) = hit.filter(|h| h.front) else { return Rgb::ZERO };
-            let [a, b, c] = surface.faces[hit.triangle].map(|v| surface.radiosity[v as usize]);
-            (a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v) / std::f64::consts::PI
-        };
+        let sight = Sight::new(self, surface, width, height, samples)?;
         let pixel = |k: u32| {
-            let (x, y) = (f64::from(k % width), f64::from(k / width));
-            let at = |s: u32| (f64::from(s) + 0.5) / f64::from(samples);
-            let grid = (0..samples * samples).map(|s| (at(s % samples), at(s / samples)));
-            let sum: Rgb = grid.map(|(dx, dy)| radiance(x + dx, y + dy)).sum();
-            sum / f64::from(samples * samples)
+            let sum: Rgb = sight.hits(k).map(|hit| sight.at(&hit, &surface.radiosity)).sum();
+            sum * sight.share / std::f64::consts::PI
         };
         let pixels = (0..width * height).into_par_iter().map(pixel).collect();
         Ok(RadianceImage { width, height, pixels })
@@ -106,5 +92,60 @@ impl Camera {
             return bad(found, "both must be finite, and apart");
         }
         Ok(())
+    }
+}
+
+/// The lines of sight through the pixels of an image, and what they meet.
+struct Sight<'a> {
+    surface: &'a VertexRadiosity,
+    rays: Rays,
+    eye: DVec3,
+    /// A line of sight at the image's top left corner, and from there to the right and downwards by
+    /// a sample each.
+    corner: DVec3,
+    right: DVec3,
+    down: DVec3,
+    width: u32,
+    samples: u32,
+    /// Of each line in its pixel.
+    share: f64,
+}
+
+impl Sight<'_> {
+    fn new<'a>(
+        camera: &Camera,
+        surface: &'a VertexRadiosity,
+        width: u32,
+        height: u32,
+        samples: u32,
+    ) -> Result<Sight<'a>, Error> {
+        camera.check(width, height, samples)?;
+        let [right, up, forward] = camera.frame();
+        let corner = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
+        let rays = Rays::new(surface.faces.iter().map(corner));
+        let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
+        let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
+        let (right, down) = (right * step, -up * step);
+        let half = |pixels: u32| f64::from(pixels) * f64::from(samples) / 2.0;
+        let corner = forward - right * half(width) - down * half(height);
+        let share = 1.0 / f64::from(samples * samples);
+        Ok(Sight { surface, rays, eye: camera.eye, corner, right, down, width, samples, share })
+    }
+
+    /// The fronts that the lines of sight of pixel `k` meet. The other lines meet backs or nothing.
+    fn hits(&self, k: u32) -> impl Iterator<Item = Hit> {
+        let n = self.samples;
+        (0..n * n).filter_map(move |s| {
+            let x = f64::from(k % self.width * n + s % n) + 0.5;
+            let y = f64::from(k / self.width * n + s / n) + 0.5;
+            let direction = self.corner + self.right * x + self.down * y;
+            self.rays.nearest(self.eye, direction, 0.0, None).filter(|hit| hit.front)
+        })
+    }
+
+    /// What is interpolated where a line meets the surface from values at its vertices.
+    fn at(&self, hit: &Hit, values: &[DVec3]) -> DVec3 {
+        let [a, b, c] = self.surface.faces[hit.triangle].map(|v| values[v as usize]);
+        a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
     }
 }

@@ -3,7 +3,7 @@
 mod boundary;
 pub(crate) mod gathering;
 mod meeting;
-mod places;
+pub(crate) mod places;
 mod refined;
 mod vertices;
 

@@ -9,9 +9,9 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
     Camera, Error, ErrorKind, FormFactors, Gather, GatherProgress, GatheredRadiosity, Gathering,
-    Go, Gpu, HemicubeGather, Hemicubes, Mesh, NearRepair, NodeId, Progress, RayCast, RayGather,
-    Report, Rgb, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj, write_exr,
-    write_ply, write_png,
+    Go, Gpu, HemicubeGather, Hemicubes, Mesh, NearRepair, NodeId, Progress, RadianceImage, RayCast,
+    RayGather, Report, Rgb, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj,
+    write_exr, write_ply, write_png,
 };
 use serde_json::json;
 
@@ -47,6 +47,8 @@ pub struct Bake {
     pub shooting: Shooting,
     pub camera: Option<Camera>,
     pub image: (u32, u32),
+    /// Whether the pixels of the image gather.
+    pub pixel_gather: bool,
     /// Whether to write the elements' own values too.
     pub elements: bool,
     pub device: Device,
@@ -101,6 +103,7 @@ impl Bake {
             shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
             camera: None,
             image: (512, 512),
+            pixel_gather: false,
             elements: false,
             device: Device::Gpu(None),
         }
@@ -164,7 +167,12 @@ impl Bake {
             write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
         }
         if let Some(camera) = self.camera {
-            let image = camera.image(&surface, width, height, SAMPLES)?;
+            let image = match self.pixel_gather {
+                true => {
+                    self.gathered_image(&camera, &mesh, &radiosity, gathered.as_ref(), maker)?
+                }
+                false => camera.image(&surface, width, height, SAMPLES)?,
+            };
             write_exr(self.out.with_added_extension("exr"), &image)?;
             write_png(self.out.with_added_extension("png"), &image)?;
         }
@@ -190,6 +198,7 @@ impl Bake {
                 ("bend".into(), json!(self.bend)),
                 ("smallest".into(), json!(self.smallest)),
                 ("max_elements".into(), json!(self.max_elements)),
+                ("pixel_gather".into(), json!(self.pixel_gather)),
                 ("ambient".into(), json!(self.ambient)),
             ],
             triangles: mesh.scene().triangles().len(),
@@ -248,6 +257,32 @@ impl Bake {
         })?;
         bar.finish_and_clear();
         Ok(Some(gathered))
+    }
+
+    /// The picture, each pixel of which gathers what the vertices know, or else the elements.
+    fn gathered_image(
+        &self,
+        camera: &Camera,
+        mesh: &Mesh,
+        radiosity: &[Rgb],
+        gathered: Option<&GatheredRadiosity>,
+        maker: &Maker,
+    ) -> Result<RadianceImage, Error> {
+        let plain = match gathered {
+            Some(_) => None,
+            None => Some(GatheredRadiosity::from_elements(mesh, radiosity)?),
+        };
+        let Some(light) = gathered.or(plain.as_ref()) else { unreachable!("one of the two") };
+        let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
+        let ((width, height), bar) = (self.image, bar());
+        let image =
+            camera.gathered_image(light, &mut *gather, width, height, SAMPLES, |done, of| {
+                bar.set_position((1000 * done / of) as u64);
+                bar.set_message(format!("picture, {done} of {of} pixels"));
+                Go::Continue(())
+            })?;
+        bar.finish_and_clear();
+        Ok(image.expect("nobody stopped it"))
     }
 }
 

@@ -61,6 +61,16 @@ impl Smooth {
             (0..count).map(|t| [0, 1, 2].map(|k| joined.find(3 * t + k) as u32)).collect();
         Smooth { corners, sides }
     }
+
+    /// Per triangle, the smooth surface that it is a part of: the number of its first triangle.
+    pub fn surfaces(&self) -> Vec<u32> {
+        let mut joined = Joined::new(self.sides.len());
+        for (t, sides) in self.sides.iter().enumerate() {
+            // A side's identity comes from one of the two triangles that share it.
+            sides.iter().for_each(|side| joined.join(t, side.id as usize / 3));
+        }
+        (0..self.sides.len()).map(|t| joined.find(t) as u32).collect()
+    }
 }
 
 /// Whether two neighbouring triangles belong to one smooth surface.

@@ -4,7 +4,7 @@
 use super::VertexRadiosity;
 use super::refined::Refined;
 use crate::error::{Error, ErrorKind};
-use crate::gather::Gather;
+use crate::gather::{Gather, Sources};
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 use crate::solve::{Go, Stop};
@@ -44,6 +44,11 @@ pub struct GatheredRadiosity {
     pub mesh: Mesh,
     /// Radiosity at its vertices.
     pub surface: VertexRadiosity,
+    /// Per element, where its three corners' values are in `reflected`.
+    pub corners: Vec<[u32; 3]>,
+    /// Reflected radiosity B − E of the vertices as others are to see it, W/m² per channel: its mean
+    /// over an element allows for the bend of the light in between, which `surface` cannot.
+    pub reflected: Vec<Rgb>,
     /// Places at which light was gathered.
     pub gathers: u64,
     /// Area-weighted mean of what gathering changed of the radiosity that vertices of the mesh given
@@ -51,6 +56,23 @@ pub struct GatheredRadiosity {
     pub change: f64,
     /// Whether more elements were to be split than there may be.
     pub stop: Stop,
+}
+
+impl GatheredRadiosity {
+    /// The light of the elements of `mesh` as it is: one value an element, W/m², no vertex gathers.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `radiosity` has not one value an element.
+    pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredRadiosity, Error> {
+        check_count(mesh, radiosity)?;
+        let surface = VertexRadiosity::new(mesh, radiosity);
+        Ok(GatheredRadiosity { surface, ..Refined::new(mesh.clone(), radiosity).finish() })
+    }
+
+    /// The light, for whoever gathers it elsewhere.
+    pub fn sources(&self) -> Sources<'_> {
+        Sources { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
+    }
 }
 
 impl Gathering {
@@ -116,9 +138,7 @@ impl Gathering {
             (fresh, young) = state.split(&split)?;
             level += 1;
         };
-        let (gathers, change) = (state.gathers(), change.unwrap_or(0.0));
-        let surface = state.surface();
-        Ok(GatheredRadiosity { mesh: state.into_mesh(), surface, gathers, change, stop })
+        Ok(GatheredRadiosity { change: change.unwrap_or(0.0), stop, ..state.finish() })
     }
 
     fn check(&self, mesh: &Mesh, radiosity: &[Rgb]) -> Result<(), Error> {
@@ -133,11 +153,15 @@ impl Gathering {
             let place = format!("smallest element {}", self.smallest);
             return bad(place, "not above 0", "use a length in the scene's unit".into());
         }
-        if radiosity.len() != mesh.element_count() {
-            let place = format!("{} values of radiosity", radiosity.len());
-            let remedy = format!("give one for each of the {} elements", mesh.element_count());
-            return bad(place, "not one an element", remedy);
-        }
-        Ok(())
+        check_count(mesh, radiosity)
     }
+}
+
+fn check_count(mesh: &Mesh, radiosity: &[Rgb]) -> Result<(), Error> {
+    if radiosity.len() == mesh.element_count() {
+        return Ok(());
+    }
+    let place = format!("{} values of radiosity", radiosity.len());
+    let remedy = format!("give one for each of the {} elements", mesh.element_count());
+    Err(Error::new(ErrorKind::Setting, place, "not one an element", remedy))
 }

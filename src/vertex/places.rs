@@ -1,11 +1,11 @@
-//! Where vertices stand when they gather.
+//! Where vertices, and whoever else gathers, stand.
 
 use glam::DVec3;
 
 use super::vertices::Vertices;
 use crate::gather::{Gathered, Place};
 use crate::mesh::Mesh;
-use crate::scene::Rgb;
+use crate::scene::{Rgb, Scene};
 
 /// The elements around every vertex, and what they say of it.
 pub(super) struct Stands<'a> {
@@ -17,6 +17,11 @@ pub(super) struct Stands<'a> {
     normals: Vec<DVec3>,
     /// Square root of the smallest element's area around each vertex, scene unit.
     sizes: Vec<f64>,
+    above: Above,
+}
+
+/// Where places are: above the surfaces of one scene.
+pub(crate) struct Above {
     /// No place is nearer to its surface than this, scene unit: several steps of a 32-bit coordinate.
     least: f64,
 }
@@ -25,7 +30,7 @@ pub(super) struct Stands<'a> {
 /// meet, whose two sides see different things.
 const INWARDS: f64 = 0.02;
 
-/// How far above its surface it stands, in units of the smallest element's size.
+/// How far above its surface a place is, in units of the smallest element's size.
 const LIFT: f64 = 1e-4;
 
 /// Elements around a vertex that it tries to stand in, at most.
@@ -56,9 +61,8 @@ impl<'a> Stands<'a> {
             }
         }
         normals.iter_mut().for_each(|n| *n = n.normalize_or(DVec3::Z));
-        let (low, high) = mesh.scene().bounds();
-        let least = 16.0 * f64::from(f32::EPSILON) * (high - low).max_element();
-        Stands { mesh, vertices, around, first, normals, sizes, least }
+        let above = Above::new(mesh.scene());
+        Stands { mesh, vertices, around, first, normals, sizes, above }
     }
 
     fn around(&self, v: u32) -> &[u32] {
@@ -78,8 +82,7 @@ impl<'a> Stands<'a> {
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
         let (position, normal) = (self.vertices.positions[v as usize], self.normals[v as usize]);
         let inwards = (self.mesh.centroid(element) - position) * INWARDS;
-        let lift = (LIFT * self.sizes[v as usize]).max(self.least);
-        Place { position: position + inwards + normal * lift, normal, near: lift / 4.0 }
+        self.above.place(position + inwards, normal, self.sizes[v as usize])
     }
 
     /// Whether there is another element to stand in after `attempt`.
@@ -88,9 +91,28 @@ impl<'a> Stands<'a> {
         attempt + 1 < around.div_ceil(around.div_ceil(ATTEMPTS))
     }
 
-    /// Whether what vertex `v` found is the inside of something that touches its surface: backs
-    /// almost everywhere, nearer than the elements are large.
+    /// Whether vertex `v` found that it is covered.
     pub fn is_covered(&self, v: u32, found: &Gathered) -> bool {
-        found.back > UNDER && found.nearness * self.sizes[v as usize] > 1.0
+        is_covered(found, self.sizes[v as usize])
     }
+}
+
+impl Above {
+    pub fn new(scene: &Scene) -> Above {
+        let (low, high) = scene.bounds();
+        Above { least: 16.0 * f64::from(f32::EPSILON) * (high - low).max_element() }
+    }
+
+    /// The place above `position`, where elements are of `size`: the square root of their area, scene
+    /// unit.
+    pub fn place(&self, position: DVec3, normal: DVec3, size: f64) -> Place {
+        let lift = (LIFT * size).max(self.least);
+        Place { position: position + normal * lift, normal, near: lift / 4.0 }
+    }
+}
+
+/// Whether what was found is the inside of something that touches the surface: backs almost
+/// everywhere, nearer than the elements are large, the square root of whose area is `size`.
+pub(crate) fn is_covered(found: &Gathered, size: f64) -> bool {
+    found.back > UNDER && found.nearness * size > 1.0
 }

@@ -3,14 +3,14 @@
 use glam::{DMat3, DVec3};
 
 use super::VertexRadiosity;
-use super::gathering::Gathering;
+use super::gathering::{GatheredRadiosity, Gathering};
 use super::places::Stands;
 use super::vertices::{Key, Vertices, corners, middles};
 use crate::error::Error;
 use crate::gather::{Gather, Place, Sources};
 use crate::mesh::{MAX_DEPTH, Mesh, NodeId, Smooth};
 use crate::scene::Rgb;
-use crate::solve::Go;
+use crate::solve::{Go, Stop};
 
 pub(super) struct Refined {
     mesh: Mesh,
@@ -72,16 +72,22 @@ impl Refined {
         &self.mesh
     }
 
-    pub fn into_mesh(self) -> Mesh {
-        self.mesh
+    /// What was reached.
+    pub fn finish(self) -> GatheredRadiosity {
+        let (surface, reflected) = (self.surface(), self.seen());
+        GatheredRadiosity {
+            mesh: self.mesh,
+            surface,
+            corners: self.vertices.corners,
+            reflected,
+            gathers: self.gathers,
+            change: 0.0,
+            stop: Stop::Converged,
+        }
     }
 
     pub fn reflected(&self) -> &[Rgb] {
         &self.reflected
-    }
-
-    pub fn gathers(&self) -> u64 {
-        self.gathers
     }
 
     /// Root mean square over the elements of how far their vertices are from `before`, relative.
@@ -313,7 +319,7 @@ impl Refined {
     }
 
     /// The mesh with what its vertices emit and reflect.
-    pub fn surface(&self) -> VertexRadiosity {
+    fn surface(&self) -> VertexRadiosity {
         let count = self.vertices.positions.len();
         let mut out = VertexRadiosity {
             positions: self.vertices.positions.clone(),

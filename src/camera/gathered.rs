@@ -1,0 +1,172 @@
+//! The camera image for the final picture: each pixel gathers the light where it looks.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{Camera, RadianceImage, Sight};
+use crate::error::Error;
+use crate::gather::{Gather, Gathered, Place};
+use crate::mesh::Smooth;
+use crate::rays::Hit;
+use crate::scene::Rgb;
+use crate::solve::Go;
+use crate::vertex::gathering::GatheredRadiosity;
+use crate::vertex::places::{Above, is_covered};
+
+/// Lines of sight that are cast at once.
+const BAND: u32 = 1 << 16;
+
+/// As many places gather at once as take about this long.
+const BATCH: Duration = Duration::from_millis(250);
+
+impl Camera {
+    /// Draws `light` with the lines of sight of [`Camera::image`], but lets the pixels gather for
+    /// themselves: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr), with the
+    /// irradiance that `gather` finds there.
+    ///
+    /// Lines of one pixel that meet the same smooth surface share one gather, at the point nearest
+    /// to the mean of theirs. So most pixels gather once, while edges are as clean as the lines are
+    /// dense. What reflects nothing does not gather. `progress` is told how many pixels are done, and
+    /// of how many, several times a second. It may stop the work: then there is no image.
+    ///
+    /// # Errors
+    /// Those of [`Camera::check`]; whatever `gather` fails with.
+    pub fn gathered_image(
+        &self,
+        light: &GatheredRadiosity,
+        gather: &mut dyn Gather,
+        width: u32,
+        height: u32,
+        samples: u32,
+        mut progress: impl FnMut(usize, usize) -> Go,
+    ) -> Result<Option<RadianceImage>, Error> {
+        let sight = Sight::new(self, &light.surface, width, height, samples)?;
+        let view = View::new(sight, light);
+        let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
+        let (of, band) = (pixels.len(), (BAND / (samples * samples)).max(1));
+        // How many gather at once changes nothing but when progress is told.
+        let mut batch = 64;
+        for start in (0..width * height).step_by(band as usize) {
+            let end = start.saturating_add(band).min(width * height);
+            let parts = view.parts(start..end);
+            let (gathers, others): (Vec<Part>, Vec<Part>) =
+                parts.into_iter().partition(|part| part.reflectance != Rgb::ZERO);
+            others.iter().for_each(|part| pixels[part.pixel] += part.known);
+            let mut left = &gathers[..];
+            while !left.is_empty() {
+                let begun = Instant::now();
+                let now;
+                (now, left) = left.split_at(left.len().min(batch));
+                let places: Vec<Place> = now.iter().map(|part| part.place).collect();
+                let found = gather.gather(&light.sources(), &places)?;
+                for (part, found) in now.iter().zip(&found) {
+                    pixels[part.pixel] += part.radiance(found);
+                }
+                batch = match begun.elapsed() {
+                    t if t > BATCH => (batch / 2).max(1),
+                    t if t < BATCH / 3 => batch * 2,
+                    _ => batch,
+                };
+                // The last pixel may have parts left.
+                if progress(now[now.len() - 1].pixel, of).is_break() {
+                    return Ok(None);
+                }
+            }
+            if progress(end as usize, of).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(RadianceImage { width, height, pixels }))
+    }
+}
+
+/// What a pixel sees of one smooth surface.
+struct Part {
+    pixel: usize,
+    place: Place,
+    /// Square root of the element's area, scene unit.
+    size: f64,
+    /// Share of the pixel, in (0, 1].
+    share: f64,
+    exitance: Rgb,
+    reflectance: Rgb,
+    /// What it adds to the pixel by the values at vertices, W/(m² sr).
+    known: Rgb,
+}
+
+impl Part {
+    /// What it adds to the pixel by what was gathered, W/(m² sr).
+    fn radiance(&self, found: &Gathered) -> Rgb {
+        if is_covered(found, self.size) {
+            return self.known;
+        }
+        (self.exitance + self.reflectance * found.irradiance) * self.share / PI
+    }
+}
+
+/// Settled light, as it is looked at.
+struct View<'a> {
+    sight: Sight<'a>,
+    light: &'a GatheredRadiosity,
+    above: Above,
+    /// Per triangle, the smooth surface that it is a part of.
+    surfaces: Vec<u32>,
+}
+
+impl View<'_> {
+    fn new<'a>(sight: Sight<'a>, light: &'a GatheredRadiosity) -> View<'a> {
+        let scene = light.mesh.scene();
+        View { sight, light, above: Above::new(scene), surfaces: Smooth::new(scene).surfaces() }
+    }
+
+    /// What a range of pixels sees, in their order.
+    fn parts(&self, pixels: Range<u32>) -> Vec<Part> {
+        let parts: Vec<Vec<Part>> = pixels.into_par_iter().map(|k| self.parts_of(k)).collect();
+        parts.into_iter().flatten().collect()
+    }
+
+    fn parts_of(&self, pixel: u32) -> Vec<Part> {
+        let mut surfaces: Vec<(u32, Vec<Hit>)> = vec![];
+        for hit in self.sight.hits(pixel) {
+            let mesh = &self.light.mesh;
+            let surface = self.surfaces[mesh.triangle(mesh.element(self.element(&hit)))];
+            match surfaces.iter_mut().find(|s| s.0 == surface) {
+                Some((_, hits)) => hits.push(hit),
+                None => surfaces.push((surface, vec![hit])),
+            }
+        }
+        surfaces.iter().filter_map(|(_, hits)| self.part(pixel as usize, hits)).collect()
+    }
+
+    /// What the lines that hit one surface see of it.
+    fn part(&self, pixel: usize, hits: &[Hit]) -> Option<Part> {
+        let surface = &self.light.surface;
+        let position = |hit: &Hit| self.sight.at(hit, &surface.positions);
+        let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
+        let away = |hit: &&Hit| position(hit).distance_squared(mean);
+        let nearest = hits.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let node = self.light.mesh.element(self.element(nearest));
+        let size = self.light.mesh.area(node).sqrt();
+        let across = self.sight.at(nearest, &surface.normals);
+        let normal = across.normalize_or(self.light.mesh.normal(node));
+        let known: Rgb = hits.iter().map(|hit| self.sight.at(hit, &surface.radiosity)).sum();
+        let material = self.light.mesh.material(node);
+        Some(Part {
+            pixel,
+            place: self.above.place(position(nearest), normal, size),
+            size,
+            share: self.sight.share * hits.len() as f64,
+            exitance: material.exitance,
+            reflectance: material.reflectance,
+            known: known * self.sight.share / PI,
+        })
+    }
+
+    fn element(&self, hit: &Hit) -> usize {
+        self.light.surface.elements[hit.triangle] as usize
+    }
+}
