@@ -37,7 +37,8 @@ const MAX_SIDE: u32 = 1 << 15;
 
 impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean of `samples` × `samples`
-    /// lines of sight on a grid (box filter).
+    /// lines of sight (box filter) on a grid that is turned a little, so that an edge along pixels
+    /// does not meet a whole row of them at once: none has another beside or below it.
     ///
     /// Radiance is radiosity over π. Backs of faces and the void are black.
     ///
@@ -135,12 +136,18 @@ impl Sight<'_> {
     /// The fronts that the lines of sight of pixel `k` meet. The other lines meet backs or nothing.
     fn hits(&self, k: u32) -> impl Iterator<Item = Hit> {
         let n = self.samples;
+        let share = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
         (0..n * n).filter_map(move |s| {
-            let x = f64::from(k % self.width * n + s % n) + 0.5;
-            let y = f64::from(k / self.width * n + s / n) + 0.5;
-            let direction = self.corner + self.right * x + self.down * y;
-            self.rays.nearest(self.eye, direction, 0.0, None).filter(|hit| hit.front)
+            let (i, j) = (s % n, s / n);
+            let x = f64::from(k % self.width * n + i) + share(j);
+            let y = f64::from(k / self.width * n + j) + share(n - 1 - i);
+            self.hit(self.corner + self.right * x + self.down * y)
         })
+    }
+
+    /// The front that is met along `direction` from the eye, if that comes first.
+    fn hit(&self, direction: DVec3) -> Option<Hit> {
+        self.rays.nearest(self.eye, direction, 0.0, None).filter(|hit| hit.front)
     }
 
     /// What is interpolated where a line meets the surface from values at its vertices.

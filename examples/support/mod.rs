@@ -268,11 +268,14 @@ impl Bake {
         gathered: Option<&GatheredRadiosity>,
         maker: &Maker,
     ) -> Result<RadianceImage, Error> {
-        let plain = match gathered {
-            Some(_) => None,
-            None => Some(GatheredRadiosity::from_elements(mesh, radiosity)?),
+        let plain;
+        let light = match gathered {
+            Some(gathered) => gathered,
+            None => {
+                plain = GatheredRadiosity::from_elements(mesh, radiosity)?;
+                &plain
+            }
         };
-        let Some(light) = gathered.or(plain.as_ref()) else { unreachable!("one of the two") };
         let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
         let ((width, height), bar) = (self.image, bar());
         let image =

@@ -23,14 +23,18 @@ const BAND: u32 = 1 << 16;
 /// As many places gather at once as take about this long.
 const BATCH: Duration = Duration::from_millis(250);
 
+/// Lines of sight share a gather unless the vertices' values differ by more than this share among
+/// them: at edges of shadows.
+const VARIES: f64 = 0.1;
+
 impl Camera {
     /// Draws `light` with the lines of sight of [`Camera::image`], but lets the pixels gather for
     /// themselves: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr), with the
     /// irradiance that `gather` finds there.
     ///
-    /// Lines of one pixel that meet the same smooth surface share one gather, at the point nearest
-    /// to the mean of theirs. So most pixels gather once, while edges are as clean as the lines are
-    /// dense. What reflects nothing does not gather. `progress` is told how many pixels are done, and
+    /// Lines of one pixel that meet the same smooth surface share one gather in their middle, unless
+    /// the vertices tell of an edge of a shadow between them. So most pixels gather once, while edges
+    /// are as clean as the lines are dense. What reflects nothing does not gather. `progress` is told how many pixels are done, and
     /// of how many, several times a second. It may stop the work: then there is no image.
     ///
     /// # Errors
@@ -71,7 +75,7 @@ impl Camera {
                     t if t < BATCH / 3 => batch * 2,
                     _ => batch,
                 };
-                // The last pixel may have parts left.
+                // Of the last pixel, parts may be left.
                 if progress(now[now.len() - 1].pixel, of).is_break() {
                     return Ok(None);
                 }
@@ -132,41 +136,67 @@ impl View<'_> {
     fn parts_of(&self, pixel: u32) -> Vec<Part> {
         let mut surfaces: Vec<(u32, Vec<Hit>)> = vec![];
         for hit in self.sight.hits(pixel) {
-            let mesh = &self.light.mesh;
-            let surface = self.surfaces[mesh.triangle(mesh.element(self.element(&hit)))];
+            let surface = self.surface(&hit);
             match surfaces.iter_mut().find(|s| s.0 == surface) {
                 Some((_, hits)) => hits.push(hit),
                 None => surfaces.push((surface, vec![hit])),
             }
         }
-        surfaces.iter().filter_map(|(_, hits)| self.part(pixel as usize, hits)).collect()
+        let mut parts = vec![];
+        surfaces.iter().for_each(|(_, hits)| self.add_parts(pixel as usize, hits, &mut parts));
+        parts
     }
 
-    /// What the lines that hit one surface see of it.
-    fn part(&self, pixel: usize, hits: &[Hit]) -> Option<Part> {
-        let surface = &self.light.surface;
-        let position = |hit: &Hit| self.sight.at(hit, &surface.positions);
-        let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
-        let away = |hit: &&Hit| position(hit).distance_squared(mean);
-        let nearest = hits.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let node = self.light.mesh.element(self.element(nearest));
-        let size = self.light.mesh.area(node).sqrt();
-        let across = self.sight.at(nearest, &surface.normals);
-        let normal = across.normalize_or(self.light.mesh.normal(node));
-        let known: Rgb = hits.iter().map(|hit| self.sight.at(hit, &surface.radiosity)).sum();
-        let material = self.light.mesh.material(node);
-        Some(Part {
+    /// Adds what the lines that hit one surface see of it: one part, or more where the light varies.
+    fn add_parts(&self, pixel: usize, hits: &[Hit], parts: &mut Vec<Part>) {
+        let values = || hits.iter().map(|hit| self.sight.at(hit, &self.light.surface.radiosity));
+        let known: Rgb = values().sum();
+        let low = values().fold(Rgb::INFINITY, Rgb::min);
+        let spread = (values().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
+        if hits.len() > 1 && spread.length() > VARIES * known.length() {
+            let (above, below) = hits.split_at(hits.len() / 2);
+            self.add_parts(pixel, above, parts);
+            self.add_parts(pixel, below, parts);
+            return;
+        }
+        let hit = self.middle(hits);
+        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
+        let node = mesh.element(self.element(&hit));
+        let (size, material) = (mesh.area(node).sqrt(), mesh.material(node));
+        let normal = self.sight.at(&hit, &surface.normals).normalize_or(mesh.normal(node));
+        parts.push(Part {
             pixel,
-            place: self.above.place(position(nearest), normal, size),
+            place: self.above.place(self.sight.at(&hit, &surface.positions), normal, size),
             size,
             share: self.sight.share * hits.len() as f64,
             exitance: material.exitance,
             reflectance: material.reflectance,
             known: known * self.sight.share / PI,
-        })
+        });
+    }
+
+    /// Where the line of sight through the mean of `hits` meets their surface, or else the nearest of
+    /// them. Light that is linear over the surface has its mean there.
+    fn middle(&self, hits: &[Hit]) -> Hit {
+        let position = |hit: &Hit| self.sight.at(hit, &self.light.surface.positions);
+        let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
+        let away = |hit: &Hit| position(hit).distance_squared(mean);
+        let first = (away(&hits[0]), hits[0]);
+        let nearest = hits
+            .iter()
+            .map(|hit| (away(hit), *hit))
+            .fold(first, |a, b| if b.0 < a.0 { b } else { a });
+        let met = self.sight.hit(mean - self.sight.eye);
+        met.filter(|hit| self.surface(hit) == self.surface(&hits[0])).unwrap_or(nearest.1)
     }
 
     fn element(&self, hit: &Hit) -> usize {
         self.light.surface.elements[hit.triangle] as usize
+    }
+
+    /// The smooth surface that was hit.
+    fn surface(&self, hit: &Hit) -> u32 {
+        let mesh = &self.light.mesh;
+        self.surfaces[mesh.triangle(mesh.element(self.element(hit)))]
     }
 }
