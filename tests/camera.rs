@@ -80,7 +80,7 @@ fn a_floor_under_a_lamp_has_the_radiance_of_the_closed_form() {
         // element's size, which is below 1, nearer than h = 2: 2 · 1e-4 / 2 off, or less.
         assert!((radiance - want).length() <= 1e-4 * want.length(), "{k}: {radiance} {want}");
     }
-    assert!(floor > 300 && lamp > 30, "{floor} {lamp}");
+    assert!(floor > 250 && lamp > 15, "{floor} {lamp}");
 }
 
 /// Finds the same irradiance everywhere, and counts the places.
@@ -115,7 +115,7 @@ fn edges_cover_the_same_shares_of_pixels_as_without_gathering() {
         seen += usize::from(floor);
         partly += usize::from(floor && a.x < 0.99 * of_floor);
     }
-    assert!(partly > 40, "{partly}");
+    assert!(partly > 20, "{partly}");
     // One gather a pixel, however many lines of sight; none on the lamp.
     assert_eq!(even.places, seen);
 }
