@@ -76,6 +76,37 @@ fn bake_writes_all_it_says() {
 }
 
 #[test]
+fn bake_gathers_without_a_gpu() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("lit");
+    write(
+        folder.path(),
+        "lit.mtl",
+        "newmtl lamp\nKd 0 0 0\nKe 5 5 5\nnewmtl grey\nKd 0.5 0.5 0.5\n",
+    );
+    let plates = "mtllib lit.mtl\nusemtl grey\no floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
+                  f 1 2 3 4\nusemtl lamp\no lamp\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
+    let scene = write(folder.path(), "lit.obj", plates);
+    let mut args = vec![scene.to_str().unwrap(), "--out", stem.to_str().unwrap(), "--cpu"];
+    args.extend(["--element-size", "0.4", "--hemicube", "16", "--gather", "needed"]);
+    args.extend(["--smallest", "0.2"]);
+    let out = run("bake", &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(stem.with_extension("json")).unwrap()).unwrap();
+    let number = |key: &str| json[key].as_u64().unwrap();
+    // The floor's vertices at least, 5 × 5 of them; the lamp reflects nothing and need not look.
+    assert!(number("gathers") >= 25, "{json}");
+    assert!(number("elements") >= 64 && json["settings"]["gather"] == "needed", "{json}");
+    let ply = std::fs::read(stem.with_extension("ply")).unwrap();
+    let header = String::from_utf8_lossy(&ply[..ply.len().min(300)]);
+    assert!(
+        header.starts_with("ply")
+            && header.contains(&format!("element vertex {}", number("vertices")))
+    );
+}
+
+#[test]
 fn view_factors_writes_a_matrix_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let plates = "o low\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n\
@@ -140,7 +171,18 @@ fn bad_settings_are_refused() {
     with(&["--image", "0,5", "--camera", "278,273,-800,278,273,0,39"], &["0 × 5"]);
     with(&["--rotations", "0"], &["zero"]);
     with(&["--viewpoints", "much"], &["much"]);
+    with(&["--gather", "some"], &["some", "none, needed, all"]);
+    with(&["--bend", "much"], &["much"]);
+    with(&["--max-elements", "-1"], &["-1"]);
+    with(&["--smallest", "tiny"], &["tiny"]);
     with(&["--what"], &["--what"]);
+    let coarse = ["--gather", "needed", "--element-size", "600", "--hemicube", "16"];
+    let gathering = |more: &[&str], words: &[&str]| with(&[&coarse, more].concat(), words);
+    gathering(&["--bend", "0"], &["tolerance 0", "above 0"]);
+    gathering(&["--bend", "1.5"], &["tolerance 1.5"]);
+    gathering(&["--bend", "nan"], &["tolerance NaN"]);
+    gathering(&["--smallest", "0"], &["smallest element 0"]);
+    gathering(&["--smallest", "-3"], &["smallest element -3"]);
     refused(&[], &["usage"]);
     refused(&[cornell(), "--out", "no/such/folder/x"], &["no/such/folder"]);
     if device().is_empty() {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use common::{cube, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::polygon_to_polygon;
+use radiosity::form_factor::analytic::{point_to_polygon, polygon_to_polygon};
 use radiosity::{
     Absent, ErrorKind, Factor, Go, Material, Mesh, RayCast, Scene, ViewFactors, load_obj,
     write_matrix_market, write_view_factor_list,
@@ -78,6 +78,31 @@ fn all_cases_of_an_independent_list() {
     println!("{honest} honest; estimate over error {ratios:.1?}");
     assert!(count >= 70 && errors[count / 2] <= 1e-9);
     assert!(honest * 10 >= count * 9, "{honest} of {count} within two estimates");
+}
+
+/// The cases of the list that leave a point instead of a surface.
+#[test]
+fn factors_from_a_point_of_an_independent_list() {
+    let text = std::fs::read_to_string(data("view_factors/expected.json")).unwrap();
+    let cases: Vec<Value> = serde_json::from_str(&text).unwrap();
+    let mut count = 0;
+    for case in &cases {
+        let Some(place) = case.get("differential").map(|d| &d["dA"]) else { continue };
+        let vector =
+            |key: &str| DVec3::from_array([0, 1, 2].map(|k| place[key][k].as_f64().unwrap()));
+        let (point, normal) = (vector("point"), vector("normal"));
+        let scene = load_obj(data("view_factors").join(case["obj"].as_str().unwrap())).unwrap();
+        let to = scene.groups().iter().position(|g| case["to"] == **g).unwrap();
+        let of_group = |&t: &usize| scene.triangles()[t].group as usize == to;
+        let triangles = (0..scene.triangles().len()).filter(of_group);
+        let got: f64 = triangles.map(|t| point_to_polygon(point, normal, &scene.corners(t))).sum();
+        let want = case["value"].as_f64().unwrap();
+        // What the list knows of the truth, and 1e-14 for each of two triangles.
+        let bound = case["uncertainty"].as_f64().unwrap() + 2e-14;
+        assert!((got - want).abs() <= bound, "{}: {got} for {want}", case["id"]);
+        count += 1;
+    }
+    assert_eq!(count, 4);
 }
 
 /// A cube with a box inside, walls 4 × 4: 120 groups, every entry.
