@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod closed_forms;
+pub mod surface;
 
 use glam::DVec3;
 use radiosity::{Gpu, Material, Mesh, Scene, Triangle};
