@@ -144,6 +144,10 @@ fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Vec<Line>) {
             cut.push(flat(at(k, l, 0.0)));
         }
     }
+    if cut.len() == 1 {
+        // The cut goes through the corner opposite.
+        cut.extend((0..3).find(|&k| height[k] == 0.0).map(|k| flat(corners[k])));
+    }
     if let [p, q] = cut[..] {
         lines.push(Line { ends: [p, q], gap: 0.0 });
     }
