@@ -36,8 +36,11 @@ const LIFT: f64 = 1e-4;
 /// Elements around a vertex that it tries to stand in, at most.
 const ATTEMPTS: usize = 6;
 
-/// A place that sees more than this share of backs is under something, if that is near.
+/// A place that sees more than this share of backs is under something, if that is near or dark.
 const UNDER: f64 = 0.9;
+
+/// A place that sees more than this share of backs is inside: seams let a ray or two through.
+const INSIDE: f64 = 0.995;
 
 impl<'a> Stands<'a> {
     pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> Stands<'a> {
@@ -112,7 +115,8 @@ impl Above {
 }
 
 /// Whether what was found is the inside of something that touches the surface: backs almost
-/// everywhere, nearer than the elements are large, the square root of whose area is `size`.
+/// everywhere, nearer than the elements are large (the square root of their area is `size`), or
+/// nothing else at all.
 pub(crate) fn is_covered(found: &Gathered, size: f64) -> bool {
-    found.back > UNDER && found.nearness * size > 1.0
+    found.back > UNDER && (found.nearness * size > 1.0 || found.back > INSIDE)
 }
