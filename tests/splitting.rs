@@ -16,7 +16,7 @@ fn grey() -> Material {
     Material::grey("grey", 0.5)
 }
 
-/// Splits a pseudo-random third of the elements, `times` times.
+/// Splits a pseudo-random quarter of the elements, `times` times.
 fn split_at_random(mut mesh: Mesh, times: u32) -> Mesh {
     for turn in 0..times {
         let chosen = |e: &usize| (*e as u32 ^ turn << 9).wrapping_mul(0x9e37_79b9) >> 30 == 0;
@@ -227,8 +227,8 @@ fn what_hangs_close_splits_as_deep_as_it_is_close() {
 
 #[test]
 fn triangles_that_cross_split_each_other_along_the_cut() {
-    // The cut is from y = 1.1 on the plane z = 0, from x = 1 to where the first one ends, 2.9: through two of
-    // the second one's sides, or a side and the corner opposite.
+    // The cut runs along y = 1.1, z = 0, from x = 1 to where the first one ends, 2.9: through two
+    // of the second one's sides, or one and the corner opposite.
     for z in [0.3, 0.0] {
         let points = [[0., 0., 0.], [4., 0., 0.], [0., 4., 0.]].into_iter();
         let points = points.chain([[1., 1.1, -1.], [1., 1.1, 2.], [9., 1.1, z]]);
