@@ -140,7 +140,7 @@ fn a_furnace_stays_as_it_is() {
             let found = settings.gather(&mesh, &settled, gather, go).unwrap();
             assert_eq!(found.stop, Stop::Converged);
             // Walls are lights of their own here, which rays find by closed forms too, all of each
-            // visible. Those are good to 1e-14 each, nearly edge on too; there are as many as elements.
+            // visible. Those are good to 1e-14 each, edge on too; they are as many as elements.
             let bound = 1e-14 * mesh.element_count() as f64 * even;
             let off =
                 found.surface.radiosity.iter().map(|b| (b.x - even).abs()).fold(0.0, f64::max);
