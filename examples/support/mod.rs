@@ -129,6 +129,7 @@ impl Bake {
         };
         let element_size = self.element_size.unwrap_or_else(by_default);
         let mesh = Mesh::new(scene, element_size)?.split_at_contacts(self.contacts);
+        self.gathering(&mesh).check()?;
         let maker = Maker::new(&self.device, &mesh, self.hemicube, self.rotations)?;
         let near = NearRepair::new(maker, &mesh, self.near);
         let levels = if self.viewpoints.is_some() { u32::MAX } else { 0 };
@@ -228,6 +229,20 @@ pub fn default_element_size(scene: &Scene) -> f64 {
 }
 
 impl Bake {
+    fn gathering(&self, mesh: &Mesh) -> Gathering {
+        let longest = |e| {
+            let [a, b, c] = mesh.corners(mesh.element(e));
+            (b - a).length().max((c - b).length()).max((a - c).length())
+        };
+        let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
+        Gathering {
+            tolerance: self.bend,
+            elements: self.max_elements,
+            everywhere: u32::from(self.gather == Gathers::All),
+            ..Gathering::new(self.smallest.unwrap_or(largest / SMALLEST))
+        }
+    }
+
     /// Lets vertices gather, if they are to.
     fn gathered(
         &self,
@@ -238,17 +253,7 @@ impl Bake {
         if self.gather == Gathers::None {
             return Ok(None);
         }
-        let longest = |e| {
-            let [a, b, c] = mesh.corners(mesh.element(e));
-            (b - a).length().max((c - b).length()).max((a - c).length())
-        };
-        let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
-        let settings = Gathering {
-            tolerance: self.bend,
-            elements: self.max_elements,
-            everywhere: u32::from(self.gather == Gathers::All),
-            ..Gathering::new(self.smallest.unwrap_or(largest / SMALLEST))
-        };
+        let settings = self.gathering(mesh);
         let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
         let bar = bar();
         let gathered = settings.gather(mesh, radiosity, &mut *gather, |p| {

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::light_view::LightView;
 use super::lights::{Lights, NO_LIGHT};
 use super::{Gather, Gathered, Place, Sources};
 use crate::error::{Error, ErrorKind};
@@ -39,11 +40,18 @@ impl RayGather {
     }
 
     fn at(&self, sources: &Sources, place: &Place) -> Gathered {
-        let apart = self.lights.apart(place);
+        let mut apart = self.lights.apart(place);
+        // What reaches too far around is seen well enough by the rays over the hemisphere, and points
+        // spread over its area see its nearest part badly.
+        apart.retain(|&(light, _)| {
+            let triangles = self.lights.lights[light as usize].triangles.iter();
+            let corners = triangles.map(|&t| sources.mesh.scene().corners(t as usize));
+            LightView::new(place, corners).is_some()
+        });
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
         let (tangent, bitangent) = place.normal.any_orthonormal_pair();
         let share = 1.0 / f64::from(self.count);
-        let turn = if std::env::var("TURN").is_ok() { turn(place.position) } else { 0.25 };
+        let turn = turn(place.position);
         let mut out = Gathered::default();
         for k in 0..self.count {
             // Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley points.

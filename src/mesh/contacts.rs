@@ -1,8 +1,10 @@
 //! Where surfaces touch: elements there are cut small, since the light on them jumps.
 
+use std::collections::HashMap;
+
 use glam::{DVec2, DVec3};
 
-use super::{Cell, MAX_DEPTH, Mesh};
+use super::{Cell, MAX_DEPTH, Mesh, Smooth};
 use crate::scene::Scene;
 
 /// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
@@ -10,6 +12,9 @@ const TOUCH: f64 = 0.15;
 
 /// Of an element's size: lines have to come this far into it to part it.
 const INSIDE: f64 = 0.02;
+
+/// Cosine of the angle between triangles in one plane, at least: 1e-5 radians.
+const FLAT: f64 = 1.0 - 5e-11;
 
 /// A line on a triangle along which another triangle touches or crosses it.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +92,7 @@ fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
     // Sweep along x: of the boxes that have begun, those that have not ended.
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_unstable_by(|&s, &t| boxes[s][0].x.total_cmp(&boxes[t][0].x).then(s.cmp(&t)));
+    let rims = rims(scene);
     let mut out = vec![vec![]; count];
     let mut begun: Vec<usize> = vec![];
     for t in order {
@@ -94,8 +100,8 @@ fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
         for &s in &begun {
             let apart = boxes[s][0].cmpgt(boxes[t][1]) | boxes[t][0].cmpgt(boxes[s][1]);
             if !apart.any() {
-                touch(scene, t, s, slack[t], &mut out[t]);
-                touch(scene, s, t, slack[s], &mut out[s]);
+                touch(scene, t, s, &rims[s], slack[t], &mut out[t]);
+                touch(scene, s, t, &rims[t], slack[s], &mut out[s]);
             }
         }
         begun.push(t);
@@ -103,9 +109,24 @@ fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
     out
 }
 
-/// Adds the lines along which triangle `s` touches or crosses `t`: the parts of its edges that lie
-/// within `slack` of the plane of `t`, and its cut with that plane.
-fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Vec<Line>) {
+/// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
+/// nothing.
+fn rims(scene: &Scene) -> Vec<[bool; 3]> {
+    let sides = Smooth::new(scene).sides;
+    let mut first: HashMap<u32, (usize, usize)> = HashMap::new();
+    let mut out = vec![[true; 3]; sides.len()];
+    for (t, k) in (0..sides.len()).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
+        let (s, l) = *first.entry(sides[t][k].id).or_insert((t, k));
+        if s != t && scene.normal(s).dot(scene.normal(t)) > FLAT {
+            (out[t][k], out[s][l]) = (false, false);
+        }
+    }
+    out
+}
+
+/// Adds the lines along which triangle `s` touches or crosses `t`: the parts of its sides `rim` that
+/// lie within `slack` of the plane of `t`, and its cut with that plane.
+fn touch(scene: &Scene, t: usize, s: usize, rim: &[bool; 3], slack: f64, lines: &mut Vec<Line>) {
     let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
     let corners = scene.corners(s);
     let height = corners.map(|p| normal.dot(p - a));
@@ -125,7 +146,7 @@ fn touch(scene: &Scene, t: usize, s: usize, slack: f64, lines: &mut Vec<Line>) {
     let mut cut = vec![];
     for (k, l) in [(0, 1), (1, 2), (2, 0)] {
         let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
-        if low <= slack && high >= -slack {
+        if rim[k] && low <= slack && high >= -slack {
             let within = |k: usize, l: usize| {
                 if height[k].abs() <= slack {
                     corners[k]

@@ -101,7 +101,8 @@ impl Gathering {
         gather: &mut dyn Gather,
         mut progress: impl FnMut(&GatherProgress) -> Go,
     ) -> Result<GatheredRadiosity, Error> {
-        self.check(mesh, radiosity)?;
+        self.check()?;
+        check_count(mesh, radiosity)?;
         let mut state = Refined::new(mesh.clone(), radiosity);
         let before = state.reflected().to_vec();
         let mut change = None;
@@ -141,19 +142,23 @@ impl Gathering {
         Ok(GatheredRadiosity { change: change.unwrap_or(0.0), stop, ..state.finish() })
     }
 
-    fn check(&self, mesh: &Mesh, radiosity: &[Rgb]) -> Result<(), Error> {
-        let bad = |place: String, found: &str, remedy: String| {
+    /// Whether [`Gathering::gather`] would take these settings: worth asking before a long solve.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a tolerance outside (0, 1] or a smallest edge that is not above 0.
+    pub fn check(&self) -> Result<(), Error> {
+        let bad = |place: String, found: &str, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, place, found, remedy))
         };
         if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             let place = format!("tolerance {}", self.tolerance);
-            return bad(place, "out of range", "use a share above 0 and up to 1".into());
+            return bad(place, "out of range", "use a share above 0 and up to 1");
         }
         if self.smallest.is_nan() || self.smallest <= 0.0 {
             let place = format!("smallest element {}", self.smallest);
-            return bad(place, "not above 0", "use a length in the scene's unit".into());
+            return bad(place, "not above 0", "use a length in the scene's unit");
         }
-        check_count(mesh, radiosity)
+        Ok(())
     }
 }
 
