@@ -41,12 +41,12 @@ impl RayGather {
 
     fn at(&self, sources: &Sources, place: &Place) -> Gathered {
         let mut apart = self.lights.apart(place);
-        // What reaches too far around is seen well enough by the rays over the hemisphere, and points
-        // spread over its area see its nearest part badly.
+        // Without a closed form, what reaches far around is seen better by the rays over the hemisphere
+        // than by points spread over its area.
         apart.retain(|&(light, _)| {
-            let triangles = self.lights.lights[light as usize].triangles.iter();
-            let corners = triangles.map(|&t| sources.mesh.scene().corners(t as usize));
-            LightView::new(place, corners).is_some()
+            let light = &self.lights.lights[light as usize];
+            let corner = |&t: &u32| sources.mesh.scene().corners(t as usize);
+            light.convex || LightView::new(place, light.triangles.iter().map(corner)).is_some()
         });
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
         let (tangent, bitangent) = place.normal.any_orthonormal_pair();

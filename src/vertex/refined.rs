@@ -33,7 +33,7 @@ const BATCH: usize = 256;
 
 /// Where less than this share of the mean is reflected, errors are weighed against the share: the
 /// insides of gaps are not worth most of the elements.
-const DIM: f64 = 0.02;
+const DIM: f64 = 0.05;
 
 /// Of two elements, one half as long may be off by two to this power times as much: between equal
 /// errors, which would cut contacts to dust, and equal errors times length.
