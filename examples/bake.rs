@@ -31,7 +31,7 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --bend T          split where a side's middle is off by this share of its radiosity [0.02]
   --smallest X      elements with no longer edge are not split [largest edge / 24]
   --contacts N      levels that elements are split which other surfaces touch [3]
-  --max-elements N  elements there may be [262144]
+  --max-elements N  elements there may be [524288]
   --ambient         add the light not yet shot, spread evenly; the files say so
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
   --near R          closed forms for receivers within R patch diameters; -1 for none [1]

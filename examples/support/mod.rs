@@ -94,7 +94,7 @@ impl Bake {
             gather: Gathers::None,
             bend: 0.02,
             smallest: None,
-            max_elements: 1 << 18,
+            max_elements: 1 << 19,
             ambient: false,
             hemicube: 128,
             near: 1.0,

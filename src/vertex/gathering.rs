@@ -76,10 +76,10 @@ impl GatheredRadiosity {
 }
 
 impl Gathering {
-    /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, 2¹⁸ elements at
+    /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, 2¹⁹ elements at
     /// most.
     pub fn new(smallest: f64) -> Gathering {
-        Gathering { tolerance: 0.02, smallest, elements: 1 << 18, everywhere: 0 }
+        Gathering { tolerance: 0.02, smallest, elements: 1 << 19, everywhere: 0 }
     }
 
     /// Lets the vertices of `mesh` gather, given the radiosity of its elements (W/m², one value an

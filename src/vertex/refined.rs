@@ -20,6 +20,10 @@ pub(super) struct Refined {
     reflected: Vec<Rgb>,
     /// Whether a vertex lies under something that touches its surface.
     covered: Vec<bool>,
+    /// How many times elements had been split when a vertex gathered last.
+    seen_at: Vec<u32>,
+    /// How many times they have been.
+    level: u32,
     /// Where all vertices are gathered at.
     gathers: u64,
     /// Radiosity that is as good as none, W/m².
@@ -27,6 +31,10 @@ pub(super) struct Refined {
     /// Longest edge of the elements to begin with, scene unit.
     largest: f64,
 }
+
+/// Corners of elements that are split gather anew after so many levels: what is near them is known
+/// better by then.
+const STALE: u32 = 2;
 
 /// Vertices that gather at once: progress is told of after each batch.
 const BATCH: usize = 256;
@@ -65,7 +73,19 @@ impl Refined {
         let largest = elements().map(|(_, n)| longest(&mesh.corners(n))).fold(0.0, f64::max);
         let covered = vec![false; reflected.len()];
         let dim = DIM * flux / area;
-        Refined { mesh, smooth, vertices, reflected, covered, gathers: 0, dim, largest }
+        let (seen_at, level, gathers) = (vec![0; reflected.len()], 0, 0);
+        Refined {
+            mesh,
+            smooth,
+            vertices,
+            reflected,
+            covered,
+            seen_at,
+            level,
+            gathers,
+            dim,
+            largest,
+        }
     }
 
     pub fn mesh(&self) -> &Mesh {
@@ -226,19 +246,22 @@ impl Refined {
         }
     }
 
-    /// Splits `elements`, which ascend. Gives the vertices that are new, with the mean of those that
-    /// they lie between, and the elements that are.
+    /// Splits `elements`, which ascend. Gives the vertices that are to gather: new ones, which have the
+    /// mean of those that they lie between, and stale ones; and the elements that are new.
     pub fn split(&mut self, elements: &[usize]) -> Result<(Vec<u32>, Vec<usize>), Error> {
         let finer = self.mesh.split(elements)?;
         let vertices = Vertices::new(&finer, &self.smooth);
         let count = vertices.positions.len();
         let (mut reflected, mut covered) = (vec![Rgb::ZERO; count], vec![false; count]);
+        self.level += 1;
+        let mut seen_at = vec![self.level; count];
         let mut fresh = vec![];
         for (v, key) in vertices.keys.iter().enumerate() {
             match self.vertices.find(key) {
                 Some(old) => {
                     reflected[v] = self.reflected[old as usize];
                     covered[v] = self.covered[old as usize];
+                    seen_at[v] = self.seen_at[old as usize];
                 }
                 None => fresh.push(v as u32),
             }
@@ -251,6 +274,13 @@ impl Refined {
             let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
             // The corners of the fourth part are the middles of the sides opposite a, b and c.
             let middles = vertices.corners[e + 3 * k + 3].map(|v| v as usize);
+            for v in self.vertices.corners[e].map(|v| &self.vertices.keys[v as usize]) {
+                let Some(v) = vertices.find(v) else { continue };
+                if self.level - seen_at[v as usize] >= STALE {
+                    seen_at[v as usize] = self.level;
+                    fresh.push(v);
+                }
+            }
             for (m, mean) in middles.into_iter().zip([b + c, c + a, a + b]) {
                 if is_new(m) {
                     reflected[m] = mean / 2.0;
@@ -258,7 +288,7 @@ impl Refined {
             }
         }
         (self.mesh, self.vertices) = (finer, vertices);
-        (self.reflected, self.covered) = (reflected, covered);
+        (self.reflected, self.covered, self.seen_at) = (reflected, covered, seen_at);
         Ok((fresh, young))
     }
 
