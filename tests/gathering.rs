@@ -249,7 +249,9 @@ fn settings_bound_how_many_and_how_small() {
     let (least, most) = sizes(&found.mesh);
     assert!(least > 0.02 / 2.0 && least <= 0.02, "{least}");
     assert!(most <= largest);
-    assert_eq!(found.gathers as usize, places(&found));
+    // Each at least once; what was wrong or has grown stale, again.
+    let all = places(&found);
+    assert!((all..2 * all).contains(&(found.gathers as usize)), "{} {all}", found.gathers);
     let few = at_the_edge(&Gathering { elements: base.element_count() + 100, ..fine.clone() });
     assert_eq!(few.stop, Stop::Elements);
     let count = few.mesh.element_count() - base.element_count();
@@ -343,7 +345,8 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
         let (found, last) = (found.unwrap(), told[told.len() - 1]);
         assert_eq!(
             (found.stop, last.level, told.len() as u32),
-            (Stop::Cancelled, stop_at, stop_at + 1)
+            // The first level gathers twice: the light given is far off.
+            (Stop::Cancelled, stop_at, stop_at + 1 + u32::from(stop_at > 0))
         );
         assert_eq!(found.mesh.element_count(), last.elements);
         assert!(told.iter().all(|p| p.gathered == p.of && p.of > 0), "one batch a level");

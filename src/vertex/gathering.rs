@@ -75,6 +75,9 @@ impl GatheredRadiosity {
     }
 }
 
+/// Vertices that the elements had wrong by more than this share gather twice to begin with.
+const WRONG: f64 = 0.1;
+
 impl Gathering {
     /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, 2¹⁹ elements at
     /// most.
@@ -116,7 +119,14 @@ impl Gathering {
             if state.gather(&fresh, gather, &mut told)?.is_break() {
                 break Stop::Cancelled;
             }
-            change.get_or_insert_with(|| state.change(&before));
+            if change.is_none() {
+                change = Some(state.change(&before));
+                // What the elements got badly wrong was seen by its neighbours as wrong.
+                let wrong = state.off(&before, WRONG);
+                if state.gather(&wrong, gather, &mut told)?.is_break() {
+                    break Stop::Cancelled;
+                }
+            }
             let room = self.elements.saturating_sub(elements) / 3;
             let mut bent: Vec<(f64, usize)> =
                 young.iter().map(|&e| (state.bend(e, self), e)).filter(|b| b.0 > 1.0).collect();

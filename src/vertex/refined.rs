@@ -123,6 +123,15 @@ impl Refined {
         if all > 0.0 { (off / all).sqrt() } else { 0.0 }
     }
 
+    /// The vertices that are further from `before` than this share of what they have now.
+    pub fn off(&self, before: &[Rgb], share: f64) -> Vec<u32> {
+        let off = |&v: &u32| {
+            let now = self.reflected[v as usize];
+            now.distance(before[v as usize]) > share * now.length()
+        };
+        (0..before.len() as u32).filter(off).collect()
+    }
+
     /// Lets the vertices `fresh` gather.
     pub fn gather(
         &mut self,
