@@ -232,6 +232,12 @@ impl Mesh {
         n.cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
     }
 
+    /// Longest edge of `node`, scene unit.
+    pub fn longest_edge(&self, node: NodeId) -> f64 {
+        let [a, b, c] = self.corners(node);
+        (b - a).length().max((c - b).length()).max((a - c).length())
+    }
+
     /// Centroid of `node`.
     pub fn centroid(&self, node: NodeId) -> DVec3 {
         let [a, b, c] = self.corners(node);

@@ -9,6 +9,8 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 
+use crate::scene::Scene;
+
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
 /// intersections are in 64.
 #[derive(Debug)]
@@ -66,6 +68,11 @@ impl Rays {
         let bvh = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
         let triangles = corners.into_iter().map(|[a, b, c]| [a, b - a, c - a]).collect();
         Rays { bvh, triangles, origin, scale }
+    }
+
+    /// For the triangles of `scene`, by their numbers.
+    pub fn of_scene(scene: &Scene) -> Rays {
+        Rays::new((0..scene.triangles().len()).map(|t| scene.corners(t)))
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and

@@ -72,13 +72,19 @@ impl VertexRadiosity {
             positions,
             ..Default::default()
         };
+        out.add_elements(mesh, &rims, |_, e| element_radiosity[e]);
+        out
+    }
+
+    /// Adds every element of `mesh` as a face, or as a fan where finer neighbours put vertices on its
+    /// sides; `middle` says what the fan has in its middle, W/m².
+    fn add_elements(&mut self, mesh: &Mesh, rims: &Rims, middle: impl Fn(&Self, usize) -> Rgb) {
         for (e, rim) in rims.iter() {
             match *rim {
-                [a, b, c] => out.add_face([a, b, c], e),
-                _ => out.add_fan(mesh, rim, e, element_radiosity[e]),
+                [a, b, c] => self.add_face([a, b, c], e),
+                _ => self.add_fan(mesh, rim, e, middle(self, e)),
             }
         }
-        out
     }
 
     fn add_face(&mut self, face: [u32; 3], e: usize) {

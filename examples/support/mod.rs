@@ -230,10 +230,7 @@ pub fn default_element_size(scene: &Scene) -> f64 {
 
 impl Bake {
     fn gathering(&self, mesh: &Mesh) -> Gathering {
-        let longest = |e| {
-            let [a, b, c] = mesh.corners(mesh.element(e));
-            (b - a).length().max((c - b).length()).max((a - c).length())
-        };
+        let longest = |e| mesh.longest_edge(mesh.element(e));
         let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
         Gathering {
             tolerance: self.bend,

@@ -34,8 +34,9 @@ impl Camera {
     ///
     /// Lines of one pixel that meet the same smooth surface share one gather in their middle, unless
     /// the vertices tell of an edge of a shadow between them. So most pixels gather once, while edges
-    /// are as clean as the lines are dense. What reflects nothing does not gather. `progress` is told how many pixels are done, and
-    /// of how many, several times a second. It may stop the work: then there is no image.
+    /// are as clean as the lines are dense. What reflects nothing does not gather. `progress` is told
+    /// how many pixels are done, and of how many, several times a second. It may stop the work: then
+    /// there is no image.
     ///
     /// # Errors
     /// Those of [`Camera::check`]; whatever `gather` fails with.

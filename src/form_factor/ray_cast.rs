@@ -30,8 +30,7 @@ impl RayCast {
             let place = format!("{count} rays a row");
             return Err(Error::new(ErrorKind::Setting, place, "not usable", "use 1 to 268435456"));
         }
-        let scene = mesh.scene();
-        let rays = Rays::new((0..scene.triangles().len()).map(|t| scene.corners(t)));
+        let rays = Rays::of_scene(mesh.scene());
         Ok(RayCast { rays, count })
     }
 

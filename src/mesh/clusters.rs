@@ -7,7 +7,7 @@
 //! [`SPREAD_DEGREES`] from its axis: what a cluster sends out is much like what one flat patch does.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap, HashMap};
+use std::collections::{BTreeSet, BinaryHeap};
 
 use glam::DVec3;
 
@@ -148,17 +148,9 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
 fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
     let smooth = Smooth::new(scene);
     let mut beside = vec![BTreeSet::new(); smooth.sides.len()];
-    let mut first: HashMap<u32, u32> = HashMap::new();
-    for (t, sides) in (0u32..).zip(&smooth.sides) {
-        for side in sides {
-            match first.insert(side.id, t) {
-                Some(other) if other != t => {
-                    beside[t as usize].insert(other);
-                    beside[other as usize].insert(t);
-                }
-                _ => {}
-            }
-        }
+    for [(s, _), (t, _)] in smooth.joins() {
+        beside[s].insert(t as u32);
+        beside[t].insert(s as u32);
     }
     beside
 }

@@ -1,7 +1,5 @@
 //! Where surfaces touch: elements there are cut small, since the light on them jumps.
 
-use std::collections::HashMap;
-
 use glam::{DVec2, DVec3};
 
 use super::{Cell, MAX_DEPTH, Mesh, Smooth};
@@ -112,12 +110,10 @@ fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
 /// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
 /// nothing.
 fn rims(scene: &Scene) -> Vec<[bool; 3]> {
-    let sides = Smooth::new(scene).sides;
-    let mut first: HashMap<u32, (usize, usize)> = HashMap::new();
-    let mut out = vec![[true; 3]; sides.len()];
-    for (t, k) in (0..sides.len()).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
-        let (s, l) = *first.entry(sides[t][k].id).or_insert((t, k));
-        if s != t && scene.normal(s).dot(scene.normal(t)) > FLAT {
+    let smooth = Smooth::new(scene);
+    let mut out = vec![[true; 3]; smooth.sides.len()];
+    for [(s, l), (t, k)] in smooth.joins() {
+        if scene.normal(s).dot(scene.normal(t)) > FLAT {
             (out[t][k], out[s][l]) = (false, false);
         }
     }

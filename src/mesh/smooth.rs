@@ -62,13 +62,22 @@ impl Smooth {
         Smooth { corners, sides }
     }
 
+    /// The sides across which the surface goes on smoothly to another triangle: each once, as the two
+    /// triangles that share it and which of their sides it is.
+    pub fn joins(&self) -> impl Iterator<Item = [(usize, usize); 2]> {
+        let all = (0..self.sides.len()).flat_map(|t| [(t, 0), (t, 1), (t, 2)]);
+        // A side's identity is its place with the first of the triangles that share it.
+        let shared = all.map(|(t, k)| {
+            let id = self.sides[t][k].id as usize;
+            [(id / 3, id % 3), (t, k)]
+        });
+        shared.filter(|[(s, _), (t, _)]| s != t)
+    }
+
     /// Per triangle, the smooth surface that it is a part of: the number of its first triangle.
     pub fn surfaces(&self) -> Vec<u32> {
         let mut joined = Joined::new(self.sides.len());
-        for (t, sides) in self.sides.iter().enumerate() {
-            // A side's identity comes from one of the two triangles that share it.
-            sides.iter().for_each(|side| joined.join(t, side.id as usize / 3));
-        }
+        self.joins().for_each(|[(s, _), (t, _)]| joined.join(s, t));
         (0..self.sides.len()).map(|t| joined.find(t) as u32).collect()
     }
 }

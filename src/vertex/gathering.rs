@@ -128,11 +128,11 @@ impl Gathering {
                 }
             }
             let room = self.elements.saturating_sub(elements) / 3;
-            let mut bent: Vec<(f64, usize)> =
-                young.iter().map(|&e| (state.bend(e, self), e)).filter(|b| b.0 > 1.0).collect();
-            if level < self.everywhere {
-                bent = young.iter().map(|&e| (1.0, e)).filter(|b| state.splits(b.1)).collect();
-            }
+            let mut bent: Vec<(f64, usize)> = if level < self.everywhere {
+                young.iter().map(|&e| (1.0, e)).filter(|b| state.splits(b.1)).collect()
+            } else {
+                young.iter().map(|&e| (state.bend(e, self), e)).filter(|b| b.0 > 1.0).collect()
+            };
             if bent.is_empty() {
                 break if crowded { Stop::Elements } else { Stop::Converged };
             }

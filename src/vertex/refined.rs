@@ -70,7 +70,7 @@ impl Refined {
             (radiosity[e] - mesh.material(n).exitance).length() * mesh.area(n)
         };
         let flux: f64 = elements().map(lit).sum();
-        let largest = elements().map(|(_, n)| longest(&mesh.corners(n))).fold(0.0, f64::max);
+        let largest = elements().map(|(_, n)| mesh.longest_edge(n)).fold(0.0, f64::max);
         let covered = vec![false; reflected.len()];
         let dim = DIM * flux / area;
         let (seen_at, level, gathers) = (vec![0; reflected.len()], 0, 0);
@@ -229,7 +229,7 @@ impl Refined {
     /// as much.
     pub fn bend(&self, e: usize, settings: &Gathering) -> f64 {
         let node = self.mesh.element(e);
-        let size = longest(&self.mesh.corners(node));
+        let size = self.mesh.longest_edge(node);
         if !self.splits(e) || size <= settings.smallest {
             return 0.0;
         }
@@ -375,15 +375,10 @@ impl Refined {
             }
         }
         out.normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
-        for (e, rim) in self.vertices.rims.iter() {
-            match *rim {
-                [a, b, c] => out.add_face([a, b, c], e),
-                _ => {
-                    let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
-                    out.add_fan(&self.mesh, rim, e, corners.iter().sum::<Rgb>() / 3.0);
-                }
-            }
-        }
+        out.add_elements(&self.mesh, &self.vertices.rims, |out, e| {
+            let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
+            corners.iter().sum::<Rgb>() / 3.0
+        });
         out
     }
 }
@@ -407,8 +402,4 @@ impl Side {
     fn bend(&self) -> Rgb {
         self.middle - self.mean
     }
-}
-
-fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
-    (*b - *a).length().max((*c - *b).length()).max((*a - *c).length())
 }
