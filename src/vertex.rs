@@ -5,20 +5,23 @@ pub(crate) mod gathering;
 mod meeting;
 pub(crate) mod places;
 mod refined;
+mod seams;
 mod vertices;
 
 use glam::DVec3;
 
 use crate::mesh::{Mesh, Smooth};
 use crate::scene::Rgb;
-use vertices::{Rims, Vertices};
+use seams::Seams;
+use vertices::Vertices;
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
 ///
 /// A smooth surface is a set of triangles of one group and one material that meet at angles below
 /// [`crate::CREASE_DEGREES`]. Where neighbouring elements differ in size, the larger one is fanned
-/// around its centroid over the vertices on its sides: no cracks, no T-vertices.
+/// around its centroid over the vertices on its sides, across creases too: no cracks, no T-vertices,
+/// and where the scene is watertight so is the mesh, position by position.
 #[derive(Clone, Debug, Default)]
 pub struct VertexRadiosity {
     /// Vertex positions, in the scene's length unit.
@@ -45,7 +48,9 @@ impl VertexRadiosity {
     /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
     /// No value is let below zero.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
-        let Vertices { positions, rims, .. } = Vertices::new(mesh, &Smooth::new(mesh.scene()));
+        let smooth = Smooth::new(mesh.scene());
+        let vertices = Vertices::new(mesh, &smooth);
+        let (positions, rims) = (&vertices.positions, &vertices.rims);
         let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
         let mut around = vec![0.0; positions.len()];
         rims.iter().for_each(|(e, rim)| rim.iter().for_each(|&v| around[v as usize] += areas[e]));
@@ -60,7 +65,7 @@ impl VertexRadiosity {
         let normals = mean(&|e, _| mesh.normal(mesh.element(e)));
         let mut smoothed = mean(&|e, _| element_radiosity[e]);
         let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
-        boundary::extrapolate(mesh, &rims, &positions, &normals, element_radiosity, &mut smoothed);
+        boundary::extrapolate(mesh, rims, positions, &normals, element_radiosity, &mut smoothed);
         let missing = mean(&|e, rim| {
             let corners = rim.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
             element_radiosity[e] - corners / rim.len() as f64
@@ -69,17 +74,23 @@ impl VertexRadiosity {
         let mut out = VertexRadiosity {
             radiosity: corrected.collect(),
             normals,
-            positions,
+            positions: positions.clone(),
             ..Default::default()
         };
-        out.add_elements(mesh, &rims, |_, e| element_radiosity[e]);
+        out.add_elements(mesh, &Seams::new(mesh, &smooth, &vertices), |_, e| element_radiosity[e]);
         out
     }
 
-    /// Adds every element of `mesh` as a face, or as a fan where finer neighbours put vertices on its
-    /// sides; `middle` says what the fan has in its middle, W/m².
-    fn add_elements(&mut self, mesh: &Mesh, rims: &Rims, middle: impl Fn(&Self, usize) -> Rgb) {
-        for (e, rim) in rims.iter() {
+    /// Adds every element of `mesh` as a face, or as a fan where there are vertices on its sides;
+    /// `middle` says what the fan has in its middle, W/m².
+    fn add_elements(&mut self, mesh: &Mesh, seams: &Seams, middle: impl Fn(&Self, usize) -> Rgb) {
+        for seam in &seams.vertices {
+            let [a, b] = seam.between.map(|v| v as usize);
+            self.positions.push(seam.position);
+            self.normals.push((self.normals[a] + self.normals[b]).normalize_or_zero());
+            self.radiosity.push((self.radiosity[a] + self.radiosity[b]) / 2.0);
+        }
+        for (e, rim) in seams.rims.iter() {
             match *rim {
                 [a, b, c] => self.add_face([a, b, c], e),
                 _ => self.add_fan(mesh, rim, e, middle(self, e)),

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::surface::assert_whole;
+use common::surface::{assert_watertight, assert_whole};
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::form_factor::analytic::point_to_polygon;
@@ -99,9 +99,26 @@ fn unequal_depths_everywhere_leave_no_cracks() {
         println!("{} elements from {least:.3} to {most:.3}", found.mesh.element_count());
         assert!(found.stop == Stop::Converged && most / least > 7.9, "unequal depths");
         assert!(found.mesh.element_count() > 2 * mesh.element_count());
+        for surface in [&found.surface, &VertexRadiosity::new(&mesh, &dark)] {
+            assert_eq!(surface.radiosity.len(), surface.positions.len());
+            assert_eq!(surface.normals.len(), surface.positions.len());
+        }
         assert_whole(&found.mesh, &found.surface);
-        assert_eq!(found.surface.radiosity.len(), found.surface.positions.len());
+        assert_watertight(&found.mesh, &found.surface);
+        assert_watertight(&mesh, &VertexRadiosity::new(&mesh, &dark));
     }
+}
+
+#[test]
+fn the_cornell_box_is_as_watertight_as_its_scene() {
+    let mesh = common::cornell_box(70.0).split_at_contacts(3);
+    let dark = vec![Rgb::ZERO; mesh.element_count()];
+    assert_watertight(&mesh, &VertexRadiosity::new(&mesh, &dark));
+    let mut even = Known(|_: &Sources, p: &Place| 1.0 + random(p.position));
+    let settings = Gathering { tolerance: 0.2, elements: 40_000, ..Gathering::new(3.0) };
+    let found = settings.gather(&mesh, &dark, &mut even, go).unwrap();
+    assert!(found.mesh.element_count() > 2 * mesh.element_count());
+    assert_watertight(&found.mesh, &found.surface);
 }
 
 /// What arrives at a place in a convex room that nothing stands in, elements being as bright as the

@@ -15,6 +15,9 @@ pub(crate) struct Smooth {
     pub corners: Vec<[u32; 3]>,
     /// Per triangle, the sides from corner k to corner k+1.
     pub sides: Vec<[Side; 3]>,
+    /// Per triangle, the edge of the scene that each side lies on: the same for all triangles with
+    /// sides between the same two positions, creases or not.
+    pub edges: Vec<[u32; 3]>,
 }
 
 /// A side of a triangle.
@@ -44,7 +47,10 @@ impl Smooth {
         };
         let mut sides: Vec<[Side; 3]> = (0..count).map(|t| [0, 1, 2].map(|k| own(t, k))).collect();
         let mut joined = Joined::new(3 * count);
+        let mut edges = vec![[0; 3]; count];
         for pair in by_ends.values() {
+            // In the order of the triangles: the first is the lowest.
+            pair.iter().for_each(|&(t, k)| edges[t][k] = (3 * pair[0].0 + pair[0].1) as u32);
             // More than two triangles at a side have no one surface to continue.
             let &[(t, k), (s, l)] = pair.as_slice() else { continue };
             let opposite = sides[t][k].reversed != sides[s][l].reversed;
@@ -59,7 +65,7 @@ impl Smooth {
         }
         let corners =
             (0..count).map(|t| [0, 1, 2].map(|k| joined.find(3 * t + k) as u32)).collect();
-        Smooth { corners, sides }
+        Smooth { corners, sides, edges }
     }
 
     /// The sides across which the surface goes on smoothly to another triangle: each once, as the two

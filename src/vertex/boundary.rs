@@ -6,7 +6,8 @@ use std::collections::HashMap;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::{Rims, meeting};
+use super::meeting;
+use super::vertices::Rims;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 

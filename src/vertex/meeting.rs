@@ -131,7 +131,7 @@ fn exchanges(mesh: &Mesh, ends: &[End], k: usize, others: &[usize], shot: &[Rgb]
 #[cfg(test)]
 mod tests {
     use super::super::boundary::{ends, extrapolate};
-    use super::super::{Rims, Vertices};
+    use super::super::vertices::{Rims, Vertices};
     use super::*;
     use crate::mesh::Smooth;
     use crate::scene::{Material, Scene, Triangle};

@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::VertexRadiosity;
 use super::gathering::{GatheredRadiosity, Gathering};
 use super::places::Stands;
+use super::seams::Seams;
 use super::vertices::{Key, Vertices, corners, middles};
 use crate::error::Error;
 use crate::gather::{Gather, Place, Sources};
@@ -375,7 +376,8 @@ impl Refined {
             }
         }
         out.normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
-        out.add_elements(&self.mesh, &self.vertices.rims, |out, e| {
+        let seams = Seams::new(&self.mesh, &self.smooth, &self.vertices);
+        out.add_elements(&self.mesh, &seams, |out, e| {
             let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
             corners.iter().sum::<Rgb>() / 3.0
         });

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::mesh::{Cell, MAX_DEPTH, Mesh, Side, Smooth};
+use crate::scene::Scene;
 
 /// Steps along a triangle's side on the lattice that all depths share.
 const FINEST: u32 = 1 << MAX_DEPTH;
@@ -38,6 +39,12 @@ pub(super) struct Rims {
 }
 
 impl Rims {
+    /// Adds the rim of one more element.
+    pub fn push(&mut self, add: impl FnOnce(&mut Vec<u32>)) {
+        add(&mut self.vertices);
+        self.ends.push(self.vertices.len());
+    }
+
     pub fn of(&self, e: usize) -> &[u32] {
         let start = if e == 0 { 0 } else { self.ends[e - 1] };
         &self.vertices[start..self.ends[e]]
@@ -54,7 +61,11 @@ impl Vertices {
         let (keys, positions, corners, rims, numbers) = Default::default();
         let mut out = Vertices { keys, positions, corners, rims, numbers };
         (0..mesh.element_count()).for_each(|e| out.add_corners(mesh, smooth, e));
-        (0..mesh.element_count()).for_each(|e| out.add_rim(mesh, smooth, e));
+        let mut rims = Rims::default();
+        for e in 0..mesh.element_count() {
+            rims.push(|rim| out.outline(mesh, smooth, e, rim, &mut |_, _, _| None));
+        }
+        out.rims = rims;
         out
     }
 
@@ -65,38 +76,48 @@ impl Vertices {
 
     fn add_corners(&mut self, mesh: &Mesh, smooth: &Smooth, e: usize) {
         let node = mesh.element(e);
-        let (places, positions) = (lattice(mesh.cell(node)), mesh.corners(node));
-        self.corners.push([0, 1, 2].map(|k| {
-            let key = key(smooth, mesh.triangle(node), places[k]);
+        let t = mesh.triangle(node);
+        self.corners.push(lattice(mesh.cell(node)).map(|place| {
+            let key = key(smooth, t, place);
             *self.numbers.entry(key).or_insert_with(|| {
                 self.keys.push(key);
-                self.positions.push(positions[k]);
+                self.positions.push(position(mesh.scene(), smooth, t, place));
                 self.positions.len() as u32 - 1
             })
         }));
     }
 
-    fn add_rim(&mut self, mesh: &Mesh, smooth: &Smooth, e: usize) {
+    /// Adds the vertices around element `e` to `rim`: its corners, and those between them, midpoints
+    /// of midpoints for as long as there are any. Where there is none, `missing` is asked for one,
+    /// given the key, the position and the vertices that it lies between.
+    pub fn outline(
+        &self,
+        mesh: &Mesh,
+        smooth: &Smooth,
+        e: usize,
+        rim: &mut Vec<u32>,
+        missing: &mut impl FnMut(Key, &dyn Fn() -> DVec3, [u32; 2]) -> Option<u32>,
+    ) {
         let node = mesh.element(e);
+        let t = mesh.triangle(node);
         let places = lattice(mesh.cell(node));
-        let mut rim = std::mem::take(&mut self.rims.vertices);
+        // What lies between two places, in order: the latest part first.
+        let mut open = vec![];
         for k in 0..3 {
-            rim.push(self.corners[e][k]);
-            let (from, to) = (places[k], places[(k + 1) % 3]);
-            self.add_between(smooth, mesh.triangle(node), from, to, &mut rim);
-        }
-        self.rims.ends.push(rim.len());
-        self.rims.vertices = rim;
-    }
-
-    /// Vertices strictly between lattice points `a` and `b`, in order: midpoints of midpoints, for
-    /// as long as there are any.
-    fn add_between(&self, smooth: &Smooth, t: usize, a: [u32; 2], b: [u32; 2], rim: &mut Vec<u32>) {
-        let Some(middle) = middle(a, b) else { return };
-        if let Some(vertex) = self.find(&key(smooth, t, middle)) {
-            self.add_between(smooth, t, a, middle, rim);
-            rim.push(vertex);
-            self.add_between(smooth, t, middle, b, rim);
+            let end = |k: usize| (places[k], self.corners[e][k]);
+            open.push((end(k), end((k + 1) % 3)));
+            while let Some((a, b)) = open.pop() {
+                let half = middle(a.0, b.0).and_then(|place| {
+                    let key = key(smooth, t, place);
+                    let at = || position(mesh.scene(), smooth, t, place);
+                    let vertex = self.find(&key).or_else(|| missing(key, &at, [a.1, b.1]));
+                    vertex.map(|v| (place, v))
+                });
+                match half {
+                    Some(half) => open.extend([(half, b), (a, half)]),
+                    None => rim.push(a.1),
+                }
+            }
         }
     }
 }
@@ -123,6 +144,28 @@ fn middle(a: [u32; 2], b: [u32; 2]) -> Option<[u32; 2]> {
 /// Corners of `cell` on the finest lattice of its triangle.
 fn lattice(cell: Cell) -> [[u32; 2]; 3] {
     cell.lattice_corners().map(|c| c.map(|k| k * (FINEST >> cell.level)))
+}
+
+/// Where a lattice point of triangle `t` is. On a side that does not depend, bit for bit, on the
+/// triangle that asks.
+fn position(scene: &Scene, smooth: &Smooth, t: usize, [i, j]: [u32; 2]) -> DVec3 {
+    let corners = scene.corners(t);
+    let share = |steps: u32| f64::from(steps) / f64::from(FINEST);
+    let side = |k: usize, step: u32| {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let (from, to, step) =
+            if smooth.sides[t][k].reversed { (b, a, FINEST - step) } else { (a, b, step) };
+        from * (1.0 - share(step)) + to * share(step)
+    };
+    match (i, j) {
+        (i, 0) => side(0, i),
+        (i, j) if i + j == FINEST => side(1, j),
+        (0, j) => side(2, FINEST - j),
+        (i, j) => {
+            let (u, v) = (share(i), share(j));
+            corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v
+        }
+    }
 }
 
 fn key(smooth: &Smooth, triangle: usize, [i, j]: [u32; 2]) -> Key {

@@ -28,6 +28,49 @@ pub fn assert_whole(mesh: &Mesh, surface: &VertexRadiosity) {
     }
 }
 
+/// Panics unless `surface` is watertight wherever the scene of `mesh` is: vertices at the very same
+/// position taken as one, every side of its faces is run as often one way as the other, but for
+/// those on edges where the scene's triangles do not match either.
+pub fn assert_watertight(mesh: &Mesh, surface: &VertexRadiosity) {
+    let scene = mesh.scene();
+    let sides = |corners: [DVec3; 3]| [0, 1, 2].map(|k| (corners[k], corners[(k + 1) % 3]));
+    let triangles = (0..scene.triangles().len()).flat_map(|t| sides(scene.corners(t)));
+    let wanted = unmatched(triangles);
+    let faces = surface.faces.iter().map(|f| f.map(|v| surface.positions[v as usize]));
+    let found = unmatched(faces.flat_map(sides));
+    let length =
+        |open: &[(DVec3, DVec3)]| -> f64 { open.iter().map(|(a, b)| a.distance(*b)).sum() };
+    let (wanted_length, found_length) = (length(&wanted), length(&found));
+    // Lengths of parts add up to that of the whole, rounded once each.
+    let bound = 1e-15 * (1.0 + found.len() as f64) * wanted_length;
+    assert!((found_length - wanted_length).abs() <= bound, "{found_length} open, {wanted_length}");
+    for (a, b) in found {
+        // On one of the scene's open edges, and the same way round: a billionth of it off at most.
+        let on = |&(from, to): &(DVec3, DVec3)| {
+            let along = to - from;
+            let off = |p: DVec3| (p - from).cross(along).length() / along.length_squared();
+            off(a).max(off(b)) < 1e-9 && (b - a).dot(along) > 0.0
+        };
+        assert!(wanted.iter().any(on), "open from {a} to {b}");
+    }
+}
+
+/// The sides that are run more often one way than the other, as often as that.
+fn unmatched(sides: impl Iterator<Item = (DVec3, DVec3)>) -> Vec<(DVec3, DVec3)> {
+    let bits = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut runs: HashMap<[[u64; 3]; 2], (i32, DVec3, DVec3)> = HashMap::new();
+    for (a, b) in sides {
+        let (from, to) = if bits(a) < bits(b) { (a, b) } else { (b, a) };
+        let run = runs.entry([bits(from), bits(to)]).or_insert((0, from, to));
+        run.0 += if from == a { 1 } else { -1 };
+    }
+    let open = |(count, a, b): (i32, DVec3, DVec3)| {
+        let side = if count > 0 { (a, b) } else { (b, a) };
+        std::iter::repeat_n(side, count.unsigned_abs() as usize)
+    };
+    runs.into_values().flat_map(open).collect()
+}
+
 fn assert_quad(
     surface: &VertexRadiosity,
     faces: &[[u32; 3]],
