@@ -79,7 +79,7 @@ pub use io::{
     Report, Seconds, load_obj, write_exr, write_matrix_market, write_ply, write_png,
     write_view_factor_list, write_view_factors,
 };
-pub use mesh::{CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
+pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solve::{Go, Ledger, Progress, Shooting, Solution, Stop};
 pub use tone::ToneCurve;

@@ -19,7 +19,7 @@ use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Scene};
 pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
-pub use smooth::CREASE_DEGREES;
+pub use smooth::{COPLANAR_DEGREES, CREASE_DEGREES};
 pub(crate) use smooth::{Side, Smooth};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.

@@ -22,7 +22,7 @@ pub struct Material {
 }
 
 /// A face of the scene: counter-clockwise corners seen from its front.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Triangle {
     /// Indices into the positions.
     pub corners: [u32; 3],
@@ -30,6 +30,9 @@ pub struct Triangle {
     pub group: u32,
     /// Index into the materials.
     pub material: u32,
+    /// Smoothing group: says with angles where a surface has creases ([`crate::CREASE_DEGREES`]).
+    /// `Some(0)` is in none; `None` means that nothing is known.
+    pub smoothing: Option<u32>,
 }
 
 /// A checked scene: every index in range, every number finite, every triangle with area.
@@ -224,7 +227,7 @@ mod tests {
 
     fn one(corners: [[f64; 3]; 3], material: Material) -> Result<Scene, Error> {
         let positions = corners.map(DVec3::from_array).to_vec();
-        let t = Triangle { corners: [0, 1, 2], group: 0, material: 0 };
+        let t = Triangle { corners: [0, 1, 2], ..Default::default() };
         Scene::new(positions, vec![t], vec!["it".into()], vec![material])
     }
     const RIGHT: [[f64; 3]; 3] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
@@ -258,7 +261,7 @@ mod tests {
         assert!(one(RIGHT, dark).is_err());
         for (corners, group, material) in [([0, 1, 3], 0, 0), ([0, 1, 2], 1, 0), ([0, 1, 2], 0, 1)]
         {
-            let t = Triangle { corners, group, material };
+            let t = Triangle { corners, group, material, smoothing: None };
             let p = RIGHT.map(DVec3::from_array).to_vec();
             assert!(Scene::new(p, vec![t], vec!["g".into()], vec![m()]).is_err());
         }
@@ -271,7 +274,7 @@ mod tests {
         assert!(Scene::new(vec![], vec![], vec![], vec![]).is_err());
         let mut p = RIGHT.map(DVec3::from_array).to_vec();
         p.push(DVec3::new(2., 0., 0.));
-        let t = |corners| Triangle { corners, group: 0, material: 0 };
+        let t = |corners| Triangle { corners, ..Default::default() };
         let all = vec![t([0, 1, 2]), t([0, 1, 3])];
         let s = Scene::new(p, all, vec!["g".into()], vec![Material::grey("m", 0.1)]).unwrap();
         assert_eq!((s.triangles().len(), s.degenerate(), s.warnings().len()), (1, 1, 1));

@@ -18,10 +18,11 @@ use vertices::Vertices;
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
 ///
-/// A smooth surface is a set of triangles of one group and one material that meet at angles below
-/// [`crate::CREASE_DEGREES`]. Where neighbouring elements differ in size, the larger one is fanned
-/// around its centroid over the vertices on its sides, across creases too: no cracks, no T-vertices,
-/// and where the scene is watertight so is the mesh, position by position.
+/// A smooth surface is a set of triangles of one group and one material that meet in no crease:
+/// at angles up to [`crate::CREASE_DEGREES`] in one smoothing group, else up to
+/// [`crate::COPLANAR_DEGREES`]. Where neighbouring elements differ in size, the larger one is
+/// fanned around its centroid over the vertices on its sides, across creases too: no cracks, no
+/// T-vertices, and where the scene is watertight so is the mesh, position by position.
 #[derive(Clone, Debug, Default)]
 pub struct VertexRadiosity {
     /// Vertex positions, in the scene's length unit.
@@ -140,8 +141,12 @@ mod tests {
 
     /// Triangles over shared positions; one group and one material each as given.
     fn mesh(positions: &[[f64; 3]], faces: &[([u32; 3], u32, u32)], size: f64) -> Mesh {
-        let triangles =
-            faces.iter().map(|&(corners, group, material)| Triangle { corners, group, material });
+        let triangles = faces.iter().map(|&(corners, group, material)| Triangle {
+            corners,
+            group,
+            material,
+            smoothing: None,
+        });
         let names = ["a", "b"].map(String::from).to_vec();
         let materials = ["a", "b"].map(|n| Material::grey(n, 0.5)).to_vec();
         let positions = positions.iter().map(|&p| DVec3::from_array(p)).collect();

@@ -4,7 +4,9 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
-use radiosity::{Error, ErrorKind, Scene, load_obj};
+use radiosity::{
+    Error, ErrorKind, Gathering, Go, Mesh, RayGather, Rgb, Scene, VertexRadiosity, load_obj,
+};
 use tempfile::TempDir;
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -234,7 +236,8 @@ fn bytes_that_are_no_obj_at_all() {
     refused(load(&[("room.obj", &noise(100_000))]), ErrorKind::Scene, &["room.obj", "no face"]);
     refused(load(&[("room.obj", &[0; 100_000])]), ErrorKind::Scene, &["room.obj", "not OBJ"]);
     // Noise between words of the format: refused or taken, but never a panic.
-    let words = ["v", "f", "l", "o", "g", "usemtl", "mtllib", "1", "-1", "0.5", "/", "\\", "\n"];
+    let words =
+        ["v", "f", "l", "o", "g", "s", "usemtl", "mtllib", "1", "-1", "0.5", "/", "\\", "\n"];
     for _ in 0..300 {
         let mut bytes = SQUARE.as_bytes().to_vec();
         for pick in noise(60) {
@@ -336,6 +339,50 @@ fn a_group_that_comes_again_is_the_same_group() {
     assert_eq!(scene.groups(), ["a", "b", "default"]);
     let groups: Vec<u32> = scene.triangles().iter().map(|t| t.group).collect();
     assert_eq!(groups, [0, 1, 0, 2]);
+}
+
+#[test]
+fn smoothing_groups_last_until_the_next() {
+    let text = "f 1 2 3\ns 4294967295 # all\nf 1 2 3 4\ng a\nf 1 2 3\no b\ns 2\nf 1 2 3\n";
+    let off = "s off\nf 1 2 3\ns 7\ns 0\nf 1 2 3\ns 2\nf 1 2 3\n";
+    let scene = obj(&format!("{SQUARE}{text}{off}")).unwrap();
+    let groups: Vec<Option<u32>> = scene.triangles().iter().map(|t| t.smoothing).collect();
+    let all = Some(u32::MAX);
+    assert_eq!(groups, [None, all, all, all, Some(2), Some(0), Some(0), Some(2)]);
+    assert_eq!(scene.warnings().len(), 1, "only of the material: {:?}", scene.warnings());
+    // Without a group they say nothing.
+    let scene = obj(&format!("{SQUARE}s 1\ns\nf 1 2 3\ns 1\ns on # and\nf 1 2 3\n")).unwrap();
+    assert!(scene.triangles().iter().all(|t| t.smoothing.is_none()));
+    warned(&scene, "2 `s` lines without a group");
+    warned(&scene, "room.obj:6");
+}
+
+#[test]
+fn smoothing_groups_must_be_whole_numbers() {
+    for group in ["-1", "1.0", "4294967296", "x", "nan", "1 2", "off 1", "on 1", "Off"] {
+        let text = format!("{SQUARE}s {group}\nf 1 2 3\n");
+        let parts =
+            ["room.obj:5: ", &format!("smoothing group '{group}'"), "`s off`", "whole number"];
+        refused(obj(&text), ErrorKind::Scene, &parts);
+    }
+}
+
+#[test]
+fn a_fold_of_two_smoothing_groups_is_a_crease() {
+    // Folded by 27°, along the diagonal.
+    let square = SQUARE.replace("1 1 0", "1 1 0.34");
+    for (first, second, vertices) in
+        [("", "", 4), ("s 1", "", 4), ("s 1", "s 2", 6), ("s off", "", 6), ("", "s 1", 6)]
+    {
+        let text = format!("{square}{first}\nf 1 2 4\n{second}\nf 2 3 4\n");
+        let mesh = Mesh::new(obj(&text).unwrap(), f64::INFINITY).unwrap();
+        let light = [Rgb::ONE; 2];
+        let mut rays = RayGather::new(&mesh, 64).unwrap();
+        let fine = Gathering::new(9.0).gather(&mesh, &light, &mut rays, |_| Go::Continue(()));
+        for surface in [VertexRadiosity::new(&mesh, &light), fine.unwrap().surface] {
+            assert_eq!(surface.positions.len(), vertices, "{first}, {second}");
+        }
+    }
 }
 
 #[test]

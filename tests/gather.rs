@@ -251,11 +251,8 @@ fn lights_of_many_triangles() {
     ]
     .map(|t| t.map(DVec3::from_array));
     for (corners, convex) in [(&bulb[..], true), (&trough[..], false)] {
-        let triangles = (0..corners.len() as u32).map(|t| Triangle {
-            corners: [3 * t, 3 * t + 1, 3 * t + 2],
-            group: 0,
-            material: 0,
-        });
+        let triangles = (0..corners.len() as u32)
+            .map(|t| Triangle { corners: [3 * t, 3 * t + 1, 3 * t + 2], ..Default::default() });
         let positions = corners.iter().copied().flatten().collect();
         let scene = Scene::new(positions, triangles.collect(), vec!["g".into()], vec![lamp()]);
         let light = Light::new(Mesh::new(scene.unwrap(), f64::INFINITY).unwrap(), |_, _| Rgb::ZERO);

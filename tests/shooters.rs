@@ -34,7 +34,7 @@ fn room(n: u32) -> Scene {
             for i in 0..n {
                 let (a, b) = (first + j * (n + 1) + i, first + (j + 1) * (n + 1) + i);
                 for corners in [[a, a + 1, b + 1], [a, b + 1, b]] {
-                    triangles.push(Triangle { corners, group, material });
+                    triangles.push(Triangle { corners, group, material, smoothing: None });
                 }
             }
         }

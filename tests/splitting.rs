@@ -231,7 +231,7 @@ fn triangles_that_cross_split_each_other_along_the_cut() {
     for z in [0.3, 0.0] {
         let points = [[0., 0., 0.], [4., 0., 0.], [0., 4., 0.]].into_iter();
         let points = points.chain([[1., 1.1, -1.], [1., 1.1, 2.], [9., 1.1, z]]);
-        let triangle = |c: u32| Triangle { corners: [c, c + 1, c + 2], group: 0, material: 0 };
+        let triangle = |c: u32| Triangle { corners: [c, c + 1, c + 2], ..Default::default() };
         let (triangles, points) =
             ([0, 3].map(triangle).to_vec(), points.map(DVec3::from_array).collect());
         let scene = Scene::new(points, triangles, vec!["g".into()], vec![grey()]).unwrap();

@@ -114,7 +114,7 @@ mod tests {
             let (x, y) = p.any_orthonormal_pair();
             positions.extend([p, p + 0.01 * x, p + 0.01 * y]);
             let corners = [3 * k, 3 * k + 1, 3 * k + 2];
-            triangles.push(Triangle { corners, group: 0, material: 0 });
+            triangles.push(Triangle { corners, ..Default::default() });
         }
         let material = Material::grey("g", 0.5);
         Scene::new(positions, triangles, vec!["g".into()], vec![material]).unwrap()

@@ -263,11 +263,8 @@ mod tests {
             let small = centre.length() * 0.1;
             corners.push([x, -0.5 * x + 0.9 * y, -0.5 * x - 0.9 * y].map(|p| centre + p * small));
         }
-        let triangles = (0..corners.len() as u32).map(|t| Triangle {
-            corners: [3 * t, 3 * t + 1, 3 * t + 2],
-            group: 0,
-            material: 0,
-        });
+        let triangles = (0..corners.len() as u32)
+            .map(|t| Triangle { corners: [3 * t, 3 * t + 1, 3 * t + 2], ..Default::default() });
         let triangles = triangles.collect();
         let materials = vec![Material::grey("grey", 0.5)];
         let scene = Scene::new(

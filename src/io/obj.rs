@@ -19,8 +19,14 @@ const DEFAULT_GROUP: &str = "default";
 /// The front of a face is where its corners run counter-clockwise. A face may have any number of
 /// corners, and its outline may be concave, but must not cross itself. It belongs to the group of
 /// the latest `o` or `g` line ("default" before the first); a name that comes again continues its
-/// group. Lengths stay in the file's own unit. Normals, texture coordinates, smoothing, points and
-/// lines are not used.
+/// group. Lengths stay in the file's own unit. Normals, texture coordinates, points and lines are
+/// not used.
+///
+/// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
+/// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced Visualizer 3.0,
+/// "Grouping"). In one group surfaces have creases at angles above [`crate::CREASE_DEGREES`], else
+/// above [`crate::COPLANAR_DEGREES`]. Faces before the first `s`, and after one that says nothing
+/// (`s` or `s on`, as some programs write), are as if in a group of their own.
 ///
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
@@ -32,8 +38,9 @@ const DEFAULT_GROUP: &str = "default";
 /// # Errors
 /// [`ErrorKind::File`] for a file that cannot be read. [`ErrorKind::Scene`], with file and line,
 /// for one whose content cannot be used: numbers that are not finite, corners without a vertex,
-/// unknown materials, reflectances outside [0, 1), negative radiances, outlines that cross
-/// themselves; and for a scene without a triangle that has area.
+/// unknown materials, smoothing groups that are not whole numbers, reflectances outside [0, 1),
+/// negative radiances, outlines that cross themselves; and for a scene without a triangle that has
+/// area.
 pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
     let scan = Scan::of(path)?;
@@ -55,6 +62,11 @@ struct Scan {
     group: Option<u32>,
     library: Library,
     material: Option<u32>,
+    /// By the latest `s` line, as in [`Triangle::smoothing`].
+    smoothing: Option<u32>,
+    /// `s` lines with neither a group nor `off`.
+    without_group: usize,
+    first_without_group: String,
     points_and_lines: usize,
     unknown: usize,
     first_unknown: String,
@@ -65,6 +77,7 @@ struct Face {
     line: usize,
     group: u32,
     material: Option<u32>,
+    smoothing: Option<u32>,
 }
 
 impl Scan {
@@ -93,9 +106,10 @@ impl Scan {
             "f" => self.face(line, rest)?,
             "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
             "usemtl" => self.material = Some(self.use_material(line, rest)?),
+            "s" => self.smooth(line, rest)?,
             "mtllib" => self.library.load(line, rest)?,
             "p" | "l" => self.points_and_lines += 1,
-            "vt" | "vn" | "s" | "" => {}
+            "vt" | "vn" | "" => {}
             comment if comment.starts_with('#') => {}
             _ => {
                 if self.unknown == 0 {
@@ -148,7 +162,8 @@ impl Scan {
         }
         self.geometry.push('\n');
         let group = self.current_group();
-        self.faces.push(Face { line: line.number, group, material: self.material });
+        let (material, smoothing) = (self.material, self.smoothing);
+        self.faces.push(Face { line: line.number, group, material, smoothing });
         Ok(())
     }
 
@@ -191,6 +206,25 @@ impl Scan {
                 new
             })
         })
+    }
+
+    /// `s` with a group, or with `off`; without either it says nothing.
+    fn smooth(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
+        self.smoothing = match words(rest).collect::<Vec<_>>().join(" ").as_str() {
+            "off" => Some(0),
+            "" | "on" => {
+                if self.without_group == 0 {
+                    self.first_without_group = line.place();
+                }
+                self.without_group += 1;
+                None
+            }
+            group => Some(group.parse().map_err(|_| {
+                let remedy = format!("write `s off`, or `s` and a whole number up to {}", u32::MAX);
+                line.refuse(format!("smoothing group {}", quoted(&[group])), remedy)
+            })?),
+        };
+        Ok(())
     }
 
     fn use_material(&self, line: &Line, name: &str) -> Result<u32, Error> {
@@ -250,9 +284,12 @@ impl Scan {
                 );
                 Error::new(ErrorKind::Scene, text::place(path, face.line), found, remedy)
             })?;
-            let (group, material) = (face.group, face.material.unwrap_or(default));
-            let triangle =
-                |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), group, material };
+            let Face { group, smoothing, .. } = *face;
+            let material = face.material.unwrap_or(default);
+            let triangle = |t: [usize; 3]| {
+                let corners = t.map(|i| corners[i]);
+                Triangle { corners, group, material, smoothing }
+            };
             triangles.extend(pieces.into_iter().map(triangle));
         }
         Ok(triangles)
@@ -269,6 +306,12 @@ impl Scan {
             (bare, _) => warnings.push(format!(
                 "{bare} faces before the first `usemtl` reflect {DEFAULT_REFLECTANCE} and emit nothing"
             )),
+        }
+        if self.without_group > 0 {
+            let (count, first) = (self.without_group, &self.first_without_group);
+            warnings.push(format!(
+                "{count} `s` lines without a group, first at {first}: creases by angle alone there"
+            ));
         }
         if self.points_and_lines > 0 {
             let count = self.points_and_lines;

@@ -2,9 +2,10 @@
 //!
 //! Two clusters become one across a shared side, cheapest pair first, until no pair is left that
 //! may: greedy merging along the edges of the dual graph (Garland, Willmott and Heckbert 2001),
-//! which is how the face clusters of Willmott, Heckbert and Garland (1999) are made. Only a smooth
-//! surface of one group and one material is merged, and no normal in a cluster is further than
+//! which is how the face clusters of Willmott, Heckbert and Garland (1999) are made. Only a surface
+//! of one group and one material is merged, and no normal in a cluster is further than
 //! [`SPREAD_DEGREES`] from its axis: what a cluster sends out is much like what one flat patch does.
+//! Smoothing groups have no say: they are about what is seen of a surface, not about what it sends.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -144,9 +145,9 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
     (merged.angle <= SPREAD_DEGREES.to_radians()).then(|| Reverse((cost.to_bits(), a, b)))
 }
 
-/// For each triangle those across a side where the surface goes on smoothly.
+/// For each triangle those across a side where the surface goes on without a sharp fold.
 fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
-    let smooth = Smooth::new(scene);
+    let smooth = Smooth::by_angle(scene);
     let mut beside = vec![BTreeSet::new(); smooth.sides.len()];
     for [(s, _), (t, _)] in smooth.joins() {
         beside[s].insert(t as u32);
@@ -176,7 +177,7 @@ mod tests {
                 let (a, b) = (j * (n + 1) + i, (j + 1) * (n + 1) + i);
                 let [group, material] = kind(j);
                 for corners in [[a, a + 1, b + 1], [a, b + 1, b]] {
-                    triangles.push(Triangle { corners, group, material });
+                    triangles.push(Triangle { corners, group, material, smoothing: None });
                 }
             }
         }
@@ -284,6 +285,18 @@ mod tests {
             let triangles = clusters.triangles(c);
             assert!(triangles.iter().all(|&t| kind(t) == kind(triangles[0])));
         }
+    }
+
+    #[test]
+    fn facets_are_merged_like_a_smooth_surface() {
+        let ball = sphere();
+        let facet = |&t: &Triangle| Triangle { smoothing: Some(0), ..t };
+        let facets = ball.triangles().iter().map(facet).collect();
+        let names = ball.groups().to_vec();
+        let faceted =
+            Scene::new(ball.positions().to_vec(), facets, names, ball.materials().to_vec());
+        let [one, two] = [ball, faceted.unwrap()].map(|scene| Clusters::new(&scene));
+        assert_eq!((one.parts, one.roots), (two.parts, two.roots));
     }
 
     #[test]

@@ -4,10 +4,17 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, Triangle};
 
-/// Neighbours whose normals differ by more than this many degrees meet in a crease.
+/// Neighbours of one smoothing group meet in a crease if their normals differ by more than this
+/// many degrees: radiosity jumps there, whatever shading is wanted. The same holds for neighbours
+/// of which no smoothing group is known.
 pub const CREASE_DEGREES: f64 = 40.0;
+
+/// All other neighbours, in two smoothing groups or in none, meet in a crease if their normals
+/// differ by more than this many degrees: triangles of a polygon that is flat but for rounding do
+/// not.
+pub const COPLANAR_DEGREES: f64 = 1.0;
 
 /// Identities shared across a smooth surface: one object or group, one material, no crease.
 pub(crate) struct Smooth {
@@ -30,7 +37,21 @@ pub(crate) struct Side {
 }
 
 impl Smooth {
+    /// What goes on smoothly by the scene's smoothing groups and by angles.
     pub fn new(scene: &Scene) -> Smooth {
+        let together =
+            |a: &Triangle, b: &Triangle| a.smoothing == b.smoothing && a.smoothing != Some(0);
+        Smooth::up_to(scene, |a, b| if together(a, b) { CREASE_DEGREES } else { COPLANAR_DEGREES })
+    }
+
+    /// What would go on smoothly if nothing were known of smoothing groups.
+    pub fn by_angle(scene: &Scene) -> Smooth {
+        Smooth::up_to(scene, |_, _| CREASE_DEGREES)
+    }
+
+    /// What goes on smoothly where two neighbours' normals may differ by as many degrees as `most`
+    /// says.
+    fn up_to(scene: &Scene, most: impl Fn(&Triangle, &Triangle) -> f64) -> Smooth {
         let welded = weld(scene);
         let count = scene.triangles().len();
         let mut by_ends: HashMap<(u32, u32), Vec<(usize, usize)>> = HashMap::new();
@@ -54,7 +75,10 @@ impl Smooth {
             // More than two triangles at a side have no one surface to continue.
             let &[(t, k), (s, l)] = pair.as_slice() else { continue };
             let opposite = sides[t][k].reversed != sides[s][l].reversed;
-            if !opposite || !continues(scene, t, s) {
+            let (a, b) = (&scene.triangles()[t], &scene.triangles()[s]);
+            let alike = a.group == b.group && a.material == b.material;
+            let least = most(a, b).to_radians().cos();
+            if !opposite || !alike || scene.normal(t).dot(scene.normal(s)) < least {
                 continue;
             }
             let id = sides[t][k].id.min(sides[s][l].id);
@@ -88,14 +112,6 @@ impl Smooth {
     }
 }
 
-/// Whether two neighbouring triangles belong to one smooth surface.
-fn continues(scene: &Scene, t: usize, s: usize) -> bool {
-    let (a, b) = (scene.triangles()[t], scene.triangles()[s]);
-    a.group == b.group
-        && a.material == b.material
-        && scene.normal(t).dot(scene.normal(s)) >= CREASE_DEGREES.to_radians().cos()
-}
-
 /// Per triangle corner, one number for each distinct position.
 fn weld(scene: &Scene) -> Vec<[u32; 3]> {
     let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
@@ -127,5 +143,53 @@ impl Joined {
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.find(a), self.find(b));
         self.0[a.max(b)] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Material;
+
+    /// Two triangles of these smoothing groups, folded along their shared side.
+    fn fold(degrees: f64, smoothing: [Option<u32>; 2]) -> Scene {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let points = [[0., 0., 0.], [0., 1., 0.], [-1., 0., 0.], [cos, 0., sin]];
+        let triangle = |corners, smoothing| Triangle { corners, smoothing, ..Default::default() };
+        let triangles = vec![triangle([0, 1, 2], smoothing[0]), triangle([1, 0, 3], smoothing[1])];
+        let (points, material) = (points.map(DVec3::from_array), Material::grey("m", 0.5));
+        Scene::new(points.to_vec(), triangles, vec!["g".into()], vec![material]).unwrap()
+    }
+
+    const SAME: [[Option<u32>; 2]; 2] = [[None, None], [Some(3), Some(3)]];
+    const NOT_THE_SAME: [[Option<u32>; 2]; 4] =
+        [[Some(0), Some(0)], [Some(3), Some(4)], [Some(3), Some(0)], [Some(3), None]];
+
+    #[test]
+    fn smoothing_groups_part_what_is_not_flat_and_join_what_is_not_sharp() {
+        for (degrees, same, others) in [
+            (0.0, true, true),
+            (COPLANAR_DEGREES - 0.1, true, true),
+            (COPLANAR_DEGREES + 0.1, true, false),
+            (20.0, true, false),
+            (CREASE_DEGREES - 0.1, true, false),
+            (CREASE_DEGREES + 0.1, false, false),
+            (60.0, false, false),
+        ] {
+            for (pairs, joined) in [(&SAME[..], same), (&NOT_THE_SAME[..], others)] {
+                for &pair in pairs {
+                    let surfaces = Smooth::new(&fold(degrees, pair)).surfaces();
+                    assert_eq!(surfaces == [0, 0], joined, "{pair:?} at {degrees}°");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn by_angle_no_smoothing_group_counts() {
+        for pair in [SAME.as_slice(), &NOT_THE_SAME].concat() {
+            assert_eq!(Smooth::by_angle(&fold(20.0, pair)).surfaces(), [0, 0], "{pair:?}");
+            assert_eq!(Smooth::by_angle(&fold(60.0, pair)).surfaces(), [0, 1], "{pair:?}");
+        }
     }
 }

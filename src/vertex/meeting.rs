@@ -144,7 +144,8 @@ mod tests {
         let a = 1.0 + f64::EPSILON;
         let floor = [[0., 0., 0.], [1., 0., 0.], [1., 2., 0.], [0., 2., 0.]];
         let wall = [[0., 0., 0.], [0., 2. * a, 0.], [0., 2. * a, 1.], [0., 0., 1.]];
-        let triangle = |corners, group| Triangle { corners, group, material: group };
+        let triangle =
+            |corners, group| Triangle { corners, group, material: group, smoothing: None };
         let quads = [(0, [0, 1, 2]), (0, [0, 2, 3]), (1, [4, 5, 6]), (1, [4, 6, 7])];
         let materials =
             vec![Material::grey("floor", floor_reflectance), Material::grey("wall", 0.0)];

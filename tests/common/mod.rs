@@ -23,7 +23,7 @@ pub fn quads(quads: &[([[f64; 3]; 4], Material)]) -> Scene {
     for (k, (corners, _)) in (0u32..).zip(quads) {
         positions.extend(corners.map(DVec3::from_array));
         for corners in [[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]] {
-            triangles.push(Triangle { corners, group: k, material: k });
+            triangles.push(Triangle { corners, group: k, material: k, smoothing: None });
         }
     }
     let names = (0..quads.len()).map(|k| format!("q{k}")).collect();
