@@ -34,7 +34,7 @@ fn measure(c: &mut Criterion, gpu: &Gpu, mesh: &Mesh, resolution: u32) {
             (next..next + batch).map(|k| mesh.element(k * 7919 % mesh.element_count())).collect();
         next += batch;
         let (before, start) = (hemicubes.seconds(), Instant::now());
-        hemicubes.rows(mesh, &patches).expect("rows");
+        hemicubes.rows(mesh, &patches, 1.0).expect("rows");
         (start.elapsed(), before, hemicubes.seconds())
     };
     type Part = fn(&StageSeconds) -> f64;

@@ -16,7 +16,7 @@ use radiosity::{
 struct Stored<'a>(&'a HashMap<NodeId, Row>);
 
 impl FormFactors for Stored<'_> {
-    fn rows(&mut self, _: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, _: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
         Ok(patches.iter().map(|p| self.0[p].clone()).collect())
     }
 
@@ -29,8 +29,13 @@ impl FormFactors for Stored<'_> {
 struct Recording(RayCast, HashMap<NodeId, Row>);
 
 impl FormFactors for Recording {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        let rows = self.0.rows(mesh, patches)?;
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let rows = self.0.rows(mesh, patches, unshot_share)?;
         self.1.extend(patches.iter().copied().zip(rows.iter().cloned()));
         Ok(rows)
     }

@@ -9,31 +9,32 @@ use std::process::ExitCode;
 
 use glam::DVec3;
 use lexopt::prelude::*;
-use radiosity::Camera;
-use support::{Bake, Device, Gathers};
+use radiosity::{Camera, Effort, GatherEffort};
+use support::{Bake, Choice, Goal};
 
 const USAGE: &str = "\
-usage: bake SCENE.obj [--out STEM] [--element-size X] [--hemicube N] [--near R]
-            [--viewpoints TOL] [--rotations K] [--unshot F] [--shots N] [--row-memory MB]
-            [--patch-tolerance X] [--patch-level N] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--pixel-gather] [--elements] [--gather none|needed|all] [--bend T]
-            [--smallest X] [--max-elements N] [--contacts N] [--ambient]
-            [--adapter NAME | --cpu]
+usage: bake SCENE.obj [--out STEM] [--error X | --time SECONDS | --gather none|needed|all]
+            [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--pixel-gather]
+            [--elements] [--adapter NAME | --cpu]
 
-Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera, STEM.exr
-(linear radiance) and STEM.png. STEM is the scene without its ending, unless given.
+Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and, with
+a camera, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless
+given.
 
-  --element-size X  longest edge of an element, in the scene's unit [diagonal / 32; / 20 if
-                    vertices gather]
-  --gather WHO      vertices that look at the settled light for themselves: none, those needed
-                    for the light to be linear in between (elements are split where it is not),
-                    or all of twice finer elements [none]
-  --bend T          split where a side's middle is off by this share of its radiosity [0.02]
-  --smallest X      elements with no longer edge are not split [largest edge / 24]
+How far to go:
+  --error X         until the radiosity of the vertices is off by less than this share, root mean
+                    square over the area, by estimate: 0.02 for 2 %
+  --time SECONDS    as exact as these seconds allow
+  --gather WHO      without either: vertices that look at the settled light for themselves: none,
+                    those needed for the light to be linear in between (elements are split where
+                    it is not), or all of twice finer elements [none]
+
+Settings, each chosen by what is asked for unless set by hand; in brackets those of --gather none:
+  --element-size X  longest edge of an element that light is shot on, scene unit [diagonal / 32]
   --contacts N      levels that elements are split which other surfaces touch [3]
-  --max-elements N  elements there may be [524288]
-  --ambient         add the light not yet shot, spread evenly; the files say so
-  --hemicube N      pixels along an edge of a hemicube's top face, even [128]
+  --hemicube N      pixels along an edge of a hemicube's top face, even, for patches that shoot
+                    much; a half or a quarter of them for dim ones, but no less than 16 [128]
+  --full-share F    a patch shoots much from this share of the emitted light on; with 0 all do
   --near R          closed forms for receivers within R patch diameters; -1 for none [1]
   --viewpoints TOL  see a patch from its parts too, and go down to the elements where more than
                     this share of its light lands on other triangles by them; four times the
@@ -45,12 +46,24 @@ Writes STEM.ply (radiosity at vertices), STEM.json (a report) and, with a camera
   --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
                     patches as small as they can be [0.004]
   --patch-level N   the smallest patches are 4^N elements [0]
+  --ambient         add the light not yet shot, spread evenly; the files say so
+Of vertices that gather:
+  --gather-size X   longest edge of the elements whose corners gather first, scene unit
+  --gather-contacts N  levels that these are split which other surfaces touch
+  --rays N          looks a vertex takes
+  --bend T          split where a side's middle is off by this share of its radiosity
+  --smallest X      elements with no longer edge are not split
+  --max-elements N  elements there may be [524288]
+  --sweeps N        times that all vertices gather, the last time what they found before
+
+Files and devices:
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
   --pixel-gather    every pixel of the picture looks at the settled light for itself
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
-  --cpu             rays on the CPU instead of hemicubes, K N squared a row";
+  --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
+                    light goes along";
 
 fn main() -> ExitCode {
     let bake = match parse(lexopt::Parser::from_env()) {
@@ -80,24 +93,97 @@ fn main() -> ExitCode {
 fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
     let mut scene: Option<OsString> = None;
     let mut bake = Bake::new("");
-    let mut out = None;
+    let (mut out, mut gather) = (None, None);
     while let Some(arg) = args.next()? {
         match arg {
             Long("help") | Short('h') => return Ok(None),
             Long("out") => out = Some(args.value()?),
-            Long("element-size") => bake.element_size = Some(args.value()?.parse()?),
-            Long("hemicube") => bake.hemicube = args.value()?.parse()?,
-            Long("near") => bake.near = args.value()?.parse()?,
-            Long("viewpoints") => bake.viewpoints = Some(args.value()?.parse()?),
-            Long("rotations") => bake.rotations = args.value()?.parse()?,
-            Long("unshot") => bake.shooting.unshot = args.value()?.parse()?,
-            Long("shots") => bake.shooting.shots = Some(args.value()?.parse()?),
+            Long("error") => bake.goal = Goal::Error(args.value()?.parse()?),
+            Long("time") => bake.goal = Goal::Seconds(args.value()?.parse()?),
+            Long("gather") => match args.value()?.string()?.as_str() {
+                "none" => set(&mut bake, |effort| effort.gather = None),
+                "needed" => gather = Some(0),
+                "all" => gather = Some(1),
+                other => return Err(format!("'{other}' is not one of none, needed, all").into()),
+            },
             Long("row-memory") => {
                 let megabytes: usize = args.value()?.parse()?;
-                bake.shooting.row_memory = megabytes.saturating_mul(1 << 20);
+                let bytes = megabytes.saturating_mul(1 << 20);
+                set(&mut bake, move |effort| effort.shooting.row_memory = bytes);
             }
-            Long("patch-tolerance") => bake.shooting.tolerance = args.value()?.parse()?,
-            Long("patch-level") => bake.shooting.level = args.value()?.parse()?,
+            Long("ambient") => set(&mut bake, |effort| effort.ambient = true),
+            Long("element-size") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.element_size = value);
+            }
+            Long("contacts") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.contacts = value);
+            }
+            Long("hemicube") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.hemicube = value);
+            }
+            Long("full-share") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.full_share = Some(value));
+            }
+            Long("near") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.near = value);
+            }
+            Long("viewpoints") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.viewpoints = Some(value));
+            }
+            Long("rotations") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.rotations = value);
+            }
+            Long("unshot") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.shooting.unshot = value);
+            }
+            Long("shots") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.shooting.shots = Some(value));
+            }
+            Long("patch-tolerance") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.shooting.tolerance = value);
+            }
+            Long("patch-level") => {
+                let value = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.shooting.level = value);
+            }
+            Long("gather-size") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.element_size = value);
+            }
+            Long("gather-contacts") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.contacts = value);
+            }
+            Long("rays") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.rays = value);
+            }
+            Long("bend") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.gathering.tolerance = value);
+            }
+            Long("smallest") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.gathering.smallest = value);
+            }
+            Long("max-elements") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.gathering.elements = value);
+            }
+            Long("sweeps") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.gathering.sweeps = value);
+            }
             Long("camera") => {
                 let [a, b, c, d, e, f, vertical_fov] = args.value()?.parse_with(numbers)?;
                 let (eye, target) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
@@ -106,30 +192,30 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("image") => bake.image = args.value()?.parse_with(numbers).map(|[w, h]| (w, h))?,
             Long("pixel-gather") => bake.pixel_gather = true,
             Long("elements") => bake.elements = true,
-            Long("gather") => bake.gather = args.value()?.parse_with(gathers)?,
-            Long("bend") => bake.bend = args.value()?.parse()?,
-            Long("smallest") => bake.smallest = Some(args.value()?.parse()?),
-            Long("contacts") => bake.contacts = args.value()?.parse()?,
-            Long("max-elements") => bake.max_elements = args.value()?.parse()?,
-            Long("ambient") => bake.ambient = true,
-            Long("adapter") => bake.device = Device::Gpu(Some(args.value()?.string()?)),
-            Long("cpu") => bake.device = Device::Cpu,
+            Long("adapter") => bake.device = Choice::Gpu(Some(args.value()?.string()?)),
+            Long("cpu") => bake.device = Choice::Cpu,
             Value(path) if scene.is_none() => scene = Some(path),
             _ => return Err(arg.unexpected()),
         }
+    }
+    if let Some(everywhere) = gather {
+        if let Goal::Plain { gather } = &mut bake.goal {
+            *gather = true;
+        }
+        set_gather(&mut bake, move |gather| gather.gathering.everywhere = everywhere);
     }
     bake.scene = scene.ok_or("no scene given")?.into();
     bake.out = out.map_or_else(|| bake.scene.with_extension(""), Into::into);
     Ok(Some(bake))
 }
 
-fn gathers(text: &str) -> Result<Gathers, String> {
-    match text {
-        "none" => Ok(Gathers::None),
-        "needed" => Ok(Gathers::Needed),
-        "all" => Ok(Gathers::All),
-        other => Err(format!("'{other}' is not one of none, needed, all")),
-    }
+fn set(bake: &mut Bake, change: impl Fn(&mut Effort) + 'static) {
+    bake.changes.push(Box::new(change));
+}
+
+/// What vertices that do not gather do not need is left alone.
+fn set_gather(bake: &mut Bake, change: impl Fn(&mut GatherEffort) + 'static) {
+    set(bake, move |effort| effort.gather.iter_mut().for_each(&change));
 }
 
 /// Exactly `N` numbers with commas between.

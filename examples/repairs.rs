@@ -78,7 +78,7 @@ fn reciprocity(mesh: &Mesh, maker: &mut dyn FormFactors) -> Result<(f64, f64), E
     let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
     let mut rows: Vec<Row> = Vec::with_capacity(elements.len());
     for batch in elements.chunks(maker.batch()) {
-        rows.extend(maker.rows(mesh, batch)?);
+        rows.extend(maker.rows(mesh, batch, 1.0)?);
     }
     let flux = |i: usize, j: usize| {
         let found = rows[i].entries.binary_search_by_key(&(j as u32), |e| e.element);

@@ -18,7 +18,7 @@ use radiosity::{
     Error, ErrorKind, Estimate, Go, Mesh, Scene, ViewFactors, load_obj, write_matrix_market,
     write_view_factor_list, write_view_factors,
 };
-use support::{Device, Maker};
+use support::Choice;
 
 const USAGE: &str = "\
 usage: view_factors SCENE.obj… [--error E] [--two-sided NAME]… [--enforce] [--format F,…]
@@ -57,7 +57,7 @@ struct Settings {
 
 enum Method {
     Exact { error: f64, two_sided: Vec<String> },
-    Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
+    Sampled { element_size: Option<f64>, hemicube: u32, device: Choice },
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -125,8 +125,9 @@ impl Settings {
             Method::Sampled { element_size, hemicube, device } => {
                 let size = element_size.unwrap_or_else(|| support::default_element_size(&scene));
                 let mesh = Mesh::new(scene, size)?;
-                let mut maker = Maker::new(device, &mesh, *hemicube, NonZeroU32::MIN)?;
-                let [name, kind, _] = maker.adapter();
+                let device = device.open()?;
+                let mut maker = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
+                let [name, kind, _] = device.adapter();
                 println!("{} elements, {name} ({kind})", mesh.element_count());
                 ViewFactors::sampled(&mesh, &mut maker, progress)?
             }
@@ -274,8 +275,8 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Settings>, lexopt::Error> {
             Long("sampled") => sampled = true,
             Long("element-size") => element_size = Some(args.value()?.parse()?),
             Long("hemicube") => hemicube = Some(args.value()?.parse()?),
-            Long("adapter") => device = Some(Device::Gpu(Some(args.value()?.string()?))),
-            Long("cpu") => device = Some(Device::Cpu),
+            Long("adapter") => device = Some(Choice::Gpu(Some(args.value()?.string()?))),
+            Long("cpu") => device = Some(Choice::Cpu),
             Value(path) => scenes.push(path.into()),
             _ => return Err(arg.unexpected()),
         }
@@ -290,7 +291,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Settings>, lexopt::Error> {
         true => Method::Sampled {
             element_size,
             hemicube: hemicube.unwrap_or(128),
-            device: device.unwrap_or(Device::Gpu(None)),
+            device: device.unwrap_or(Choice::Gpu(None)),
         },
         false if element_size.is_some() || hemicube.is_some() || device.is_some() => {
             return Err("--element-size, --hemicube, --adapter and --cpu need --sampled".into());

@@ -1,6 +1,7 @@
 //! The contract between whoever makes form-factor rows and whoever uses them.
 
 pub mod analytic;
+pub(crate) mod effort;
 pub(crate) mod near;
 pub(crate) mod ray_cast;
 pub(crate) mod viewpoints;
@@ -129,9 +130,18 @@ impl Row {
 pub trait FormFactors {
     /// The rows of `patches`, in their order.
     ///
+    /// `unshot_share` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
+    /// the worst channel, that one of `patches` is about to shoot. A maker may take less trouble
+    /// over rows along which little light goes; 1 asks for all it can do.
+    ///
     /// # Errors
     /// Whatever keeps the maker from making them, [`ErrorKind::Device`] above all.
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error>;
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error>;
 
     /// How many rows are best asked for at once.
     fn batch(&self) -> usize {

@@ -12,6 +12,7 @@ mod layout;
 mod radiance;
 mod readback;
 mod reduce;
+mod resolution;
 mod sources;
 mod sum;
 

@@ -51,7 +51,12 @@
 //! Specular or glossy reflection, transparency, textures, participating media, polarisation, time.
 //! Light leaves and arrives diffusely, and an emitter is a surface.
 
+mod accuracy;
+mod bake;
 mod camera;
+mod certificate;
+mod device;
+mod effort;
 mod error;
 pub mod form_factor;
 mod gather;
@@ -66,7 +71,12 @@ mod tone;
 mod vertex;
 mod view_factors;
 
+pub use accuracy::{Accuracy, Budget};
+pub use bake::{BakeSeconds, Baked, Stage};
 pub use camera::{Camera, RadianceImage};
+pub use certificate::Certificate;
+pub use device::{Device, DeviceRows};
+pub use effort::{Effort, GatherEffort};
 pub use error::{Error, ErrorKind};
 pub use form_factor::near::NearRepair;
 pub use form_factor::ray_cast::RayCast;

@@ -4,7 +4,7 @@ mod boundary;
 pub(crate) mod gathering;
 mod meeting;
 pub(crate) mod places;
-mod refined;
+pub(crate) mod refined;
 mod seams;
 mod vertices;
 
@@ -31,6 +31,9 @@ pub struct VertexRadiosity {
     pub normals: Vec<DVec3>,
     /// Radiosity B at the vertices, W/m² per channel, linear.
     pub radiosity: Vec<Rgb>,
+    /// How far the radiosity of each vertex and of the faces around it may be off, one standard error,
+    /// W/m²: a length over the channels. Empty where nothing is known of it.
+    pub error: Vec<f64>,
     /// Faces, counter-clockwise from the front, as indices of vertices.
     pub faces: Vec<[u32; 3]>,
     /// The element that each face is (a part of).

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use radiosity::{
-    Error, ErrorKind, Gathering, Go, Mesh, RayGather, Rgb, Scene, VertexRadiosity, load_obj,
+    Error, ErrorKind, GatheredRadiosity, Gathering, Go, Mesh, RayGather, Rgb, Scene,
+    VertexRadiosity, load_obj,
 };
 use tempfile::TempDir;
 
@@ -378,7 +379,12 @@ fn a_fold_of_two_smoothing_groups_is_a_crease() {
         let mesh = Mesh::new(obj(&text).unwrap(), f64::INFINITY).unwrap();
         let light = [Rgb::ONE; 2];
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        let fine = Gathering::new(9.0).gather(&mesh, &light, &mut rays, |_| Go::Continue(()));
+        let fine = Gathering::new(9.0).gather(
+            &GatheredRadiosity::from_elements(&mesh, &light).unwrap(),
+            &mesh,
+            &mut rays,
+            |_| Go::Continue(()),
+        );
         for surface in [VertexRadiosity::new(&mesh, &light), fine.unwrap().surface] {
             assert_eq!(surface.positions.len(), vertices, "{first}, {second}");
         }

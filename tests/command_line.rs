@@ -67,12 +67,28 @@ fn bake_writes_all_it_says() {
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(json["triangles"], 32);
     assert_eq!(json["settings"]["hemicube"], 32);
+    let drawn = json["hemicubes_by_resolution"].as_object().unwrap();
+    if device().is_empty() {
+        assert_eq!(drawn.keys().collect::<Vec<_>>(), ["32", "16"]);
+        let all: u64 = drawn.values().map(|n| n.as_u64().unwrap()).sum();
+        assert!(json["hemicubes"] == all && drawn["16"] != 0, "{json}");
+    }
     assert!(json["ledger"]["emitted"][0].as_f64().unwrap() > 0.0);
     assert!(json["seconds"]["total"].as_f64().unwrap() > 0.0);
     // Two runs, the same bytes.
     let first = std::fs::read(folder.path().join("box.one.ply")).unwrap();
     assert!(run("bake", &args).status.success());
     assert!(first == std::fs::read(folder.path().join("box.one.ply")).unwrap());
+    // All at full resolution: other rows, and none of the others drawn.
+    args.extend(["--full-share", "0"]);
+    assert!(run("bake", &args).status.success());
+    assert!(first != std::fs::read(folder.path().join("box.one.ply")).unwrap());
+    let json = std::fs::read(folder.path().join("box.one.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["settings"]["full_share"], 0.0);
+    if device().is_empty() {
+        assert_eq!(json["hemicubes_by_resolution"]["32"], json["hemicubes"]);
+    }
 }
 
 #[test]
@@ -169,6 +185,7 @@ fn bad_settings_are_refused() {
     with(&["--unshot", "2"], &["unshot share 2"]);
     with(&["--camera", "1,2,3"], &["camera", "7"]);
     with(&["--image", "0,5", "--camera", "278,273,-800,278,273,0,39"], &["0 × 5"]);
+    with(&["--full-share", "much"], &["much"]);
     with(&["--rotations", "0"], &["zero"]);
     with(&["--viewpoints", "much"], &["much"]);
     with(&["--gather", "some"], &["some", "none, needed, all"]);

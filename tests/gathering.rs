@@ -36,6 +36,11 @@ fn lamp() -> Material {
     Material { exitance: Rgb::ONE, ..Material::grey("lamp", 0.0) }
 }
 
+/// The light of elements, one value each, W/m².
+fn shot(mesh: &Mesh, radiosity: &[Rgb]) -> GatheredRadiosity {
+    GatheredRadiosity::from_elements(mesh, radiosity).unwrap()
+}
+
 type Quad = [[f64; 3]; 4];
 
 /// A rectangle at height `z` that faces up.
@@ -94,7 +99,7 @@ fn unequal_depths_everywhere_leave_no_cracks() {
             1.0 + f64::from(random(p.position) < 0.04) * random(-p.position)
         });
         let settings = Gathering { tolerance: 0.05, ..Gathering::new(0.08) };
-        let found = settings.gather(&mesh, &dark, &mut spots, go).unwrap();
+        let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut spots, go).unwrap();
         let (least, most) = sizes(&found.mesh);
         println!("{} elements from {least:.3} to {most:.3}", found.mesh.element_count());
         assert!(found.stop == Stop::Converged && most / least > 7.9, "unequal depths");
@@ -116,7 +121,7 @@ fn the_cornell_box_is_as_watertight_as_its_scene() {
     assert_watertight(&mesh, &VertexRadiosity::new(&mesh, &dark));
     let mut even = Known(|_: &Sources, p: &Place| 1.0 + random(p.position));
     let settings = Gathering { tolerance: 0.2, elements: 40_000, ..Gathering::new(3.0) };
-    let found = settings.gather(&mesh, &dark, &mut even, go).unwrap();
+    let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut even, go).unwrap();
     assert!(found.mesh.element_count() > 2 * mesh.element_count());
     assert_watertight(&found.mesh, &found.surface);
 }
@@ -154,7 +159,7 @@ fn a_furnace_stays_as_it_is() {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
         let (exact, seen): (_, &mut dyn Gather) = (&mut Known(convex_room), &mut rays);
         for gather in [exact, seen] {
-            let found = settings.gather(&mesh, &settled, gather, go).unwrap();
+            let found = settings.gather(&shot(&mesh, &settled), &mesh, gather, go).unwrap();
             assert_eq!(found.stop, Stop::Converged);
             // Walls are lights of their own here, which rays find by closed forms too, all of each
             // visible. Those are good to 1e-14 each, edge on too; they are as many as elements.
@@ -194,7 +199,7 @@ fn floor() -> (Mesh, Vec<Rgb>) {
 fn at_the_edge(settings: &Gathering) -> GatheredRadiosity {
     let (mesh, light) = floor();
     let mut gather = Known(|_: &Sources, p: &Place| half_hidden(p.position));
-    settings.gather(&mesh, &light, &mut gather, go).unwrap()
+    settings.gather(&shot(&mesh, &light), &mesh, &mut gather, go).unwrap()
 }
 
 /// Interpolated radiosity at `p` of a floor, and the element it is in.
@@ -312,7 +317,7 @@ fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
         let light = vec![Rgb::ZERO; mesh.element_count()];
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let settings = Gathering { elements: 3000, ..Gathering::new(0.04) };
-        let found = settings.gather(&mesh, &light, &mut rays, go).unwrap();
+        let found = settings.gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap();
         for k in 0..60 {
             // Before the wall that faces the lamp nothing hides it, and the light is even: on the
             // elements that the wall stands on, too, it is what is gathered at the point directly,
@@ -327,6 +332,31 @@ fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
 }
 
 #[test]
+fn every_sweep_gathers_what_the_one_before_it_found() {
+    // Light from nowhere is taken for half of what is known: reflectance ½, no emission, so that the
+    // light of each sweep is half of the last one's.
+    let mesh = Mesh::new(cube(&grey()), 0.8).unwrap();
+    let fine = Mesh::new(mesh.scene().clone(), 0.2).unwrap();
+    let light = shot(&fine, &vec![Rgb::ONE; fine.element_count()]);
+    for sweeps in [1, 2, 3] {
+        let mut told = vec![];
+        let mut gather = Known(|s: &Sources, p: &Place| convex_room(s, p));
+        let settings = Gathering { sweeps, ..Gathering::new(0.01) };
+        let found = settings.gather(&light, &mesh, &mut gather, |p| {
+            told.push(p.sweep);
+            Go::Continue(())
+        });
+        let (found, want) = (found.unwrap(), 0.5f64.powi(sweeps as i32));
+        told.dedup();
+        assert_eq!(told, (0..sweeps).collect::<Vec<_>>());
+        // Closed forms are good to 1e-14 each, and there are as many as elements.
+        let off = found.surface.radiosity.iter().map(|b| (b.x - want).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-14 * fine.element_count() as f64, "{sweeps}: {off}");
+        assert!((found.change - 1.0).abs() < 1e-9, "half of it is as much as is left");
+    }
+}
+
+#[test]
 fn two_runs_give_the_same_bits() {
     let material = Material { exitance: Rgb::new(1.0, 0.5, 0.0), ..grey() };
     let mut walls: Vec<(Quad, Material)> =
@@ -337,7 +367,7 @@ fn two_runs_give_the_same_bits() {
     let light = vec![Rgb::ONE; mesh.element_count()];
     let [one, two] = [0, 1].map(|_| {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        Gathering::new(0.1).gather(&mesh, &light, &mut rays, go).unwrap()
+        Gathering::new(0.1).gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap()
     });
     assert!(one.mesh.element_count() > mesh.element_count());
     assert!(one.surface.radiosity == two.surface.radiosity);
@@ -355,15 +385,14 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
     for stop_at in [0, 1, 2] {
         let mut told: Vec<GatherProgress> = vec![];
         let mut gather = Known(|_: &Sources, p: &Place| half_hidden(p.position));
-        let found = Gathering::new(0.01).gather(&mesh, &light, &mut gather, |p| {
+        let found = Gathering::new(0.01).gather(&shot(&mesh, &light), &mesh, &mut gather, |p| {
             told.push(*p);
             if p.level == stop_at { Go::Break(()) } else { Go::Continue(()) }
         });
         let (found, last) = (found.unwrap(), told[told.len() - 1]);
         assert_eq!(
             (found.stop, last.level, told.len() as u32),
-            // The first level gathers twice: the light given is far off.
-            (Stop::Cancelled, stop_at, stop_at + 1 + u32::from(stop_at > 0))
+            (Stop::Cancelled, stop_at, stop_at + 1)
         );
         assert_eq!(found.mesh.element_count(), last.elements);
         assert!(told.iter().all(|p| p.gathered == p.of && p.of > 0), "one batch a level");
@@ -374,10 +403,11 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
 
 #[test]
 fn settings_out_of_range_are_refused() {
-    let (mesh, light) = floor();
-    let refused = |settings: Gathering, light: &[Rgb]| {
+    let (mesh, values) = floor();
+    let light = shot(&mesh, &values);
+    let refused = |settings: Gathering, light: &GatheredRadiosity| {
         let mut never = Known(|_: &Sources, _: &Place| unreachable!());
-        let error = settings.gather(&mesh, light, &mut never, go).unwrap_err();
+        let error = settings.gather(light, &mesh, &mut never, go).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     };
     let good = Gathering::new(0.1);
@@ -387,6 +417,10 @@ fn settings_out_of_range_are_refused() {
     for smallest in [0.0, -1.0, f64::NAN] {
         refused(Gathering { smallest, ..good.clone() }, &light);
     }
-    refused(good.clone(), &light[1..]);
-    refused(good, &[]);
+    let elsewhere = Mesh::new(cube(&grey()), 1.0).unwrap();
+    refused(good, &shot(&elsewhere, &vec![Rgb::ONE; elsewhere.element_count()]));
+    for few in [&values[1..], &[]] {
+        let error = GatheredRadiosity::from_elements(&mesh, few).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Setting);
+    }
 }

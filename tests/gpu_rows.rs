@@ -27,7 +27,7 @@ fn outline_bound(n: u32, perimeter: f64, corners: f64) -> f64 {
 }
 
 fn rows(gpu: &Gpu, mesh: &Mesh, n: u32, patches: &[NodeId]) -> Vec<Row> {
-    let rows = Hemicubes::new(gpu, mesh, n).unwrap().rows(mesh, patches).unwrap();
+    let rows = Hemicubes::new(gpu, mesh, n).unwrap().rows(mesh, patches, 1.0).unwrap();
     rows.iter().zip(patches).for_each(|(row, &p)| row.check(mesh, p).unwrap());
     rows
 }
@@ -175,7 +175,7 @@ fn agree(size: f64, n: u32, rays: u32, count: usize) {
     let all = mesh.element_count();
     let patches: Vec<NodeId> = (0..count).map(|k| mesh.element(k * 7919 % all)).collect();
     let gpu_rows = rows(&gpu, &mesh, n, &patches);
-    let cpu_rows = RayCast::new(&mesh, rays).unwrap().rows(&mesh, &patches).unwrap();
+    let cpu_rows = RayCast::new(&mesh, rays).unwrap().rows(&mesh, &patches, 1.0).unwrap();
     let (pixel, mut worst) = (largest_pixel(n), 0.0f64);
     for (a, b) in gpu_rows.iter().zip(&cpu_rows) {
         let dense = |row: &Row| {
@@ -219,13 +219,15 @@ fn rows_are_the_same_bits_however_they_are_batched() {
     let patches: Vec<NodeId> =
         (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
     let mut maker = Hemicubes::new(&gpu, &mesh, 64).unwrap();
-    let together = maker.rows(&mesh, &patches).unwrap();
+    let together = maker.rows(&mesh, &patches, 1.0).unwrap();
     for (row, &p) in together.iter().zip(&patches) {
-        assert!(&maker.rows(&mesh, &[p]).unwrap()[0] == row, "{p:?}");
+        assert!(&maker.rows(&mesh, &[p], 1.0).unwrap()[0] == row, "{p:?}");
     }
     assert_eq!(maker.drawn(), 140);
-    assert!(Hemicubes::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &patches).unwrap() == together);
-    assert_eq!(maker.rows(&mesh, &[]).unwrap(), []);
+    assert!(
+        Hemicubes::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &patches, 1.0).unwrap() == together
+    );
+    assert_eq!(maker.rows(&mesh, &[], 1.0).unwrap(), []);
 }
 
 #[test]
@@ -274,7 +276,7 @@ fn turned_hemicubes_average_pixel_errors_away() {
     let make = |k: u32| {
         let k = NonZeroU32::new(k).unwrap();
         let mut maker = Hemicubes::new(&gpu, &mesh, 128).unwrap().with_rotations(k);
-        let rows = maker.rows(&mesh, &patches).unwrap();
+        let rows = maker.rows(&mesh, &patches, 1.0).unwrap();
         rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
         assert_eq!(maker.drawn(), u64::from(k.get()) * patches.len() as u64);
         rows

@@ -33,11 +33,11 @@ fn patches(mesh: &Mesh) -> Vec<NodeId> {
 fn near_entries_come_close_to_the_area_averaged_factor() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patches = patches(&mesh);
-    let truth = exact().rows(&mesh, &patches).unwrap();
+    let truth = exact().rows(&mesh, &patches, 1.0).unwrap();
     // Largest error of an entry against the closed form between areas, and mean share moved.
     let error = |reach: f64| {
         let mut repair = NearRepair::new(from_centroid(), &mesh, reach);
-        let rows = repair.rows(&mesh, &patches).unwrap();
+        let rows = repair.rows(&mesh, &patches, 1.0).unwrap();
         let mut worst = 0.0f64;
         for ((row, right), &patch) in rows.iter().zip(&truth).zip(&patches) {
             row.check(&mesh, patch).unwrap();
@@ -61,7 +61,7 @@ fn near_entries_come_close_to_the_area_averaged_factor() {
 fn a_mended_entry_is_the_closed_form_from_the_receiver() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patch = patches(&mesh)[0];
-    let row = &NearRepair::new(from_centroid(), &mesh, 0.0).rows(&mesh, &[patch]).unwrap()[0];
+    let row = &NearRepair::new(from_centroid(), &mesh, 0.0).rows(&mesh, &[patch], 1.0).unwrap()[0];
     let (mut touching, corners) = (0, mesh.corners(patch));
     for (e, factor) in dense(&mesh, row).into_iter().enumerate().filter(|f| f.1 > 0.0) {
         let node = mesh.element(e);
@@ -80,9 +80,9 @@ fn a_mended_entry_is_the_closed_form_from_the_receiver() {
 fn rows_out_of_reach_are_left_as_they_are() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patches = patches(&mesh);
-    let raw = from_centroid().rows(&mesh, &patches).unwrap();
+    let raw = from_centroid().rows(&mesh, &patches, 1.0).unwrap();
     let mut off = NearRepair::new(from_centroid(), &mesh, -1.0);
-    assert!(off.rows(&mesh, &patches).unwrap() == raw);
+    assert!(off.rows(&mesh, &patches, 1.0).unwrap() == raw);
     assert_eq!(off.batch(), from_centroid().batch());
     assert_eq!(off.inner().made as usize, patches.len());
     // A patch in the middle of a wall touches nothing but its own plane.
@@ -93,7 +93,8 @@ fn rows_out_of_reach_are_left_as_they_are() {
     assert!(!middle.is_empty());
     let mut touching = NearRepair::new(from_centroid(), &mesh, 0.0);
     assert!(
-        touching.rows(&mesh, &middle).unwrap() == from_centroid().rows(&mesh, &middle).unwrap()
+        touching.rows(&mesh, &middle, 1.0).unwrap()
+            == from_centroid().rows(&mesh, &middle, 1.0).unwrap()
     );
     assert_eq!(touching.moved(), 0.0);
 }

@@ -85,7 +85,7 @@ struct Sent {
 }
 
 impl FormFactors for Sent {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
         let row = |&patch: &NodeId| {
             let emits = mesh.material(patch).exitance != Rgb::ZERO;
             let to = if emits { &self.lit } else { &self.black };

@@ -228,7 +228,7 @@ fn a_dark_scene_is_solved_at_once() {
 /// Returns whatever it is given.
 struct Given(Vec<Row>);
 impl FormFactors for Given {
-    fn rows(&mut self, _: &Mesh, _: &[NodeId]) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, _: &Mesh, _: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
         Ok(self.0.clone())
     }
 }
@@ -273,7 +273,8 @@ fn ray_rows_match_a_closed_form() {
     let mesh = Mesh::new(quads(&[(speck, grey.clone()), (square, grey)]), f64::INFINITY).unwrap();
     let r = (1.0f64 + 0.0625).sqrt();
     let exact = 4.0 / PI * (0.25 / r) * (0.25 / r).atan();
-    let row = &RayCast::new(&mesh, 1 << 16).unwrap().rows(&mesh, &[mesh.element(0)]).unwrap()[0];
+    let row =
+        &RayCast::new(&mesh, 1 << 16).unwrap().rows(&mesh, &[mesh.element(0)], 1.0).unwrap()[0];
     let got: f64 = row.entries.iter().map(|e| Row::form_factor(e.share)).sum();
     let bound = 4.0 * (exact * (1.0 - exact) / 65536.0).sqrt();
     assert!((got - exact).abs() < bound, "{got} {exact} {bound}");

@@ -47,7 +47,7 @@ fn a_patch_half_behind_a_plate_is_seen_from_both_sides() {
     let exact = lit * polygon_to_polygon(&before, &wall);
     let see = |levels: u32| {
         let mut rows = Viewpoints::new(rays(&mesh), 0.02, levels);
-        let row = rows.rows(&mesh, &[patch]).unwrap().remove(0);
+        let row = rows.rows(&mesh, &[patch], 1.0).unwrap().remove(0);
         row.check(&mesh, patch).unwrap();
         (to_wall(&mesh, &row), rows.extra())
     };
@@ -76,16 +76,16 @@ fn rows_are_the_same_alone_in_company_and_again() {
     let patches: Vec<NodeId> =
         mesh.children(patch).unwrap().into_iter().chain([mesh.element(0), mesh.root(3)]).collect();
     let make = || Viewpoints::new(rays(&mesh), 0.02, 3);
-    let all = make().rows(&mesh, &patches).unwrap();
+    let all = make().rows(&mesh, &patches, 1.0).unwrap();
     assert_eq!(all.len(), patches.len());
-    assert!(make().rows(&mesh, &patches).unwrap() == all);
+    assert!(make().rows(&mesh, &patches, 1.0).unwrap() == all);
     let mut one = make();
     for (row, &patch) in all.iter().zip(&patches) {
         row.check(&mesh, patch).unwrap();
-        assert!(one.rows(&mesh, &[patch]).unwrap()[0] == *row);
+        assert!(one.rows(&mesh, &[patch], 1.0).unwrap()[0] == *row);
     }
     // An element has no parts: its row is the maker's own.
-    assert!(rays(&mesh).rows(&mesh, &[mesh.element(0)]).unwrap()[0] == all[4]);
+    assert!(rays(&mesh).rows(&mesh, &[mesh.element(0)], 1.0).unwrap()[0] == all[4]);
 }
 
 #[test]
@@ -101,10 +101,10 @@ fn each_part_is_mended_for_itself() {
             mesh.children(parts[0]).is_none().then_some((p, parts))
         })
     {
-        let row = rows.rows(&mesh, &[patch]).unwrap().remove(0);
+        let row = rows.rows(&mesh, &[patch], 1.0).unwrap().remove(0);
         row.check(&mesh, patch).unwrap();
         let mut mean = vec![0.0; mesh.element_count()];
-        for part in near().rows(&mesh, &parts).unwrap() {
+        for part in near().rows(&mesh, &parts, 1.0).unwrap() {
             for e in &part.entries {
                 mean[e.element as usize] += f64::from(e.share) / 4.0;
             }
@@ -137,7 +137,7 @@ fn nothing_is_spent_beyond_the_comparison_in_the_open() {
     let spent = |tolerance: f64, levels: u32| {
         let near = NearRepair::new(from_centroid(), &mesh, 1.0);
         let mut rows = Viewpoints::new(near, tolerance, levels);
-        rows.rows(&mesh, &patches).unwrap();
+        rows.rows(&mesh, &patches, 1.0).unwrap();
         assert_eq!(rows.inner().inner().made, rows.extra() + patches.len() as u64);
         rows.extra()
     };
@@ -153,13 +153,18 @@ fn nothing_is_spent_beyond_the_comparison_in_the_open() {
 fn a_maker_that_withholds_rows_is_named() {
     struct Short(ClosedForms);
     impl FormFactors for Short {
-        fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-            self.0.rows(mesh, &patches[1..])
+        fn rows(
+            &mut self,
+            mesh: &Mesh,
+            patches: &[NodeId],
+            unshot_share: f64,
+        ) -> Result<Vec<Row>, Error> {
+            self.0.rows(mesh, &patches[1..], unshot_share)
         }
     }
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 1.0).unwrap();
     let near = NearRepair::new(Short(from_centroid()), &mesh, 1.0);
-    let error = Viewpoints::new(near, 0.02, 1).rows(&mesh, &[mesh.root(0)]).unwrap_err();
+    let error = Viewpoints::new(near, 0.02, 1).rows(&mesh, &[mesh.root(0)], 1.0).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::FormFactor);
     assert!(error.to_string().contains("3 rows for 4 patches"), "{error}");
 }

@@ -2,86 +2,71 @@
 // Each example uses a part of it.
 #![allow(dead_code)]
 
-use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
-    Camera, Error, ErrorKind, FormFactors, Gather, GatherProgress, GatheredRadiosity, Gathering,
-    Go, Gpu, HemicubeGather, Hemicubes, Mesh, NearRepair, NodeId, Progress, RadianceImage, RayCast,
-    RayGather, Report, Rgb, Row, Scene, Seconds, Shooting, VertexRadiosity, Viewpoints, load_obj,
-    write_exr, write_ply, write_png,
+    Accuracy, Baked, Budget, Camera, Certificate, Device, Effort, Error, ErrorKind, GatherEffort,
+    GatherProgress, Gathering, Go, Progress, RadianceImage, Report, Scene, Seconds, Shooting,
+    Stage, VertexRadiosity, load_obj, write_exr, write_ply, write_png,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 
-/// Settings of a bake.
-#[derive(Clone, Debug)]
+/// What is asked of a bake.
 pub struct Bake {
     pub scene: PathBuf,
     /// Path of the output without its ending.
     pub out: PathBuf,
-    /// Longest element edge, scene unit; by default a share of the scene's diagonal.
-    pub element_size: Option<f64>,
-    /// Levels that elements are split which others touch.
-    pub contacts: u32,
-    /// Which vertices gather.
-    pub gather: Gathers,
-    /// Elements are split where sides bend by more than this share.
-    pub bend: f64,
-    /// Longest edge of an element that is not split any more, scene unit; by default a share of the
-    /// element size.
-    pub smallest: Option<f64>,
-    /// How many elements there may be.
-    pub max_elements: usize,
-    /// Whether the light not yet shot is added, spread evenly.
-    pub ambient: bool,
-    pub hemicube: u32,
-    /// Receivers within this many patch diameters get closed forms; below 0 none.
-    pub near: f64,
-    /// Patches whose parts disagree by more than this share of light are seen from finer parts; with
-    /// none, each only from its centroid.
-    pub viewpoints: Option<f64>,
-    /// Hemicubes a viewpoint.
-    pub rotations: NonZeroU32,
-    pub shooting: Shooting,
+    pub goal: Goal,
+    /// Settings made by hand, in their order.
+    pub changes: Vec<Change>,
     pub camera: Option<Camera>,
     pub image: (u32, u32),
     /// Whether the pixels of the image gather.
     pub pixel_gather: bool,
     /// Whether to write the elements' own values too.
     pub elements: bool,
-    pub device: Device,
+    pub device: Choice,
 }
 
-/// Which vertices look at the settled light for themselves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gathers {
-    /// None: vertices get what the elements around them have.
-    None,
-    /// Those of the mesh, and more where the light between them bends.
-    Needed,
-    /// As needed, after splitting every element once.
-    All,
+/// A setting made by hand.
+pub type Change = Box<dyn Fn(&mut Effort)>;
+
+/// How far to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// As far as fixed settings do, whose vertices gather or do not.
+    Plain { gather: bool },
+    /// Until the error is estimated to be below this.
+    Error(f64),
+    /// As far as these seconds allow.
+    Seconds(f64),
 }
-
-/// Element size over that of the smallest that gathering makes.
-const SMALLEST: f64 = 24.0;
-
-/// Hemicubes that gather have this share of the pixels along an edge of those that shoot.
-const GATHER_PIXELS: u32 = 2;
-
-/// Lines of sight along a pixel's side.
-const SAMPLES: u32 = 4;
 
 /// Who makes rows.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Device {
+pub enum Choice {
     /// Hemicubes on the adapter of this name, or the best.
     Gpu(Option<String>),
     /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
     Cpu,
 }
+
+impl Choice {
+    pub fn open(&self) -> Result<Device, Error> {
+        match self {
+            Choice::Gpu(name) => Device::gpu(name.as_deref()),
+            Choice::Cpu => Ok(Device::Cpu),
+        }
+    }
+}
+
+/// The accuracy whose settings vertices gather with where none is asked for.
+const PLAIN: f64 = 0.008;
+
+/// Lines of sight along a pixel's side.
+const SAMPLES: u32 = 4;
 
 impl Bake {
     pub fn new(scene: impl Into<PathBuf>) -> Bake {
@@ -89,30 +74,19 @@ impl Bake {
         Bake {
             out: scene.with_extension(""),
             scene,
-            element_size: None,
-            contacts: 3,
-            gather: Gathers::None,
-            bend: 0.02,
-            smallest: None,
-            max_elements: 1 << 19,
-            ambient: false,
-            hemicube: 128,
-            near: 1.0,
-            viewpoints: None,
-            rotations: NonZeroU32::MIN,
-            shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
+            goal: Goal::Plain { gather: false },
+            changes: vec![],
             camera: None,
             image: (512, 512),
             pixel_gather: false,
             elements: false,
-            device: Device::Gpu(None),
+            device: Choice::Gpu(None),
         }
     }
 
     /// From the scene file to STEM.ply, STEM.json and, with a camera, STEM.exr and STEM.png.
     pub fn run(&self) -> Result<Report, Error> {
-        let mut clock = Clock::start();
-        let mut seconds = Seconds::default();
+        let start = Instant::now();
         writable(&self.out)?;
         let (width, height) = self.image;
         self.camera.iter().try_for_each(|c| c.check(width, height, SAMPLES))?;
@@ -120,105 +94,137 @@ impl Bake {
         for warning in scene.warnings() {
             eprintln!("warning: {warning}");
         }
-        let warnings = scene.warnings().to_vec();
-        seconds.load = clock.lap();
-
-        let by_default = || match self.gather {
-            Gathers::None => default_element_size(&scene),
-            _ => 1.6 * default_element_size(&scene),
-        };
-        let element_size = self.element_size.unwrap_or_else(by_default);
-        let mesh = Mesh::new(scene, element_size)?.split_at_contacts(self.contacts);
-        self.gathering(&mesh).check()?;
-        let maker = Maker::new(&self.device, &mesh, self.hemicube, self.rotations)?;
-        let near = NearRepair::new(maker, &mesh, self.near);
-        let levels = if self.viewpoints.is_some() { u32::MAX } else { 0 };
-        let mut rows = Viewpoints::new(near, self.viewpoints.unwrap_or(1.0), levels);
-        seconds.mesh = clock.lap();
-
-        let bar = bar();
-        let solution = self.shooting.solve(&mesh, &mut rows, |p| {
-            show(&bar, p, self.shooting.unshot);
-            Go::Continue(())
-        })?;
-        bar.finish_and_clear();
-        let (near, maker) = (rows.inner(), rows.inner().inner());
-        (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
-        seconds.solve = clock.lap() - maker.seconds;
-
-        let mut radiosity = solution.radiosity;
-        let mut comments = vec![];
-        if self.ambient {
-            let [r, g, b] = solution.ledger.add_ambient(&mesh, &mut radiosity).to_array();
-            comments.push(format!(
-                "ambient term of the unshot light added: reflectance times {r:e} {g:e} {b:e} W/m2"
-            ));
-        }
-        let gathered = self.gathered(&mesh, &radiosity, maker)?;
-        let mut surface = match &gathered {
-            Some(gathered) => gathered.surface.clone(),
-            None => VertexRadiosity::new(&mesh, &radiosity),
-        };
-        surface.comments = comments;
-        seconds.vertices = clock.lap();
-
+        let (warnings, triangles) = (scene.warnings().to_vec(), scene.triangles().len());
+        let load = start.elapsed().as_secs_f64();
+        let opening = Instant::now();
+        let device = self.device.open()?;
+        let open = opening.elapsed().as_secs_f64();
+        let baked = self.bake(scene, &device)?;
+        let writing = Instant::now();
+        let mut surface = baked.light.surface.clone();
+        surface.comments = comments(&baked);
         write_ply(self.out.with_added_extension("ply"), &surface)?;
         if self.elements {
-            let flat = VertexRadiosity::flat(&mesh, &radiosity);
+            let flat = VertexRadiosity::flat(&baked.mesh, &baked.solution.radiosity);
             write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
         }
         if let Some(camera) = self.camera {
             let image = match self.pixel_gather {
-                true => {
-                    self.gathered_image(&camera, &mesh, &radiosity, gathered.as_ref(), maker)?
-                }
+                true => self.gathered_image(&camera, &baked, &device)?,
                 false => camera.image(&surface, width, height, SAMPLES)?,
             };
             write_exr(self.out.with_added_extension("exr"), &image)?;
             write_png(self.out.with_added_extension("png"), &image)?;
         }
-        seconds.write = clock.lap();
-        seconds.total = clock.total();
-
+        let s = baked.seconds;
         let report = Report {
             scene: self.scene.display().to_string(),
-            adapter: maker.adapter(),
-            settings: vec![
-                ("element_size".into(), json!(element_size)),
-                ("hemicube".into(), json!(self.hemicube)),
-                ("near".into(), json!(self.near)),
-                ("viewpoints".into(), json!(self.viewpoints)),
-                ("rotations".into(), json!(self.rotations.get())),
-                ("unshot".into(), json!(self.shooting.unshot)),
-                ("shots".into(), json!(self.shooting.shots)),
-                ("row_memory".into(), json!(self.shooting.row_memory)),
-                ("patch_tolerance".into(), json!(self.shooting.tolerance)),
-                ("patch_level".into(), json!(self.shooting.level)),
-                ("contacts".into(), json!(self.contacts)),
-                ("gather".into(), json!(format!("{:?}", self.gather).to_lowercase())),
-                ("bend".into(), json!(self.bend)),
-                ("smallest".into(), json!(self.smallest)),
-                ("max_elements".into(), json!(self.max_elements)),
-                ("pixel_gather".into(), json!(self.pixel_gather)),
-                ("ambient".into(), json!(self.ambient)),
-            ],
-            triangles: mesh.scene().triangles().len(),
-            shot_elements: mesh.element_count(),
-            elements: gathered.as_ref().map_or(&mesh, |g| &g.mesh).element_count(),
+            adapter: device.adapter(),
+            goal: self.goal.to_json(),
+            settings: settings(&baked.effort),
+            triangles,
+            shot_elements: baked.mesh.element_count(),
+            elements: baked.light.mesh.element_count(),
             vertices: surface.positions.len(),
-            shots: solution.shots,
-            hemicubes: (solution.rows_made + rows.extra()) * u64::from(self.rotations.get()),
-            gathers: gathered.as_ref().map_or(0, |g| g.gathers),
-            gather_change: gathered.as_ref().map_or(0.0, |g| g.change),
-            gather_stop: gathered.as_ref().map_or("none".into(), |g| g.stop.to_string()),
-            near_moved: near.moved(),
-            stop: solution.stop.to_string(),
-            ledger: solution.ledger,
-            seconds,
+            shots: baked.solution.shots,
+            hemicubes: baked.hemicubes,
+            hemicubes_by_resolution: baked.hemicubes_by_resolution,
+            gathers: baked.light.gathers,
+            gather_change: baked.light.change,
+            gather_stop: match baked.effort.gather {
+                Some(_) => baked.light.stop.to_string(),
+                None => "none".into(),
+            },
+            near_moved: baked.near_moved,
+            stop: baked.solution.stop.to_string(),
+            ledger: baked.solution.ledger,
+            certificate: baked.certificate,
+            seconds: Seconds {
+                load,
+                open,
+                mesh: s.mesh,
+                draw: s.draw,
+                reduce: s.reduce,
+                readback: s.readback,
+                solve: s.solve,
+                vertices: s.vertices,
+                certificate: s.certificate,
+                write: writing.elapsed().as_secs_f64(),
+                total: start.elapsed().as_secs_f64(),
+            },
             warnings,
         };
         report.write(self.out.with_added_extension("json"))?;
         Ok(report)
+    }
+
+    fn bake(&self, scene: Scene, device: &Device) -> Result<Baked, Error> {
+        let bar = bar();
+        let told = |stage: &Stage| {
+            show(&bar, stage);
+            Go::Continue(())
+        };
+        let adjust = |effort: &mut Effort| self.changes.iter().for_each(|change| change(effort));
+        let baked = match self.goal {
+            Goal::Error(error) => Accuracy { error, adjust: &adjust }.bake(scene, device, told),
+            Goal::Seconds(seconds) => Budget { seconds, adjust: &adjust }.bake(scene, device, told),
+            Goal::Plain { gather } => {
+                let mut effort =
+                    if gather { Effort::for_error(PLAIN, &scene) } else { plain(&scene) };
+                adjust(&mut effort);
+                effort.bake(scene, device, told)
+            }
+        };
+        bar.finish_and_clear();
+        baked
+    }
+
+    /// The picture, each pixel of which gathers what the vertices know, or else the elements.
+    fn gathered_image(
+        &self,
+        camera: &Camera,
+        baked: &Baked,
+        device: &Device,
+    ) -> Result<RadianceImage, Error> {
+        let rays = baked.effort.gather.as_ref().map_or(2048, |gather| gather.rays);
+        let mut gather = device.gather(&baked.light.mesh, rays)?;
+        let ((width, height), bar) = (self.image, bar());
+        let image = camera.gathered_image(
+            &baked.light,
+            &mut *gather,
+            width,
+            height,
+            SAMPLES,
+            |done, of| {
+                bar.set_position((1000 * done / of) as u64);
+                bar.set_message(format!("picture, {done} of {of} pixels"));
+                Go::Continue(())
+            },
+        )?;
+        bar.finish_and_clear();
+        Ok(image.expect("nobody stopped it"))
+    }
+}
+
+impl Goal {
+    fn to_json(self) -> Value {
+        match self {
+            Goal::Plain { .. } => json!(null),
+            Goal::Error(error) => json!({ "error": error }),
+            Goal::Seconds(seconds) => json!({ "seconds": seconds }),
+        }
+    }
+}
+
+/// Elements alone: for previews.
+pub fn plain(scene: &Scene) -> Effort {
+    Effort {
+        element_size: default_element_size(scene),
+        contacts: 3,
+        hemicube: 128,
+        shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
+        gather: None,
+        ..Effort::for_error(0.02, scene)
     }
 }
 
@@ -228,67 +234,52 @@ pub fn default_element_size(scene: &Scene) -> f64 {
     (high - low).length() / 32.0
 }
 
-impl Bake {
-    fn gathering(&self, mesh: &Mesh) -> Gathering {
-        let longest = |e| mesh.longest_edge(mesh.element(e));
-        let largest = (0..mesh.element_count()).map(longest).fold(0.0, f64::max);
-        Gathering {
-            tolerance: self.bend,
-            elements: self.max_elements,
-            everywhere: u32::from(self.gather == Gathers::All),
-            ..Gathering::new(self.smallest.unwrap_or(largest / SMALLEST))
-        }
+fn comments(baked: &Baked) -> Vec<String> {
+    let mut comments = vec![];
+    if baked.effort.ambient {
+        comments.push("ambient term of the unshot light added to the elements".into());
     }
+    let Certificate { total, places, .. } = baked.certificate;
+    comments.push(format!(
+        "estimated error {:.3} % of radiosity, RMS over area, at {places} places; vertices have \
+         their own",
+        100.0 * total
+    ));
+    comments
+}
 
-    /// Lets vertices gather, if they are to.
-    fn gathered(
-        &self,
-        mesh: &Mesh,
-        radiosity: &[Rgb],
-        maker: &Maker,
-    ) -> Result<Option<GatheredRadiosity>, Error> {
-        if self.gather == Gathers::None {
-            return Ok(None);
-        }
-        let settings = self.gathering(mesh);
-        let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
-        let bar = bar();
-        let gathered = settings.gather(mesh, radiosity, &mut *gather, |p| {
-            show_gathering(&bar, p);
-            Go::Continue(())
-        })?;
-        bar.finish_and_clear();
-        Ok(Some(gathered))
+fn settings(effort: &Effort) -> Vec<(String, Value)> {
+    let Effort { shooting, gather, .. } = effort;
+    let mut all = vec![
+        ("element_size", json!(effort.element_size)),
+        ("contacts", json!(effort.contacts)),
+        ("hemicube", json!(effort.hemicube)),
+        ("full_share", json!(effort.full_share)),
+        ("near", json!(effort.near)),
+        ("viewpoints", json!(effort.viewpoints)),
+        ("rotations", json!(effort.rotations.get())),
+        ("unshot", json!(shooting.unshot)),
+        ("shots", json!(shooting.shots)),
+        ("row_memory", json!(shooting.row_memory)),
+        ("patch_tolerance", json!(shooting.tolerance)),
+        ("patch_level", json!(shooting.level)),
+        ("ambient", json!(effort.ambient)),
+        ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
+    ];
+    if let Some(GatherEffort { element_size, contacts, rays, gathering }) = gather {
+        let Gathering { tolerance, smallest, elements, everywhere, sweeps } = gathering;
+        all.extend([
+            ("gather_size", json!(element_size)),
+            ("gather_contacts", json!(contacts)),
+            ("rays", json!(rays)),
+            ("bend", json!(tolerance)),
+            ("smallest", json!(smallest)),
+            ("max_elements", json!(elements)),
+            ("gather_levels", json!(everywhere)),
+            ("sweeps", json!(sweeps)),
+        ]);
     }
-
-    /// The picture, each pixel of which gathers what the vertices know, or else the elements.
-    fn gathered_image(
-        &self,
-        camera: &Camera,
-        mesh: &Mesh,
-        radiosity: &[Rgb],
-        gathered: Option<&GatheredRadiosity>,
-        maker: &Maker,
-    ) -> Result<RadianceImage, Error> {
-        let plain;
-        let light = match gathered {
-            Some(gathered) => gathered,
-            None => {
-                plain = GatheredRadiosity::from_elements(mesh, radiosity)?;
-                &plain
-            }
-        };
-        let mut gather = maker.gather(mesh, self.hemicube / GATHER_PIXELS)?;
-        let ((width, height), bar) = (self.image, bar());
-        let image =
-            camera.gathered_image(light, &mut *gather, width, height, SAMPLES, |done, of| {
-                bar.set_position((1000 * done / of) as u64);
-                bar.set_message(format!("picture, {done} of {of} pixels"));
-                Go::Continue(())
-            })?;
-        bar.finish_and_clear();
-        Ok(image.expect("nobody stopped it"))
-    }
+    all.into_iter().map(|(name, value)| (name.into(), value)).collect()
 }
 
 /// Refuses an output that could not be written before any work is done for it.
@@ -303,94 +294,6 @@ pub fn writable(out: &Path) -> Result<(), Error> {
     })
 }
 
-/// Makes rows one way or the other, and counts the time.
-pub struct Maker {
-    rows: Rows,
-    seconds: f64,
-}
-
-enum Rows {
-    Gpu(Gpu, Box<Hemicubes>),
-    Cpu(RayCast),
-}
-
-impl Maker {
-    pub fn new(
-        device: &Device,
-        mesh: &Mesh,
-        hemicube: u32,
-        rotations: NonZeroU32,
-    ) -> Result<Maker, Error> {
-        let rows = match device {
-            Device::Gpu(name) => {
-                let gpu = Gpu::new(name.as_deref())?;
-                let hemicubes = Hemicubes::new(&gpu, mesh, hemicube)?.with_rotations(rotations);
-                Rows::Gpu(gpu, Box::new(hemicubes))
-            }
-            Device::Cpu => {
-                radiosity::hemicube::check_resolution(hemicube)?;
-                Rows::Cpu(RayCast::new(
-                    mesh,
-                    (hemicube * hemicube).saturating_mul(rotations.get()),
-                )?)
-            }
-        };
-        Ok(Maker { rows, seconds: 0.0 })
-    }
-
-    /// Who gathers: the device that makes the rows, or the CPU where that is the device: half as many
-    /// rays as a hemicube's top face of `resolution` has pixels take less time there than drawing.
-    fn gather(&self, mesh: &Mesh, resolution: u32) -> Result<Box<dyn Gather>, Error> {
-        Ok(match &self.rows {
-            Rows::Gpu(gpu, _) if gpu.adapter().kind != "CPU" => {
-                Box::new(HemicubeGather::new(gpu, mesh, resolution)?)
-            }
-            _ => Box::new(RayGather::new(mesh, (resolution * resolution / 2).max(16))?),
-        })
-    }
-
-    /// Name, type and driver.
-    pub fn adapter(&self) -> [String; 3] {
-        match &self.rows {
-            Rows::Gpu(gpu, _) => {
-                let adapter = gpu.adapter().clone();
-                [adapter.name, adapter.kind, adapter.driver]
-            }
-            Rows::Cpu(_) => ["rays".into(), "CPU".into(), "none".into()],
-        }
-    }
-
-    /// Seconds of draw, reduce and read-back; rays are all draw.
-    fn stages(&self) -> (f64, f64, f64) {
-        match &self.rows {
-            Rows::Gpu(_, hemicubes) => {
-                let s = hemicubes.seconds();
-                (s.draw, s.reduce, s.readback)
-            }
-            Rows::Cpu(_) => (self.seconds, 0.0, 0.0),
-        }
-    }
-}
-
-impl FormFactors for Maker {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        let start = Instant::now();
-        let rows = match &mut self.rows {
-            Rows::Gpu(_, hemicubes) => hemicubes.rows(mesh, patches),
-            Rows::Cpu(rays) => rays.rows(mesh, patches),
-        };
-        self.seconds += start.elapsed().as_secs_f64();
-        rows
-    }
-
-    fn batch(&self) -> usize {
-        match &self.rows {
-            Rows::Gpu(_, hemicubes) => hemicubes.batch(),
-            Rows::Cpu(rays) => rays.batch(),
-        }
-    }
-}
-
 fn bar() -> ProgressBar {
     let bar = ProgressBar::new(1000);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {msg}") {
@@ -399,46 +302,28 @@ fn bar() -> ProgressBar {
     bar
 }
 
-/// The bar fills with the logarithm of the unshot share, which falls about evenly.
-fn show(bar: &ProgressBar, p: &Progress, wanted: f64) {
-    let done = p.unshot_share.max(1e-16).ln() / wanted.clamp(1e-16, 0.999).ln();
-    bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
-    bar.set_message(format!(
-        "shooting, {:.3} % unshot, {} shots, {} hemicubes, {:.1} s",
-        100.0 * p.unshot_share,
-        p.shots,
-        p.rows_made,
-        p.elapsed.as_secs_f64()
-    ));
-}
-
-/// The bar fills with the vertices of a level.
-fn show_gathering(bar: &ProgressBar, p: &GatherProgress) {
-    bar.set_position((1000 * p.gathered / p.of.max(1)) as u64);
-    bar.set_message(format!(
-        "gathering, split {} times, {} of {} vertices, {} elements",
-        p.level, p.gathered, p.of, p.elements
-    ));
-}
-
-struct Clock {
-    start: Instant,
-    lap: Instant,
-}
-
-impl Clock {
-    fn start() -> Clock {
-        Clock { start: Instant::now(), lap: Instant::now() }
-    }
-
-    fn lap(&mut self) -> f64 {
-        let seconds = self.lap.elapsed().as_secs_f64();
-        self.lap = Instant::now();
-        seconds
-    }
-
-    fn total(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+/// The bar fills with the vertices of a level, or while shooting with the share that is shot.
+fn show(bar: &ProgressBar, stage: &Stage) {
+    match stage {
+        Stage::Shooting(Progress { shots, rows_made, unshot_share, elapsed }) => {
+            bar.set_position((1000.0 * (1.0 - unshot_share).clamp(0.0, 1.0)) as u64);
+            bar.set_message(format!(
+                "shooting, {:.3} % unshot, {shots} shots, {rows_made} hemicubes, {:.1} s",
+                100.0 * unshot_share,
+                elapsed.as_secs_f64()
+            ));
+        }
+        Stage::Gathering(GatherProgress { sweep, level, elements, gathered, of }) => {
+            bar.set_position((1000 * gathered / of.max(&1)) as u64);
+            bar.set_message(format!(
+                "gathering, sweep {}, split {level} times, {gathered} of {of} vertices, \
+                 {elements} elements",
+                sweep + 1
+            ));
+        }
+        Stage::Judged(certificate) => {
+            bar.println(format!("estimated error {:.2} %", 100.0 * certificate.total));
+        }
     }
 }
 
@@ -450,7 +335,7 @@ pub fn table(report: &Report) -> String {
         let whole = report.ledger.emitted.element_sum();
         if whole > 0.0 { 100.0 * c.element_sum() / whole } else { 0.0 }
     };
-    let ledger = report.ledger;
+    let (ledger, c) = (report.ledger, report.certificate);
     [
         format!("adapter    {name} ({kind}), {driver}"),
         format!(
@@ -475,9 +360,27 @@ pub fn table(report: &Report) -> String {
             share(ledger.unshot)
         ),
         format!(
-            "seconds    load {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, read back {:.2}, \
-             solve {:.2}, vertices {:.2}, write {:.2}, total {:.2}",
-            s.load, s.mesh, s.draw, s.reduce, s.readback, s.solve, s.vertices, s.write, s.total
+            "error      about {:.2} %: mesh {:.2}, sampling {:.2}, settling {:.2}, unshot {:.2}",
+            100.0 * c.total,
+            100.0 * c.mesh,
+            100.0 * c.sampling,
+            100.0 * c.settling,
+            100.0 * c.unshot
+        ),
+        format!(
+            "seconds    load {:.2}, open {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, \
+             read back {:.2}, solve {:.2}, vertices {:.2}, error {:.2}, write {:.2}, total {:.2}",
+            s.load,
+            s.open,
+            s.mesh,
+            s.draw,
+            s.reduce,
+            s.readback,
+            s.solve,
+            s.vertices,
+            s.certificate,
+            s.write,
+            s.total
         ),
     ]
     .join("\n")

@@ -61,8 +61,13 @@ impl<M: FormFactors> NearRepair<M> {
     }
 
     /// The maker's own rows, nothing mended.
-    pub(super) fn raw(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        self.rows.rows(mesh, patches)
+    pub(super) fn raw(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        self.rows.rows(mesh, patches, unshot_share)
     }
 
     /// Mends `rows` as seen from the centroids of `patches`.
@@ -79,8 +84,13 @@ impl<M: FormFactors> NearRepair<M> {
 }
 
 impl<M: FormFactors> FormFactors for NearRepair<M> {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
-        let mut rows = self.raw(mesh, patches)?;
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let mut rows = self.raw(mesh, patches, unshot_share)?;
         self.mend(mesh, patches, &mut rows);
         Ok(rows)
     }

@@ -84,9 +84,15 @@ impl<M: FormFactors> Viewpoints<M> {
     }
 
     /// Fills the views at `places`.
-    fn see(&mut self, mesh: &Mesh, views: &mut [View], places: &[usize]) -> Result<(), Error> {
+    fn see(
+        &mut self,
+        mesh: &Mesh,
+        views: &mut [View],
+        places: &[usize],
+        unshot_share: f64,
+    ) -> Result<(), Error> {
         let nodes: Vec<NodeId> = places.iter().map(|&k| views[k].node).collect();
-        let made = self.rows.raw(mesh, &nodes)?;
+        let made = self.rows.raw(mesh, &nodes, unshot_share)?;
         if made.len() != nodes.len() {
             let found = format!("{} rows for {} patches", made.len(), nodes.len());
             let remedy = "FormFactors::rows must return one row a patch";
@@ -106,7 +112,12 @@ impl<M: FormFactors> Viewpoints<M> {
 }
 
 impl<M: FormFactors> FormFactors for Viewpoints<M> {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
         let mut views: Vec<View> = patches.iter().map(|&p| View::of(p)).collect();
         let mut unseen: Vec<usize> = (0..views.len()).collect();
         let mut split = if self.levels > 0 { unseen.clone() } else { vec![] };
@@ -121,7 +132,7 @@ impl<M: FormFactors> FormFactors for Viewpoints<M> {
             });
             let parts = |views: &[View], k: usize| views[k].parts.map_or(0..0, |p| p..p + 4);
             unseen.extend(split.iter().flat_map(|&k| parts(&views, k).take(3)));
-            self.see(mesh, &mut views, &unseen)?;
+            self.see(mesh, &mut views, &unseen, unshot_share)?;
             self.extra += (unseen.len() - if level == 0 { patches.len() } else { 0 }) as u64;
             unseen.clear();
             for &k in &split {

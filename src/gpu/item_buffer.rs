@@ -8,17 +8,16 @@ use super::cells::Cells;
 use super::device::Gpu;
 use super::layers::{Layers, Shown};
 use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::resolution::Resolution;
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
-/// Item buffers of a batch of hemicubes, and what it takes to draw them.
+/// What it takes to draw the item buffers of a batch of hemicubes, whatever their resolution.
 #[derive(Debug)]
 pub struct ItemBuffer {
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
     views: wgpu::Buffer,
-    pub layers: Layers,
-    resolution: u32,
 }
 
 /// One face of a hemicube, and the places in the drawing order that it can see.
@@ -28,15 +27,16 @@ pub struct View {
 }
 
 impl ItemBuffer {
-    /// For the triangles of `mesh` in drawing order, relative to `origin`; `batch` hemicubes of
-    /// `resolution`.
+    /// What an item buffer is made of.
+    pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+    /// For the triangles of `mesh` in drawing order, relative to `origin`; `batch` hemicubes.
     pub fn new(
         gpu: &Gpu,
         mesh: &Mesh,
         cells: &Cells,
         order: &[u32],
         origin: DVec3,
-        resolution: u32,
         batch: u32,
     ) -> Self {
         let device = &gpu.device;
@@ -59,9 +59,8 @@ impl ItemBuffer {
             label: Some("item_buffer.wgsl"),
             source: wgpu::ShaderSource::Wgsl(ITEM_BUFFER_WGSL.into()),
         });
-        let target = wgpu::TextureFormat::R32Uint;
-        let nearest = Shown::Nearest;
-        let pipeline = Layers::pipeline(gpu, &module, None, "fragment", target.into(), nearest);
+        let (target, nearest) = (ItemBuffer::FORMAT.into(), Shown::Nearest);
+        let pipeline = Layers::pipeline(gpu, &module, None, "fragment", target, nearest);
         let buffers = [&corners, &triangles, &views];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("item buffer"),
@@ -71,16 +70,16 @@ impl ItemBuffer {
                 resource: buffers[k].as_entire_binding(),
             }),
         });
-        let layers = Layers::new(gpu, target, [resolution, 3 * resolution], batch);
-        ItemBuffer { pipeline, bindings, views, layers, resolution }
+        ItemBuffer { pipeline, bindings, views }
     }
 
-    /// Records the drawing of the hemicubes that `views` (five each) look out from, with
-    /// timestamps before the first (query 0) and after the last (query 1).
+    /// Records the drawing of the hemicubes that `views` (five each) look out from on the layers of
+    /// `at`, with timestamps before the first (query 0) and after the last (query 1).
     pub fn draw(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
+        at: &Resolution,
         views: &[View],
         queries: Option<&wgpu::QuerySet>,
     ) {
@@ -88,10 +87,10 @@ impl ItemBuffer {
         gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(&faces));
         let count = views.len() / 5;
         for h in 0..count {
-            let mut pass = self.layers.pass(encoder, h, count, queries);
+            let mut pass = at.layers.pass(encoder, h, count, queries);
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &self.bindings, &[]);
-            let n = self.resolution;
+            let n = at.pixels;
             for face in 0..5 {
                 let (lines, view) = (Face::rows(face, n), 5 * h + face);
                 let (y, height) = (lines.start as f32, lines.len() as f32);

@@ -2,22 +2,23 @@
 
 use super::cells::Cells;
 use super::device::Gpu;
-use super::item_buffer::ItemBuffer;
 use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
+use super::resolution::Resolution;
 use crate::error::Error;
 use crate::hemicube;
 
-/// The reduction of a batch of hemicubes.
+/// The reduction of a batch of hemicubes, whatever their resolution.
 #[derive(Debug)]
 pub struct Reduce {
     pipeline: wgpu::ComputePipeline,
-    bindings: wgpu::BindGroup,
+    /// The row slot of each item.
+    slot_of: wgpu::Buffer,
     /// The item buffers once more, as plain memory: reading them as a texture costs more than the
     /// copy does.
     items: wgpu::Buffer,
     /// Dense rows of the batch, `slots` words each.
     pub rows: wgpu::Buffer,
-    resolution: u32,
+    slots: u32,
 }
 
 impl Reduce {
@@ -26,21 +27,10 @@ impl Reduce {
         u64::from(stride(resolution)) * u64::from(3 * resolution) * 4
     }
 
-    /// For `batch` hemicubes of `resolution`, to rows of `slots` words.
-    pub fn new(
-        gpu: &Gpu,
-        cells: &Cells,
-        resolution: u32,
-        slots: u32,
-        batch: u32,
-    ) -> Result<Self, Error> {
+    /// For `batch` hemicubes of at most `resolution`, to rows of `slots` words.
+    pub fn new(gpu: &Gpu, cells: &Cells, resolution: u32, slots: u32, batch: u32) -> Self {
         let device = &gpu.device;
-        let weights = hemicube::weights(resolution)?;
-        let weights = gpu.storage("weights", bytemuck::cast_slice(&weights));
         let slot_of = gpu.storage("slots", bytemuck::cast_slice(&cells.slots));
-        let stride = stride(resolution);
-        let reduction = Reduction { resolution, slots, stride };
-        let reduction = gpu.uniform("reduction", bytemuck::bytes_of(&reduction));
         let rows = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("rows"),
             size: u64::from(batch) * u64::from(slots) * 4,
@@ -67,37 +57,46 @@ impl Reduce {
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
+        Reduce { pipeline, slot_of, items, rows, slots }
+    }
+
+    /// What the pass reads and writes for hemicubes of `resolution`, at most the one that this was
+    /// made for.
+    pub fn bindings(&self, gpu: &Gpu, resolution: u32) -> Result<wgpu::BindGroup, Error> {
+        let weights = hemicube::weights(resolution)?;
+        let weights = gpu.storage("weights", bytemuck::cast_slice(&weights));
+        let reduction = Reduction { resolution, slots: self.slots, stride: stride(resolution) };
+        let reduction = gpu.uniform("reduction", bytemuck::bytes_of(&reduction));
         let resources = [
-            items.as_entire_binding(),
+            self.items.as_entire_binding(),
             weights.as_entire_binding(),
-            rows.as_entire_binding(),
+            self.rows.as_entire_binding(),
             reduction.as_entire_binding(),
-            slot_of.as_entire_binding(),
+            self.slot_of.as_entire_binding(),
         ];
         let entries: Vec<_> = (0..)
             .zip(resources)
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
-        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("reduce"),
-            layout: &pipeline.get_bind_group_layout(0),
+            layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,
-        });
-        Ok(Reduce { pipeline, bindings, items, rows, resolution })
+        }))
     }
 
-    /// Records the reduction of the first `count` hemicubes of `source`, with a timestamp after it
-    /// (query 2).
+    /// Records the reduction of the first `count` hemicubes on the layers of `at`, with a timestamp
+    /// after it (query 2).
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        source: &ItemBuffer,
+        at: &Resolution,
         count: u32,
         queries: Option<&wgpu::QuerySet>,
     ) {
-        let n = self.resolution;
+        let n = at.pixels;
         encoder.clear_buffer(&self.rows, 0, None);
-        source.layers.copy(encoder, &self.items, stride(n) * 4, count);
+        at.layers.copy(encoder, &self.items, stride(n) * 4, count);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),
             timestamp_writes: queries.map(|query_set| wgpu::ComputePassTimestampWrites {
@@ -107,7 +106,7 @@ impl Reduce {
             }),
         });
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
+        pass.set_bind_group(0, &at.bindings, &[]);
         pass.dispatch_workgroups(n.div_ceil(WORKGROUP), (3 * n).div_ceil(STRIP), count);
     }
 }

@@ -11,7 +11,8 @@ use crate::vertex::VertexRadiosity;
 /// Writes `surface` as binary little-endian PLY.
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
-/// (float, W/m² per channel, linear), `red green blue` (uchar, tone-mapped for viewers). Faces:
+/// (float, W/m² per channel, linear), `red green blue` (uchar, tone-mapped for viewers), and, where
+/// it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the channels). Faces:
 /// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
 /// header.
 ///
@@ -37,16 +38,24 @@ pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<()
         for name in ["red", "green", "blue"] {
             writeln!(out, "property uchar {name}")?;
         }
+        // An error a vertex, or none at all.
+        let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
+        if errors {
+            writeln!(out, "property float error")?;
+        }
         writeln!(out, "element face {}", surface.faces.len())?;
         writeln!(out, "property list uchar int vertex_indices\nend_header")?;
         let vertices = surface.positions.iter().zip(&surface.normals).zip(&surface.radiosity);
-        for ((position, normal), radiosity) in vertices {
-            for v in [position, normal, radiosity] {
-                for x in v.as_vec3().to_array() {
+        for (v, ((position, normal), radiosity)) in vertices.enumerate() {
+            for vector in [position, normal, radiosity] {
+                for x in vector.as_vec3().to_array() {
                     out.write_all(&x.to_le_bytes())?;
                 }
             }
             out.write_all(&tone.display(*radiosity))?;
+            if errors {
+                out.write_all(&(surface.error[v] as f32).to_le_bytes())?;
+            }
         }
         for face in &surface.faces {
             out.write_all(&[3])?;

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::write_file;
+use crate::certificate::Certificate;
 use crate::error::Error;
 use crate::scene::Rgb;
 use crate::solve::Ledger;
@@ -17,7 +18,9 @@ pub struct Report {
     pub scene: String,
     /// Name, type and driver of what made the rows.
     pub adapter: [String; 3],
-    /// Settings by name.
+    /// What was asked for.
+    pub goal: Value,
+    /// Settings by name: those chosen, and those made by hand.
     pub settings: Vec<(String, Value)>,
     /// Triangles with area.
     pub triangles: usize,
@@ -31,6 +34,9 @@ pub struct Report {
     pub shots: u64,
     /// Rows made: hemicubes drawn, or fans of rays cast.
     pub hemicubes: u64,
+    /// Hemicubes drawn at each resolution: pixels along an edge of the top face, and how many.
+    /// None where rays were cast.
+    pub hemicubes_by_resolution: Vec<(u32, u64)>,
     /// Places at which vertices gathered.
     pub gathers: u64,
     /// What gathering changed of the vertices; see `GatheredRadiosity`.
@@ -43,6 +49,8 @@ pub struct Report {
     pub stop: String,
     /// Where the light went.
     pub ledger: Ledger,
+    /// How far off the result is.
+    pub certificate: Certificate,
     /// Where the time went.
     pub seconds: Seconds,
     /// What deserves a look.
@@ -55,7 +63,9 @@ pub struct Report {
 pub struct Seconds {
     /// Reading the scene.
     pub load: f64,
-    /// Cutting it into elements, and opening the device.
+    /// Opening the device.
+    pub open: f64,
+    /// Cutting the scene into elements, and getting the device ready.
     pub mesh: f64,
     /// Rendering item buffers, or casting rays.
     pub draw: f64,
@@ -67,6 +77,8 @@ pub struct Seconds {
     pub solve: f64,
     /// Elements to vertices, gathering and splitting included.
     pub vertices: f64,
+    /// Judging what was found.
+    pub certificate: f64,
     /// Drawing the camera image and writing all other files.
     pub write: f64,
     /// All of it.
@@ -78,11 +90,14 @@ impl Report {
     pub fn to_json(&self) -> Value {
         let channels = |c: Rgb| json!(c.to_array());
         let Ledger { emitted, absorbed, left, back, unshot } = self.ledger;
-        let s = self.seconds;
+        let (s, c) = (self.seconds, self.certificate);
         let [name, kind, driver] = &self.adapter;
+        let drawn = self.hemicubes_by_resolution.iter();
+        let drawn: Map<String, Value> = drawn.map(|(n, k)| (n.to_string(), json!(k))).collect();
         json!({
             "scene": self.scene,
             "adapter": { "name": name, "type": kind, "driver": driver },
+            "goal": self.goal,
             "settings": self.settings.iter().cloned().collect::<Map<String, Value>>(),
             "triangles": self.triangles,
             "shot_elements": self.shot_elements,
@@ -90,6 +105,7 @@ impl Report {
             "vertices": self.vertices,
             "shots": self.shots,
             "hemicubes": self.hemicubes,
+            "hemicubes_by_resolution": drawn,
             "gathers": self.gathers,
             "gather_change": self.gather_change,
             "gather_stop": self.gather_stop,
@@ -102,10 +118,14 @@ impl Report {
                 "back": channels(back),
                 "unshot": channels(unshot),
             },
+            "error": {
+                "total": c.total, "mesh": c.mesh, "sampling": c.sampling, "settling": c.settling,
+                "unshot": c.unshot, "unshot_bound": c.unshot_bound, "places": c.places,
+            },
             "seconds": {
-                "load": s.load, "mesh": s.mesh, "draw": s.draw, "reduce": s.reduce,
+                "load": s.load, "open": s.open, "mesh": s.mesh, "draw": s.draw, "reduce": s.reduce,
                 "readback": s.readback, "solve": s.solve, "vertices": s.vertices,
-                "write": s.write, "total": s.total,
+                "certificate": s.certificate, "write": s.write, "total": s.total,
             },
             "warnings": self.warnings,
         })

@@ -9,7 +9,7 @@
 //! brightness likewise, there the links between two patches).
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashSet};
 use std::ops::Range;
 
 use glam::DVec3;
@@ -26,6 +26,8 @@ pub(super) struct Shooters<'m> {
     /// Centroid of each element.
     centroids: Vec<DVec3>,
     cut: Vec<Shooter>,
+    /// Nodes that see mostly backs.
+    blind: HashSet<NodeId>,
     /// Most that √s q may be.
     tolerance: f64,
     /// Quadtree levels above the elements that are not gone below.
@@ -41,6 +43,8 @@ struct Shooter {
     near: Near,
     /// Emits and has not shot yet.
     fresh: bool,
+    /// Times that its patch saw mostly backs.
+    rejected: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -67,26 +71,31 @@ pub(super) struct Shot {
 }
 
 impl<'m> Shooters<'m> {
-    /// The largest there are; but emitters shoot by their elements, since what is nearest a lamp
-    /// depends most on its shape.
+    /// The largest there are; but emitters that are few shoot by their elements, since what is nearest
+    /// a lamp depends most on its shape.
     pub fn new(mesh: &'m Mesh, tolerance: f64, level: u32) -> Shooters<'m> {
         let clusters = Clusters::new(mesh.scene());
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
         let centroids = elements.map(|n| mesh.centroid(n)).collect();
-        let mut all = Shooters { mesh, clusters, centroids, cut: vec![], tolerance, level };
+        let blind = HashSet::new();
+        let mut all = Shooters { mesh, clusters, centroids, cut: vec![], blind, tolerance, level };
         // As in the middle of a cube of that area.
         let area: f64 = (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum();
         let near = Near { first: (6.0 / area).sqrt(), second: 6.0 / area };
+        let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
+        let emitters = (0..mesh.scene().triangles().len()).filter(|&t| emits(t));
+        let few = emitters.map(|t| mesh.elements_of(mesh.root(t)).len()).sum::<usize>() <= FEW;
         for &root in all.clusters.roots() {
             let triangles = all.clusters.triangles(root);
-            if mesh.scene().material(triangles[0] as usize).exitance == Rgb::ZERO {
-                all.cut.push(all.shooter(Source::Cluster(root), near));
+            let fresh = emits(triangles[0] as usize);
+            if !(fresh && few) {
+                let shooter = all.shooter(Source::Cluster(root), near);
+                all.cut.push(Shooter { fresh, ..shooter });
                 continue;
             }
             let below = triangles.iter().flat_map(|&t| mesh.elements_of(mesh.root(t as usize)));
             let one = |e| all.shooter(Source::Node(mesh.element(e)), near);
-            let emitter = |e| Shooter { fresh: true, ..one(e) };
-            let emitters: Vec<Shooter> = below.map(emitter).collect();
+            let emitters: Vec<Shooter> = below.map(|e| Shooter { fresh, ..one(e) }).collect();
             all.cut.extend(emitters);
         }
         all
@@ -142,7 +151,7 @@ impl<'m> Shooters<'m> {
     }
 
     /// Learns from a new row how near the receivers of `shot` are. Answers whether it is to be
-    /// taken still; if not, the shooter has been split.
+    /// taken still; if not, the shooter has been split, or shoots from elsewhere.
     pub fn confirm(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
         let eye = self.mesh.centroid(shot.patch);
         let mut near = Near { first: 0.0, second: 0.0 };
@@ -152,7 +161,15 @@ impl<'m> Shooters<'m> {
             near.first += factor / distance;
             near.second += factor / (distance * distance);
         }
-        self.cut[shot.shooter].near = near;
+        let shooter = &mut self.cut[shot.shooter];
+        shooter.near = near;
+        let alone = all(&shooter.elements).nth(1).is_none();
+        if Row::form_factor(row.back) > BLIND && shooter.rejected < ATTEMPTS && !alone {
+            shooter.rejected += 1;
+            shooter.patch = None;
+            self.blind.insert(shot.patch);
+            return false;
+        }
         !self.split(shot.shooter, flux)
     }
 
@@ -226,7 +243,9 @@ impl<'m> Shooters<'m> {
         let whole: f64 = elements().map(light).sum();
         let mean = whole / elements().map(area).sum::<f64>();
         let lit = |&e: &usize| light(e) >= LIT * mean * area(e);
-        if let Source::Node(node) = shooter.source {
+        if let Source::Node(node) = shooter.source
+            && !self.blind.contains(&node)
+        {
             let mut middle = node;
             while let Some([.., part]) = mesh.children(middle) {
                 middle = part;
@@ -237,7 +256,8 @@ impl<'m> Shooters<'m> {
         }
         let middle = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / whole;
         let off = |e: &usize| self.centroids[*e].distance_squared(middle);
-        let nearest = elements().filter(lit).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let sees = |e: &usize| !self.blind.contains(&mesh.element(*e));
+        let nearest = elements().filter(lit).filter(sees).min_by(|a, b| off(a).total_cmp(&off(b)));
         mesh.element(nearest.unwrap_or(shooter.elements[0].start))
     }
 
@@ -263,7 +283,7 @@ impl<'m> Shooters<'m> {
             }
             joins
         });
-        Shooter { source, elements, patch: None, near, fresh: false }
+        Shooter { source, elements, patch: None, near, fresh: false, rejected: 0 }
     }
 
     fn parts(&self, source: Source) -> Vec<Source> {
@@ -281,8 +301,16 @@ impl<'m> Shooters<'m> {
     }
 }
 
+/// Elements of emitters that all shoot by themselves. More are rooms that glow, not lamps.
+const FEW: usize = 1024;
+
 /// A batch ends where the flux is below this share of its brightest patch.
 const BATCH_FALL: f64 = 0.25;
+
+/// Who sees more than this share of backs stands in or under something, and nobody shoots from there
+/// if another place can be found in so many attempts.
+const BLIND: f64 = 0.5;
+const ATTEMPTS: u32 = 4;
 
 /// An element is lit from this share of its shooter's mean radiosity.
 const LIT: f64 = 0.5;

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use super::kept_rows::KeptRows;
-use super::shooters::Shooters;
+use super::shooters::{Shooters, Shot};
 use super::{Flux, Go, Ledger, Progress, Solution, Stop};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{FormFactors, Row};
@@ -28,8 +28,8 @@ pub struct Shooting {
     /// the emitted light that it carries, under a square root, times the share of this that goes
     /// wrong, as far as can be told from its size, from how near its receivers are and from how
     /// uneven it is. Patches are as large as this lets them be, from clusters of many triangles down
-    /// to elements. 0 makes every patch as small as `level` allows. Elements of emitters always
-    /// shoot by themselves. Rows are taken to be right for near receivers: see
+    /// to elements. 0 makes every patch as small as `level` allows. Elements of emitters shoot by
+    /// themselves where they are few. Rows are taken to be right for near receivers: see
     /// [`NearRepair`](crate::NearRepair).
     pub tolerance: f64,
     /// The smallest patches are this many quadtree levels above the elements: 4ᵏ elements, or a
@@ -88,9 +88,11 @@ impl Shooting {
             }
             let missing = |patch| kept.get(patch).is_none();
             let batch = shooters.brightest(&state.flux, form_factors.batch(), left, missing);
-            let missing: Vec<NodeId> =
-                batch.iter().map(|s| s.patch).filter(|&p| missing(p)).collect();
-            let made = form_factors.rows(mesh, &missing)?;
+            let draws: Vec<&Shot> = batch.iter().filter(|s| missing(s.patch)).collect();
+            let share = |s: &&Shot| state.flux.unshot_share(&s.elements);
+            let unshot_share = draws.iter().map(share).fold(0.0, f64::max);
+            let missing: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
+            let made = form_factors.rows(mesh, &missing, unshot_share)?;
             if made.len() != missing.len() {
                 let found = format!("{} rows for {} patches", made.len(), missing.len());
                 let remedy = "FormFactors::rows must return one row a patch";

@@ -3,9 +3,10 @@
 
 use super::VertexRadiosity;
 use super::refined::Refined;
+use super::vertices::Vertices;
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, Sources};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Smooth};
 use crate::scene::Rgb;
 use crate::solve::{Go, Stop};
 
@@ -22,11 +23,15 @@ pub struct Gathering {
     pub elements: usize,
     /// Levels that every element is split before the light has a say.
     pub everywhere: u32,
+    /// How often all vertices gather: first the light given, then what they gathered themselves.
+    pub sweeps: u32,
 }
 
 /// How far gathering is, told after every batch of vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherProgress {
+    /// Times that all vertices have gathered.
+    pub sweep: u32,
     /// Times that elements have been split.
     pub level: u32,
     /// Elements so far.
@@ -66,7 +71,30 @@ impl GatheredRadiosity {
     pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredRadiosity, Error> {
         check_count(mesh, radiosity)?;
         let surface = VertexRadiosity::new(mesh, radiosity);
-        Ok(GatheredRadiosity { surface, ..Refined::new(mesh.clone(), radiosity).finish() })
+        let corners = Vertices::new(mesh, &Smooth::new(mesh.scene())).corners;
+        let mut reflected = surface.radiosity.clone();
+        for (e, corners) in corners.iter().enumerate() {
+            let emitted = mesh.material(mesh.element(e)).exitance;
+            for v in corners.map(|v| v as usize) {
+                reflected[v] = (surface.radiosity[v] - emitted).max(Rgb::ZERO);
+            }
+        }
+        let mesh = mesh.clone();
+        let (gathers, change, stop) = (0, 0.0, Stop::Converged);
+        Ok(GatheredRadiosity { mesh, surface, corners, reflected, gathers, change, stop })
+    }
+
+    /// Whether this is light of the scene of `mesh`.
+    pub(crate) fn check_scene(&self, mesh: &Mesh) -> Result<(), Error> {
+        let (own, other) = (self.mesh.scene(), mesh.scene());
+        let same = std::ptr::eq(own, other)
+            || own.positions() == other.positions() && own.triangles() == other.triangles();
+        if same {
+            return Ok(());
+        }
+        let remedy = "give light that was found on a mesh of the same scene";
+        let found = "light of another scene than the mesh's";
+        Err(Error::new(ErrorKind::Setting, "light to gather", found, remedy))
     }
 
     /// The light, for whoever gathers it elsewhere.
@@ -75,19 +103,20 @@ impl GatheredRadiosity {
     }
 }
 
-/// Vertices that the elements had wrong by more than this share gather twice to begin with.
-const WRONG: f64 = 0.1;
+/// Elements of one sweep may bend so many times as much as those of the next.
+const COARSER: f64 = 3.0;
 
 impl Gathering {
     /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, 2¹⁹ elements at
     /// most.
     pub fn new(smallest: f64) -> Gathering {
-        Gathering { tolerance: 0.02, smallest, elements: 1 << 19, everywhere: 0 }
+        Gathering { tolerance: 0.02, smallest, elements: 1 << 19, everywhere: 0, sweeps: 1 }
     }
 
-    /// Lets the vertices of `mesh` gather, given the radiosity of its elements (W/m², one value an
-    /// element), splits elements, lets the new vertices gather, and so on: B = E + ρ Σ F_vj B_j, with
-    /// B_j as known so far. No light is shot again.
+    /// Lets the vertices of `mesh` gather `light`, splits elements, lets the new vertices gather, and
+    /// so on: B = E + ρ Σ F_vj B_j. No light is shot again. `light` is of the same scene, on any mesh:
+    /// what was shot on fine elements, where hemicubes see most at no cost, is gathered at the corners
+    /// of coarse ones.
     ///
     /// The estimate is the hierarchical surplus (Yserentant 1986): how far a new vertex is from the
     /// mean of the two that it lies between. Vertices under something that touches their surface
@@ -95,61 +124,41 @@ impl Gathering {
     /// `progress` is told of every batch of vertices and may stop it; what was reached is returned.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when a setting is out of range or `radiosity` has not one value an
-    /// element; whatever `gather` fails with.
+    /// [`ErrorKind::Setting`] when a setting is out of range or `light` is of another scene; whatever
+    /// `gather` fails with.
     pub fn gather(
         &self,
+        light: &GatheredRadiosity,
         mesh: &Mesh,
-        radiosity: &[Rgb],
         gather: &mut dyn Gather,
         mut progress: impl FnMut(&GatherProgress) -> Go,
     ) -> Result<GatheredRadiosity, Error> {
         self.check()?;
-        check_count(mesh, radiosity)?;
-        let mut state = Refined::new(mesh.clone(), radiosity);
-        let before = state.reflected().to_vec();
-        let mut change = None;
-        let mut fresh: Vec<u32> = (0..before.len() as u32).collect();
-        let mut young: Vec<usize> = (0..mesh.element_count()).collect();
-        let (mut level, mut crowded) = (0, false);
-        let stop = loop {
-            let elements = state.mesh().element_count();
-            let mut told =
-                |gathered, of| progress(&GatherProgress { level, elements, gathered, of });
-            if state.gather(&fresh, gather, &mut told)?.is_break() {
-                break Stop::Cancelled;
+        light.check_scene(mesh)?;
+        let mut state = Refined::new(mesh.clone(), light);
+        let stop = self.settle(&mut state, gather, &mut progress)?;
+        Ok(GatheredRadiosity { stop, ..state.reached() })
+    }
+
+    /// All sweeps: the first ones over coarser elements, since they only light the last.
+    pub(crate) fn settle(
+        &self,
+        state: &mut Refined,
+        gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(&GatherProgress) -> Go,
+    ) -> Result<Stop, Error> {
+        for left in (1..self.sweeps).rev() {
+            let coarser = COARSER.powi(left as i32);
+            let tolerance = (self.tolerance * coarser).min(1.0);
+            let smallest = self.smallest * coarser;
+            let coarse = Gathering { tolerance, smallest, ..self.clone() };
+            let stop = state.sweep(&coarse, gather, progress)?;
+            if stop == Stop::Cancelled {
+                return Ok(stop);
             }
-            if change.is_none() {
-                change = Some(state.change(&before));
-                // What the elements got badly wrong was seen by its neighbours as wrong.
-                let wrong = state.off(&before, WRONG);
-                if state.gather(&wrong, gather, &mut told)?.is_break() {
-                    break Stop::Cancelled;
-                }
-            }
-            let room = self.elements.saturating_sub(elements) / 3;
-            let mut bent: Vec<(f64, usize)> = if level < self.everywhere {
-                young.iter().map(|&e| (1.0, e)).filter(|b| state.splits(b.1)).collect()
-            } else {
-                young.iter().map(|&e| (state.bend(e, self), e)).filter(|b| b.0 > 1.0).collect()
-            };
-            if bent.is_empty() {
-                break if crowded { Stop::Elements } else { Stop::Converged };
-            }
-            if bent.len() > room {
-                crowded = true;
-                bent.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-                bent.truncate(room);
-            }
-            if bent.is_empty() {
-                break Stop::Elements;
-            }
-            let mut split: Vec<usize> = bent.into_iter().map(|b| b.1).collect();
-            split.sort_unstable();
-            (fresh, young) = state.split(&split)?;
-            level += 1;
-        };
-        Ok(GatheredRadiosity { change: change.unwrap_or(0.0), stop, ..state.finish() })
+            state.shine();
+        }
+        state.sweep(self, gather, progress)
     }
 
     /// Whether [`Gathering::gather`] would take these settings: worth asking before a long solve.

@@ -1,19 +1,24 @@
 //! The state of gathering: a mesh that grows finer, and what its vertices reflect.
 
-use glam::{DMat3, DVec3};
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+
+use glam::{DMat3, DVec2, DVec3};
 
 use super::VertexRadiosity;
-use super::gathering::{GatheredRadiosity, Gathering};
+use super::gathering::{GatherProgress, GatheredRadiosity, Gathering};
 use super::places::Stands;
 use super::seams::Seams;
 use super::vertices::{Key, Vertices, corners, middles};
 use crate::error::Error;
-use crate::gather::{Gather, Place, Sources};
-use crate::mesh::{MAX_DEPTH, Mesh, NodeId, Smooth};
+use crate::gather::{Gather, Place};
+use crate::mesh::{MAX_DEPTH, Mesh, Smooth};
 use crate::scene::Rgb;
 use crate::solve::{Go, Stop};
 
-pub(super) struct Refined {
+pub(crate) struct Refined<'a> {
+    /// What shines on the vertices.
+    light: Cow<'a, GatheredRadiosity>,
     mesh: Mesh,
     smooth: Smooth,
     vertices: Vertices,
@@ -21,21 +26,21 @@ pub(super) struct Refined {
     reflected: Vec<Rgb>,
     /// Whether a vertex lies under something that touches its surface.
     covered: Vec<bool>,
-    /// How many times elements had been split when a vertex gathered last.
-    seen_at: Vec<u32>,
-    /// How many times they have been.
+    /// How far the last sweep was from what was known before it, relative.
+    change: f64,
+    /// Times that what was reached has shone.
+    sweep: u32,
+    /// Times that elements have been split.
     level: u32,
-    /// Where all vertices are gathered at.
+    /// Places at which light was gathered.
     gathers: u64,
     /// Radiosity that is as good as none, W/m².
     dim: f64,
     /// Longest edge of the elements to begin with, scene unit.
     largest: f64,
+    /// Sides across which a smooth surface goes on.
+    joined: HashSet<u32>,
 }
-
-/// Corners of elements that are split gather anew after so many levels: what is near them is known
-/// better by then.
-const STALE: u32 = 2;
 
 /// Vertices that gather at once: progress is told of after each batch.
 const BATCH: usize = 256;
@@ -48,71 +53,75 @@ const DIM: f64 = 0.05;
 /// errors, which would cut contacts to dust, and equal errors times length.
 const SMALL: f64 = 0.75;
 
+/// Steps along an element's side at which it is looked for what shines unevenly on it.
+const LATTICE: u32 = 4;
+
+/// The middle of a parabola is off by twice its root mean square, or a little less.
+const SEEN: f64 = 2.0;
+
+/// So many times further off than others are elements where their surface ends.
+const AT_END: f64 = 2.5;
+
 /// Middles off by more than this share are at a jump, where a parabola says nothing.
 const JUMP: f64 = 0.2;
 
-impl Refined {
-    /// Starts from the radiosity of the elements of `mesh`, one value an element.
-    pub fn new(mesh: Mesh, radiosity: &[Rgb]) -> Refined {
+impl<'a> Refined<'a> {
+    /// Starts on `mesh` from what `light`, of the same scene, has at its vertices.
+    pub fn new(mesh: Mesh, light: &'a GatheredRadiosity) -> Refined<'a> {
         let smooth = Smooth::new(mesh.scene());
         let vertices = Vertices::new(&mesh, &smooth);
-        let elements = || (0..mesh.element_count()).map(|e| (e, mesh.element(e)));
-        let mut reflected = VertexRadiosity::new(&mesh, radiosity).radiosity;
-        reflected.truncate(vertices.positions.len());
-        let mut exitance = vec![Rgb::ZERO; reflected.len()];
-        for (e, node) in elements() {
-            let emitted = mesh.material(node).exitance;
-            vertices.corners[e].iter().for_each(|&v| exitance[v as usize] = emitted);
+        let sources = light.sources();
+        let at = |&(t, [u, v]): &(usize, [f64; 2])| sources.reflected_at(t, u, v);
+        let reflected: Vec<Rgb> = vertices.places.iter().map(at).collect();
+        let (mut flux, mut area) = (0.0, 0.0);
+        for (e, corners) in light.corners.iter().enumerate() {
+            let size = light.mesh.area(light.mesh.element(e));
+            let mean = corners.iter().map(|&v| light.reflected[v as usize]).sum::<Rgb>() / 3.0;
+            (flux, area) = (flux + mean.length() * size, area + size);
         }
-        let all = reflected.iter_mut().zip(exitance);
-        all.for_each(|(b, emitted)| *b = (*b - emitted).max(Rgb::ZERO));
-        let area: f64 = elements().map(|(_, n)| mesh.area(n)).sum();
-        let lit = |(e, n): (usize, NodeId)| {
-            (radiosity[e] - mesh.material(n).exitance).length() * mesh.area(n)
-        };
-        let flux: f64 = elements().map(lit).sum();
-        let largest = elements().map(|(_, n)| mesh.longest_edge(n)).fold(0.0, f64::max);
-        let covered = vec![false; reflected.len()];
-        let dim = DIM * flux / area;
-        let (seen_at, level, gathers) = (vec![0; reflected.len()], 0, 0);
+        let edge = |e| mesh.longest_edge(mesh.element(e));
+        let largest = (0..mesh.element_count()).map(edge).fold(0.0, f64::max);
+        let (covered, dim) = (vec![false; reflected.len()], DIM * flux / area);
+        let joined = smooth.joins().map(|[(t, k), _]| smooth.sides[t][k].id).collect();
+        let (light, sweep, level, gathers) = (Cow::Borrowed(light), 0, 0, 0);
         Refined {
+            light,
             mesh,
             smooth,
             vertices,
             reflected,
             covered,
-            seen_at,
+            change: 0.0,
+            sweep,
             level,
             gathers,
             dim,
             largest,
+            joined,
         }
     }
 
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// What was reached.
-    pub fn finish(self) -> GatheredRadiosity {
-        let (surface, reflected) = (self.surface(), self.seen());
+    pub fn reached(&self) -> GatheredRadiosity {
         GatheredRadiosity {
-            mesh: self.mesh,
-            surface,
-            corners: self.vertices.corners,
-            reflected,
+            mesh: self.mesh.clone(),
+            surface: self.surface(),
+            corners: self.vertices.corners.clone(),
+            reflected: self.seen(),
             gathers: self.gathers,
-            change: 0.0,
+            change: self.change,
             stop: Stop::Converged,
         }
     }
 
-    pub fn reflected(&self) -> &[Rgb] {
-        &self.reflected
+    /// Lets what was reached shine from now on.
+    pub fn shine(&mut self) {
+        self.light = Cow::Owned(self.reached());
+        self.sweep += 1;
     }
 
     /// Root mean square over the elements of how far their vertices are from `before`, relative.
-    pub fn change(&self, before: &[Rgb]) -> f64 {
+    fn distance(&self, before: &[Rgb]) -> f64 {
         let (mut off, mut all) = (0.0, 0.0);
         for (e, corners) in self.vertices.corners.iter().enumerate() {
             let area = self.mesh.area(self.mesh.element(e));
@@ -124,29 +133,18 @@ impl Refined {
         if all > 0.0 { (off / all).sqrt() } else { 0.0 }
     }
 
-    /// The vertices that are further from `before` than this share of what they have now.
-    pub fn off(&self, before: &[Rgb], share: f64) -> Vec<u32> {
-        let off = |&v: &u32| {
-            let now = self.reflected[v as usize];
-            now.distance(before[v as usize]) > share * now.length()
-        };
-        (0..before.len() as u32).filter(off).collect()
-    }
-
     /// Lets the vertices `fresh` gather.
-    pub fn gather(
+    fn gather(
         &mut self,
         fresh: &[u32],
         gather: &mut dyn Gather,
-        told: &mut dyn FnMut(usize, usize) -> Go,
+        progress: &mut dyn FnMut(&GatherProgress) -> Go,
     ) -> Result<Go, Error> {
         let stands = Stands::new(&self.mesh, &self.vertices);
         // What reflects nothing need not look.
         let reflects = |&v: &u32| stands.reflectance(v) != Rgb::ZERO;
         let mut left: Vec<u32> = fresh.iter().copied().filter(reflects).collect();
-        let seen = self.seen();
-        let sources =
-            Sources { mesh: &self.mesh, corners: &self.vertices.corners, reflected: &seen };
+        let sources = self.light.sources();
         let (of, mut gathered) = (left.len(), 0);
         for attempt in 0.. {
             let mut again = vec![];
@@ -165,7 +163,9 @@ impl Refined {
                         self.reflected[v as usize] = stands.reflectance(v) * found.irradiance;
                     }
                 }
-                if told(gathered, of).is_break() {
+                let elements = self.mesh.element_count();
+                let (sweep, level) = (self.sweep, self.level);
+                if progress(&GatherProgress { sweep, level, elements, gathered, of }).is_break() {
                     return Ok(Go::Break(()));
                 }
             }
@@ -176,6 +176,59 @@ impl Refined {
         }
         self.uncover();
         Ok(Go::Continue(()))
+    }
+
+    /// Lets all vertices gather what shines, then splits and gathers on.
+    pub fn sweep(
+        &mut self,
+        settings: &Gathering,
+        gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(&GatherProgress) -> Go,
+    ) -> Result<Stop, Error> {
+        let (before, all) = (self.reflected.clone(), 0..self.reflected.len() as u32);
+        if self.gather(&all.collect::<Vec<_>>(), gather, progress)?.is_break() {
+            return Ok(Stop::Cancelled);
+        }
+        self.change = self.distance(&before);
+        self.refine(settings, gather, progress)
+    }
+
+    /// Splits elements where the light bends by more than `settings` allow, and lets the new vertices
+    /// gather, until it does nowhere.
+    pub fn refine(
+        &mut self,
+        settings: &Gathering,
+        gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(&GatherProgress) -> Go,
+    ) -> Result<Stop, Error> {
+        let mut young: Vec<usize> = (0..self.mesh.element_count()).collect();
+        let mut crowded = false;
+        loop {
+            let room = settings.elements.saturating_sub(self.mesh.element_count()) / 3;
+            let mut bent: Vec<(f64, usize)> = if self.level < settings.everywhere {
+                young.iter().map(|&e| (1.0, e)).filter(|b| self.splits(b.1)).collect()
+            } else {
+                young.iter().map(|&e| (self.bend(e, settings), e)).filter(|b| b.0 > 1.0).collect()
+            };
+            if bent.is_empty() {
+                return Ok(if crowded { Stop::Elements } else { Stop::Converged });
+            }
+            if bent.len() > room {
+                crowded = true;
+                bent.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                bent.truncate(room);
+            }
+            if bent.is_empty() {
+                return Ok(Stop::Elements);
+            }
+            let mut split: Vec<usize> = bent.into_iter().map(|b| b.1).collect();
+            split.sort_unstable();
+            let fresh;
+            (fresh, young) = self.split(&split)?;
+            if self.gather(&fresh, gather, progress)?.is_break() {
+                return Ok(Stop::Cancelled);
+            }
+        }
     }
 
     /// What the vertices reflect, as others are to see it: raised or lowered so that the mean over
@@ -220,7 +273,7 @@ impl Refined {
     }
 
     /// Whether element `e` can be split at all.
-    pub fn splits(&self, e: usize) -> bool {
+    fn splits(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
         self.mesh.cell(node).level < MAX_DEPTH && self.mesh.material(node).reflectance != Rgb::ZERO
     }
@@ -228,7 +281,7 @@ impl Refined {
     /// How much the light on element `e` bends, in units of what is allowed; 0 where it is not to be
     /// split. An element without a parent is taken for bent where its corners differ by four times
     /// as much.
-    pub fn bend(&self, e: usize, settings: &Gathering) -> f64 {
+    fn bend(&self, e: usize, settings: &Gathering) -> f64 {
         let node = self.mesh.element(e);
         let size = self.mesh.longest_edge(node);
         if !self.splits(e) || size <= settings.smallest {
@@ -252,26 +305,102 @@ impl Refined {
                 let given = pairs.into_iter().filter(|(a, b)| a.1 != b.1);
                 given.map(step).fold(bent, f64::max)
             }
-            None => pairs.into_iter().filter(|(a, b)| !(a.1 && b.1)).map(step).fold(0.0, f64::max),
+            None => {
+                let mean = corners.iter().map(|c| c.0).sum::<Rgb>() / 3.0;
+                let hidden = off(mean, mean + Rgb::splat(self.hidden(e) / 3f64.sqrt()));
+                let steps = pairs.into_iter().filter(|(a, b)| !(a.1 && b.1)).map(step);
+                steps.fold(SEEN * hidden, f64::max)
+            }
         }
     }
 
-    /// Splits `elements`, which ascend. Gives the vertices that are to gather: new ones, which have the
-    /// mean of those that they lie between, and stale ones; and the elements that are new.
-    pub fn split(&mut self, elements: &[usize]) -> Result<(Vec<u32>, Vec<usize>), Error> {
+    /// How far what shines is from linear over element `e`, where it is known more finely than that:
+    /// root mean square over a lattice, W/m².
+    fn hidden(&self, e: usize) -> f64 {
+        let node = self.mesh.element(e);
+        let (t, sources) = (self.mesh.triangle(node), self.light.sources());
+        let [a, b, c] = self.mesh.cell(node).corners().map(DVec2::from_array);
+        let at = |p: DVec2| sources.reflected_at(t, p.x, p.y);
+        let ends = [a, b, c].map(at);
+        let mut squares = 0.0;
+        for i in 0..=LATTICE {
+            for j in 0..=LATTICE - i {
+                let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(LATTICE));
+                let linear = ends[0] * (1.0 - u - v) + ends[1] * u + ends[2] * v;
+                squares += at(a * (1.0 - u - v) + b * u + c * v).distance_squared(linear);
+            }
+        }
+        (squares / f64::from((LATTICE + 1) * (LATTICE + 2) / 2)).sqrt()
+    }
+
+    /// How far off each element may be by what is known of it, W/m²: a quarter of how far the middles
+    /// of its parent were, and more where its surface ends or something stands on it. There light
+    /// goes as d ln d with the distance d, which halving does not make four times as straight.
+    pub fn rest(&self) -> Vec<f64> {
+        let ends = self.ends();
+        let rest = |e: usize| {
+            let known = match self.sides(e) {
+                Some(sides) => {
+                    let lit = sides.iter().filter(|s| s.lit);
+                    lit.map(|s| s.bend().length()).fold(0.0, f64::max) / 4.0
+                }
+                None => self.hidden(e),
+            };
+            let at_end = self.vertices.corners[e].iter().any(|&v| ends[v as usize]);
+            if at_end { known * AT_END } else { known }
+        };
+        (0..self.mesh.element_count()).map(rest).collect()
+    }
+
+    /// Whether each vertex lies where its surface ends, or next to what is covered.
+    fn ends(&self) -> Vec<bool> {
+        let mut ends = self.covered.clone();
+        for corners in &self.vertices.corners {
+            if corners.iter().any(|&v| self.covered[v as usize]) {
+                corners.iter().for_each(|&v| ends[v as usize] = true);
+            }
+        }
+        let mut sides: HashMap<(u32, u32), u32> = HashMap::new();
+        for corners in &self.vertices.corners {
+            for k in 0..3 {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                *sides.entry((a.min(b), a.max(b))).or_default() += 1;
+            }
+        }
+        // Where elements are unequal, inner sides are run once too; those join no two triangles.
+        let outer = |v: u32| match self.vertices.keys[v as usize] {
+            Key::Inside { .. } => false,
+            Key::Side { id, .. } => !self.joined.contains(&id),
+            Key::Corner(_) => true,
+        };
+        for ((a, b), count) in sides {
+            if count == 1 && outer(a) && outer(b) {
+                ends[a as usize] = true;
+                ends[b as usize] = true;
+            }
+        }
+        ends
+    }
+
+    /// What shines on the vertices.
+    pub fn light(&self) -> &GatheredRadiosity {
+        &self.light
+    }
+
+    /// Splits `elements`, which ascend. Gives the vertices that are new, which have the mean of those
+    /// that they lie between, and the elements that are.
+    fn split(&mut self, elements: &[usize]) -> Result<(Vec<u32>, Vec<usize>), Error> {
         let finer = self.mesh.split(elements)?;
+        self.level += 1;
         let vertices = Vertices::new(&finer, &self.smooth);
         let count = vertices.positions.len();
         let (mut reflected, mut covered) = (vec![Rgb::ZERO; count], vec![false; count]);
-        self.level += 1;
-        let mut seen_at = vec![self.level; count];
         let mut fresh = vec![];
         for (v, key) in vertices.keys.iter().enumerate() {
             match self.vertices.find(key) {
                 Some(old) => {
                     reflected[v] = self.reflected[old as usize];
                     covered[v] = self.covered[old as usize];
-                    seen_at[v] = self.seen_at[old as usize];
                 }
                 None => fresh.push(v as u32),
             }
@@ -284,13 +413,6 @@ impl Refined {
             let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
             // The corners of the fourth part are the middles of the sides opposite a, b and c.
             let middles = vertices.corners[e + 3 * k + 3].map(|v| v as usize);
-            for v in self.vertices.corners[e].map(|v| &self.vertices.keys[v as usize]) {
-                let Some(v) = vertices.find(v) else { continue };
-                if self.level - seen_at[v as usize] >= STALE {
-                    seen_at[v as usize] = self.level;
-                    fresh.push(v);
-                }
-            }
             for (m, mean) in middles.into_iter().zip([b + c, c + a, a + b]) {
                 if is_new(m) {
                     reflected[m] = mean / 2.0;
@@ -298,7 +420,7 @@ impl Refined {
             }
         }
         (self.mesh, self.vertices) = (finer, vertices);
-        (self.reflected, self.covered, self.seen_at) = (reflected, covered, seen_at);
+        (self.reflected, self.covered) = (reflected, covered);
         Ok((fresh, young))
     }
 

@@ -24,6 +24,9 @@ pub(super) struct Vertices {
     pub keys: Vec<Key>,
     /// Where it is, scene unit.
     pub positions: Vec<DVec3>,
+    /// A triangle that each lies in, and its barycentric position there: weights of the second and
+    /// third corner.
+    pub places: Vec<(usize, [f64; 2])>,
     /// The three at the corners of each element.
     pub corners: Vec<[u32; 3]>,
     /// All around each element.
@@ -58,8 +61,8 @@ impl Rims {
 impl Vertices {
     /// Those of `mesh`, whose scene's smooth surfaces are `smooth`.
     pub fn new(mesh: &Mesh, smooth: &Smooth) -> Vertices {
-        let (keys, positions, corners, rims, numbers) = Default::default();
-        let mut out = Vertices { keys, positions, corners, rims, numbers };
+        let (keys, positions, places, corners, rims, numbers) = Default::default();
+        let mut out = Vertices { keys, positions, places, corners, rims, numbers };
         (0..mesh.element_count()).for_each(|e| out.add_corners(mesh, smooth, e));
         let mut rims = Rims::default();
         for e in 0..mesh.element_count() {
@@ -82,6 +85,7 @@ impl Vertices {
             *self.numbers.entry(key).or_insert_with(|| {
                 self.keys.push(key);
                 self.positions.push(position(mesh.scene(), smooth, t, place));
+                self.places.push((t, place.map(share)));
                 self.positions.len() as u32 - 1
             })
         }));
@@ -146,11 +150,14 @@ fn lattice(cell: Cell) -> [[u32; 2]; 3] {
     cell.lattice_corners().map(|c| c.map(|k| k * (FINEST >> cell.level)))
 }
 
+fn share(steps: u32) -> f64 {
+    f64::from(steps) / f64::from(FINEST)
+}
+
 /// Where a lattice point of triangle `t` is. On a side that does not depend, bit for bit, on the
 /// triangle that asks.
 fn position(scene: &Scene, smooth: &Smooth, t: usize, [i, j]: [u32; 2]) -> DVec3 {
     let corners = scene.corners(t);
-    let share = |steps: u32| f64::from(steps) / f64::from(FINEST);
     let side = |k: usize, step: u32| {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         let (from, to, step) =

@@ -62,7 +62,7 @@ impl ViewFactors {
         let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
         let mut done = 0;
         for batch in elements.chunks(form_factors.batch().max(1)) {
-            for (row, &from) in form_factors.rows(mesh, batch)?.iter().zip(batch) {
+            for (row, &from) in form_factors.rows(mesh, batch, 1.0)?.iter().zip(batch) {
                 row.check(mesh, from)?;
                 let (fine, coarse) = (mesh.area(from), coarse[done]);
                 let sum = &mut sums[group(from) as usize];

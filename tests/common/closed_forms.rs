@@ -20,7 +20,7 @@ pub fn from_centroid() -> ClosedForms {
 }
 
 impl FormFactors for ClosedForms {
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId]) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
         self.made += patches.len() as u64;
         let row = |&patch: &NodeId| {
             let (polygon, eye, n) = (mesh.corners(patch), mesh.centroid(patch), mesh.normal(patch));

@@ -18,25 +18,53 @@ pub struct Errors {
     pub worst: f64,
 }
 
+/// A point of a truth file.
+#[derive(Clone, Debug)]
+pub struct Point {
+    pub kind: String,
+    pub position: DVec3,
+    pub normal: DVec3,
+    pub radiosity: Rgb,
+}
+
+/// The points of a truth file, or what is wrong with it.
+pub fn points(truth: &str) -> Result<Vec<Point>, String> {
+    let truth: Value = serde_json::from_str(truth).map_err(|e| e.to_string())?;
+    let points = truth["points"].as_array().ok_or("no list \"points\"")?;
+    let read = |(k, point): (usize, &Value)| {
+        let vector = |key: &str| {
+            let [x, y, z] = [0, 1, 2].map(|c| point[key][c].as_f64());
+            let vector = x.zip(y).zip(z).map(|((x, y), z)| DVec3::new(x, y, z));
+            vector.ok_or_else(|| format!("point {}: \"{key}\" is not three numbers", k + 1))
+        };
+        let kind = point["kind"].as_str();
+        Ok(Point {
+            kind: kind.ok_or_else(|| format!("point {}: no \"kind\"", k + 1))?.into(),
+            position: vector("p")?,
+            normal: vector("n")?,
+            radiosity: vector("B")?,
+        })
+    };
+    points.iter().enumerate().map(read).collect()
+}
+
 /// Compares `surface`, interpolated in its faces, with the points of a truth file. Panics when a
 /// point lies on no face.
 pub fn compare(surface: &VertexRadiosity, truth: &str) -> BTreeMap<String, Errors> {
-    let truth: Value = serde_json::from_str(truth).expect("JSON");
+    let points = points(truth).expect("a truth file");
     let mut errors: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
-    for point in truth["points"].as_array().expect("points") {
-        let vector = |key: &str| {
-            DVec3::from_array([0, 1, 2].map(|k| point[key][k].as_f64().expect("a number")))
-        };
-        let (wanted, got) = (vector("B"), at(surface, vector("p"), vector("n")));
-        let got = got.expect("a face at the point");
-        let error = got.distance(wanted) / wanted.length();
-        let signed = got.length() / wanted.length() - 1.0;
-        errors
-            .entry(point["kind"].as_str().expect("a kind").into())
-            .or_default()
-            .push((error, signed));
+    for point in points {
+        let found = off(surface, &point).expect("a face at the point");
+        errors.entry(point.kind).or_default().push(found);
     }
     errors.into_iter().map(|(kind, list)| (kind, summary(list))).collect()
+}
+
+/// |B − truth|/|truth| and (|B| − |truth|)/|truth| at a point, if it lies on a face of `surface`.
+pub fn off(surface: &VertexRadiosity, point: &Point) -> Option<(f64, f64)> {
+    let (got, _) = at(surface, point.position, point.normal)?;
+    let whole = point.radiosity.length();
+    Some((got.distance(point.radiosity) / whole, got.length() / whole - 1.0))
 }
 
 fn summary(errors: Vec<(f64, f64)>) -> Errors {
@@ -48,9 +76,9 @@ fn summary(errors: Vec<(f64, f64)>) -> Errors {
     Errors { count, bias, rms, median: errors[count / 2], worst: errors[count - 1] }
 }
 
-/// Interpolated radiosity at `p` with unit normal `n`, in the nearest face that faces alike.
-fn at(surface: &VertexRadiosity, p: DVec3, n: DVec3) -> Option<Rgb> {
-    let mut best: Option<(f64, Rgb)> = None;
+/// Interpolated radiosity, and the error it may have, at `p` with unit normal `n`, in the nearest face that faces alike.
+pub fn at(surface: &VertexRadiosity, p: DVec3, n: DVec3) -> Option<(Rgb, f64)> {
+    let mut best: Option<(f64, (Rgb, f64))> = None;
     for face in &surface.faces {
         let [a, b, c] = face.map(|v| surface.positions[v as usize]);
         let (e1, e2, d) = (b - a, c - a, p - a);
@@ -65,7 +93,9 @@ fn at(surface: &VertexRadiosity, p: DVec3, n: DVec3) -> Option<Rgb> {
         let off = beyond * normal.length().sqrt() + d.dot(unit).abs();
         if best.is_none_or(|(least, _)| off < least) {
             let [x, y, z] = face.map(|v| surface.radiosity[v as usize]);
-            best = Some((off, x * (1.0 - u - v) + y * u + z * v));
+            let told = face.map(|v| surface.error.get(v as usize).copied().unwrap_or(0.0));
+            let told = told[0] * (1.0 - u - v) + told[1] * u + told[2] * v;
+            best = Some((off, (x * (1.0 - u - v) + y * u + z * v, told)));
         }
     }
     // Points are given to four decimals of a millimetre, on walls that are planar to about that.

@@ -1,0 +1,374 @@
+//! A whole bake: from a scene to radiosity at vertices, as far as an effort goes, or until an
+//! accuracy is reached.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::certificate::{Certificate, Judged};
+use crate::device::{Device, DeviceRows};
+use crate::effort::Effort;
+use crate::error::Error;
+use crate::form_factor::near::NearRepair;
+use crate::form_factor::viewpoints::Viewpoints;
+use crate::gather::Gather;
+use crate::mesh::Mesh;
+use crate::scene::Scene;
+use crate::solve::{Go, Progress, Solution, Stop};
+use crate::vertex::gathering::{GatherProgress, GatheredRadiosity, Gathering};
+use crate::vertex::refined::Refined;
+
+/// What came out of a bake.
+#[derive(Clone, Debug)]
+pub struct Baked {
+    /// The mesh that light was shot on.
+    pub mesh: Mesh,
+    /// The light of its elements.
+    pub solution: Solution,
+    /// Radiosity at vertices, each with the error it may have.
+    pub light: GatheredRadiosity,
+    /// How far off that is.
+    pub certificate: Certificate,
+    /// The settings that were used in the end.
+    pub effort: Effort,
+    /// Rows drawn or cast, those of all rotations and viewpoints counted.
+    pub hemicubes: u64,
+    /// Hemicubes drawn at each resolution; none where rays were cast.
+    pub hemicubes_by_resolution: Vec<(u32, u64)>,
+    /// Share of a row that the proximity repair moved, in the mean.
+    pub near_moved: f64,
+    /// Where the time went.
+    pub seconds: BakeSeconds,
+}
+
+/// Seconds of wall time by stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BakeSeconds {
+    /// Cutting the scene into elements, and getting the device ready.
+    pub mesh: f64,
+    /// Rendering item buffers, or casting rays.
+    pub draw: f64,
+    /// Adding up pixel weights.
+    pub reduce: f64,
+    /// Getting rows from the device.
+    pub readback: f64,
+    /// Shooting along rows, repairs of rows included.
+    pub solve: f64,
+    /// Elements to vertices, gathering and splitting included.
+    pub vertices: f64,
+    /// Judging what was found.
+    pub certificate: f64,
+}
+
+impl BakeSeconds {
+    /// All of it.
+    pub fn total(&self) -> f64 {
+        let rows = self.draw + self.reduce + self.readback;
+        self.mesh + rows + self.solve + self.vertices + self.certificate
+    }
+}
+
+/// What a bake is at, told often.
+#[derive(Clone, Copy, Debug)]
+pub enum Stage {
+    /// Light is shot.
+    Shooting(Progress),
+    /// Vertices gather.
+    Gathering(GatherProgress),
+    /// The solution was judged.
+    Judged(Certificate),
+}
+
+/// Whoever is told of the stages of a bake, and may stop it.
+pub(crate) type Tell<'a> = &'a mut dyn FnMut(&Stage) -> Go;
+
+impl Effort {
+    /// Bakes `scene` as far as these settings go. `progress` may stop it at any time: what was
+    /// reached is returned.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Setting`] for a setting out of range; [`crate::ErrorKind::Device`] when the
+    /// device fails.
+    pub fn bake(
+        &self,
+        scene: impl Into<Arc<Scene>>,
+        device: &Device,
+        mut progress: impl FnMut(&Stage) -> Go,
+    ) -> Result<Baked, Error> {
+        self.bake_until(&scene.into(), device, &Goal::None, &mut progress)
+    }
+
+    /// As [`Effort::bake`], and on until `goal` is reached.
+    pub(crate) fn bake_until(
+        &self,
+        scene: &Arc<Scene>,
+        device: &Device,
+        goal: &Goal,
+        progress: Tell,
+    ) -> Result<Baked, Error> {
+        let shot = Shot::new(self, scene, device, progress)?;
+        let light = GatheredRadiosity::from_elements(&shot.mesh, &shot.solution.radiosity)?;
+        let (light, certificate, shot, effort) = match &self.gather {
+            Some(gather) if shot.solution.stop != Stop::Cancelled => {
+                let mesh = Mesh::new(scene.clone(), gather.element_size)?;
+                let mesh = mesh.split_at_contacts(gather.contacts);
+                let looks = device.gather(&mesh, gather.rays)?;
+                let state = Refined::new(mesh, &light);
+                Settling { effort: self.clone(), state, looks, device, shot }
+                    .until(goal, progress)?
+            }
+            _ => shot.judge(self, light, device, progress)?,
+        };
+        let Shot {
+            mesh, solution, hemicubes, hemicubes_by_resolution, near_moved, seconds, ..
+        } = shot;
+        Ok(Baked {
+            mesh,
+            solution,
+            light,
+            certificate,
+            effort,
+            hemicubes,
+            hemicubes_by_resolution,
+            near_moved,
+            seconds,
+        })
+    }
+}
+
+/// What is asked of the certificate.
+pub(crate) enum Goal<'a> {
+    /// Nothing: the settings say how far to go.
+    None,
+    /// That it is below an error; whatever settings that takes are then adjusted by hand.
+    Error(f64, &'a dyn Fn(&mut Effort)),
+}
+
+/// Light that was shot.
+struct Shot {
+    mesh: Mesh,
+    solution: Solution,
+    hemicubes: u64,
+    hemicubes_by_resolution: Vec<(u32, u64)>,
+    near_moved: f64,
+    seconds: BakeSeconds,
+    since: Instant,
+}
+
+impl Shot {
+    fn new(
+        effort: &Effort,
+        scene: &Arc<Scene>,
+        device: &Device,
+        progress: Tell,
+    ) -> Result<Shot, Error> {
+        let mut since = Instant::now();
+        effort.check()?;
+        let mesh =
+            Mesh::new(scene.clone(), effort.element_size)?.split_at_contacts(effort.contacts);
+        let mut rows = device.rows(&mesh, effort.hemicube, effort.rotations)?;
+        if let Some(share) = effort.full_share {
+            rows = rows.with_full_share(share);
+        }
+        let near = NearRepair::new(rows, &mesh, effort.near);
+        let levels = if effort.viewpoints.is_some() { u32::MAX } else { 0 };
+        let mut rows = Viewpoints::new(near, effort.viewpoints.unwrap_or(1.0), levels);
+        let mut seconds = BakeSeconds { mesh: lap(&mut since), ..Default::default() };
+        let mut tell = |p: &Progress| progress(&Stage::Shooting(*p));
+        let mut solution = effort.shooting.solve(&mesh, &mut rows, &mut tell)?;
+        if effort.ambient {
+            solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
+        }
+        let maker: &DeviceRows = rows.inner().inner();
+        (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
+        seconds.solve = lap(&mut since) - maker.seconds();
+        let rotations = u64::from(effort.rotations.get());
+        let hemicubes = (solution.rows_made + rows.extra()) * rotations;
+        let near_moved = rows.inner().moved();
+        let hemicubes_by_resolution = rows.inner().inner().drawn_by_resolution();
+        Ok(Shot { mesh, solution, hemicubes, hemicubes_by_resolution, near_moved, seconds, since })
+    }
+
+    /// The elements' own light, as it is.
+    fn judge(
+        mut self,
+        effort: &Effort,
+        mut light: GatheredRadiosity,
+        device: &Device,
+        progress: Tell,
+    ) -> Result<(GatheredRadiosity, Certificate, Shot, Effort), Error> {
+        self.seconds.vertices = lap(&mut self.since);
+        let spread = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|v| light.reflected[v as usize]);
+            a.distance(b).max(b.distance(c)).max(c.distance(a)) / 4.0
+        };
+        let rest: Vec<f64> = light.corners.iter().map(spread).collect();
+        let mut looks = device.gather(&self.mesh, LOOKS)?;
+        let ledger = &self.solution.ledger;
+        let judged = Judged { light: &light, sources: &light, rest: &rest, ledger, sweeps: 0 };
+        let (certificate, error) = judged.judge(LEAST_PLACES, &mut *looks)?;
+        light.surface.error = error;
+        self.seconds.certificate = lap(&mut self.since);
+        let _ = progress(&Stage::Judged(certificate));
+        Ok((light, certificate, self, effort.clone()))
+    }
+}
+
+/// Vertices that gather what was shot.
+struct Settling<'a> {
+    effort: Effort,
+    state: Refined<'a>,
+    looks: Box<dyn Gather>,
+    device: &'a Device,
+    shot: Shot,
+}
+
+impl Settling<'_> {
+    /// Gathers as the effort says, and on until the goal is reached or nothing is left to be done.
+    fn until(
+        mut self,
+        goal: &Goal,
+        progress: Tell,
+    ) -> Result<(GatheredRadiosity, Certificate, Shot, Effort), Error> {
+        if let Goal::Error(wanted, adjust) = goal {
+            self.look(*wanted, adjust)?;
+        }
+        let mut tell = |stage: Stage| progress(&stage);
+        let mut stop =
+            self.gathering()
+                .clone()
+                .settle(&mut self.state, &mut *self.looks, &mut |p| tell(Stage::Gathering(*p)))?;
+        for round in 0.. {
+            let mut light = self.state.reached();
+            self.shot.seconds.vertices += lap(&mut self.shot.since);
+            let rest = self.state.rest();
+            let ledger = &self.shot.solution.ledger;
+            let (sources, sweeps) = (self.state.light(), self.gathering().sweeps);
+            let judged = Judged { light: &light, sources, rest: &rest, ledger, sweeps };
+            let count = (light.gathers as usize / GATHERS_A_PLACE).clamp(LEAST_PLACES, MOST_PLACES);
+            let (certificate, error) = judged.judge(count, &mut *self.looks)?;
+            light.surface.error = error;
+            light.stop = stop;
+            self.shot.seconds.certificate += lap(&mut self.shot.since);
+            let go = tell(Stage::Judged(certificate));
+            let Goal::Error(wanted, adjust) = goal else {
+                return Ok((light, certificate, self.shot, self.effort));
+            };
+            let done = certificate.total <= SURE * wanted
+                || stop != Stop::Converged
+                || go.is_break()
+                || round == ROUNDS;
+            let again = if done { None } else { self.improve(&certificate, *wanted, adjust)? };
+            let Some(again) = again else {
+                return Ok((light, certificate, self.shot, self.effort));
+            };
+            let gathering = self.gathering().clone();
+            let mut tell = |p: &GatherProgress| tell(Stage::Gathering(*p));
+            stop = match again {
+                Again::All => self.state.sweep(&gathering, &mut *self.looks, &mut tell)?,
+                Again::Split => self.state.refine(&gathering, &mut *self.looks, &mut tell)?,
+            };
+        }
+        unreachable!("rounds end")
+    }
+
+    /// Chooses how many looks a vertex takes, by how much they disagree at a few places.
+    fn look(&mut self, wanted: f64, adjust: &dyn Fn(&mut Effort)) -> Result<(), Error> {
+        let (light, ledger) = (self.state.light(), &self.shot.solution.ledger);
+        let judged = Judged { light, sources: light, rest: &[], ledger, sweeps: 0 };
+        let sampling = judged.sampling(PROBES, &mut *self.looks)?;
+        let mut effort = self.effort.clone();
+        if let Some(gather) = &mut effort.gather {
+            let more = (1.2 * sampling / (SURE * wanted / 2.0)).powf(1.0 / NOISE);
+            let rays = (f64::from(gather.rays) * more).clamp(LEAST_RAYS, MOST_RAYS);
+            gather.rays = rays.ceil() as u32;
+            adjust(&mut effort);
+        }
+        if let Some(gather) = &effort.gather {
+            self.looks = self.device.gather(&self.shot.mesh, gather.rays)?;
+        }
+        self.effort = effort;
+        Ok(())
+    }
+
+    fn gathering(&self) -> &Gathering {
+        &self.effort.gather.as_ref().expect("vertices gather").gathering
+    }
+
+    /// Sets more effort against the parts of the error that are most of it, if there is any to be set.
+    fn improve(
+        &mut self,
+        certificate: &Certificate,
+        wanted: f64,
+        adjust: &dyn Fn(&mut Effort),
+    ) -> Result<Option<Again>, Error> {
+        let Certificate { sampling, mesh, settling, .. } = *certificate;
+        let mut effort = self.effort.clone();
+        let Some(gather) = &mut effort.gather else { return Ok(None) };
+        // Four such parts are just what may be.
+        let part = SURE * wanted / 2.0;
+        let least = part.min(sampling.max(mesh).max(settling));
+        if settling >= least {
+            gather.gathering.sweeps += 1;
+        }
+        if sampling >= least {
+            let more = (1.2 * sampling / part).max(1.0).powf(1.0 / NOISE).clamp(1.5, 8.0);
+            gather.rays = (f64::from(gather.rays) * more) as u32;
+        }
+        if mesh >= least {
+            let finer = (part / (1.2 * mesh)).clamp(0.25, 0.7);
+            gather.gathering.tolerance *= finer;
+            gather.gathering.smallest *= finer;
+        }
+        adjust(&mut effort);
+        if effort == self.effort {
+            return Ok(None);
+        }
+        let (Some(old), Some(new)) = (&self.effort.gather, &effort.gather) else { return Ok(None) };
+        let mut again = Again::Split;
+        if new.rays != old.rays {
+            self.looks = self.device.gather(&self.shot.mesh, new.rays)?;
+            again = Again::All;
+        }
+        if new.gathering.sweeps != old.gathering.sweeps {
+            self.state.shine();
+            again = Again::All;
+        }
+        self.effort = effort;
+        Ok(Some(again))
+    }
+}
+
+/// Who is to gather again.
+enum Again {
+    All,
+    Split,
+}
+
+/// The error of n rays falls as n to minus this power, or a little faster.
+const NOISE: f64 = 0.75;
+
+/// Seconds since `then`, which becomes now.
+fn lap(then: &mut Instant) -> f64 {
+    let seconds = then.elapsed().as_secs_f64();
+    *then = Instant::now();
+    seconds
+}
+
+/// The estimate has to be below this share of the error asked for.
+const SURE: f64 = 0.75;
+
+/// Places at which it is tried how many looks are enough, and how many these can be.
+const PROBES: usize = 64;
+const LEAST_RAYS: f64 = 64.0;
+const MOST_RAYS: f64 = 65536.0;
+
+/// Times that more is done, at most.
+const ROUNDS: u32 = 8;
+
+/// The certificate looks at one place for so many that vertices gathered at, three times each.
+const GATHERS_A_PLACE: usize = 32;
+const LEAST_PLACES: usize = 192;
+const MOST_PLACES: usize = 1024;
+
+/// Looks a place where vertices do not gather.
+const LOOKS: u32 = 1024;

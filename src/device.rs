@@ -1,0 +1,154 @@
+//! Who sees: hemicubes on a graphics device, or rays on the CPU.
+
+use std::num::NonZeroU32;
+use std::time::Instant;
+
+use crate::error::Error;
+use crate::form_factor::ray_cast::RayCast;
+use crate::form_factor::{FormFactors, Row};
+use crate::gather::Gather;
+use crate::gather::rays::RayGather;
+use crate::gpu::{Gpu, HemicubeGather, Hemicubes};
+use crate::mesh::{Mesh, NodeId};
+
+/// What makes rows and gathers light.
+#[derive(Clone, Debug)]
+pub enum Device {
+    /// Hemicubes on a graphics device.
+    Gpu(Gpu),
+    /// Rays on the CPU, as many a row as the hemicube's top face would have pixels.
+    Cpu,
+}
+
+impl Device {
+    /// The graphics adapter with `name` in its name, or the best.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::new`].
+    pub fn gpu(name: Option<&str>) -> Result<Device, Error> {
+        Ok(Device::Gpu(Gpu::new(name)?))
+    }
+
+    /// Name, type and driver.
+    pub fn adapter(&self) -> [String; 3] {
+        match self {
+            Device::Gpu(gpu) => {
+                let adapter = gpu.adapter().clone();
+                [adapter.name, adapter.kind, adapter.driver]
+            }
+            Device::Cpu => ["rays".into(), "CPU".into(), "none".into()],
+        }
+    }
+
+    /// Whoever makes rows over `mesh`, each from `rotations` hemicubes of `resolution`.
+    ///
+    /// # Errors
+    /// Those of [`Hemicubes::new`] and [`RayCast::new`].
+    pub fn rows(
+        &self,
+        mesh: &Mesh,
+        resolution: u32,
+        rotations: NonZeroU32,
+    ) -> Result<DeviceRows, Error> {
+        let rows = match self {
+            Device::Gpu(gpu) => {
+                let hemicubes = Hemicubes::new(gpu, mesh, resolution)?.with_rotations(rotations);
+                Rows::Gpu(Box::new(hemicubes))
+            }
+            Device::Cpu => {
+                crate::hemicube::check_resolution(resolution)?;
+                let rays = (resolution * resolution).saturating_mul(rotations.get());
+                Rows::Cpu(RayCast::new(mesh, rays)?)
+            }
+        };
+        Ok(DeviceRows { rows, seconds: 0.0 })
+    }
+
+    /// Whoever gathers over the scene of `mesh` with about `rays` looks a place: hemicubes on the
+    /// device, or rays where that is the CPU, which takes less time there than drawing.
+    ///
+    /// # Errors
+    /// Those of [`HemicubeGather::new`] and [`RayGather::new`].
+    pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
+        Ok(match self {
+            Device::Gpu(gpu) if gpu.adapter().kind != "CPU" => {
+                // A pixel of the top face is worth half a ray, or a little less.
+                let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
+                Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?)
+            }
+            _ => Box::new(RayGather::new(mesh, rays)?),
+        })
+    }
+}
+
+/// Makes the rows of a [`Device`], and counts the time.
+#[derive(Debug)]
+pub struct DeviceRows {
+    rows: Rows,
+    seconds: f64,
+}
+
+#[derive(Debug)]
+enum Rows {
+    Gpu(Box<Hemicubes>),
+    Cpu(RayCast),
+}
+
+impl DeviceRows {
+    /// Full resolution, or all rays, for patches that shoot at least this share of the light; 0 for all.
+    pub fn with_full_share(self, full_share: f64) -> DeviceRows {
+        let rows = match self.rows {
+            Rows::Gpu(hemicubes) => Rows::Gpu(Box::new(hemicubes.with_full_share(full_share))),
+            Rows::Cpu(rays) => Rows::Cpu(rays.with_full_share(full_share)),
+        };
+        DeviceRows { rows, ..self }
+    }
+
+    /// Hemicubes drawn at each resolution; none where there are rays.
+    pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
+        match &self.rows {
+            Rows::Gpu(hemicubes) => hemicubes.drawn_by_resolution(),
+            Rows::Cpu(_) => vec![],
+        }
+    }
+
+    /// Seconds of drawing, reducing and reading back; rays are all drawing.
+    pub fn stages(&self) -> (f64, f64, f64) {
+        match &self.rows {
+            Rows::Gpu(hemicubes) => {
+                let s = hemicubes.seconds();
+                (s.draw, s.reduce, s.readback)
+            }
+            Rows::Cpu(_) => (self.seconds, 0.0, 0.0),
+        }
+    }
+
+    /// Seconds spent on rows, all in all.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+}
+
+impl FormFactors for DeviceRows {
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let start = Instant::now();
+        let rows = match &mut self.rows {
+            Rows::Gpu(hemicubes) => hemicubes.rows(mesh, patches, unshot_share),
+            Rows::Cpu(rays) => rays.rows(mesh, patches, unshot_share),
+        };
+        self.seconds += start.elapsed().as_secs_f64();
+        rows
+    }
+
+    fn batch(&self) -> usize {
+        match &self.rows {
+            Rows::Gpu(hemicubes) => hemicubes.batch(),
+            Rows::Cpu(rays) => rays.batch(),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What a bake spends: all its settings, and which of them an accuracy asks for.
+
+use std::num::NonZeroU32;
+
+use crate::error::Error;
+use crate::scene::Scene;
+use crate::solve::Shooting;
+use crate::vertex::gathering::Gathering;
+
+/// All settings of a bake. [`Effort::for_error`] chooses them; each can be changed by hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effort {
+    /// Longest edge of the elements that light is shot on, scene unit.
+    pub element_size: f64,
+    /// Levels that those elements are split which other surfaces touch.
+    pub contacts: u32,
+    /// Pixels along an edge of the top face of the hemicubes that shoot much, even; a half or a quarter
+    /// of them for dim patches.
+    pub hemicube: u32,
+    /// The share of the emitted light from which on a patch shoots much; with none, the device's own.
+    pub full_share: Option<f64>,
+    /// Hemicubes a viewpoint, each turned further.
+    pub rotations: NonZeroU32,
+    /// Receivers within this many patch diameters get closed forms; below 0 none.
+    pub near: f64,
+    /// Patches whose parts disagree by more than this share of light are seen from finer parts; with
+    /// none, each only from its centroid.
+    pub viewpoints: Option<f64>,
+    /// How far light is shot, and from how large patches.
+    pub shooting: Shooting,
+    /// Whether the light not yet shot is added, spread evenly.
+    pub ambient: bool,
+    /// How vertices gather; with none, they get what the elements around them have.
+    pub gather: Option<GatherEffort>,
+}
+
+/// Settings of vertices that gather.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GatherEffort {
+    /// Longest edge of the elements whose corners gather first, scene unit.
+    pub element_size: f64,
+    /// Levels that those elements are split which other surfaces touch.
+    pub contacts: u32,
+    /// Looks that a vertex takes: rays, or pixels of a hemicube that are worth as much.
+    pub rays: u32,
+    /// Where elements are split, and how often all vertices gather.
+    pub gathering: Gathering,
+}
+
+impl Effort {
+    /// Whether a bake would take these settings of gathering: worth asking before a long solve. What
+    /// comes before that is checked where it is used.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.gather.as_ref().map_or(Ok(()), |gather| gather.gathering.check())
+    }
+
+    /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
+    /// root mean square over the area of `scene`.
+    pub fn for_error(error: f64, scene: &Scene) -> Effort {
+        let (low, high) = scene.bounds();
+        let diagonal = (high - low).length();
+        let e = error.clamp(1e-4, 0.3);
+        let hemicube = match e {
+            e if e > 0.03 => 32,
+            e if e > 0.015 => 64,
+            e if e > 0.004 => 128,
+            _ => 256,
+        };
+        let contacts = if e < 0.009 { 3 } else { 2 };
+        let gathering = Gathering {
+            tolerance: (2.5 * e).min(0.3),
+            sweeps: if e > 0.03 { 1 } else { 2 },
+            ..Gathering::new(0.1 * diagonal * e.powf(0.85))
+        };
+        Effort {
+            element_size: 0.105 * diagonal * e.powf(0.4),
+            contacts,
+            hemicube,
+            full_share: None,
+            rotations: NonZeroU32::MIN,
+            near: 1.0,
+            viewpoints: None,
+            shooting: Shooting { unshot: e / 40.0, tolerance: e.min(0.03), ..Shooting::default() },
+            ambient: false,
+            gather: Some(GatherEffort {
+                element_size: 0.3 * diagonal * e.powf(0.3),
+                contacts: if e > 0.07 { 1 } else { contacts },
+                rays: (20.0 / e).ceil() as u32,
+                gathering,
+            }),
+        }
+    }
+}

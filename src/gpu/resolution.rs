@@ -1,0 +1,40 @@
+//! What drawing and adding up need for each resolution; all else they share.
+
+use super::device::Gpu;
+use super::item_buffer::ItemBuffer;
+use super::layers::Layers;
+use super::reduce::Reduce;
+use crate::error::Error;
+use crate::form_factor::effort;
+
+/// Item buffers of a batch of hemicubes of one resolution, and the weights of their pixels.
+#[derive(Debug)]
+pub struct Resolution {
+    /// Pixels along an edge of the top face.
+    pub pixels: u32,
+    pub layers: Layers,
+    /// What `reduce` reads and writes.
+    pub bindings: wgpu::BindGroup,
+    /// Hemicubes drawn so far.
+    pub drawn: u64,
+}
+
+impl Resolution {
+    /// For `batch` hemicubes each: first `resolution`, then what it is halved to for little light.
+    pub fn halved(
+        gpu: &Gpu,
+        reduce: &Reduce,
+        resolution: u32,
+        batch: u32,
+    ) -> Result<Vec<Resolution>, Error> {
+        let halvings = 0..=effort::HALVINGS;
+        let mut pixels: Vec<u32> = halvings.map(|k| effort::halved(resolution, k)).collect();
+        pixels.dedup();
+        pixels.into_iter().map(|n| Resolution::new(gpu, reduce, n, batch)).collect()
+    }
+
+    fn new(gpu: &Gpu, reduce: &Reduce, pixels: u32, batch: u32) -> Result<Resolution, Error> {
+        let layers = Layers::new(gpu, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch);
+        Ok(Resolution { pixels, layers, bindings: reduce.bindings(gpu, pixels)?, drawn: 0 })
+    }
+}
