@@ -1,0 +1,221 @@
+//! The picture: error over time of all runs, and of each knob's by itself.
+
+use std::io::Cursor;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{RgbImage, imageops};
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+use crate::Found;
+use crate::grid::{Ask, Panel, percent};
+use crate::measure::Judge;
+use crate::plot::{Axes, BLACK, Canvas, Font, GREY, LIGHT, Mark, range};
+
+const WIDTH: u32 = 1200;
+const HEIGHT: u32 = 1700;
+
+/// The bitmap is drawn so many times larger, and then made smaller: smooth edges.
+const FINER: u32 = 3;
+
+const FRONT: RGBColor = RGBColor(31, 95, 168);
+const DIAL: RGBColor = RGBColor(205, 72, 20);
+const SERIES: [RGBColor; 3] = [FRONT, RGBColor(150, 60, 140), RGBColor(30, 130, 70)];
+
+pub fn svg(found: &Found) -> Result<String, String> {
+    fonts()?;
+    let mut text = String::new();
+    let area = SVGBackend::with_string(&mut text, (WIDTH, HEIGHT)).into_drawing_area();
+    found.draw(&Canvas::new(&area, 1.0, 0.04)?)?;
+    area.present().map_err(|e| e.to_string())?;
+    drop(area);
+    Ok(text)
+}
+
+pub fn png(found: &Found) -> Result<Vec<u8>, String> {
+    fonts()?;
+    let (width, height) = (FINER * WIDTH, FINER * HEIGHT);
+    let mut pixels = vec![0; 3 * (width * height) as usize];
+    let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
+    found.draw(&Canvas::new(&area, f64::from(FINER), 0.17)?)?;
+    area.present().map_err(|e| e.to_string())?;
+    drop(area);
+    let large = RgbImage::from_raw(width, height, pixels).expect("as many pixels");
+    let image = imageops::resize(&large, WIDTH, HEIGHT, imageops::FilterType::Triangle);
+    let mut bytes = Cursor::new(vec![]);
+    let small =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter);
+    image.write_with_encoder(small).map_err(|e| e.to_string())?;
+    Ok(bytes.into_inner())
+}
+
+/// Fonts that come along: there may be none on the system.
+fn fonts() -> Result<(), String> {
+    for (style, bytes) in
+        [(FontStyle::Normal, dejavu::sans::regular()), (FontStyle::Bold, dejavu::sans::bold())]
+    {
+        plotters::style::register_font("sans-serif", style, bytes).map_err(|_| "no font")?;
+    }
+    Ok(())
+}
+
+type Drawn = Result<(), String>;
+
+impl Found {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
+        let middle = f64::from(WIDTH) / 2.0;
+        let title = format!("What a bake of {} costs and how far it is off", self.scene);
+        canvas.text(&title, (middle, 32.0), Font::new(30.0, BLACK).bold().anchor(HPos::Center))?;
+        let against = match &self.judge {
+            Judge::Truth(points) => {
+                let count = points.iter().filter(|p| p.kind == "area").count();
+                format!("errors against truth, at {count} points spread over the area")
+            }
+            Judge::Finest(_) => "errors against a finer run, which has its own".into(),
+        };
+        let line = format!("{}; {against}", self.adapter);
+        canvas.text(&line, (middle, 68.0), Font::new(19.0, GREY).anchor(HPos::Center))?;
+        self.legend(canvas, 104.0)?;
+        self.main(canvas, [95.0, 128.0, 1180.0, 790.0])?;
+
+        let runs = || self.grid.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.runs);
+        let seconds = range(runs().map(|r| self.measured[r.1].seconds), 0.1);
+        let errors = range(runs().map(|r| self.measured[r.1].errors.area), 0.12);
+        let heading = format!(
+            "One knob at a time, around the settings meant for {} (ringed)",
+            percent(self.grid.base_error)
+        );
+        let font = Font::new(24.0, BLACK).bold().anchor(HPos::Center);
+        canvas.text(&heading, (middle, 890.0), font)?;
+        for (k, panel) in self.grid.panels.iter().enumerate() {
+            let (left, top) = (95.0 + 373.0 * (k % 3) as f64, 975.0 + 400.0 * (k / 3) as f64);
+            let frame = [left, top, left + 335.0, top + 270.0];
+            self.knob(canvas, panel, Axes::new(frame, seconds, errors), k % 3 == 0)?;
+        }
+        Ok(())
+    }
+
+    fn at(&self, axes: &Axes, run: usize) -> (f64, f64) {
+        axes.at(self.measured[run].seconds, self.measured[run].errors.area)
+    }
+
+    fn legend<B: DrawingBackend>(&self, canvas: &Canvas<B>, y: f64) -> Drawn {
+        let font = Font::new(18.0, BLACK);
+        let mut x = 95.0;
+        for (name, mark, colour) in [
+            ("fixed settings", Mark::Dot(5.0), LIGHT),
+            ("the best of them, and what was changed", Mark::Dot(6.0), FRONT),
+            ("chosen by the dial", Mark::Diamond(11.0), DIAL),
+        ] {
+            canvas.mark(mark, (x + 12.0, y), colour)?;
+            canvas.text(name, (x + 30.0, y), font)?;
+            x += 62.0 + canvas.text_width(name, font)?;
+        }
+        canvas.line(&[(x, y), (x + 26.0, y)], DIAL, 1.0)?;
+        canvas.text("error asked of it", (x + 34.0, y), font)
+    }
+
+    fn main<B: DrawingBackend>(&self, canvas: &Canvas<B>, frame: [f64; 4]) -> Drawn {
+        let runs = &self.grid.runs;
+        let asked = |k: usize| match runs[k].ask {
+            Ask::Dial(error) => Some(error),
+            Ask::Settings(_) => None,
+        };
+        let dial: Vec<(usize, f64)> =
+            (0..runs.len()).filter_map(|k| Some((k, asked(k)?))).collect();
+        let errors = self.measured.iter().map(|m| m.errors.area).chain(dial.iter().map(|d| d.1));
+        let seconds = range(self.measured.iter().map(|m| m.seconds), 0.07);
+        let mut axes = Axes::new(frame, seconds, range(errors, 0.07));
+        axes.draw(canvas, 20.0, true)?;
+        for &(_, error) in &dial {
+            let (_, y) = axes.at(1.0, error);
+            canvas.line(&[(axes.left, y), (axes.right, y)], DIAL, 1.0)?;
+            axes.cross(&[(axes.left, y), (axes.right, y)]);
+            let text = format!("{} asked", percent(error));
+            let font = Font::new(16.0, DIAL).anchor(HPos::Right);
+            let width = canvas.text_width(&text, font)?;
+            canvas.text(&text, (axes.right - 6.0, y - 11.0), font)?;
+            axes.take((axes.right - 6.0 - width / 2.0, y - 11.0), width / 2.0);
+        }
+        for k in (0..runs.len()).filter(|&k| asked(k).is_none()) {
+            let at = self.at(&axes, k);
+            canvas.mark(Mark::Dot(5.0), at, LIGHT)?;
+            axes.take(at, 5.0);
+        }
+        let front: Vec<_> = self.front.iter().map(|&k| self.at(&axes, k)).collect();
+        canvas.line(&front, FRONT, 2.0)?;
+        axes.cross(&front);
+        for &at in &front {
+            canvas.mark(Mark::Dot(6.0), at, FRONT)?;
+            axes.take(at, 6.0);
+        }
+        for &(k, _) in &dial {
+            let at = self.at(&axes, k);
+            canvas.mark(Mark::Diamond(12.0), at, DIAL)?;
+            axes.take(at, 11.0);
+        }
+        for &(k, error) in &dial {
+            let at = self.at(&axes, k);
+            let font = Font::new(20.0, DIAL).bold();
+            axes.label(canvas, &format!("dial {}", percent(error)), at, font)?;
+        }
+        for (&k, &at) in self.front.iter().zip(&front) {
+            let (knob, value) = (runs[k].knob, &runs[k].value);
+            let text = match knob {
+                "effort" => format!("meant for {value}"),
+                "no gather" => format!("no gather, element size {value}"),
+                "resolution" => format!("resolution {value} px"),
+                _ => format!("{knob} {value}"),
+            };
+            axes.label(canvas, &text, at, Font::new(16.0, FRONT))?;
+        }
+        Ok(())
+    }
+
+    fn knob<B: DrawingBackend>(
+        &self,
+        canvas: &Canvas<B>,
+        panel: &Panel,
+        mut axes: Axes,
+        first: bool,
+    ) -> Drawn {
+        let (left, top) = (axes.left, axes.top);
+        canvas.text(panel.title, (left, top - 42.0), Font::new(20.0, BLACK).bold())?;
+        let mut x = left;
+        if panel.series.len() == 1 {
+            canvas.text(panel.note, (x, top - 17.0), Font::new(15.0, GREY))?;
+        } else {
+            for (series, colour) in panel.series.iter().zip(SERIES) {
+                let font = Font::new(15.0, colour).bold();
+                canvas.text(series.name, (x, top - 17.0), font)?;
+                x += canvas.text_width(series.name, font)? + 22.0;
+            }
+        }
+        axes.draw(canvas, 17.0, first)?;
+        for (k, run) in self.grid.runs.iter().enumerate() {
+            let at = self.at(&axes, k);
+            if matches!(run.ask, Ask::Settings(_)) && axes.holds(at) {
+                canvas.mark(Mark::Dot(3.0), at, LIGHT)?;
+                axes.cross(&[at, at]);
+            }
+        }
+        for (series, colour) in panel.series.iter().zip(SERIES) {
+            let points: Vec<_> = series.runs.iter().map(|r| self.at(&axes, r.1)).collect();
+            canvas.line(&points, colour, 2.0)?;
+            axes.cross(&points);
+            for &at in &points {
+                canvas.mark(Mark::Dot(4.5), at, colour)?;
+                axes.take(at, 4.5);
+            }
+        }
+        let base = self.at(&axes, self.grid.base);
+        canvas.mark(Mark::Ring(9.0), base, BLACK)?;
+        axes.take(base, 9.0);
+        for (series, colour) in panel.series.iter().zip(SERIES) {
+            for (label, run) in &series.runs {
+                axes.label(canvas, label, self.at(&axes, *run), Font::new(16.0, colour))?;
+            }
+        }
+        Ok(())
+    }
+}
