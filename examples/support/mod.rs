@@ -169,8 +169,7 @@ impl Bake {
             Goal::Error(error) => Accuracy { error, adjust: &adjust }.bake(scene, device, told),
             Goal::Seconds(seconds) => Budget { seconds, adjust: &adjust }.bake(scene, device, told),
             Goal::Plain { gather } => {
-                let mut effort =
-                    if gather { Effort::for_error(PLAIN, &scene) } else { plain(&scene) };
+                let mut effort = if gather { gathering(&scene) } else { plain(&scene) };
                 adjust(&mut effort);
                 effort.bake(scene, device, told)
             }
@@ -226,6 +225,17 @@ pub fn plain(scene: &Scene) -> Effort {
         gather: None,
         ..Effort::for_error(0.02, scene)
     }
+}
+
+/// Vertices that gather, with small elements at contacts: what is asked for there is not an error over
+/// the area.
+pub fn gathering(scene: &Scene) -> Effort {
+    let mut effort = Effort::for_error(PLAIN, scene);
+    if let Some(gather) = &mut effort.gather {
+        gather.gathering.smallest /= 2.0;
+        gather.rays = 1500;
+    }
+    effort
 }
 
 /// A 32nd of the diagonal of the scene's bounding box.
