@@ -60,10 +60,8 @@ pub trait Gather {
 impl Sources<'_> {
     /// Reflected radiosity at barycentric position (`u`, `v`) of triangle `t`.
     pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
-        let element = self.mesh.element_at(t, u, v);
-        let cell = self.mesh.cell(self.mesh.element(element));
+        let (element, [u, v]) = self.mesh.element_at(t, u, v);
         let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);
-        let [u, v] = cell.local(u, v);
         a * (1.0 - u - v) + b * u + c * v
     }
 }

@@ -58,6 +58,7 @@ mod certificate;
 mod device;
 mod effort;
 mod error;
+mod fan;
 pub mod form_factor;
 mod gather;
 mod gpu;

@@ -250,16 +250,28 @@ impl Mesh {
     }
 
     /// The element at barycentric position (`u`, `v`) of triangle `t`: weights of its second and
-    /// third corner. Positions outside the triangle go to the nearest element along the axes.
-    pub fn element_at(&self, t: usize, u: f64, v: f64) -> usize {
-        let mut node = self.root(t);
-        let finest = Cell::at(self.depths[t], u, v);
-        while let Some(children) = self.children(node) {
-            let cell = finest.ancestor(self.node(node).cell.level + 1);
-            let here = children.into_iter().find(|&k| self.node(k).cell == cell);
-            node = here.expect("four children cover their parent");
+    /// third corner; and the same position in the element. Positions outside the triangle go to the
+    /// nearest element along the axes.
+    pub fn element_at(&self, t: usize, u: f64, v: f64) -> (usize, [f64; 2]) {
+        let mut node = self.node(self.root(t));
+        let [mut u, mut v] = [u, v];
+        while node.children != LEAF {
+            (u, v) = (2.0 * u, 2.0 * v);
+            let child = match (u > 1.0, v > 1.0, u + v > 1.0) {
+                (true, ..) => 1,
+                (_, true, _) => 2,
+                (.., true) => 3,
+                _ => 0,
+            };
+            (u, v) = match child {
+                1 => (u - 1.0, v),
+                2 => (u, v - 1.0),
+                3 => (1.0 - u, 1.0 - v),
+                _ => (u, v),
+            };
+            node = self.node(NodeId(node.children + child));
         }
-        self.node(node).first_element as usize
+        (node.first_element as usize, [u, v])
     }
 
     /// Deepest level of triangle `t`'s quadtree.

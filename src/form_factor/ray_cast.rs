@@ -1,11 +1,10 @@
 //! Form-factor rows from rays on the CPU: a second opinion, and what runs without a GPU.
 
-use std::f64::consts::TAU;
-
 use rayon::prelude::*;
 
 use super::{Entry, FormFactors, Row, effort};
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
+use crate::fan::Fan;
 use crate::mesh::{Mesh, NodeId};
 use crate::rays::Rays;
 
@@ -33,12 +32,9 @@ impl RayCast {
     /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁸.
+    /// [`crate::ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayCast, Error> {
-        if count == 0 || count > 1 << 28 {
-            let place = format!("{count} rays a row");
-            return Err(Error::new(ErrorKind::Setting, place, "not usable", "use 1 to 268435456"));
-        }
+        Fan::new(count)?;
         let rays = Rays::of_scene(mesh.scene());
         Ok(RayCast { rays, count, full_share: RayCast::FULL_SHARE })
     }
@@ -51,27 +47,16 @@ impl RayCast {
         RayCast { full_share, ..self }
     }
 
-    fn row(&self, mesh: &Mesh, patch: NodeId, count: u32) -> Row {
-        let normal = mesh.normal(patch);
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
+    fn row(&self, mesh: &Mesh, patch: NodeId, fan: &Fan, count: u32) -> Row {
         let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
         let start = START * mesh.area(patch).sqrt();
         let turn = f64::from(shuffle(patch.0)) / 2f64.powi(32);
-        let mut seen: Vec<u32> = (0..count)
-            .map(|k| {
-                // Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley points.
-                let radius2 = (f64::from(k) + 0.5) / f64::from(count);
-                let phi = TAU * (f64::from(k.reverse_bits()) / 2f64.powi(32) + turn);
-                let (sin, cos) = phi.sin_cos();
-                let flat = (tangent * cos + bitangent * sin) * radius2.sqrt();
-                let direction = flat + normal * (1.0 - radius2).sqrt();
-                match self.rays.nearest(eye, direction, start, Some(own)) {
-                    None => OPEN,
-                    Some(hit) if !hit.front => BACK,
-                    Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v) as u32,
-                }
-            })
-            .collect();
+        let see = |direction| match self.rays.nearest(eye, direction, start, Some(own)) {
+            None => OPEN,
+            Some(hit) if !hit.front => BACK,
+            Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v).0 as u32,
+        };
+        let mut seen: Vec<u32> = fan.above(mesh.normal(patch), turn).map(see).collect();
         seen.sort_unstable();
         // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
         let upto = |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(count)) as u32;
@@ -99,7 +84,8 @@ impl FormFactors for RayCast {
     ) -> Result<Vec<Row>, Error> {
         let halvings = effort::halvings(unshot_share, self.full_share);
         let count = (self.count >> (2 * halvings)).max(effort::LEAST.pow(2)).min(self.count);
-        Ok(patches.par_iter().map(|&p| self.row(mesh, p, count)).collect())
+        let fan = Fan::new(count)?;
+        Ok(patches.par_iter().map(|&p| self.row(mesh, p, &fan, count)).collect())
     }
 
     /// The same on every machine, since it decides the order of shots.

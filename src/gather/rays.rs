@@ -1,6 +1,6 @@
 //! Gathering with rays on the CPU: a second opinion, and what runs without a GPU.
 
-use std::f64::consts::TAU;
+use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -8,9 +8,10 @@ use rayon::prelude::*;
 use super::light_view::LightView;
 use super::lights::{Lights, NO_LIGHT};
 use super::{Gather, Gathered, Place, Sources};
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
+use crate::fan::{Fan, radical_inverse};
 use crate::mesh::Mesh;
-use crate::rays::Rays;
+use crate::rays::{Hit, Rays};
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
 ///
@@ -21,6 +22,7 @@ use crate::rays::Rays;
 pub struct RayGather {
     rays: Rays,
     lights: Lights,
+    fan: Fan,
     count: u32,
 }
 
@@ -28,14 +30,10 @@ impl RayGather {
     /// `count` rays a place over the triangles of `mesh`'s scene.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁸.
+    /// [`crate::ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        if count == 0 || count > 1 << 28 {
-            let place = format!("{count} rays a place");
-            return Err(Error::new(ErrorKind::Setting, place, "not usable", "use 1 to 268435456"));
-        }
-        let rays = Rays::of_scene(mesh.scene());
-        Ok(RayGather { rays, lights: Lights::new(mesh.shared_scene()), count })
+        let (fan, rays) = (Fan::new(count)?, Rays::of_scene(mesh.scene()));
+        Ok(RayGather { rays, lights: Lights::new(mesh.shared_scene()), fan, count })
     }
 
     fn at(&self, sources: &Sources, place: &Place) -> Gathered {
@@ -48,16 +46,10 @@ impl RayGather {
             light.convex || LightView::new(place, light.triangles.iter().map(corner)).is_some()
         });
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
-        let (tangent, bitangent) = place.normal.any_orthonormal_pair();
         let share = 1.0 / f64::from(self.count);
         let turn = turn(place.position);
         let mut out = Gathered::default();
-        for k in 0..self.count {
-            // Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley points.
-            let radius2 = (f64::from(k) + 0.5) * share;
-            let (sin, cos) = (TAU * (radical_inverse(k) + turn)).sin_cos();
-            let flat = (tangent * cos + bitangent * sin) * radius2.sqrt();
-            let direction = flat + place.normal * (1.0 - radius2).sqrt();
+        for direction in self.fan.above(place.normal, turn) {
             let Some(hit) = self.rays.nearest(place.position, direction, place.near, None) else {
                 out.open += share;
                 continue;
@@ -111,13 +103,13 @@ impl RayGather {
                 continue;
             }
             let r2 = to.length_squared();
-            let factor = whole / f64::from(count) * facing * above / (r2 * r2) * 2.0 / TAU;
+            let factor = whole / f64::from(count) * facing * above / (PI * r2 * r2);
             all += factor;
-            let hit = self.rays.nearest(place.position, to, place.near / r2.sqrt(), None);
-            let reached = hit.is_none_or(|h| {
-                h.distance >= 1.0 - 1e-9 || self.lights.of_triangle[h.triangle] == light && h.front
-            });
-            seen += if reached { factor } else { 0.0 };
+            // What is met first may be another part of the light, which is as good.
+            let near = place.near / r2.sqrt();
+            let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
+            let blocked = self.rays.blocked(place.position, to, near..1.0 - 1e-9, other);
+            seen += if blocked { 0.0 } else { factor };
         }
         (seen, all)
     }
@@ -127,11 +119,6 @@ impl Gather for RayGather {
     fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
         Ok(places.par_iter().map(|p| self.at(sources, p)).collect())
     }
-}
-
-/// The second coordinate of Hammersley's points, in [0, 1).
-fn radical_inverse(k: u32) -> f64 {
-    f64::from(k.reverse_bits()) / 2f64.powi(32)
 }
 
 /// A turn in [0, 1) that differs from place to place: a hash of where it is.

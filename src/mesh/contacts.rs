@@ -47,7 +47,7 @@ impl Mesh {
     fn level_at(&self, t: usize, cell: Cell) -> u32 {
         let c = cell.corners();
         let middle = |k: usize| (c[0][k] + c[1][k] + c[2][k]) / 3.0;
-        self.cell(self.element(self.element_at(t, middle(0), middle(1)))).level
+        self.cell(self.element(self.element_at(t, middle(0), middle(1)).0)).level
     }
 }
 

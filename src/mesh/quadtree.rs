@@ -78,17 +78,6 @@ impl Cell {
         if self.flipped { [-u, -v] } else { [u, v] }
     }
 
-    /// The cell of `level` at barycentric (u, v); positions outside are brought inside.
-    pub fn at(level: u32, u: f64, v: f64) -> Cell {
-        let side = 1u32 << level;
-        let (fu, fv) = (u * f64::from(side), v * f64::from(side));
-        // Casts from float saturate: below zero and NaN become 0.
-        let i = (fu as u32).min(side - 1);
-        let j = (fv as u32).min(side - 1 - i);
-        let beyond = fu - f64::from(i) + fv - f64::from(j) > 1.0;
-        Cell { level, i, j, flipped: beyond && i + j < side - 1 }
-    }
-
     /// Number of this cell among the 4ˡ of its level, row by row (`i` first). The item-buffer
     /// shader computes the same number.
     pub fn index(self) -> u32 {
@@ -133,16 +122,5 @@ mod tests {
             indices.sort();
             assert_eq!(indices, (0..4u32.pow(l)).collect::<Vec<_>>());
         }
-    }
-
-    #[test]
-    fn a_cell_is_found_by_its_centroid() {
-        for cell in level(5) {
-            let c = cell.corners();
-            let mid = |k: usize| (c[0][k] + c[1][k] + c[2][k]) / 3.0;
-            assert_eq!(Cell::at(5, mid(0), mid(1)), cell);
-        }
-        assert_eq!(Cell::at(3, -1.0, 9.0), Cell { level: 3, i: 0, j: 7, flipped: false });
-        assert_eq!(Cell::at(3, f64::NAN, 0.0), Cell { level: 3, i: 0, j: 0, flipped: false });
     }
 }
