@@ -52,6 +52,7 @@ Of vertices that gather:
   --gather-contacts N  levels that these are split which other surfaces touch
   --rays N          looks a vertex takes
   --bend T          split where a side's middle is off by this share of its radiosity
+  --curve T         split once more, without a look, where parabolas bend by more; inf for nowhere
   --smallest X      elements with no longer edge are not split
   --max-elements N  elements there may be [524288]
   --sweeps N        times that all vertices gather, the last time what they found before
@@ -175,6 +176,10 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("smallest") => {
                 let value = args.value()?.parse()?;
                 set_gather(&mut bake, move |gather| gather.gathering.smallest = value);
+            }
+            Long("curve") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.gathering.curve = value);
             }
             Long("max-elements") => {
                 let value = args.value()?.parse()?;

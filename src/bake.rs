@@ -233,14 +233,20 @@ impl Settling<'_> {
             self.look(*wanted, adjust)?;
         }
         let mut tell = |stage: Stage| progress(&stage);
-        let mut stop =
-            self.gathering()
-                .clone()
-                .settle(&mut self.state, &mut *self.looks, &mut |p| tell(Stage::Gathering(*p)))?;
+        let gather = self.effort.gather.as_ref().expect("vertices gather");
+        let mut rough = match gather.gathering.sweeps {
+            0 | 1 => None,
+            _ => Some(self.device.gather(&self.shot.mesh, gather.rays.div_ceil(ROUGH))?),
+        };
+        let mut stop = gather.gathering.settle(
+            &mut self.state,
+            &mut *self.looks,
+            rough.as_mut().map(|r| &mut **r as &mut dyn Gather),
+            &mut |p| tell(Stage::Gathering(*p)),
+        )?;
         for round in 0.. {
-            let mut light = self.state.reached();
+            let (mut light, rest) = self.state.curved(self.gathering())?;
             self.shot.seconds.vertices += lap(&mut self.shot.since);
-            let rest = self.state.rest();
             let ledger = &self.shot.solution.ledger;
             let (sources, sweeps) = (self.state.light(), self.gathering().sweeps);
             let judged = Judged { light: &light, sources, rest: &rest, ledger, sweeps };
@@ -318,6 +324,7 @@ impl Settling<'_> {
             let finer = (part / (1.2 * mesh)).clamp(0.25, 0.7);
             gather.gathering.tolerance *= finer;
             gather.gathering.smallest *= finer;
+            gather.gathering.curve *= finer;
         }
         adjust(&mut effort);
         if effort == self.effort {
@@ -343,6 +350,9 @@ enum Again {
     All,
     Split,
 }
+
+/// Where vertices only light others, their noise is averaged: they take so many times fewer looks.
+const ROUGH: u32 = 4;
 
 /// The error of n rays falls as n to minus this power, or a little faster.
 const NOISE: f64 = 0.75;

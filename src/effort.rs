@@ -69,6 +69,7 @@ impl Effort {
         let contacts = if e < 0.009 { 3 } else { 2 };
         let gathering = Gathering {
             tolerance: (2.5 * e).min(0.3),
+            curve: e / 4.0,
             sweeps: if e > 0.03 { 1 } else { 2 },
             ..Gathering::new(0.1 * diagonal * e.powf(0.85))
         };

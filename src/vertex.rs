@@ -1,6 +1,8 @@
 //! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
 
 mod boundary;
+mod covered;
+mod curves;
 pub(crate) mod gathering;
 mod meeting;
 pub(crate) mod places;

@@ -277,13 +277,15 @@ fn settings(effort: &Effort) -> Vec<(String, Value)> {
         ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
     ];
     if let Some(GatherEffort { element_size, contacts, rays, gathering }) = gather {
-        let Gathering { tolerance, smallest, elements, everywhere, sweeps } = gathering;
+        let Gathering { tolerance, smallest, curve, elements, everywhere, sweeps } = gathering;
         all.extend([
             ("gather_size", json!(element_size)),
             ("gather_contacts", json!(contacts)),
             ("rays", json!(rays)),
             ("bend", json!(tolerance)),
             ("smallest", json!(smallest)),
+            // JSON has no infinity: null where nothing is split for its curve.
+            ("curve", json!(curve)),
             ("max_elements", json!(elements)),
             ("gather_levels", json!(everywhere)),
             ("sweeps", json!(sweeps)),

@@ -130,6 +130,7 @@ impl Grid {
         let bend = self.vary(base, "bend", "bend", steps, label, |e, f| {
             if let Some(gather) = &mut e.gather {
                 gather.gathering.tolerance = (f * gather.gathering.tolerance).min(1.0);
+                gather.gathering.curve *= f;
             }
         });
         self.panel("Gather", "none; how often; how much a side may bend", [none, sweeps, bend]);

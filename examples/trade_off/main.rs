@@ -238,17 +238,18 @@ impl Found {
     fn csv(&self) -> String {
         let mut out = String::from(
             "knob,value,element_size,contacts,hemicube,rotations,near,unshot,patch_tolerance,gather,\
-             gather_size,gather_contacts,rays,bend,smallest,sweeps,bake_seconds,error_over_area,\
+             gather_size,gather_contacts,rays,bend,curve,smallest,sweeps,bake_seconds,error_over_area,\
              error_all_points,error_against,estimate,vertices,shot_elements,elements,hemicubes,\
              gathers,on_front\n",
         );
         for (k, (run, m)) in self.grid.runs.iter().zip(&self.measured).enumerate() {
             let e = &m.effort;
-            let gather = e.gather.as_ref().map_or("none,,,,,,".to_string(), |g| {
+            let gather = e.gather.as_ref().map_or("none,,,,,,,".to_string(), |g| {
                 let s = &g.gathering;
                 let (size, contacts, rays) = (g.element_size, g.contacts, g.rays);
-                let (bend, smallest, sweeps) = (s.tolerance, s.smallest, s.sweeps);
-                format!("needed,{size:.6},{contacts},{rays},{bend},{smallest:.6},{sweeps}")
+                let (bend, curve) = (s.tolerance, s.curve);
+                let (smallest, sweeps) = (s.smallest, s.sweeps);
+                format!("needed,{size:.6},{contacts},{rays},{bend},{curve},{smallest:.6},{sweeps}")
             });
             let all = m.errors.all.map_or(String::new(), |all| format!("{all:.6}"));
             let _ = writeln!(

@@ -17,6 +17,7 @@ pub const CREASE_DEGREES: f64 = 40.0;
 pub const COPLANAR_DEGREES: f64 = 1.0;
 
 /// Identities shared across a smooth surface: one object or group, one material, no crease.
+#[derive(Clone)]
 pub(crate) struct Smooth {
     /// Per triangle, the identity of each corner.
     pub corners: Vec<[u32; 3]>,

@@ -19,6 +19,7 @@ pub(super) enum Key {
 }
 
 /// The vertices of a mesh.
+#[derive(Clone)]
 pub(super) struct Vertices {
     /// What each vertex is.
     pub keys: Vec<Key>,
@@ -35,7 +36,7 @@ pub(super) struct Vertices {
 }
 
 /// The vertices around each element: its corners, and what finer neighbours put between them.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Rims {
     ends: Vec<usize>,
     vertices: Vec<u32>,
