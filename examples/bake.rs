@@ -51,6 +51,7 @@ Of vertices that gather:
   --gather-size X   longest edge of the elements whose corners gather first, scene unit
   --gather-contacts N  levels that these are split which other surfaces touch
   --rays N          looks a vertex takes
+  --noise T         up to 16 times as many rays where they disagree by this share; inf for never
   --bend T          split where a side's middle is off by this share of its radiosity
   --curve T         split once more, without a look, where parabolas bend by more; inf for nowhere
   --smallest X      elements with no longer edge are not split
@@ -168,6 +169,10 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("rays") => {
                 let value = args.value()?.parse()?;
                 set_gather(&mut bake, move |gather| gather.rays = value);
+            }
+            Long("noise") => {
+                let value = args.value()?.parse()?;
+                set_gather(&mut bake, move |gather| gather.noise = value);
             }
             Long("bend") => {
                 let value = args.value()?.parse()?;

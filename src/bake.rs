@@ -111,8 +111,8 @@ impl Effort {
             Some(gather) if shot.solution.stop != Stop::Cancelled => {
                 let mesh = Mesh::new(scene.clone(), gather.element_size)?;
                 let mesh = mesh.split_at_contacts(gather.contacts);
-                let looks = device.gather(&mesh, gather.rays)?;
-                let state = Refined::new(mesh, &light);
+                let state = Refined::new(mesh.clone(), &light);
+                let looks = device.gather_evenly(&mesh, gather.rays, gather.noise, state.dim())?;
                 Settling { effort: self.clone(), state, looks, device, shot }
                     .until(goal, progress)?
             }
@@ -236,7 +236,7 @@ impl Settling<'_> {
         let gather = self.effort.gather.as_ref().expect("vertices gather");
         let mut rough = match gather.gathering.sweeps {
             0 | 1 => None,
-            _ => Some(self.device.gather(&self.shot.mesh, gather.rays.div_ceil(ROUGH))?),
+            _ => Some(self.looks(ROUGH)?),
         };
         let mut stop = gather.gathering.settle(
             &mut self.state,
@@ -272,6 +272,15 @@ impl Settling<'_> {
             stop = match again {
                 Again::All => self.state.sweep(&gathering, &mut *self.looks, &mut tell)?,
                 Again::Split => self.state.refine(&gathering, &mut *self.looks, &mut tell)?,
+                Again::Settle => {
+                    let mut rough = self.looks(ROUGH)?;
+                    match self.state.settle(&mut *rough, &mut tell)? {
+                        Stop::Converged => {
+                            self.state.refine(&gathering, &mut *self.looks, &mut tell)?
+                        }
+                        stop => stop,
+                    }
+                }
             };
         }
         unreachable!("rounds end")
@@ -281,19 +290,30 @@ impl Settling<'_> {
     fn look(&mut self, wanted: f64, adjust: &dyn Fn(&mut Effort)) -> Result<(), Error> {
         let (light, ledger) = (self.state.light(), &self.shot.solution.ledger);
         let judged = Judged { light, sources: light, rest: &[], ledger, sweeps: 0 };
-        let sampling = judged.sampling(PROBES, &mut *self.looks)?;
+        let most = AIM * SURE * wanted / 2.0;
+        // Without more where they disagree: that is for what these few places do not show.
+        let mut looks = match &self.effort.gather {
+            Some(gather) => self.device.gather(&self.shot.mesh, gather.rays)?,
+            None => return Ok(()),
+        };
+        let sampling = judged.sampling(PROBES, &mut *looks)?;
         let mut effort = self.effort.clone();
         if let Some(gather) = &mut effort.gather {
-            let more = (1.2 * sampling / (SURE * wanted / 2.0)).powf(1.0 / NOISE);
+            let more = (sampling / most).powf(1.0 / NOISE);
             let rays = (f64::from(gather.rays) * more).clamp(LEAST_RAYS, MOST_RAYS);
-            gather.rays = rays.ceil() as u32;
+            (gather.rays, gather.noise) = (rays.ceil() as u32, OUTLIER * most);
             adjust(&mut effort);
         }
-        if let Some(gather) = &effort.gather {
-            self.looks = self.device.gather(&self.shot.mesh, gather.rays)?;
-        }
         self.effort = effort;
+        self.looks = self.looks(1)?;
         Ok(())
+    }
+
+    /// Whoever gathers as the effort says, with a part of the looks.
+    fn looks(&self, fewer: u32) -> Result<Box<dyn Gather>, Error> {
+        let gather = self.effort.gather.as_ref().expect("vertices gather");
+        let (rays, noise) = (gather.rays.div_ceil(fewer), gather.noise * f64::from(fewer));
+        self.device.gather_evenly(&self.shot.mesh, rays, noise, self.state.dim())
     }
 
     fn gathering(&self) -> &Gathering {
@@ -307,21 +327,20 @@ impl Settling<'_> {
         wanted: f64,
         adjust: &dyn Fn(&mut Effort),
     ) -> Result<Option<Again>, Error> {
-        let Certificate { sampling, mesh, settling, .. } = *certificate;
+        let Certificate { sampling, mesh, settling, unshot, .. } = *certificate;
         let mut effort = self.effort.clone();
         let Some(gather) = &mut effort.gather else { return Ok(None) };
-        // Four such parts are just what may be.
-        let part = SURE * wanted / 2.0;
-        let least = part.min(sampling.max(mesh).max(settling));
-        if settling >= least {
+        let most = highest([sampling, mesh, settling], unshot, AIM * SURE * wanted);
+        if settling > most {
             gather.gathering.sweeps += 1;
         }
-        if sampling >= least {
-            let more = (1.2 * sampling / part).max(1.0).powf(1.0 / NOISE).clamp(1.5, 8.0);
+        if sampling > most {
+            let more = (sampling / most).powf(1.0 / NOISE).clamp(1.25, 8.0);
             gather.rays = (f64::from(gather.rays) * more) as u32;
+            gather.noise *= (most / sampling).clamp(0.25, 0.8);
         }
-        if mesh >= least {
-            let finer = (part / (1.2 * mesh)).clamp(0.25, 0.7);
+        if mesh > most {
+            let finer = (most / mesh).clamp(0.4, 0.8);
             gather.gathering.tolerance *= finer;
             gather.gathering.smallest *= finer;
             gather.gathering.curve *= finer;
@@ -331,28 +350,55 @@ impl Settling<'_> {
             return Ok(None);
         }
         let (Some(old), Some(new)) = (&self.effort.gather, &effort.gather) else { return Ok(None) };
-        let mut again = Again::Split;
-        if new.rays != old.rays {
-            self.looks = self.device.gather(&self.shot.mesh, new.rays)?;
-            again = Again::All;
-        }
-        if new.gathering.sweeps != old.gathering.sweeps {
-            self.state.shine();
-            again = Again::All;
-        }
+        let again = if (new.rays, new.noise) != (old.rays, old.noise) {
+            if new.gathering.sweeps != old.gathering.sweeps {
+                self.state.shine();
+            }
+            Again::All
+        } else if new.gathering.sweeps != old.gathering.sweeps {
+            Again::Settle
+        } else {
+            Again::Split
+        };
         self.effort = effort;
+        self.looks = self.looks(1)?;
         Ok(Some(again))
     }
 }
 
-/// Who is to gather again.
+/// What is to be done again.
 enum Again {
+    /// All vertices gather.
     All,
+    /// What was reached shines, all gather the difference, then elements are split.
+    Settle,
+    /// Elements are split.
     Split,
 }
 
+/// How high the highest of `parts` may be for the squares of all, and of `rest`, to add up to the square
+/// of `whole`, if the higher ones are lowered.
+fn highest(mut parts: [f64; 3], rest: f64, whole: f64) -> f64 {
+    parts.sort_by(f64::total_cmp);
+    let mut left = (whole * whole - rest * rest).max(0.1 * whole * whole);
+    for (k, part) in parts.iter().enumerate() {
+        let most = (left / (parts.len() - k) as f64).sqrt();
+        if *part >= most {
+            return most;
+        }
+        left -= part * part;
+    }
+    f64::INFINITY
+}
+
+/// The estimate is brought to this share of what is allowed, since it does not follow to the letter.
+const AIM: f64 = 0.9;
+
 /// Where vertices only light others, their noise is averaged: they take so many times fewer looks.
 const ROUGH: u32 = 4;
+
+/// Places whose rays disagree so many times as much as they should on the average get more of them.
+const OUTLIER: f64 = 3.0;
 
 /// The error of n rays falls as n to minus this power, or a little faster.
 const NOISE: f64 = 0.75;
@@ -369,7 +415,7 @@ const SURE: f64 = 0.75;
 
 /// Places at which it is tried how many looks are enough, and how many these can be.
 const PROBES: usize = 64;
-const LEAST_RAYS: f64 = 64.0;
+const LEAST_RAYS: f64 = 128.0;
 const MOST_RAYS: f64 = 65536.0;
 
 /// Times that more is done, at most.

@@ -51,7 +51,7 @@ const GAP: f64 = 0.1;
 
 /// Errors have heavier tails than a normal distribution of the same spread: so much wider are those
 /// of vertices given, that one in twenty is off by more than twice as much.
-const HEAVY: f64 = 1.6;
+const HEAVY: f64 = 1.8;
 
 /// A random place, and what is there.
 struct Sample {

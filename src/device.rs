@@ -70,13 +70,25 @@ impl Device {
     /// # Errors
     /// Those of [`HemicubeGather::new`] and [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
+        self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
+    }
+
+    /// The same, with more rays where they disagree: see [`RayGather::with_noise`]. Hemicubes are what
+    /// they are.
+    pub(crate) fn gather_evenly(
+        &self,
+        mesh: &Mesh,
+        rays: u32,
+        noise: f64,
+        dim: f64,
+    ) -> Result<Box<dyn Gather>, Error> {
         Ok(match self {
             Device::Gpu(gpu) if gpu.adapter().kind != "CPU" => {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
                 Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?)
             }
-            _ => Box::new(RayGather::new(mesh, rays)?),
+            _ => Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim)),
         })
     }
 }

@@ -43,6 +43,9 @@ pub struct GatherEffort {
     pub contacts: u32,
     /// Looks that a vertex takes: rays, or pixels of a hemicube that are worth as much.
     pub rays: u32,
+    /// Rays find on the CPU that half of them are off by more than this share of the irradiance: then
+    /// there are more, up to 16 times as many. Infinity for never.
+    pub noise: f64,
     /// Where elements are split, and how often all vertices gather.
     pub gathering: Gathering,
 }
@@ -68,25 +71,30 @@ impl Effort {
         };
         let contacts = if e < 0.009 { 3 } else { 2 };
         let gathering = Gathering {
-            tolerance: (2.5 * e).min(0.3),
+            tolerance: (2.5 * e).min(0.1),
             curve: e / 4.0,
             sweeps: if e > 0.03 { 1 } else { 2 },
             ..Gathering::new(0.1 * diagonal * e.powf(0.85))
         };
         Effort {
-            element_size: 0.105 * diagonal * e.powf(0.4),
+            element_size: diagonal * (0.105 * e.powf(0.4)).max(0.6 * e),
             contacts,
             hemicube,
             full_share: None,
             rotations: NonZeroU32::MIN,
             near: 1.0,
             viewpoints: None,
-            shooting: Shooting { unshot: e / 40.0, tolerance: e.min(0.03), ..Shooting::default() },
+            shooting: Shooting {
+                unshot: e / 40.0,
+                tolerance: e.min(0.02 + 0.4 * e),
+                ..Shooting::default()
+            },
             ambient: false,
             gather: Some(GatherEffort {
                 element_size: 0.3 * diagonal * e.powf(0.3),
                 contacts: if e > 0.07 { 1 } else { contacts },
                 rays: (20.0 / e).ceil() as u32,
+                noise: e,
                 gathering,
             }),
         }

@@ -1,6 +1,7 @@
 //! A fan of rays: directions over a hemisphere, as many as there is form factor.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use glam::DVec3;
 
@@ -15,7 +16,7 @@ pub(crate) struct Fan {
 }
 
 /// Rays that a fan can have at most.
-const MOST: u32 = 1 << 20;
+pub(crate) const MOST: u32 = 1 << 20;
 
 impl Fan {
     /// `count` rays.
@@ -28,26 +29,58 @@ impl Fan {
             let remedy = format!("use 1 to {MOST}");
             return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
         }
+        Ok(Fan::of(count, |k| [(f64::from(k) + 0.5) / f64::from(count), radical_inverse(k)]))
+    }
+
+    /// As many rays, of which the first half, quarter and so on are fans of their own if `count` is a
+    /// power of two, and what they lack of the whole is too.
+    pub fn nested(count: u32) -> Fan {
+        Fan::of(count.clamp(1, MOST), nested)
+    }
+
+    fn of(count: u32, point: impl Fn(u32) -> [f64; 2]) -> Fan {
         let direction = |k: u32| {
-            let radius2 = (f64::from(k) + 0.5) / f64::from(count);
-            let (sin, cos) = (TAU * radical_inverse(k)).sin_cos();
+            let [radius2, phi] = point(k);
+            let (sin, cos) = (TAU * phi).sin_cos();
             [cos * radius2.sqrt(), sin * radius2.sqrt(), (1.0 - radius2).sqrt()]
         };
-        Ok(Fan { directions: (0..count).map(direction).collect() })
+        Fan { directions: (0..count).map(direction).collect() }
     }
 
     /// Unit directions above a surface with unit `normal`, the fan turned about it by `turn` of a full
     /// turn.
     pub fn above(&self, normal: DVec3, turn: f64) -> impl Iterator<Item = DVec3> + '_ {
+        self.part(0..self.directions.len() as u32, normal, turn)
+    }
+
+    /// Some of those.
+    pub fn part(
+        &self,
+        range: Range<u32>,
+        normal: DVec3,
+        turn: f64,
+    ) -> impl Iterator<Item = DVec3> + '_ {
         let (x, y) = normal.any_orthonormal_pair();
         let (sin, cos) = (TAU * turn).sin_cos();
         let (x, y) = (x * cos + y * sin, y * cos - x * sin);
-        self.directions.iter().map(move |d| x * d[0] + y * d[1] + normal * d[2])
+        let directions = &self.directions[range.start as usize..range.end as usize];
+        directions.iter().map(move |d| x * d[0] + y * d[1] + normal * d[2])
     }
 }
 
+/// Point `k` of a (0, 2)-sequence in base 2 (Sobol 1967): any 2ᵐ in a row from a multiple of that on are
+/// spread as evenly as Hammersley's. In the middle of its cell of 2⁻³².
+pub(crate) fn nested(k: u32) -> [f64; 2] {
+    let (mut left, mut column, mut bits) = (k, 1u32 << 31, 0);
+    while left > 0 {
+        bits ^= if left & 1 == 1 { column } else { 0 };
+        (left, column) = (left >> 1, column ^ (column >> 1));
+    }
+    [k.reverse_bits(), bits].map(|b| (f64::from(b) + 0.5) / 2f64.powi(32))
+}
+
 /// The second coordinate of Hammersley's points, in [0, 1).
-pub(crate) fn radical_inverse(k: u32) -> f64 {
+fn radical_inverse(k: u32) -> f64 {
     f64::from(k.reverse_bits()) / 2f64.powi(32)
 }
 

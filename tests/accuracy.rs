@@ -106,7 +106,7 @@ fn what_is_set_by_hand_stays() {
     let adjust = |effort: &mut Effort| {
         effort.hemicube = 48;
         if let Some(gather) = &mut effort.gather {
-            gather.rays = 77;
+            (gather.rays, gather.noise) = (77, 0.05);
             gather.gathering = Gathering { sweeps: 1, ..Gathering::new(60.0) };
         }
     };

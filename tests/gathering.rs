@@ -262,6 +262,40 @@ fn elements_are_split_at_the_shadow_and_nowhere_else() {
     assert!(rms[1] < rms[0] / 2.0 && rms[1] < 0.01, "{rms:?}");
 }
 
+/// Where light is a parabola, a vertex that follows it without a look is as good as one that looks.
+#[test]
+fn vertices_between_those_that_gather_lie_on_the_parabola() {
+    let (mesh, radiosity) = floor();
+    let light = shot(&mesh, &radiosity);
+    let curved =
+        |p: DVec3| 10.0 + 0.3 * p.x - p.y + 0.7 * p.x * p.x - 1.1 * p.x * p.y + 0.4 * p.y * p.y;
+    // Vertices stand a little off where they belong: on a lattice of 1/16 after two splits.
+    let lattice = |x: f64, origin: f64| ((x - origin) * 16.0).round() / 16.0 + origin;
+    let belongs = |p: DVec3| DVec3::new(lattice(p.x, -0.95), lattice(p.y, -1.0), 0.0);
+    let mut asked = 0;
+    let mut gather = |settings: &Gathering| {
+        asked = 0;
+        let mut known = Known(|_: &Sources, place: &Place| {
+            asked += 1;
+            curved(belongs(place.position))
+        });
+        let found = settings.gather(&light, &mesh, &mut known, go).unwrap();
+        (found, asked)
+    };
+    let plain = Gathering { tolerance: 1.0, everywhere: 2, ..Gathering::new(1e-9) };
+    let (flat, looks) = gather(&Gathering { curve: f64::INFINITY, ..plain.clone() });
+    let (found, others) = gather(&Gathering { curve: 1e-12, ..plain });
+    assert_eq!(looks, others, "nobody looks for it");
+    let ratio = found.mesh.element_count() as f64 / flat.mesh.element_count() as f64;
+    assert!(ratio > 3.9, "all that gathers is split once more: {ratio}");
+    // Exact but for rounding, of values up to 7.
+    let count = found.surface.positions.len();
+    assert!(count > 4 * flat.surface.positions.len() - 200, "{count}");
+    for (p, b) in found.surface.positions.iter().zip(&found.surface.radiosity) {
+        assert!((b.x - 0.5 * curved(*p)).abs() < 1e-13, "{p}: {b}");
+    }
+}
+
 #[test]
 fn settings_bound_how_many_and_how_small() {
     let (base, _) = floor();

@@ -133,6 +133,48 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
     assert!(rows(half) > 1);
 }
 
+/// A large patch is seen from one place. Where something stands on that place, another is taken.
+#[test]
+fn nobody_shoots_from_under_a_block() {
+    let mut walls: Vec<_> = (0..3)
+        .flat_map(|k| {
+            let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+            let (x, y, z) = (axes[k] * 2.0, axes[(k + 1) % 3] * 2.0, axes[(k + 2) % 3] * 2.0);
+            [[DVec3::ZERO, y, y + z, z], [x, x + z, x + y + z, x + y]]
+        })
+        .map(|corners| (corners.map(|p| p.to_array()), Material::grey("wall", 0.6)))
+        .collect();
+    // The last wall is the ceiling: all of it shines.
+    walls[5].1 = lamp();
+    let empty = quads(&walls);
+    // Blocks without a bottom on the two elements nearest to the middle of the floor, the fifth wall:
+    // each hides its element's centroid and a tenth of its area.
+    let mesh = Mesh::new(empty.clone(), 1.0).unwrap();
+    let floor = [8, 9].into_iter().flat_map(|t| mesh.elements_of(mesh.root(t)));
+    let mut middles: Vec<DVec3> = floor.map(|e| mesh.centroid(mesh.element(e))).collect();
+    let off = |p: &DVec3| p.distance(DVec3::new(1.0, 1.0, 0.0));
+    middles.sort_by(|p, q| off(p).total_cmp(&off(q)));
+    for p in &middles[..2] {
+        let corner = |k: usize, z: f64| {
+            let (dx, dy) = [(-0.08, -0.08), (0.08, -0.08), (0.08, 0.08), (-0.08, 0.08)][k % 4];
+            [p.x + dx, p.y + dy, z]
+        };
+        for k in 0..4 {
+            let side = [corner(k, 0.0), corner(k + 1, 0.0), corner(k + 1, 0.2), corner(k, 0.2)];
+            walls.push((side, Material::grey("block", 0.6)));
+        }
+        walls.push(([0, 1, 2, 3].map(|k| corner(k, 0.2)), Material::grey("block", 0.6)));
+    }
+    for scene in [empty, quads(&walls)] {
+        let mesh = Mesh::new(scene, 1.0).unwrap();
+        let s = solve(&mesh, Shooting { tolerance: 5.0, ..Default::default() });
+        let back = s.ledger.back.x / s.ledger.emitted.x;
+        println!("{back} of the light met backs, {} rows", s.rows_made);
+        // The room is closed: backs are only seen from inside a block, where nobody is to shoot from.
+        assert_eq!(back, 0.0);
+    }
+}
+
 #[test]
 fn clusters_keep_the_energy_and_give_the_same_bits_every_time() {
     let mesh = Mesh::new(room(8), f64::INFINITY).unwrap();

@@ -276,12 +276,14 @@ fn settings(effort: &Effort) -> Vec<(String, Value)> {
         ("ambient", json!(effort.ambient)),
         ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
     ];
-    if let Some(GatherEffort { element_size, contacts, rays, gathering }) = gather {
+    if let Some(GatherEffort { element_size, contacts, rays, noise, gathering }) = gather {
         let Gathering { tolerance, smallest, curve, elements, everywhere, sweeps } = gathering;
         all.extend([
             ("gather_size", json!(element_size)),
             ("gather_contacts", json!(contacts)),
             ("rays", json!(rays)),
+            // JSON has no infinity: null where there are never more rays.
+            ("noise", json!(noise)),
             ("bend", json!(tolerance)),
             ("smallest", json!(smallest)),
             // JSON has no infinity: null where nothing is split for its curve.

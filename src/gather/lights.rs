@@ -12,6 +12,8 @@ use crate::scene::{Rgb, Scene};
 pub(crate) struct Light {
     /// Its triangles, ascending.
     pub triangles: Vec<u32>,
+    /// Area of each and all before it, in the scene's unit squared.
+    pub ends: Vec<f64>,
     /// Exitance of all of them, W/m² per channel.
     pub exitance: Rgb,
     /// Whether no part of it can hide another: all of it lies behind each of its triangles' planes.
@@ -72,7 +74,14 @@ impl Lights {
             }
             triangles.sort_unstable();
             let convex = is_convex(&scene, &triangles);
-            lights.push(Light { triangles, exitance: scene.material(start).exitance, convex });
+            let exitance = scene.material(start).exitance;
+            let mut whole = 0.0;
+            let end = |&t: &u32| {
+                whole += scene.area(t as usize);
+                whole
+            };
+            let ends = triangles.iter().map(end).collect();
+            lights.push(Light { triangles, ends, exitance, convex });
         }
         Lights { scene, lights, of_triangle }
     }

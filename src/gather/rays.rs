@@ -1,39 +1,69 @@
 //! Gathering with rays on the CPU: a second opinion, and what runs without a GPU.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::light_view::LightView;
-use super::lights::{Lights, NO_LIGHT};
+use super::lights::{Light, Lights, NO_LIGHT};
 use super::{Gather, Gathered, Place, Sources};
-use crate::error::Error;
-use crate::fan::{Fan, radical_inverse};
+use crate::error::{Error, ErrorKind};
+use crate::fan::{self, Fan, nested};
 use crate::mesh::Mesh;
 use crate::rays::{Hit, Rays};
+use crate::scene::Scene;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
 ///
 /// Every ray carries the same share of the hemisphere, so what reflected light it finds has the
 /// error of an average over n stratified samples. A light's irradiance is its closed form times the
-/// share of it that a quarter of √n × √n rays find visible, weighted by their form factors.
+/// share of it that a quarter as many rays find visible, weighted by their form factors.
 #[derive(Debug)]
 pub struct RayGather {
     rays: Rays,
     lights: Lights,
     fan: Fan,
-    count: u32,
+    /// Rays a place: at least and at most.
+    least: u32,
+    most: u32,
+    /// How much half of the rays may differ from all, as a share of the irradiance, and the irradiance
+    /// that is taken for none.
+    noise: f64,
+    dim: f64,
 }
 
+/// Rays for a place where they disagree, for one where they do not.
+const MORE: u32 = 16;
+
+/// Rays over the hemisphere for one to a light.
+const A_LIGHT: u32 = 4;
+
 impl RayGather {
-    /// `count` rays a place over the triangles of `mesh`'s scene.
+    /// About `count` rays a place over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
-    /// [`crate::ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
+    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        let (fan, rays) = (Fan::new(count)?, Rays::of_scene(mesh.scene()));
-        Ok(RayGather { rays, lights: Lights::new(mesh.shared_scene()), fan, count })
+        if count == 0 || count > fan::MOST {
+            let place = format!("{count} rays a place");
+            let remedy = format!("use 1 to {}", fan::MOST);
+            return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
+        }
+        let least = 1 << f64::from(count).log2().round().max(1.0) as u32;
+        let (rays, lights) = (Rays::of_scene(mesh.scene()), Lights::new(mesh.shared_scene()));
+        let (fan, noise, dim) = (Fan::nested(least), f64::INFINITY, 0.0);
+        Ok(RayGather { rays, lights, fan, least, most: least, noise, dim })
+    }
+
+    /// Twice as many rays where half of them find more or less than all by over a share `noise` of the
+    /// irradiance, or of `dim` (W/m²) where there is less, or where half of what the luckiest ray found
+    /// is as much; and so on, up to 16 times as many. That is for seldom places, such as those that see
+    /// a bright spot through a gap.
+    pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
+        let most = if noise.is_finite() { (self.least * MORE).min(fan::MOST) } else { self.least };
+        RayGather { fan: Fan::nested(most), most, noise, dim, ..self }
     }
 
     fn at(&self, sources: &Sources, place: &Place) -> Gathered {
@@ -45,73 +75,153 @@ impl RayGather {
             let corner = |&t: &u32| sources.mesh.scene().corners(t as usize);
             light.convex || LightView::new(place, light.triangles.iter().map(corner)).is_some()
         });
-        let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
-        let share = 1.0 / f64::from(self.count);
+        let look = |range| self.look(sources, place, &apart, range);
+        let (mut count, mut known) = (self.least, look(0..self.least / 2));
+        loop {
+            let more = look(count / 2..count);
+            let [half, other] = [&known, &more].map(|seen| self.found(seen, &apart, count / 2));
+            known.add(&more);
+            let all = self.found(&known, &apart, count);
+            // Stratified halves may miss the same; then by as much as one ray finds.
+            let off = half.irradiance.distance(other.irradiance).max(known.most / f64::from(count));
+            if off / 2.0 <= self.noise * all.irradiance.length().max(self.dim) || count == self.most
+            {
+                return all;
+            }
+            count *= 2;
+        }
+    }
+
+    /// What a part of the rays see.
+    fn look(
+        &self,
+        sources: &Sources,
+        place: &Place,
+        apart: &[(u32, f64)],
+        range: Range<u32>,
+    ) -> Seen {
         let turn = turn(place.position);
-        let mut out = Gathered::default();
-        for direction in self.fan.above(place.normal, turn) {
+        let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
+        let mut seen = Seen::default();
+        let out = &mut seen.around;
+        for direction in self.fan.part(range.clone(), place.normal, turn) {
             let Some(hit) = self.rays.nearest(place.position, direction, place.near, None) else {
-                out.open += share;
+                out.open += 1.0;
                 continue;
             };
-            out.nearness += share / hit.distance;
+            out.nearness += 1.0 / hit.distance;
             if !hit.front {
-                out.back += share;
+                out.back += 1.0;
                 continue;
             }
-            out.irradiance += sources.reflected_at(hit.triangle, hit.u, hit.v) * share;
+            let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v);
+            out.irradiance += reflected;
+            seen.most = seen.most.max(reflected.length());
             let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !is_apart(light) {
-                out.irradiance += self.lights.lights[light as usize].exitance * share;
+                out.irradiance += self.lights.lights[light as usize].exitance;
             }
         }
-        for (light, factor) in apart {
-            let (seen, whole) = self.visible(sources.mesh, place, light, turn);
-            let Some(light) = self.lights.lights.get(light as usize) else { continue };
-            let factor = if !light.convex { seen } else { factor * seen / whole.max(1e-300) };
-            out.direct += light.exitance * factor;
+        let range = range.start / A_LIGHT..range.end.div_ceil(A_LIGHT);
+        let visible = |&(light, _): &(u32, f64)| {
+            self.visible(sources.mesh.scene(), place, light, range.clone(), turn)
+        };
+        seen.lights = apart.iter().map(visible).collect();
+        seen
+    }
+
+    /// What was found by `count` rays.
+    fn found(&self, seen: &Seen, apart: &[(u32, f64)], count: u32) -> Gathered {
+        let (share, mut out) = (1.0 / f64::from(count), seen.around);
+        out.irradiance *= share;
+        [&mut out.open, &mut out.back, &mut out.nearness].into_iter().for_each(|x| *x *= share);
+        for (&(light, factor), visible) in apart.iter().zip(&seen.lights) {
+            let light = &self.lights.lights[light as usize];
+            let share = match light.convex {
+                true => factor / visible.all.max(1e-300),
+                false => 1.0 / visible.points.max(1.0),
+            };
+            out.direct += light.exitance * visible.seen * share;
         }
         out.irradiance += out.direct;
         out
     }
 
     /// The form factor from `place` to what is visible of a light, and to all of it as if nothing
-    /// were in between, both by the same points on it.
-    fn visible(&self, mesh: &Mesh, place: &Place, light: u32, turn: f64) -> (f64, f64) {
-        let triangles = &self.lights.lights[light as usize].triangles;
-        let areas: Vec<f64> = triangles.iter().map(|&t| mesh.scene().area(t as usize)).collect();
-        let whole: f64 = areas.iter().sum();
-        let count = (self.count / 4).max(16);
-        let (mut k, mut below) = (0, 0.0);
-        let (mut seen, mut all) = (0.0, 0.0);
-        for i in 0..count {
-            let at = (f64::from(i) + 0.5) / f64::from(count) * whole;
-            while at > below + areas[k] && k + 1 < areas.len() {
-                below += areas[k];
-                k += 1;
-            }
+    /// were in between, both by the same points on it: those of `range`.
+    fn visible(
+        &self,
+        scene: &Scene,
+        place: &Place,
+        light: u32,
+        range: Range<u32>,
+        turn: f64,
+    ) -> Visible {
+        let Light { triangles, ends, .. } = &self.lights.lights[light as usize];
+        let whole = ends[ends.len() - 1];
+        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
+        for i in range {
+            let [x, y] = nested(i);
+            let at = x * whole;
+            let k = ends.partition_point(|&end| end < at).min(triangles.len() - 1);
+            let below = if k == 0 { 0.0 } else { ends[k - 1] };
             let triangle = triangles[k] as usize;
-            let [a, b, c] = mesh.scene().corners(triangle);
-            let across = ((at - below) / areas[k]).clamp(0.0, 1.0);
+            let [a, b, c] = scene.corners(triangle);
+            let across = ((at - below) / (ends[k] - below)).clamp(0.0, 1.0);
             // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
-            let (root, v) = (across.sqrt(), (radical_inverse(i) + turn).fract());
+            let (root, v) = (across.sqrt(), (y + turn).fract());
             let point = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
             let to = point - place.position;
-            let facing = -mesh.scene().normal(triangle).dot(to);
+            let facing = -scene.normal(triangle).dot(to);
             let above = place.normal.dot(to);
             if facing <= 0.0 || above <= 0.0 {
                 continue;
             }
             let r2 = to.length_squared();
-            let factor = whole / f64::from(count) * facing * above / (PI * r2 * r2);
-            all += factor;
+            let factor = whole * facing * above / (PI * r2 * r2);
+            out.all += factor;
             // What is met first may be another part of the light, which is as good.
             let near = place.near / r2.sqrt();
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
             let blocked = self.rays.blocked(place.position, to, near..1.0 - 1e-9, other);
-            seen += if blocked { 0.0 } else { factor };
+            out.seen += if blocked { 0.0 } else { factor };
         }
-        (seen, all)
+        out
+    }
+}
+
+/// Sums over rays.
+#[derive(Debug, Default)]
+struct Seen {
+    around: Gathered,
+    /// The brightest that a ray found, W/m².
+    most: f64,
+    lights: Vec<Visible>,
+}
+
+/// Sums of form factors over points on a light.
+#[derive(Debug, Default)]
+struct Visible {
+    points: f64,
+    /// To those that are visible.
+    seen: f64,
+    /// To all that are above the horizon and face the place.
+    all: f64,
+}
+
+impl Seen {
+    fn add(&mut self, other: &Seen) {
+        let (sum, more) = (&mut self.around, &other.around);
+        sum.irradiance += more.irradiance;
+        sum.open += more.open;
+        sum.back += more.back;
+        sum.nearness += more.nearness;
+        self.most = self.most.max(other.most);
+        for (sum, more) in self.lights.iter_mut().zip(&other.lights) {
+            sum.points += more.points;
+            sum.seen += more.seen;
+            sum.all += more.all;
+        }
     }
 }
 

@@ -118,17 +118,21 @@ impl<'a> Refined<'a> {
         if all > 0.0 { (off / all).sqrt() } else { 0.0 }
     }
 
-    /// Lets the vertices `fresh` gather.
+    /// Lets the vertices `fresh` gather what shines; given what shone `before`, only what is more or
+    /// less now.
     fn gather(
         &mut self,
         fresh: &[u32],
+        before: Option<&GatheredRadiosity>,
         gather: &mut dyn Gather,
         progress: &mut dyn FnMut(&GatherProgress) -> Go,
     ) -> Result<Go, Error> {
         let stands = Stands::new(&self.mesh, &self.vertices);
-        // What reflects nothing need not look.
-        let reflects = |&v: &u32| stands.reflectance(v) != Rgb::ZERO;
-        let mut left: Vec<u32> = fresh.iter().copied().filter(reflects).collect();
+        // What reflects nothing need not look, and what is covered does not change.
+        let looks = |&v: &u32| {
+            stands.reflectance(v) != Rgb::ZERO && !(before.is_some() && self.covered[v as usize])
+        };
+        let mut left: Vec<u32> = fresh.iter().copied().filter(looks).collect();
         let sources = self.light.sources();
         let (of, mut gathered) = (left.len(), 0);
         for attempt in 0.. {
@@ -136,16 +140,30 @@ impl<'a> Refined<'a> {
             for batch in left.chunks(BATCH) {
                 let places: Vec<Place> = batch.iter().map(|&v| stands.place(v, attempt)).collect();
                 self.gathers += places.len() as u64;
-                for (&v, found) in batch.iter().zip(gather.gather(&sources, &places)?) {
-                    let covered = stands.is_covered(v, &found);
-                    self.covered[v as usize] = covered;
+                let found = gather.gather(&sources, &places)?;
+                let old =
+                    before.map(|light| gather.gather(&light.sources(), &places)).transpose()?;
+                for (k, (&v, found)) in batch.iter().zip(&found).enumerate() {
+                    let covered = stands.is_covered(v, found);
                     if covered && stands.has_more(v, attempt) {
                         again.push(v);
                     } else {
                         gathered += 1;
                     }
-                    if !covered {
-                        self.reflected[v as usize] = stands.reflectance(v) * found.irradiance;
+                    let reflected = &mut self.reflected[v as usize];
+                    let reflectance = stands.reflectance(v);
+                    match &old {
+                        Some(_) if covered => {}
+                        Some(old) => {
+                            let more = reflectance * (found.irradiance - old[k].irradiance);
+                            *reflected = (*reflected + more).max(Rgb::ZERO);
+                        }
+                        None => {
+                            self.covered[v as usize] = covered;
+                            if !covered {
+                                *reflected = reflectance * found.irradiance;
+                            }
+                        }
                     }
                 }
                 let elements = self.mesh.element_count();
@@ -171,11 +189,27 @@ impl<'a> Refined<'a> {
         progress: &mut dyn FnMut(&GatherProgress) -> Go,
     ) -> Result<Stop, Error> {
         let (before, all) = (self.reflected.clone(), 0..self.reflected.len() as u32);
-        if self.gather(&all.collect::<Vec<_>>(), gather, progress)?.is_break() {
+        if self.gather(&all.collect::<Vec<_>>(), None, gather, progress)?.is_break() {
             return Ok(Stop::Cancelled);
         }
         self.change = self.distance(&before);
         self.refine(settings, gather, progress)
+    }
+
+    /// Lets what was reached shine, and all vertices gather how much more or less that is than what
+    /// shone before: little, so that few looks at both will do.
+    pub fn settle(
+        &mut self,
+        gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(&GatherProgress) -> Go,
+    ) -> Result<Stop, Error> {
+        let (known, all) = (self.reflected.clone(), 0..self.reflected.len() as u32);
+        let now = Cow::Owned(self.reached());
+        let before = std::mem::replace(&mut self.light, now);
+        self.sweep += 1;
+        let go = self.gather(&all.collect::<Vec<_>>(), Some(&before), gather, progress)?;
+        self.change = self.distance(&known);
+        Ok(if go.is_break() { Stop::Cancelled } else { Stop::Converged })
     }
 
     /// Splits elements where the light bends by more than `settings` allow, and lets the new vertices
@@ -195,6 +229,11 @@ impl<'a> Refined<'a> {
             } else {
                 young.iter().map(|&e| (self.bend(e, settings), e)).filter(|b| b.0 > 1.0).collect()
             };
+            if bent.is_empty() && young.len() < self.mesh.element_count() {
+                // What covered vertices were given depends on others that came later.
+                young = (0..self.mesh.element_count()).collect();
+                continue;
+            }
             if bent.is_empty() {
                 return Ok(if crowded { Stop::Elements } else { Stop::Converged });
             }
@@ -210,7 +249,7 @@ impl<'a> Refined<'a> {
             split.sort_unstable();
             let fresh;
             (fresh, young) = self.split(&split)?;
-            if self.gather(&fresh, gather, progress)?.is_break() {
+            if self.gather(&fresh, None, gather, progress)?.is_break() {
                 return Ok(Stop::Cancelled);
             }
         }
@@ -220,6 +259,11 @@ impl<'a> Refined<'a> {
     pub(super) fn splits(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
         self.mesh.cell(node).level < MAX_DEPTH && self.mesh.material(node).reflectance != Rgb::ZERO
+    }
+
+    /// Radiosity that is as good as none, W/m².
+    pub fn dim(&self) -> f64 {
+        self.dim
     }
 
     /// What shines on the vertices.
@@ -288,5 +332,43 @@ impl<'a> Refined<'a> {
             corners.iter().sum::<Rgb>() / 3.0
         });
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gather::rays::RayGather;
+
+    #[test]
+    fn what_changed_is_all_there_is_to_gather() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let emitted = |e| mesh.material(mesh.element(e)).exitance;
+        let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(emitted).collect();
+        let light = GatheredRadiosity::from_elements(&mesh, &radiosity).unwrap();
+        // Nothing is split: a vertex stands where it stood.
+        let settings = Gathering::new(1e9);
+        let mut gather = RayGather::new(&mesh, 256).unwrap();
+        let mut go = |_: &GatherProgress| Go::Continue(());
+        let mut state = Refined::new(mesh, &light);
+        state.sweep(&settings, &mut gather, &mut go).unwrap();
+        let first = state.reflected.clone();
+        let mut other = state.clone();
+        state.settle(&mut gather, &mut go).unwrap();
+        // The same looks at all that shines, on the same mesh.
+        other.shine();
+        let all: Vec<u32> = (0..first.len() as u32).collect();
+        let _ = other.gather(&all, None, &mut gather, &mut go).unwrap();
+        let whole = first.iter().map(|b| b.length()).fold(0.0, f64::max);
+        let mut changed = 0.0f64;
+        for (v, before) in first.iter().enumerate() {
+            let [a, b] = [state.reflected[v], other.reflected[v]];
+            // Sums of 256 rays, rounded in another order; covered ones follow from their neighbours.
+            assert!(a.distance(b) < 1e-12 * whole, "vertex {v}: {a} {b}");
+            changed = changed.max(a.distance(*before));
+        }
+        assert!(changed > 0.05 * whole, "a second bounce is a change: {changed} of {whole}");
+        assert!(state.change > 0.05);
     }
 }
