@@ -290,7 +290,7 @@ impl Settling<'_> {
     fn look(&mut self, wanted: f64, adjust: &dyn Fn(&mut Effort)) -> Result<(), Error> {
         let (light, ledger) = (self.state.light(), &self.shot.solution.ledger);
         let judged = Judged { light, sources: light, rest: &[], ledger, sweeps: 0 };
-        let most = AIM * SURE * wanted / 2.0;
+        let most = SAMPLING * AIM * SURE * wanted;
         // Without more where they disagree: that is for what these few places do not show.
         let mut looks = match &self.effort.gather {
             Some(gather) => self.device.gather(&self.shot.mesh, gather.rays)?,
@@ -340,7 +340,7 @@ impl Settling<'_> {
             gather.noise *= (most / sampling).clamp(0.25, 0.8);
         }
         if mesh > most {
-            let finer = (most / mesh).clamp(0.4, 0.8);
+            let finer = (most / mesh).clamp(0.6, 0.8);
             gather.gathering.tolerance *= finer;
             gather.gathering.smallest *= finer;
             gather.gathering.curve *= finer;
@@ -393,6 +393,9 @@ fn highest(mut parts: [f64; 3], rest: f64, whole: f64) -> f64 {
 
 /// The estimate is brought to this share of what is allowed, since it does not follow to the letter.
 const AIM: f64 = 0.9;
+
+/// What rays may be off by, of what all may be: chosen beforehand, as the others follow.
+const SAMPLING: f64 = 0.5;
 
 /// Where vertices only light others, their noise is averaged: they take so many times fewer looks.
 const ROUGH: u32 = 4;

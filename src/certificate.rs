@@ -45,9 +45,12 @@ pub(crate) struct Judged<'a> {
     pub sweeps: u32,
 }
 
-/// A dim place that sees what is nearer than this share of the scene's diagonal lies in a gap that nobody
-/// looks into. It is not judged.
+/// A place that is dim or behind something, and sees what is nearer than this share of the scene's
+/// diagonal, lies in a gap that nobody looks into. It is not judged.
 const GAP: f64 = 0.1;
+
+/// Behind something are places that see more than this share of backs.
+const BEHIND: f64 = 0.5;
 
 /// Errors have heavier tails than a normal distribution of the same spread: so much wider are those
 /// of vertices given, that one in twenty is off by more than twice as much.
@@ -97,7 +100,8 @@ impl Judged<'_> {
             }
             let [a, b, c] = three.map(|g| s.emitted + s.reflectance * g.irradiance);
             let truth = (a + b) / 2.0;
-            if truth.length() < dim && found[k].nearness * gap > 1.0 {
+            let hidden = truth.length() < dim || found[k].back > BEHIND;
+            if hidden && found[k].nearness * gap > 1.0 {
                 continue;
             }
             let whole = truth.length().max(s.said.length()).max(dim);

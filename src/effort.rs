@@ -65,8 +65,8 @@ impl Effort {
         let e = error.clamp(1e-4, 0.3);
         let hemicube = match e {
             e if e > 0.03 => 32,
-            e if e > 0.015 => 64,
-            e if e > 0.004 => 128,
+            e if e > 0.006 => 64,
+            e if e > 0.003 => 128,
             _ => 256,
         };
         let contacts = if e < 0.009 { 3 } else { 2 };
