@@ -425,7 +425,7 @@ const MOST_RAYS: f64 = 65536.0;
 const ROUNDS: u32 = 8;
 
 /// The certificate looks at one place for so many that vertices gathered at, three times each.
-const GATHERS_A_PLACE: usize = 32;
+const GATHERS_A_PLACE: usize = 48;
 const LEAST_PLACES: usize = 192;
 const MOST_PLACES: usize = 1024;
 

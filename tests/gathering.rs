@@ -299,7 +299,7 @@ fn vertices_between_those_that_gather_lie_on_the_parabola() {
 #[test]
 fn settings_bound_how_many_and_how_small() {
     let (base, _) = floor();
-    let fine = Gathering { tolerance: 0.001, ..Gathering::new(0.02) };
+    let fine = Gathering { tolerance: 0.001, curve: f64::INFINITY, ..Gathering::new(0.02) };
     let (found, largest) = (at_the_edge(&fine), sizes(&base).1);
     // What is above the smallest size is split in two along its edges.
     let (least, most) = sizes(&found.mesh);

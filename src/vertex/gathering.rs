@@ -142,7 +142,8 @@ impl Gathering {
         light.check_scene(mesh)?;
         let mut state = Refined::new(mesh.clone(), light);
         let stop = self.settle(&mut state, gather, None, &mut progress)?;
-        Ok(GatheredRadiosity { stop, ..state.curved(self)?.0 })
+        let reached = if stop == Stop::Cancelled { state.reached() } else { state.curved(self)?.0 };
+        Ok(GatheredRadiosity { stop, ..reached })
     }
 
     /// All sweeps: the first ones over coarser elements and, if there is one, by a rough gatherer,
