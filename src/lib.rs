@@ -5,7 +5,8 @@
 //! light, and gives radiosity at the vertices of a mesh. The path, in one line:
 //! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file. For exact
 //! vertices, [`Gathering`] stands before the last: each sees the settled light for itself, and the
-//! mesh grows finer where the light asks for it.
+//! mesh grows finer where the light asks for it. [`Solver`] has other methods beside shooting, GMRES
+//! for reflectance near one among them, and a rule that picks one.
 //!
 //! ```no_run
 //! use radiosity::{

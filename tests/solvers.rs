@@ -32,10 +32,6 @@ fn methods() -> [Method; 6] {
     })
 }
 
-fn gmres() -> Solver {
-    Solver::new(Method::Gmres { restart: 20 })
-}
-
 /// Rays, as many for each row.
 fn rays(mesh: &Mesh) -> RayCast {
     RayCast::new(mesh, 1024).unwrap().with_full_share(0.0)
@@ -194,17 +190,20 @@ fn a_bright_room_is_solved_in_few_steps_whatever_lights_it() {
     let scene = room([(); 6].map(|_| grey(rho, 0.0)), grey(rho, 1.0), grey(rho, 0.0));
     let mesh = Mesh::new(scene, 0.3).unwrap();
     let mut maker = Stored::of(&mesh);
-    let solver = Solver { unshot: 1e-7, ..gmres() };
-    let s = solver.solve(&mesh, &mut maker, go).unwrap();
     let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, go).unwrap();
-    let (off, imbalance) = (off(&s, &judge), s.ledger.imbalance().max(judge.ledger.imbalance()));
-    println!(
-        "{} elements, {} steps, off {off:.1e}, {imbalance:.1e}",
-        mesh.element_count(),
-        s.steps
-    );
-    // Unshot light is amplified as all light is.
-    assert!(off < 1e-5 && s.steps <= 40 && imbalance <= 1e-9);
+    // From the start again after 3 products, it would need many thousands if cycles did not grow.
+    for (restart, most) in [(50, 50), (3, 500)] {
+        let solver = Solver { unshot: 1e-7, ..Solver::new(Method::Gmres { restart }) };
+        let s = solver.solve(&mesh, &mut maker, go).unwrap();
+        let (off, imbalance) = (off(&s, &judge), s.ledger.imbalance());
+        println!(
+            "{} elements, restart {restart}: {} steps, off {off:.1e}, imbalance {imbalance:.1e}",
+            mesh.element_count(),
+            s.steps
+        );
+        // What is unshot is amplified as all light is: 1e-7 in all, of elements much alike.
+        assert!(off < 1e-5 && s.steps <= most && imbalance <= 1e-9);
+    }
 }
 
 #[test]
@@ -219,10 +218,10 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
         let solver = Solver { unshot: 0.0, steps: Some(bounces), ..Solver::new(Method::Jacobi) };
         let s = solver.solve(&mesh, &mut maker, go).unwrap();
         assert_eq!((s.steps, s.stop), (bounces, Stop::Steps));
-        for e in 0..count {
-            let b = leaving[e] / mesh.area(mesh.element(e));
-            // Sums of some hundred terms, in the same order.
-            assert!((s.radiosity[e] - b).abs().cmple(1e-12 * b).all(), "{bounces} bounces");
+        for (e, (&b, &flux)) in s.radiosity.iter().zip(&leaving).enumerate() {
+            let known = flux / mesh.area(mesh.element(e));
+            // Sums of some hundred terms, in another order.
+            assert!((b - known).abs().cmple(1e-12 * known).all(), "{bounces} bounces");
         }
         let mut next = vec![Rgb::ZERO; count];
         for (e, &flux) in bounce.iter().enumerate() {
@@ -267,6 +266,23 @@ fn overshoot_saves_shots_where_light_goes_round_long() {
         let (plain, ahead) = (shots(false, unshot), shots(true, unshot));
         println!("to {unshot:e} unshot: {plain} shots, {ahead} with overshoot");
         assert!(ahead < plain);
+    }
+}
+
+#[test]
+fn large_patches_may_overshoot_too() {
+    let mesh = cornell_box(100.0);
+    let [plain, ahead] = [Method::ALL[0], Method::ALL[1]].map(|method| {
+        let solver = Solver { unshot: 1e-4, ..Solver::new(method) };
+        solver.solve(&mesh, &mut rays(&mesh), go).unwrap()
+    });
+    println!("{} shots, {} with overshoot", plain.shots, ahead.shots);
+    assert!(ahead.stop == Stop::Converged && ahead.ledger.imbalance() <= 1e-12);
+    // Other patches are brightest, seen from other places: a tolerance of 0.4 % for either.
+    for (a, b) in
+        [(plain.ledger.absorbed, ahead.ledger.absorbed), (plain.ledger.left, ahead.ledger.left)]
+    {
+        assert!((a - b).abs().cmple(0.01 * plain.ledger.emitted).all(), "{a} {b}");
     }
 }
 

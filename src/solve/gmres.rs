@@ -28,7 +28,10 @@ pub(super) fn gmres(run: &mut Run, restart: usize, steps: Option<u64>) -> Result
         }
         let mut cycle = Cycle::new(&run.state);
         let mut stop = None;
-        while stop.is_none() && cycle.sent.len() < length && cycle.unshot(run) > run.unshot {
+        let enough = |cycle: &Cycle, run: &Run| {
+            !cycle.sent.is_empty() && cycle.unshot(run) <= run.unshot || cycle.sent.len() == length
+        };
+        while stop.is_none() && !enough(&cycle, run) {
             if steps.is_some_and(|most| run.steps >= most) {
                 stop = Some(Stop::Steps);
             } else if let Some(bounced) = bounce(run, &cycle)? {

@@ -52,8 +52,8 @@ impl Default for Shooting {
     }
 }
 
-/// Most that is overshot, per flux that is unshot. Relaxing by ω = 1 + this converges whatever the
-/// order where ω < 2 (exchange areas are symmetric: Ostrowski 1954).
+/// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order
+/// where ω < 2, since exchange areas are symmetric (Ostrowski 1954).
 const MOST_OVERSHOOT: f64 = 0.8;
 
 impl Shooting {

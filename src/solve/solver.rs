@@ -40,8 +40,8 @@ pub enum Method {
     GaussSeidel,
     /// Restarted GMRES (Saad and Schultz 1986).
     Gmres {
-        /// Products with all rows until it starts again, 1 or more; more where it stalls. Each takes 24
-        /// bytes an element.
+        /// Products with all rows until it starts again, 1 or more; twice as many where that takes it
+        /// nowhere. Each takes 24 bytes an element.
         restart: usize,
     },
     /// Gaussian elimination, to rounding whatever unshot share is asked for; at most [`MAX_DIRECT`]
@@ -60,7 +60,7 @@ impl Method {
             Method::Shooting { tolerance, level, overshoot: true },
             Method::Jacobi,
             Method::GaussSeidel,
-            Method::Gmres { restart: 20 },
+            Method::Gmres { restart: 50 },
             Method::Direct,
         ]
     };
