@@ -147,9 +147,6 @@ impl Cycle {
         column.pop();
         self.triangle.push(column);
         self.rotations.push([c, s]);
-        // What is new in a channel that is through is rounding alone.
-        let through = last.abs().cmple(f64::EPSILON * self.norm);
-        let norm = Rgb::select(through, Rgb::ZERO, norm);
         new.iter_mut().for_each(|w| *w = ratio(*w, norm));
         self.basis.push(new);
         self.sent.push(sent);
