@@ -5,7 +5,8 @@
 //! light, and gives radiosity at the vertices of a mesh. The path, in one line:
 //! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file. For exact
 //! vertices, [`Gathering`] stands before the last: each sees the settled light for itself, and the
-//! mesh grows finer where the light asks for it.
+//! mesh grows finer where the light asks for it. [`Solver`] has other methods beside shooting, GMRES
+//! for reflectance near one among them, and a rule that picks one.
 //!
 //! ```no_run
 //! use radiosity::{
@@ -92,7 +93,7 @@ pub use io::{
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
-pub use solve::{Go, Ledger, Progress, Shooting, Solution, Stop};
+pub use solve::{Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solver, Stop};
 pub use tone::ToneCurve;
 pub use vertex::VertexRadiosity;
 pub use vertex::gathering::{GatherProgress, GatheredRadiosity, Gathering};

@@ -319,7 +319,7 @@ fn bar() -> ProgressBar {
 /// The bar fills with the vertices of a level, or while shooting with the share that is shot.
 fn show(bar: &ProgressBar, stage: &Stage) {
     match stage {
-        Stage::Shooting(Progress { shots, rows_made, unshot_share, elapsed }) => {
+        Stage::Shooting(Progress { shots, rows_made, unshot_share, elapsed, .. }) => {
             bar.set_position((1000.0 * (1.0 - unshot_share).clamp(0.0, 1.0)) as u64);
             bar.set_message(format!(
                 "shooting, {:.3} % unshot, {shots} shots, {rows_made} hemicubes, {:.1} s",

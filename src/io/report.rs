@@ -89,7 +89,7 @@ impl Report {
     /// The report as JSON.
     pub fn to_json(&self) -> Value {
         let channels = |c: Rgb| json!(c.to_array());
-        let Ledger { emitted, absorbed, left, back, unshot } = self.ledger;
+        let Ledger { emitted, absorbed, left, back, unshot, overshot } = self.ledger;
         let (s, c) = (self.seconds, self.certificate);
         let [name, kind, driver] = &self.adapter;
         let drawn = self.hemicubes_by_resolution.iter();
@@ -117,6 +117,7 @@ impl Report {
                 "left": channels(left),
                 "back": channels(back),
                 "unshot": channels(unshot),
+                "overshot": channels(overshot),
             },
             "error": {
                 "total": c.total, "mesh": c.mesh, "sampling": c.sampling, "settling": c.settling,

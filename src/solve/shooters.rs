@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::Flux;
+use super::state::Flux;
 use crate::form_factor::Row;
 use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;

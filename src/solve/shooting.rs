@@ -1,15 +1,12 @@
-//! Progressive shooting (Cohen, Chen, Wallace, Greenberg 1988) in f64.
-//!
-//! The state is flux, not radiosity: a patch that shoots Φ sends F_ij Φ to element j, which absorbs
-//! (1 − ρ_j) of it and has the rest to shoot. Divided by the receiver's area that is the textbook
-//! ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose energy.
+//! Progressive shooting (Cohen, Chen, Wallace, Greenberg 1988) in f64: the patch with most unshot
+//! flux first, which is Southwell's relaxation.
 
 use std::ops::Range;
-use std::time::Instant;
 
-use super::kept_rows::KeptRows;
+use super::run::Run;
 use super::shooters::{Shooters, Shot};
-use super::{Flux, Go, Ledger, Progress, Solution, Stop};
+use super::state::State;
+use super::{Go, Method, Progress, Solution, Stop};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::{Mesh, NodeId};
@@ -35,21 +32,34 @@ pub struct Shooting {
     /// The smallest patches are this many quadtree levels above the elements: 4ᵏ elements, or a
     /// triangle.
     pub level: u32,
+    /// Whether patches shoot ahead of the light (Feda and Purgathofer 1992): beside what they have
+    /// unshot, what they would yet receive and reflect if all that is unshot fell evenly. Saves shots
+    /// where reflectance is high; what was shot too much is made up for by what comes in, or shot as
+    /// negative light. Until then the ledger has it as `overshot`.
+    pub overshoot: bool,
 }
 
 impl Default for Shooting {
     fn default() -> Self {
-        Shooting { unshot: 1e-3, shots: None, row_memory: 1 << 30, tolerance: 4e-3, level: 0 }
+        Shooting {
+            unshot: 1e-3,
+            shots: None,
+            row_memory: 1 << 30,
+            tolerance: Shooting::TOLERANCE,
+            level: 0,
+            overshoot: false,
+        }
     }
 }
 
-/// The ledger must close to this after every batch: f64 sums of some 10⁹ terms stay far below.
-const IMBALANCE: f64 = 1e-9;
-
-/// Less than this share unshot cannot change a radiosity in f64: asking for 0 ends here.
-const LEAST_UNSHOT: f64 = 1e-16;
+/// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order
+/// where ω < 2, since exchange areas are symmetric (Ostrowski 1954).
+const MOST_OVERSHOOT: f64 = 0.8;
 
 impl Shooting {
+    /// The tolerance, unless set.
+    pub const TOLERANCE: f64 = 4e-3;
+
     /// Spreads the light that `mesh` emits, with rows from `form_factors`, brightest patch first.
     ///
     /// `progress` is told of every shot, and of every row that was made in vain, and may stop the
@@ -57,140 +67,96 @@ impl Shooting {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1] or `tolerance` not at least 0;
-    /// [`ErrorKind::FormFactor`] when a row breaks its contract; whatever `form_factors` fails with.
+    /// [`ErrorKind::Scene`] when the emitted flux is not finite; [`ErrorKind::FormFactor`] when a row
+    /// breaks its contract; whatever `form_factors` fails with.
     pub fn solve(
         &self,
         mesh: &Mesh,
         form_factors: &mut dyn FormFactors,
         mut progress: impl FnMut(&Progress) -> Go,
     ) -> Result<Solution, Error> {
-        if !(0.0..=1.0).contains(&self.unshot) {
-            let place = format!("unshot share {}", self.unshot);
-            return Err(Error::new(ErrorKind::Setting, place, "out of range", "use 0 to 1"));
-        }
-        if self.tolerance.is_nan() || self.tolerance < 0.0 {
-            let place = format!("tolerance {}", self.tolerance);
+        let &Shooting { unshot, shots, row_memory, tolerance, level, overshoot } = self;
+        if tolerance.is_nan() || tolerance < 0.0 {
+            let place = format!("tolerance {tolerance}");
             return Err(Error::new(ErrorKind::Setting, place, "below 0", "use 0 or more"));
         }
-        let start = Instant::now();
-        let mut state = State::new(mesh);
-        let mut shooters = Shooters::new(mesh, self.tolerance, self.level);
-        let mut kept = KeptRows::new(self.row_memory);
-        let (mut shots, mut rows_made) = (0, 0);
-        let stop = 'solve: loop {
-            state.settle()?;
-            if state.ledger.unshot_share() <= self.unshot.max(LEAST_UNSHOT) {
+        let mut run = Run::new(mesh, form_factors, &mut progress, unshot, row_memory)?;
+        let mut shooters = Shooters::new(mesh, tolerance, level);
+        let stop = loop {
+            if run.has_converged()? {
                 break Stop::Converged;
             }
-            let left = self.shots.map_or(u64::MAX, |most| most - shots);
+            let left = shots.map_or(u64::MAX, |most| most - run.shots);
             if left == 0 {
                 break Stop::Shots;
             }
-            let missing = |patch| kept.get(patch).is_none();
-            let batch = shooters.brightest(&state.flux, form_factors.batch(), left, missing);
-            let draws: Vec<&Shot> = batch.iter().filter(|s| missing(s.patch)).collect();
-            let share = |s: &&Shot| state.flux.unshot_share(&s.elements);
-            let unshot_share = draws.iter().map(share).fold(0.0, f64::max);
-            let missing: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
-            let made = form_factors.rows(mesh, &missing, unshot_share)?;
-            if made.len() != missing.len() {
-                let found = format!("{} rows for {} patches", made.len(), missing.len());
-                let remedy = "FormFactors::rows must return one row a patch";
-                return Err(Error::new(ErrorKind::FormFactor, "form factors", found, remedy));
-            }
-            rows_made += made.len() as u64;
-            let mut made = made.into_iter();
-            for shot in batch {
-                match kept.get(shot.patch) {
-                    Some(row) => {
-                        state.shoot(&shot.elements, row);
-                        shots += 1;
-                    }
-                    None => {
-                        let Some(row) = made.next() else { break };
-                        row.check(mesh, shot.patch)?;
-                        // Else the patch is too large, and its parts shoot.
-                        if shooters.confirm(&shot, &row, &state.flux) {
-                            state.shoot(&shot.elements, &row);
-                            kept.keep(shot.patch, row);
-                            shots += 1;
-                        }
-                    }
-                }
-                let unshot_share = state.ledger.unshot_share();
-                let told = Progress { shots, rows_made, unshot_share, elapsed: start.elapsed() };
-                if progress(&told).is_break() {
-                    state.settle()?;
-                    break 'solve Stop::Cancelled;
-                }
+            let ahead = match overshoot {
+                true => run.state.ledger.ambient(mesh).max(Rgb::ZERO),
+                false => Rgb::ZERO,
+            };
+            if shoot_batch(&mut run, &mut shooters, left, ahead)?.is_break() {
+                break Stop::Cancelled;
             }
         };
-        Ok(Solution { radiosity: state.radiosity(), ledger: state.ledger, shots, rows_made, stop })
+        run.solution(Method::Shooting { tolerance, level, overshoot }, stop)
     }
 }
 
-struct State<'m> {
-    mesh: &'m Mesh,
-    /// Reflectance of each element.
-    reflectance: Vec<Rgb>,
-    flux: Flux,
-    ledger: Ledger,
+/// Takes the next shots, at most `left`, each running `ahead` by so much radiosity per unit of
+/// reflectance.
+fn shoot_batch(run: &mut Run, shooters: &mut Shooters, left: u64, ahead: Rgb) -> Result<Go, Error> {
+    let missing = |patch| run.rows.get(patch).is_none();
+    let batch = shooters.brightest(&run.state.flux, run.rows.batch(), left, missing);
+    let draws: Vec<&Shot> = batch.iter().filter(|s| missing(s.patch)).collect();
+    let share = |s: &&Shot| run.state.flux.unshot_share(&s.elements);
+    let unshot_share = draws.iter().map(share).fold(0.0, f64::max);
+    let missing: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
+    let mut made = run.rows.make(&missing, unshot_share)?.into_iter();
+    for shot in batch {
+        match run.rows.get(shot.patch) {
+            Some(row) => {
+                run.state.shoot(&shot.elements, row, ahead);
+                run.shots += 1;
+            }
+            None => {
+                let Some(row) = made.next() else { break };
+                // Else the patch is too large, and its parts shoot.
+                if shooters.confirm(&shot, &row, &run.state.flux) {
+                    run.state.shoot(&shot.elements, &row, ahead);
+                    run.rows.keep(shot.patch, row);
+                    run.shots += 1;
+                }
+            }
+        }
+        run.steps = run.shots;
+        let unshot_share = run.state.ledger.unshot_share();
+        if run.tell(unshot_share).is_break() {
+            return Ok(Go::Break(()));
+        }
+    }
+    Ok(Go::Continue(()))
 }
 
-impl<'m> State<'m> {
-    fn new(mesh: &'m Mesh) -> State<'m> {
-        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let unshot: Vec<Rgb> =
-            elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
-        let reflectance = elements.map(|n| mesh.material(n).reflectance).collect();
-        let emitted = unshot.iter().sum();
-        let ledger = Ledger { emitted, unshot: emitted, ..Default::default() };
-        let flux = Flux { emitted, leaving: unshot.clone(), unshot };
-        State { mesh, reflectance, flux, ledger }
-    }
-
-    /// Passes the unshot flux of `from` on along `row`.
-    fn shoot(&mut self, from: &[Range<usize>], row: &Row) {
-        let Flux { unshot, leaving, .. } = &mut self.flux;
-        let mut flux = Rgb::ZERO;
-        for elements in from {
-            flux += unshot[elements.clone()].iter().sum::<Rgb>();
-            unshot[elements.clone()].fill(Rgb::ZERO);
+impl State<'_> {
+    /// Passes the unshot flux of `from` on along `row`, and `ahead`, W/m² per unit of reflectance,
+    /// beyond it.
+    fn shoot(&mut self, from: &[Range<usize>], row: &Row, ahead: Rgb) {
+        let (mut flux, mut overshot) = (Rgb::ZERO, Rgb::ZERO);
+        for e in from.iter().cloned().flatten() {
+            let unshot = std::mem::take(&mut self.flux.unshot[e]);
+            flux += unshot;
+            overshot += unshot.min(Rgb::ZERO);
+            if ahead != Rgb::ZERO {
+                let area = self.mesh.area(self.mesh.element(e));
+                let most = MOST_OVERSHOOT * unshot.max(Rgb::ZERO);
+                let over = (self.reflectance[e] * area * ahead).min(most);
+                self.flux.unshot[e] -= over;
+                flux += over;
+                overshot += over;
+            }
         }
-        let per_share = flux / f64::from(Row::TOTAL);
-        let (mut absorbed, mut reflected) = (Rgb::ZERO, Rgb::ZERO);
-        for entry in &row.entries {
-            let e = entry.element as usize;
-            let incident = per_share * f64::from(entry.share);
-            let passed = incident * self.reflectance[e];
-            unshot[e] += passed;
-            leaving[e] += passed;
-            reflected += passed;
-            absorbed += incident - passed;
-        }
-        self.ledger.absorbed += absorbed;
-        self.ledger.left += per_share * f64::from(row.open);
-        self.ledger.back += per_share * f64::from(row.back);
-        self.ledger.unshot += reflected - flux;
-    }
-
-    /// Counts what is unshot anew and checks that the ledger closes.
-    fn settle(&mut self) -> Result<(), Error> {
-        self.ledger.unshot = self.flux.unshot.iter().sum();
-        let imbalance = self.ledger.imbalance();
-        if imbalance <= IMBALANCE {
-            return Ok(());
-        }
-        Err(Error::new(
-            ErrorKind::FormFactor,
-            "energy ledger",
-            format!("emitted and accounted flux differ by {imbalance:e} of the emitted"),
-            format!("they must agree to {IMBALANCE:e}; rows that are not finite can do this"),
-        ))
-    }
-
-    fn radiosity(&self) -> Vec<Rgb> {
-        let flux = self.flux.leaving.iter().zip(0..);
-        flux.map(|(&w, e)| w / self.mesh.area(self.mesh.element(e))).collect()
+        self.pass_on(flux, row);
+        self.ledger.unshot += overshot;
+        self.ledger.overshot += overshot;
     }
 }

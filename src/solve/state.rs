@@ -1,0 +1,152 @@
+//! Where the light is while a solver runs.
+//!
+//! The state is flux, not radiosity: who sends Φ along row i sends F_ij Φ to element j, which absorbs
+//! (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that is the textbook
+//! ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose energy.
+//!
+//! With s what was sent, e what is emitted and (Mx)_j = ρ_j Σ_i F_ij x_i, the unshot flux is the
+//! residual r = e − s + Ms of the radiosity equation, and what leaves is s + r = e + Ms. Solvers only
+//! differ in what they send next (Gortler, Cohen and Slusallek 1994): this, and the ledger, is theirs
+//! in common.
+
+use std::ops::Range;
+
+use super::ledger::{Ledger, largest_share};
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::Row;
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+/// Flux of the elements, W per channel.
+pub(super) struct Flux {
+    /// Emitted by all.
+    emitted: Rgb,
+    /// Received or emitted by each and not yet passed on; below 0 where it was passed on before.
+    pub unshot: Vec<Rgb>,
+    /// Emitted or reflected by each, shot or not.
+    pub leaving: Vec<Rgb>,
+}
+
+impl Flux {
+    /// What is unshot or overshot in `elements`, as a share of the emitted: the worst channel.
+    pub fn unshot_share(&self, elements: &[Range<usize>]) -> f64 {
+        let all =
+            |run: &Range<usize>| self.unshot[run.clone()].iter().map(|u| u.abs()).sum::<Rgb>();
+        largest_share(elements.iter().map(all).sum(), self.emitted)
+    }
+
+    /// What leaves `elements`, as a share of the emitted: the worst channel.
+    pub fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
+        let all = |run: &Range<usize>| self.leaving[run.clone()].iter().sum::<Rgb>();
+        largest_share(elements.iter().map(all).sum(), self.emitted)
+    }
+}
+
+/// What became of flux that was sent, W per channel.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sent {
+    pub reflected: Rgb,
+    pub absorbed: Rgb,
+    pub left: Rgb,
+    pub back: Rgb,
+}
+
+impl Sent {
+    /// Adds `scale` times `other`.
+    pub fn add(&mut self, scale: Rgb, other: Sent) {
+        self.reflected += scale * other.reflected;
+        self.absorbed += scale * other.absorbed;
+        self.left += scale * other.left;
+        self.back += scale * other.back;
+    }
+}
+
+/// Sends `flux` along `row`; `reflect` gets what each element reflects of it.
+pub(super) fn send(
+    flux: Rgb,
+    row: &Row,
+    reflectance: &[Rgb],
+    mut reflect: impl FnMut(usize, Rgb),
+) -> Sent {
+    let per_share = flux / f64::from(Row::TOTAL);
+    let (mut absorbed, mut reflected) = (Rgb::ZERO, Rgb::ZERO);
+    for entry in &row.entries {
+        let e = entry.element as usize;
+        let incident = per_share * f64::from(entry.share);
+        let passed = incident * reflectance[e];
+        reflect(e, passed);
+        reflected += passed;
+        absorbed += incident - passed;
+    }
+    let (left, back) = (per_share * f64::from(row.open), per_share * f64::from(row.back));
+    Sent { reflected, absorbed, left, back }
+}
+
+/// Flux of all elements, and the ledger of it.
+pub(super) struct State<'m> {
+    pub mesh: &'m Mesh,
+    /// Reflectance of each element.
+    pub reflectance: Vec<Rgb>,
+    pub flux: Flux,
+    pub ledger: Ledger,
+}
+
+/// The ledger must close to this after every batch: f64 sums of some 10⁹ terms stay far below.
+const IMBALANCE: f64 = 1e-9;
+
+impl<'m> State<'m> {
+    pub fn new(mesh: &'m Mesh) -> Result<State<'m>, Error> {
+        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
+        let unshot: Vec<Rgb> =
+            elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
+        let reflectance = elements.map(|n| mesh.material(n).reflectance).collect();
+        let emitted: Rgb = unshot.iter().sum();
+        if !emitted.is_finite() {
+            let remedy = "scale exitances down: sums of flux must stay finite in 64-bit floats";
+            let found = format!("{emitted} W");
+            return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
+        }
+        let ledger = Ledger { emitted, unshot: emitted, ..Default::default() };
+        let flux = Flux { emitted, leaving: unshot.clone(), unshot };
+        Ok(State { mesh, reflectance, flux, ledger })
+    }
+
+    /// Sends `flux`, which is no longer unshot anywhere, along `row`.
+    pub fn pass_on(&mut self, flux: Rgb, row: &Row) {
+        let Flux { unshot, leaving, .. } = &mut self.flux;
+        let sent = send(flux, row, &self.reflectance, |e, passed| {
+            unshot[e] += passed;
+            leaving[e] += passed;
+        });
+        self.lose(sent);
+        self.ledger.unshot += sent.reflected - flux;
+    }
+
+    /// Books what is lost of flux that was sent.
+    pub fn lose(&mut self, sent: Sent) {
+        self.ledger.absorbed += sent.absorbed;
+        self.ledger.left += sent.left;
+        self.ledger.back += sent.back;
+    }
+
+    /// Counts what is unshot anew and checks that the ledger closes.
+    pub fn settle(&mut self) -> Result<(), Error> {
+        self.ledger.unshot = self.flux.unshot.iter().map(|u| u.max(Rgb::ZERO)).sum();
+        self.ledger.overshot = self.flux.unshot.iter().map(|u| (-*u).max(Rgb::ZERO)).sum();
+        let imbalance = self.ledger.imbalance();
+        if imbalance <= IMBALANCE {
+            return Ok(());
+        }
+        Err(Error::new(
+            ErrorKind::FormFactor,
+            "energy ledger",
+            format!("emitted and accounted flux differ by {imbalance:e} of the emitted"),
+            format!("they must agree to {IMBALANCE:e}; rows that are not finite can do this"),
+        ))
+    }
+
+    pub fn radiosity(&self) -> Vec<Rgb> {
+        let flux = self.flux.leaving.iter().zip(0..);
+        flux.map(|(&w, e)| w / self.mesh.area(self.mesh.element(e))).collect()
+    }
+}
