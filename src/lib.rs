@@ -66,6 +66,7 @@ mod gpu;
 pub mod hemicube;
 mod io;
 mod mesh;
+mod order;
 mod rays;
 mod scene;
 mod solve;

@@ -33,6 +33,9 @@ struct Near {
     spheres: Vec<Sphere>,
 }
 
+/// On grids many are just at the reach: rounding is not to tell which of them are near.
+const TIE: f64 = 1.0 + 1e-6;
+
 /// A sphere about an element.
 #[derive(Clone, Copy, Debug)]
 struct Sphere {
@@ -109,7 +112,7 @@ impl Near {
         let mut mended: Vec<(usize, f64)> = vec![];
         for (k, entry) in row.entries.iter().enumerate() {
             let sphere = self.spheres[entry.element as usize];
-            if sphere.gap(&around) > self.reach * 2.0 * around.radius {
+            if sphere.gap(&around) > self.reach * 2.0 * around.radius * TIE {
                 continue;
             }
             let element = mesh.element(entry.element as usize);

@@ -17,6 +17,7 @@ use glam::DVec3;
 use super::state::Flux;
 use crate::form_factor::Row;
 use crate::mesh::{Clusters, Mesh, NodeId};
+use crate::order::rank;
 use crate::scene::Rgb;
 
 /// The shooters. Together they cover every element once, and they only ever get smaller.
@@ -111,17 +112,17 @@ impl<'m> Shooters<'m> {
         most: u64,
         missing: impl Fn(NodeId) -> bool,
     ) -> Vec<Shot> {
-        // Positive floats are in the order of their bits; of equals the first in the cut.
+        // Of equals the first in the cut.
         let entry = |s: &Shooter, k: usize| {
             let share = flux.unshot_share(&s.elements);
-            (share > 0.0).then(|| (s.fresh, share.to_bits(), Reverse(k)))
+            (share > 0.0).then(|| (s.fresh, rank(share), Reverse(k)))
         };
         let mut bright: BinaryHeap<_> =
             self.cut.iter().zip(0..).filter_map(|(s, k)| entry(s, k)).collect();
         let (mut wanted, mut shots, mut floor) = (rows.max(1), Vec::<Shot>::new(), None);
-        while let Some((fresh, bits, Reverse(k))) = bright.pop() {
-            let share = f64::from_bits(bits);
-            let (first, least) = *floor.get_or_insert((fresh, share * BATCH_FALL));
+        while let Some((fresh, share, Reverse(k))) = bright.pop() {
+            let least = || rank(flux.unshot_share(&self.cut[k].elements) * BATCH_FALL);
+            let (first, least) = *floor.get_or_insert_with(|| (fresh, least()));
             if fresh != first || share < least || shots.len() as u64 >= most {
                 break;
             }
@@ -257,7 +258,7 @@ impl<'m> Shooters<'m> {
         let middle = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / whole;
         let off = |e: &usize| self.centroids[*e].distance_squared(middle);
         let sees = |e: &usize| !self.blind.contains(&mesh.element(*e));
-        let nearest = elements().filter(lit).filter(sees).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let nearest = elements().filter(lit).filter(sees).min_by_key(|e| rank(off(e)));
         mesh.element(nearest.unwrap_or(shooter.elements[0].start))
     }
 
