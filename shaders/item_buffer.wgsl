@@ -4,15 +4,25 @@
 
 const BACK: u32 = 1u;
 
+// A corner in two parts that add up to it.
+struct Corner {
+    high: vec3f,          // from the middle of the scene, in units of its size
+    padding: u32,
+    low: vec3f,           // what rounding took off
+    padding_2: u32,
+}
+
 struct FaceView {
-    eye: vec3f,           // patch centre, scene unit from the local origin
-    near: f32,            // near plane, scene unit
+    eye: vec3f,           // patch centre, from the middle of the scene, in units of its size
+    near: f32,            // near plane, same unit
     right: vec3f,         // unit vectors of the view, right x up = -forward
     bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
     up: vec3f,
     own_triangle: u32,    // place of the patch's own triangle, which is never drawn
     forward: vec3f,
     padding: u32,
+    eye_low: vec3f,       // what rounding took off the eye
+    padding_2: u32,
 }
 
 struct TriangleCells {
@@ -20,7 +30,7 @@ struct TriangleCells {
     side: u32,            // cells along an edge, a power of two
 }
 
-@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+@group(0) @binding(0) var<storage, read> corners: array<Corner>;
 @group(0) @binding(1) var<storage, read> triangles: array<TriangleCells>;
 @group(0) @binding(2) var<storage, read> views: array<FaceView>;
 
@@ -36,7 +46,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     let view = views[view_index];
     let triangle = index / 3u;   // its place in the drawing order
     let corner = index % 3u;
-    let d = corners[index].xyz - view.eye;
+    // Of corners near the eye the first difference is exact: nothing is too small to be seen.
+    let d = (corners[index].high - view.eye) + (corners[index].low - view.eye_low);
     let x = dot(d, view.right);
     let y = dot(d, view.up);
     let w = dot(d, view.forward);

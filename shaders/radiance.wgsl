@@ -6,20 +6,30 @@ const INNER: u32 = 0x80000000u;
 const APART: u32 = 8u;
 const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
 
+// A corner in two parts that add up to it.
+struct Corner {
+    high: vec3f,          // from the middle of the scene, in units of its size
+    padding: u32,
+    low: vec3f,           // what rounding took off
+    padding_2: u32,
+}
+
 struct RadianceView {
-    eye: vec3f,           // the place, scene unit from the local origin
-    near: f32,            // near plane, scene unit
+    eye: vec3f,           // the place, from the middle of the scene, in units of its size
+    near: f32,            // near plane, same unit
     right: vec3f,         // dot products with these three are clip x, y and w
     bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
     up: vec3f,
     light: u32,           // the light that a tile looks for
     forward: vec3f,
     apart: u32,           // how many lights shine apart
+    eye_low: vec3f,       // what rounding took off the eye
+    padding: u32,
     lights: array<u32, APART>,   // and which: their exitance is not counted here
 }
 
 struct RadianceTriangle {
-    exitance: vec3f,      // W/m² per channel
+    exitance: vec3f,      // per channel, in units of about the brightest
     light: u32,           // the light that it belongs to, if any
     index: u32,           // which of the scene's it is
     padding: array<u32, 3>,
@@ -30,12 +40,12 @@ struct Lattice {
     side: u32,            // cells along an edge, a power of two
 }
 
-@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+@group(0) @binding(0) var<storage, read> corners: array<Corner>;
 @group(0) @binding(1) var<storage, read> triangles: array<RadianceTriangle>;
 @group(0) @binding(2) var<storage, read> views: array<RadianceView>;
 @group(0) @binding(3) var<storage, read> lattices: array<Lattice>;   // one a triangle of the scene
 @group(0) @binding(4) var<storage, read> nodes: array<u32>;   // INNER + first of four children, or an element
-@group(0) @binding(5) var elements: texture_2d<f32>;   // reflected radiosity at their corners, W/m²
+@group(0) @binding(5) var elements: texture_2d<f32>;   // reflected radiosity at their corners, same unit
 
 struct Varying {
     @builtin(position) position: vec4f,
@@ -50,7 +60,9 @@ struct Varying {
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index: u32) -> Varying {
     let triangle = triangles[index / 3u];
     let corner = index % 3u;
-    let d = corners[index].xyz - views[view_index].eye;
+    // Of corners near the eye the first difference is exact: nothing is too small to be seen.
+    let high = corners[index].high - views[view_index].eye;
+    let d = high + (corners[index].low - views[view_index].eye_low);
     let x = dot(d, views[view_index].right);
     let y = dot(d, views[view_index].up);
     let w = dot(d, views[view_index].forward);

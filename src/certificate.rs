@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::error::Error;
-use crate::gather::rays::turn;
+use crate::gather::turns::Turns;
 use crate::gather::{Gather, Gathered, Place};
 use crate::scene::Rgb;
 use crate::solve::Ledger;
@@ -65,6 +65,8 @@ struct Sample {
     said: Rgb,
     emitted: Rgb,
     size: f64,
+    /// Of the place, in [0, 1).
+    turn: f64,
 }
 
 /// Dim is what reflects less than this share of the mean: its errors are weighed against that.
@@ -183,7 +185,7 @@ impl Judged<'_> {
             (b - a).cross(c - a).length() / 2.0
         };
         let whole: f64 = surface.faces.iter().map(area).sum();
-        let above = Above::new(mesh.scene());
+        let (above, turns) = (Above::new(mesh.scene()), Turns::new(mesh.scene()));
         let (mut below, mut samples) = (0.0, Vec::with_capacity(count));
         for (face, &element) in surface.faces.iter().zip(&surface.elements) {
             below += area(face);
@@ -202,13 +204,15 @@ impl Judged<'_> {
                 let element = element as usize;
                 let node = mesh.element(element);
                 let (material, size) = (mesh.material(node), mesh.area(node).sqrt());
+                let place = above.place(mix(corners(face)), mesh.normal(node), size);
                 samples.push(Sample {
                     element,
                     reflectance: material.reflectance,
-                    place: above.place(mix(corners(face)), mesh.normal(node), size),
+                    place,
                     said: mix(face.map(|v| surface.radiosity[v as usize])),
                     emitted: material.exitance,
                     size,
+                    turn: turns.of(&place),
                 });
             }
         }
@@ -279,7 +283,7 @@ impl Sample {
     fn aside(&self) -> Place {
         let p = self.place;
         let (x, _) = p.normal.any_orthonormal_pair();
-        let step = 1e-3 * self.size * (0.5 + turn(p.position));
+        let step = 1e-3 * self.size * (0.5 + self.turn);
         Place { position: p.position + x * step, ..p }
     }
 }

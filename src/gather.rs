@@ -3,6 +3,7 @@
 pub(crate) mod light_view;
 pub(crate) mod lights;
 pub(crate) mod rays;
+pub(crate) mod turns;
 
 use glam::DVec3;
 

@@ -9,6 +9,7 @@ mod hemicubes;
 mod item_buffer;
 mod layers;
 mod layout;
+mod local;
 mod radiance;
 mod readback;
 mod reduce;

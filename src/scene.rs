@@ -45,6 +45,8 @@ pub struct Scene {
     groups: Vec<String>,
     materials: Vec<Material>,
     degenerate: usize,
+    /// See [`Scene::grain`].
+    grain: f64,
     warnings: Vec<String>,
 }
 
@@ -53,7 +55,7 @@ impl Scene {
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
-    /// edge squared.
+    /// edge, times that edge again or the largest coordinate of its corners, if that is more.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
@@ -99,7 +101,9 @@ impl Scene {
                     "scale the scene down: areas must stay finite in 64-bit floats",
                 ));
             }
-            if cross > 4.0 * f64::EPSILON * longest * longest {
+            let reach =
+                [a, b, c].map(|p| p.abs().max_element()).into_iter().fold(longest, f64::max);
+            if cross > 4.0 * f64::EPSILON * longest * reach {
                 kept.push(*t);
             }
         }
@@ -111,8 +115,12 @@ impl Scene {
             };
             return Err(bad("scene", found, "give at least one triangle with area"));
         }
+        let corners = kept.iter().flat_map(|t| t.corners).map(|k| positions[k as usize]);
+        let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let grain = f64::EPSILON * largest;
+        let (triangles, warnings) = (kept, vec![]);
         let mut scene =
-            Scene { positions, triangles: kept, groups, materials, degenerate, warnings: vec![] };
+            Scene { positions, triangles, groups, materials, degenerate, grain, warnings };
         if degenerate > 0 {
             scene.warn(format!("{degenerate} triangles without area were dropped"));
         }
@@ -174,6 +182,12 @@ impl Scene {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let corners = (0..self.triangles.len()).flat_map(|t| self.corners(t));
         corners.fold(nothing, |(low, high), p| (low.min(p), high.max(p)))
+    }
+
+    /// The step between 64-bit coordinates where the scene is, its own unit: what is said to be in one
+    /// plane may be off it by a few of these, and by no more.
+    pub(crate) fn grain(&self) -> f64 {
+        self.grain
     }
 
     /// Material of triangle `t`.

@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::light_view::LightView;
 use super::lights::{Light, Lights, NO_LIGHT};
+use super::turns::Turns;
 use super::{Gather, Gathered, Place, Sources};
 use crate::error::{Error, ErrorKind};
 use crate::fan::{self, Fan, nested};
@@ -24,6 +24,7 @@ use crate::scene::Scene;
 pub struct RayGather {
     rays: Rays,
     lights: Lights,
+    turns: Turns,
     fan: Fan,
     /// Rays a place: at least and at most.
     least: u32,
@@ -54,7 +55,8 @@ impl RayGather {
         let least = 1 << f64::from(count).log2().round().max(1.0) as u32;
         let (rays, lights) = (Rays::of_scene(mesh.scene()), Lights::new(mesh.shared_scene()));
         let (fan, noise, dim) = (Fan::nested(least), f64::INFINITY, 0.0);
-        Ok(RayGather { rays, lights, fan, least, most: least, noise, dim })
+        let turns = Turns::new(mesh.scene());
+        Ok(RayGather { rays, lights, turns, fan, least, most: least, noise, dim })
     }
 
     /// Twice as many rays where half of them find more or less than all by over a share `noise` of the
@@ -100,7 +102,7 @@ impl RayGather {
         apart: &[(u32, f64)],
         range: Range<u32>,
     ) -> Seen {
-        let turn = turn(place.position);
+        let turn = self.turns.of(place);
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
         let mut seen = Seen::default();
         let out = &mut seen.around;
@@ -229,17 +231,4 @@ impl Gather for RayGather {
     fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
         Ok(places.par_iter().map(|p| self.at(sources, p)).collect())
     }
-}
-
-/// A turn in [0, 1) that differs from place to place: a hash of where it is.
-pub(crate) fn turn(p: DVec3) -> f64 {
-    let mix = |h: u64, x: f64| {
-        // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-        let mut z = (h ^ x.to_bits()).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    let bits = p.to_array().into_iter().fold(0, mix);
-    (bits >> 11) as f64 / (1u64 << 53) as f64
 }

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::chunks::Chunks;
 use super::device::Gpu;
-use super::layout::{RadianceTriangle, RadianceView, Sums, TILE, Tile};
+use super::layout::{Corner, RadianceTriangle, RadianceView, Sums, TILE, Tile};
+use super::local::Local;
 use super::radiance::{Radiance, View, image_size};
 use super::readback::{Readback, StageSeconds};
 use super::sources::SourceBuffers;
@@ -16,7 +17,7 @@ use super::sum::Sum;
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_view::LightView;
 use crate::gather::lights::{APART, Lights, NO_LIGHT};
-use crate::gather::rays::turn;
+use crate::gather::turns::Turns;
 use crate::gather::{Gather, Gathered, Place, Sources};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::Mesh;
@@ -35,7 +36,10 @@ pub struct HemicubeGather {
     radiance: Radiance,
     sum: Sum,
     readback: Readback,
-    origin: DVec3,
+    local: Local,
+    turns: Turns,
+    /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
+    bright: f64,
     triangles: usize,
     slots: u32,
     batch: u32,
@@ -69,10 +73,11 @@ impl HemicubeGather {
         let lights = Lights::new(mesh.shared_scene());
         let slots = lights.lights.len().min(APART) as u32;
         let batch = batch(gpu, scene, resolution, slots)?;
-        let (low, high) = scene.bounds();
-        let origin = low + (high - low) / 2.0;
+        let (local, turns) = (Local::new(scene), Turns::new(scene));
+        let bright = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
+        let bright = if bright > 0.0 { bright.log2().floor().exp2() } else { 1.0 };
         let chunks = Chunks::new(scene);
-        let order = (&chunks.order[..], origin);
+        let order = (&chunks.order[..], &local, bright);
         let radiance = Radiance::new(gpu, scene, &lights, order, (resolution, slots, batch));
         let sum = Sum::new(gpu, &radiance.layers, resolution, slots)?;
         let readback = Readback::new(gpu, sum.sums.size());
@@ -84,7 +89,9 @@ impl HemicubeGather {
             radiance,
             sum,
             readback,
-            origin,
+            local,
+            turns,
+            bright,
             triangles: scene.triangles().len(),
             slots,
             batch,
@@ -112,20 +119,22 @@ impl HemicubeGather {
             fits.extend(view);
             view.is_some()
         });
-        let frame = Frame::new(place.normal, turn(place.position) * FRAC_PI_2);
+        let frame = Frame::new(place.normal, self.turns.of(place) * FRAC_PI_2);
         let mut lights = [NO_LIGHT; APART];
         lights.iter_mut().zip(&apart).for_each(|(l, a)| *l = a.0);
-        let eye = (place.position - self.origin).as_vec3().to_array();
+        let [eye, eye_low] = self.local.parts(place.position);
         let view = |face: Face, light: u32| View {
             view: RadianceView {
                 eye,
-                near: place.near as f32,
+                near: self.local.length(place.near),
                 right: face.right.as_vec3().to_array(),
                 bottom: face.bottom as f32,
                 up: face.up.as_vec3().to_array(),
                 light,
                 forward: face.forward.as_vec3().to_array(),
                 apart: apart.len() as u32,
+                eye_low,
+                padding: 0,
                 lights,
             },
             places: self.chunks.in_view(place.position, &face),
@@ -150,11 +159,11 @@ impl HemicubeGather {
         }
         let [r, g, b] = sums.radiosity.map(f64::from);
         Gathered {
-            irradiance: Rgb::new(r, g, b) + direct,
+            irradiance: Rgb::new(r, g, b) * self.bright + direct,
             direct,
             open: sums.open.into(),
             back: sums.back.into(),
-            nearness: sums.nearness.into(),
+            nearness: self.local.inverse_length(sums.nearness),
         }
     }
 
@@ -187,7 +196,7 @@ impl HemicubeGather {
 
 impl Gather for HemicubeGather {
     fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
-        let buffers = SourceBuffers::new(&self.gpu, sources, self.triangles)?;
+        let buffers = SourceBuffers::new(&self.gpu, sources, self.triangles, self.bright)?;
         let bindings = self.radiance.bindings(&self.gpu, &buffers);
         let mut gathered = Vec::with_capacity(places.len());
         for batch in places.chunks(self.batch as usize) {
@@ -214,8 +223,8 @@ fn batch(gpu: &Gpu, scene: &Scene, resolution: u32, slots: u32) -> Result<u32, E
             format!("this device allows resolutions up to {most}"),
         );
     }
-    // Lights are there twice; corners take 48 bytes a triangle.
-    let each = size_of::<RadianceTriangle>().max(48) as u64;
+    // Lights are there twice.
+    let each = size_of::<RadianceTriangle>().max(3 * size_of::<Corner>()) as u64;
     let triangles = scene.triangles().len() as u64;
     if 2 * triangles * each > buffer {
         let (found, most) = (format!("{triangles} triangles"), buffer / each / 2);

@@ -4,14 +4,14 @@ use std::f64::consts::FRAC_PI_2;
 use std::num::NonZeroU32;
 use std::time::Instant;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::chunks::Chunks;
 use super::device::Gpu;
 use super::item_buffer::{ItemBuffer, View};
-use super::layout::{BACK, FIRST_ELEMENT, FaceView, OPEN};
+use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
+use super::local::Local;
 use super::readback::{Readback, StageSeconds};
 use super::reduce::Reduce;
 use super::resolution::Resolution;
@@ -38,7 +38,7 @@ pub struct Hemicubes {
     /// The full resolution, then what it is halved to.
     resolutions: Vec<Resolution>,
     readback: Readback,
-    origin: DVec3,
+    local: Local,
     slots: u32,
     batch: u32,
     rotations: NonZeroU32,
@@ -84,11 +84,12 @@ impl Hemicubes {
         let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
         let triangles = mesh.scene().triangles().len() as u64;
         let (row_bytes, items) = (u64::from(slots) * 4, Cells::count(mesh));
-        if (row_bytes + 64).max(items * 4).max(triangles * 48) > buffer {
+        let triangle_bytes = 3 * size_of::<Corner>() as u64;
+        if (row_bytes + 64).max(items * 4).max(triangles * triangle_bytes) > buffer {
             return setting(
                 "mesh".into(),
                 format!("{items} finest cells of elements in {triangles} triangles"),
-                format!("this device holds {} and {}", buffer / 4 - 16, buffer / 48),
+                format!("this device holds {} and {}", buffer / 4 - 16, buffer / triangle_bytes),
             );
         }
         let item_bytes = Reduce::items_bytes(resolution);
@@ -97,10 +98,9 @@ impl Hemicubes {
             .min(limits.max_texture_array_layers)
             .min((buffer / item_bytes) as u32)
             .min(((buffer - 64) / row_bytes) as u32);
-        let (low, high) = mesh.scene().bounds();
-        let origin = low + (high - low) / 2.0;
+        let local = Local::new(mesh.scene());
         let (cells, chunks) = (Cells::new(mesh), Chunks::new(mesh.scene()));
-        let item_buffer = ItemBuffer::new(gpu, mesh, &cells, &chunks.order, origin, batch);
+        let item_buffer = ItemBuffer::new(gpu, mesh, &cells, &chunks.order, &local, batch);
         let reduce = Reduce::new(gpu, &cells, resolution, slots, batch);
         let resolutions = Resolution::halved(gpu, &reduce, resolution, batch)?;
         let readback = Readback::new(gpu, reduce.rows.size());
@@ -112,7 +112,7 @@ impl Hemicubes {
             reduce,
             resolutions,
             readback,
-            origin,
+            local,
             slots,
             batch,
             rotations: NonZeroU32::MIN,
@@ -159,9 +159,9 @@ impl Hemicubes {
     /// The faces of the hemicube over `patch`, turned by `angle` (radians).
     fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), angle);
-        let near = (mesh.area(patch).sqrt() * NEAR) as f32;
-        let centre = mesh.centroid(patch);
-        let eye = (centre - self.origin).as_vec3().to_array();
+        let near = self.local.length(mesh.area(patch).sqrt() * NEAR);
+        let centre = mesh.eye(patch);
+        let [eye, eye_low] = self.local.parts(centre);
         let own_triangle = self.chunks.places[mesh.triangle(patch)];
         Face::all(&frame).map(|face| View {
             face: FaceView {
@@ -173,6 +173,8 @@ impl Hemicubes {
                 own_triangle,
                 forward: face.forward.as_vec3().to_array(),
                 padding: 0,
+                eye_low,
+                padding_2: 0,
             },
             places: self.chunks.in_view(centre, &face),
         })
@@ -260,6 +262,8 @@ fn sparse(dense: &[u32]) -> Row {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::gpu::layout::FIRST_CELL;
     use crate::scene::{Material, Scene, Triangle};

@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-
 use super::cells::Cells;
 use super::device::Gpu;
 use super::layers::{Layers, Shown};
 use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::local::Local;
 use super::resolution::Resolution;
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
@@ -30,21 +29,18 @@ impl ItemBuffer {
     /// What an item buffer is made of.
     pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-    /// For the triangles of `mesh` in drawing order, relative to `origin`; `batch` hemicubes.
+    /// For the triangles of `mesh` in drawing order, in `local` coordinates; `batch` hemicubes.
     pub fn new(
         gpu: &Gpu,
         mesh: &Mesh,
         cells: &Cells,
         order: &[u32],
-        origin: DVec3,
+        local: &Local,
         batch: u32,
     ) -> Self {
         let device = &gpu.device;
-        let corners: Vec<[f32; 4]> = order
-            .iter()
-            .flat_map(|&t| mesh.scene().corners(t as usize))
-            .map(|p| (p - origin).as_vec3().extend(1.0).to_array())
-            .collect();
+        let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
+        let corners = local.corners(corners);
         let triangles: Vec<TriangleCells> =
             order.iter().map(|&t| cells.triangles[t as usize]).collect();
         let corners = gpu.storage("corners", bytemuck::cast_slice(&corners));

@@ -4,6 +4,16 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::gather::lights::APART;
 
+/// A corner of a triangle, in two parts: see [`super::local`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Corner {
+    pub high: [f32; 3],
+    pub padding: u32,
+    pub low: [f32; 3],
+    pub padding_2: u32,
+}
+
 /// One face of one hemicube, as `item_buffer.wgsl` draws it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -16,6 +26,8 @@ pub struct FaceView {
     pub own_triangle: u32,
     pub forward: [f32; 3],
     pub padding: u32,
+    pub eye_low: [f32; 3],
+    pub padding_2: u32,
 }
 
 /// Where a triangle's items start, and how many cells lie along its edge.
@@ -47,6 +59,8 @@ pub struct RadianceView {
     pub light: u32,
     pub forward: [f32; 3],
     pub apart: u32,
+    pub eye_low: [f32; 3],
+    pub padding: u32,
     pub lights: [u32; APART],
 }
 
@@ -181,7 +195,18 @@ mod tests {
         let (item, reduce) = (parsed(ITEM_BUFFER_WGSL), parsed(REDUCE_WGSL));
         assert_eq!(
             wgsl_layout(&item, "FaceView"),
-            rust_layout!(FaceView { eye, near, right, bottom, up, own_triangle, forward, padding })
+            rust_layout!(FaceView {
+                eye,
+                near,
+                right,
+                bottom,
+                up,
+                own_triangle,
+                forward,
+                padding,
+                eye_low,
+                padding_2
+            })
         );
         assert_eq!(
             wgsl_layout(&item, "TriangleCells"),
@@ -203,6 +228,8 @@ mod tests {
                 light,
                 forward,
                 apart,
+                eye_low,
+                padding,
                 lights
             })
         );
@@ -210,6 +237,12 @@ mod tests {
             wgsl_layout(&radiance, "RadianceTriangle"),
             rust_layout!(RadianceTriangle { exitance, light, index, padding })
         );
+        for module in [&item, &radiance] {
+            assert_eq!(
+                wgsl_layout(module, "Corner"),
+                rust_layout!(Corner { high, padding, low, padding_2 })
+            );
+        }
         assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));
         assert_eq!(
             wgsl_layout(&gather, "Summation"),

@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-
 use super::device::Gpu;
 use super::layers::{Layers, Shown};
 use super::layout::{RADIANCE_WGSL, RadianceTriangle, RadianceView, TILE};
+use super::local::Local;
 use super::sources::SourceBuffers;
 use crate::gather::lights::Lights;
 use crate::hemicube::Face;
@@ -44,13 +43,13 @@ pub fn image_size(resolution: u32, slots: u32) -> [u32; 2] {
 }
 
 impl Radiance {
-    /// For the triangles of `scene` in drawing order, relative to `origin`; images of `batch`
-    /// places with `slots` tiles each.
+    /// For the triangles of `scene` in drawing order, in `local` coordinates and in units of `bright`
+    /// W/m²; images of `batch` places with `slots` tiles each.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
         lights: &Lights,
-        (order, origin): (&[u32], DVec3),
+        (order, local, bright): (&[u32], &Local, f64),
         (resolution, slots, batch): (u32, u32, u32),
     ) -> Radiance {
         let mut drawn = order.to_vec();
@@ -61,10 +60,9 @@ impl Radiance {
             again.push(start..drawn.len() as u32);
         }
         let corners = drawn.iter().flat_map(|&t| scene.corners(t as usize));
-        let corners: Vec<[f32; 4]> =
-            corners.map(|p| (p - origin).as_vec3().extend(1.0).to_array()).collect();
+        let corners = local.corners(corners);
         let triangle = |&t: &u32| RadianceTriangle {
-            exitance: scene.material(t as usize).exitance.as_vec3().to_array(),
+            exitance: (scene.material(t as usize).exitance / bright).as_vec3().to_array(),
             light: lights.of_triangle[t as usize],
             index: t,
             padding: [0; 3],

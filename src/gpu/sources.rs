@@ -16,18 +16,23 @@ pub struct SourceBuffers {
     pub lattices: wgpu::Buffer,
     /// Per node, [`INNER`] plus the first of its four children, or its element.
     pub nodes: wgpu::Buffer,
-    /// Per element, the reflected radiosity at its three corners, W/m² per channel, one below the
-    /// other; [`ELEMENTS_A_LINE`] side by side.
+    /// Per element, the reflected radiosity at its three corners, per channel, one below the other; [`ELEMENTS_A_LINE`] side by side.
     pub elements: wgpu::TextureView,
 }
 
 impl SourceBuffers {
-    /// Checks `sources` against a scene of so many triangles, and uploads them.
-    pub fn new(gpu: &Gpu, sources: &Sources, triangles: usize) -> Result<SourceBuffers, Error> {
+    /// Checks `sources` against a scene of so many triangles, and uploads them, in units of `bright`
+    /// W/m².
+    pub fn new(
+        gpu: &Gpu,
+        sources: &Sources,
+        triangles: usize,
+        bright: f64,
+    ) -> Result<SourceBuffers, Error> {
         check(gpu, sources, triangles)?;
         let Sources { mesh, corners, reflected } = *sources;
         let (lattices, nodes) = quadtrees(mesh);
-        let value = |k: u32| reflected[k as usize].as_vec3().extend(0.0).to_array();
+        let value = |k: u32| (reflected[k as usize] / bright).as_vec3().extend(0.0).to_array();
         let line = ELEMENTS_A_LINE as usize;
         let lines = corners.len().div_ceil(line);
         let mut texels = vec![[0f32; 4]; lines * 3 * line];

@@ -1,7 +1,10 @@
 //! PLY out: the mesh with radiosity, for other programs.
 
+use std::fmt;
 use std::io::Write;
 use std::path::Path;
+
+use glam::DVec3;
 
 use super::write_file;
 use crate::error::Error;
@@ -16,6 +19,9 @@ use crate::vertex::VertexRadiosity;
 /// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
 /// header.
 ///
+/// Where 32 bits do not do, numbers are double: `x y z` of a mesh more than 16 of its sizes from the
+/// origin, and the radiosity and its error if the largest is above 3.4e38 or below 1e-30 W/m².
+///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
 pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<(), Error> {
@@ -29,32 +35,34 @@ pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<()
             writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
         }
         writeln!(out, "element vertex {}", surface.positions.len())?;
-        for name in ["x", "y", "z", "nx", "ny", "nz"] {
-            writeln!(out, "property float {name}")?;
-        }
-        for name in ["radiosity_r", "radiosity_g", "radiosity_b"] {
-            writeln!(out, "property float {name}")?;
+        let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
+        let (place, light) = (Width::of_positions(surface), Width::of_light(surface, errors));
+        for (width, names) in [
+            (place, ["x", "y", "z"]),
+            (Width::Float, ["nx", "ny", "nz"]),
+            (light, ["radiosity_r", "radiosity_g", "radiosity_b"]),
+        ] {
+            for name in names {
+                writeln!(out, "property {width} {name}")?;
+            }
         }
         for name in ["red", "green", "blue"] {
             writeln!(out, "property uchar {name}")?;
         }
         // An error a vertex, or none at all.
-        let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
         if errors {
-            writeln!(out, "property float error")?;
+            writeln!(out, "property {light} error")?;
         }
         writeln!(out, "element face {}", surface.faces.len())?;
         writeln!(out, "property list uchar int vertex_indices\nend_header")?;
         let vertices = surface.positions.iter().zip(&surface.normals).zip(&surface.radiosity);
         for (v, ((position, normal), radiosity)) in vertices.enumerate() {
-            for vector in [position, normal, radiosity] {
-                for x in vector.as_vec3().to_array() {
-                    out.write_all(&x.to_le_bytes())?;
-                }
+            for (width, vector) in [(place, position), (Width::Float, normal), (light, radiosity)] {
+                vector.to_array().into_iter().try_for_each(|x| width.write(out, x))?;
             }
             out.write_all(&tone.display(*radiosity))?;
             if errors {
-                out.write_all(&(surface.error[v] as f32).to_le_bytes())?;
+                light.write(out, surface.error[v])?;
             }
         }
         for face in &surface.faces {
@@ -65,4 +73,50 @@ pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<()
         }
         Ok(())
     })
+}
+
+/// Numbers of 32 or 64 bits.
+#[derive(Clone, Copy)]
+enum Width {
+    Float,
+    Double,
+}
+
+impl Width {
+    /// Floats, where their steps are below a millionth of the mesh's size.
+    fn of_positions(surface: &VertexRadiosity) -> Width {
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let all = surface.positions.iter();
+        let (low, high) = all.fold(nothing, |(l, h), &p| (l.min(p), h.max(p)));
+        let largest = low.abs().max(high.abs()).max_element();
+        Width::of(largest, largest <= 16.0 * (high - low).max_element())
+    }
+
+    /// Floats, where they hold the largest value and what is a hundred million times dimmer.
+    fn of_light(surface: &VertexRadiosity, errors: bool) -> Width {
+        let brightest = surface.radiosity.iter().map(|b| b.max_element());
+        let told = surface.error.iter().copied().filter(|_| errors);
+        Width::of(brightest.chain(told).fold(0.0, f64::max), true)
+    }
+
+    fn of(largest: f64, fine: bool) -> Width {
+        let holds = largest == 0.0 || (1e-30..=f64::from(f32::MAX)).contains(&largest);
+        if fine && holds { Width::Float } else { Width::Double }
+    }
+
+    fn write(self, out: &mut dyn Write, x: f64) -> std::io::Result<()> {
+        match self {
+            Width::Float => out.write_all(&(x as f32).to_le_bytes()),
+            Width::Double => out.write_all(&x.to_le_bytes()),
+        }
+    }
+}
+
+impl fmt::Display for Width {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Width::Float => "float",
+            Width::Double => "double",
+        })
+    }
 }

@@ -6,7 +6,8 @@ use glam::DVec3;
 /// Corners a polygon may have when no fan covers it: ear clipping is quadratic at worst.
 pub(super) const MOST_CORNERS_TO_CLIP: usize = 100_000;
 
-/// Height of a triangle, in units of the polygon's extent, that the rounding of its corners hides.
+/// Height of a triangle that the rounding of its corners hides, in units of the polygon's extent or of
+/// its largest coordinate, if that is more.
 const LOST: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
@@ -22,43 +23,46 @@ pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     // Around the first corner and in units of the largest extent, so that neither rounds away.
     let extent = corners.iter().map(|&p| (p - origin).abs().max_element()).fold(0.0, f64::max);
     let points: Vec<DVec3> = corners.iter().map(|&p| (p - origin) / extent).collect();
-    if extent == 0.0 || on_a_line(&points) {
+    // Rounding is a step of the coordinates, wherever the polygon is.
+    let reach = corners.iter().map(|p| p.abs().max_element()).fold(extent, f64::max) / extent;
+    let lost = LOST * reach;
+    if extent == 0.0 || on_a_line(&points, lost) {
         return Some(vec![[0, 0, 0]]);
     }
     // Newell's normal: its length is twice the area of a flat polygon.
     let newell: DVec3 = (1..n).map(|i| points[i - 1].cross(points[i])).sum();
     let doubled_area = newell.length();
     // Each of the n products is off by a few ε. What is left may have no front, or not be finite.
-    let rounding = 16.0 * f64::EPSILON * n as f64;
+    let rounding = 16.0 * f64::EPSILON * reach * n as f64;
     if doubled_area.is_nan() || doubled_area <= rounding {
         return None;
     }
     let up = newell / doubled_area;
-    if fan_covers(&points, up) {
+    if fan_covers(&points, up, lost) {
         return Some((1..n - 1).map(|i| [0, i, i + 1]).collect());
     }
-    let (triangles, covered) = clip(&points, up)?;
+    let (triangles, covered) = clip(&points, up, lost)?;
     ((covered - doubled_area).abs() <= rounding).then_some(triangles)
 }
 
 /// Whether all corners lie on the line through the first and the one farthest from it.
-fn on_a_line(points: &[DVec3]) -> bool {
+fn on_a_line(points: &[DVec3], lost: f64) -> bool {
     let farther = |a: DVec3, b: DVec3| if b.length() > a.length() { b } else { a };
     let far = points.iter().copied().fold(DVec3::ZERO, farther);
-    points.iter().all(|p| far.cross(*p).length() <= LOST)
+    points.iter().all(|p| far.cross(*p).length() <= lost)
 }
 
 /// Whether each triangle of the fan from the first corner, which is the origin, turns about `up`
 /// and has area.
-fn fan_covers(points: &[DVec3], up: DVec3) -> bool {
+fn fan_covers(points: &[DVec3], up: DVec3, lost: f64) -> bool {
     points[1..].windows(2).all(|edge| {
         let (a, b) = (edge[0], edge[1]);
-        a.cross(b).dot(up) > LOST * a.length().max(b.length()).max((b - a).length())
+        a.cross(b).dot(up) > lost * a.length().max(b.length()).max((b - a).length())
     })
 }
 
 /// Ear clipping in the plane across `up`: triangles, and twice the area that they cover there.
-fn clip(points: &[DVec3], up: DVec3) -> Option<(Vec<[usize; 3]>, f64)> {
+fn clip(points: &[DVec3], up: DVec3, lost: f64) -> Option<(Vec<[usize; 3]>, f64)> {
     if points.len() > MOST_CORNERS_TO_CLIP {
         return None;
     }
@@ -80,7 +84,7 @@ fn clip(points: &[DVec3], up: DVec3) -> Option<(Vec<[usize; 3]>, f64)> {
             triangle.swap(1, 2);
         }
         // Ears can be flat where corners lie within an edge.
-        if turn.abs() > LOST * (b - a).length().max((c - b).length()).max((a - c).length()) {
+        if turn.abs() > lost * (b - a).length().max((c - b).length()).max((a - c).length()) {
             triangles.push(triangle);
         }
     }

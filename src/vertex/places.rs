@@ -22,7 +22,7 @@ pub(super) struct Stands<'a> {
 
 /// Where places are: above the surfaces of one scene.
 pub(crate) struct Above {
-    /// No place is nearer to its surface than this, scene unit: several steps of a 32-bit coordinate.
+    /// No place is nearer to its surface than this, scene unit: many steps of its coordinates.
     least: f64,
 }
 
@@ -32,6 +32,10 @@ const INWARDS: f64 = 0.02;
 
 /// How far above its surface a place is, in units of the smallest element's size.
 const LIFT: f64 = 1e-4;
+
+/// And in steps of the scene's coordinates, at least: a quarter of the way is out of all doubt, and so
+/// are four times the 2⁻⁴⁸ of the scene's size that a device tells apart.
+const GRAINS: f64 = 1024.0;
 
 /// Elements around a vertex that it tries to stand in, at most.
 const ATTEMPTS: usize = 6;
@@ -102,8 +106,7 @@ impl<'a> Stands<'a> {
 
 impl Above {
     pub fn new(scene: &Scene) -> Above {
-        let (low, high) = scene.bounds();
-        Above { least: 16.0 * f64::from(f32::EPSILON) * (high - low).max_element() }
+        Above { least: GRAINS * scene.grain() }
     }
 
     /// The place above `position`, where elements are of `size`: the square root of their area, scene
