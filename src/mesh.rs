@@ -29,10 +29,6 @@ pub struct NodeId(pub(crate) u32);
 /// Levels of subdivision that a triangle can have at most: 4¹² elements.
 pub const MAX_DEPTH: u32 = 12;
 
-/// Lift of an eye, in steps of the scene's coordinates. A corner is off by half a step in each of
-/// three, a centroid by some three, and as much again where planes go on beyond their corners.
-const GRAINS: f64 = 16.0;
-
 /// Elements that a mesh can have at most.
 pub const MAX_ELEMENTS: usize = 1 << 26;
 
@@ -246,12 +242,6 @@ impl Mesh {
     pub fn centroid(&self, node: NodeId) -> DVec3 {
         let [a, b, c] = self.corners(node);
         a + ((b - a) + (c - a)) / 3.0
-    }
-
-    /// Where `node` is looked out from: its centroid, lifted off its plane by the little that the
-    /// rounding of coordinates can move others in that plane to before it.
-    pub(crate) fn eye(&self, node: NodeId) -> DVec3 {
-        self.centroid(node) + self.normal(node) * (GRAINS * self.scene.grain())
     }
 
     /// Material of `node`.

@@ -185,7 +185,7 @@ impl Scene {
     }
 
     /// The step between 64-bit coordinates where the scene is, its own unit: what is said to be in one
-    /// plane may be off it by a few of these, and by no more.
+    /// plane may be off it by a few of these.
     pub(crate) fn grain(&self) -> f64 {
         self.grain
     }

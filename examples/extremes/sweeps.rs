@@ -47,7 +47,7 @@ pub const ALL: [fn(&Ask) -> Swept; 23] = [
     scale_of_lamp,
     exitance_of_lamp,
     area_of_lamp,
-    exitance_around,
+    exitance_next_door,
     areas,
 ];
 
@@ -410,19 +410,22 @@ fn area_of_lamp(ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
-/// What is gathered in a furnace whose walls all reflect: as much as leaves them.
-fn exitance_around(ask: &Ask) -> Swept {
+/// What is gathered in the second of two rooms, whose walls reflect 1e-12 of what those of the first
+/// emit: as much as leaves them.
+fn exitance_next_door(ask: &Ask) -> Swept {
     // Sums of 32 bits.
-    let mut sweep = Sweep::new("exitance", EXITANCES, "within a furnace, E/(1−ρ)", 1e-5);
+    let mut sweep = Sweep::new("exitance", EXITANCES, "next door, 1e-12 E", 1e-5);
     sweep.by("gathering");
     for e in ask.exitances() {
-        let mesh = Mesh::new(scenes::furnace(HERE, 1.0 - 1e-6, e), f64::INFINITY)?;
-        let even = vec![Rgb::splat(1e6 * e); mesh.element_count()];
-        let light = GatheredRadiosity::from_elements(&mesh, &even)?;
-        let [p, q] = [0.4, 0.5].map(|z| DVec3::from_array(HERE.place([0.3, 0.6, z])));
+        let mesh = Mesh::new(scenes::rooms(0.5, e, 0.0), f64::INFINITY)?;
+        let walls =
+            GatheredRadiosity::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
+        let even = vec![Rgb::splat(1e-12 * e); walls.reflected.len()];
+        let light = GatheredRadiosity { reflected: even, ..walls };
+        let [p, q] = [0.4, 0.5].map(|z| DVec3::from_array(HERE.place([1.8, 0.6, z])));
         let place = Place { position: p, normal: (q - p).normalize(), near: 1e-3 };
         let found = ask.gatherer(&mesh)?.gather(&light.sources(), &[place])?[0].irradiance;
-        sweep.step(&channels(&[found], e), &[1e6; 3]);
+        sweep.step(&channels(&[found], 1e-12 * e), &[1.0; 3]);
     }
     Ok(sweep)
 }

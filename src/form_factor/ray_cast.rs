@@ -48,7 +48,7 @@ impl RayCast {
     }
 
     fn row(&self, mesh: &Mesh, patch: NodeId, fan: &Fan, count: u32) -> Row {
-        let (eye, own) = (mesh.eye(patch), mesh.triangle(patch));
+        let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
         let start = START * mesh.area(patch).sqrt();
         let turn = f64::from(shuffle(patch.0)) / 2f64.powi(32);
         let see = |direction| match self.rays.nearest(eye, direction, start, Some(own)) {

@@ -160,7 +160,7 @@ impl Hemicubes {
     fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), angle);
         let near = self.local.length(mesh.area(patch).sqrt() * NEAR);
-        let centre = mesh.eye(patch);
+        let centre = mesh.centroid(patch);
         let [eye, eye_low] = self.local.parts(centre);
         let own_triangle = self.chunks.places[mesh.triangle(patch)];
         Face::all(&frame).map(|face| View {
