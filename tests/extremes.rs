@@ -12,8 +12,8 @@ mod sweep;
 mod sweeps;
 
 use radiosity::{
-    Camera, Device, ErrorKind, Mesh, RadianceImage, Rgb, VertexRadiosity, load_obj, write_exr,
-    write_ply,
+    Camera, Device, ErrorKind, Go, Mesh, RadianceImage, RayCast, Rgb, Shooting, VertexRadiosity,
+    load_obj, write_exr, write_ply,
 };
 use scenes::{Frame, HERE};
 
@@ -44,6 +44,25 @@ fn a_white_furnace_takes_few_products() {
     let ask = sweeps::Ask { device: &Device::Cpu, all: true };
     let s = sweeps::reflectance_of_furnace(&ask).unwrap();
     assert!(s.steps >= 12 && s.off <= 1e-4 && s.most <= 48, "{s:?}");
+}
+
+#[test]
+fn ties_are_ties_at_any_scale() {
+    // All walls alike: whose turn it is to shoot is a matter of order alone, unless rounding decides.
+    let light = |scale: f64| {
+        let scene = scenes::furnace(Frame::scaled(scale), 0.5, 1.0);
+        let mesh = Mesh::new(scene, 0.2 * scale).unwrap();
+        let mut rays = RayCast::new(&mesh, 256).unwrap().with_full_share(0.0);
+        let s = Shooting { unshot: 0.1, ..Shooting::default() };
+        s.solve(&mesh, &mut rays, |_| Go::Continue(())).unwrap().radiosity
+    };
+    let known = light(1.0);
+    for scale in [0.1, 3.0, 10.0, 1e-7] {
+        let found = light(scale);
+        let off = found.iter().zip(&known).map(|(a, b)| (*a / *b - 1.0).length());
+        // Sums of a thousand terms; another shot before the end would be a hundredth of it.
+        assert!(off.fold(0.0, f64::max) < 1e-12, "scale {scale}");
+    }
 }
 
 /// A surface of one radiosity over the room at `frame`.

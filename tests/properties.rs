@@ -32,6 +32,9 @@ fn config() -> ProptestConfig {
     }
 }
 
+/// Reflectance and exitance, W/m².
+type Paint = ([f64; 3], [f64; 3]);
+
 /// A closed box of unit size or so, its walls each cut in two by a line from a side to the other
 /// side. All convex: every element sees all of every other wall. With polygons inside, it is not.
 #[derive(Clone, Debug)]
@@ -39,13 +42,13 @@ struct Room {
     size: [f64; 3],
     /// Of each wall, where the cut begins and ends, as shares of the two sides it crosses.
     cuts: [[f64; 2]; 6],
-    /// Reflectance and exitance of each half.
-    halves: [[([f64; 3], [f64; 3]); 2]; 6],
+    /// Of each half of a wall.
+    halves: [[Paint; 2]; 6],
     /// Triangles that hang inside, corners as shares of the box.
-    inside: Vec<([[f64; 3]; 3], ([f64; 3], [f64; 3]))>,
+    inside: Vec<([[f64; 3]; 3], Paint)>,
 }
 
-fn material() -> impl Strategy<Value = ([f64; 3], [f64; 3])> {
+fn material() -> impl Strategy<Value = Paint> {
     let reflectance = prop::array::uniform3(prop_oneof![Just(0.0), 0.0..0.95]);
     let exitance = prop_oneof![3 => Just([0.0; 3]), 1 => prop::array::uniform3(0.0..10.0)];
     (reflectance, exitance)
