@@ -27,6 +27,10 @@ use crate::scene::Rgb;
 /// places at binary fractions of the extent lie well inside a cell, not where rounding decides.
 const SAME_PLACE: f64 = 1.0 / (1 << 20) as f64;
 
+/// Where more vertices are at one place, none hears of another: what each hears of takes time and
+/// memory. Three meet in the corner of a room; so many are a scene that is small in its extent.
+const MOST_MEETING: usize = 256;
+
 /// How often vertices at one place hear of each other's value. Each passes on at most ρ F of what
 /// is still off, F = ½ between perpendicular walls: 3 % is left of it.
 const ROUNDS: usize = 5;
@@ -62,14 +66,17 @@ pub(super) fn mend(mesh: &Mesh, ends: &[End], elements: &[Rgb], fitted: &[Rgb]) 
     values
 }
 
-/// For each of `ends` the others at its place.
+/// For each of `ends` the others at its place, if they are not too many.
 fn meeting(mesh: &Mesh, ends: &[End]) -> Vec<Vec<usize>> {
     let (low, high) = mesh.scene().bounds();
     let unit = (high - low).max_element() * SAME_PLACE;
     let place = |end: &End| ((end.position - low) / unit).round().as_i64vec3();
     let mut places: HashMap<_, Vec<usize>> = HashMap::new();
     ends.iter().zip(0..).for_each(|(end, k)| places.entry(place(end)).or_default().push(k));
-    let others = |k: usize| places[&place(&ends[k])].iter().copied().filter(move |&m| m != k);
+    let others = |k: usize| {
+        let here = Some(&places[&place(&ends[k])]).filter(|here| here.len() <= MOST_MEETING);
+        here.into_iter().flatten().copied().filter(move |&m| m != k)
+    };
     (0..ends.len()).map(|k| others(k).collect()).collect()
 }
 
