@@ -213,6 +213,33 @@ mod tests {
     }
 
     #[test]
+    fn in_a_crowd_nobody_hears_of_another() {
+        let heard = |triangles: usize| {
+            // A fan of separate triangles: their first corners are at one place.
+            let rim = |k: usize| {
+                let (sin, cos) = (k as f64 / triangles as f64).sin_cos();
+                DVec3::new(cos, sin, (k / 2 % 2) as f64)
+            };
+            let corners = |k: usize| [DVec3::ZERO, rim(2 * k), rim(2 * k + 1)];
+            let triangle =
+                |k: u32| Triangle { corners: [3 * k, 3 * k + 1, 3 * k + 2], ..Default::default() };
+            let scene = Scene::new(
+                (0..triangles).flat_map(corners).collect(),
+                (0..triangles as u32).map(triangle).collect(),
+                vec!["fan".into()],
+                vec![Material::grey("fan", 0.5)],
+            );
+            let mesh = Mesh::new(scene.unwrap(), f64::INFINITY).unwrap();
+            let Vertices { positions, rims, .. } = Vertices::new(&mesh, &Smooth::new(mesh.scene()));
+            let normals = normals(&mesh, &rims, positions.len());
+            let ends = ends(&mesh, &rims, &positions, &normals);
+            meeting(&mesh, &ends)[0].len()
+        };
+        assert_eq!(heard(MOST_MEETING), MOST_MEETING - 1);
+        assert_eq!(heard(MOST_MEETING + 1), 0);
+    }
+
+    #[test]
     fn at_the_edge_a_floor_sees_half_of_what_the_wall_has_there() {
         let mesh = corner(0.8);
         for (at_edge, slope) in [(0.0, 1.0), (1.0, -1.0), (0.5, 2.0)] {
