@@ -72,6 +72,7 @@ mod solve;
 mod tone;
 mod vertex;
 mod view_factors;
+mod winding;
 
 pub use accuracy::{Accuracy, Budget};
 pub use bake::{BakeSeconds, Baked, Stage};
