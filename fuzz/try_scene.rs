@@ -67,6 +67,7 @@ fn settle(scene: &Scene) {
     let shooting = Shooting { shots: Some(16), ..Default::default() };
     let solution = shooting.solve(&mesh, &mut rays, |_| Go::Continue(())).expect("good rows");
     assert!(solution.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
+    assert!(solution.ledger.imbalance() <= 1e-9, "{:?}", solution.ledger);
     let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
     assert!(surface.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
 }
