@@ -14,11 +14,16 @@ const SLABS: usize = 32;
 /// Boxes in a wide leaf, at most.
 const LEAF: u32 = 3;
 
+/// A hierarchy of `boxes`.
+pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
+    bvh2_to_cwbvh(&binary(boxes), LEAF, true, false)
+}
+
 /// Parts boxes where rays are expected to meet the fewest of them (Wald 2007, "On fast Construction
 /// of SAH-based Bounding Volume Hierarchies", sections 3.1 to 3.3), and into halves where nothing
 /// tells them apart, or levels run out. That takes n log n time even if all boxes are the same, or lie one
 /// in the other; merging neighbours from below takes n² then, and ends in a chain.
-pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
+fn binary(boxes: &[Aabb]) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut open = vec![(0, 0..boxes.len(), LEVELS)];
@@ -39,7 +44,7 @@ pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
         next += 2;
     }
     tree.primitive_indices = order;
-    bvh2_to_cwbvh(&tree, LEAF, true, false)
+    tree
 }
 
 /// Reorders `part` of the boxes into two, neither of which needs more than `levels`; the first ends
@@ -140,12 +145,14 @@ mod tests {
     use super::*;
     use glam::{Vec3A, vec3a};
 
-    /// Levels of wide nodes, the root's included.
-    fn depth(tree: &CwBvh, node: usize) -> usize {
-        let wide = &tree.nodes[node];
-        let inner = (0..8).filter(|&k| !wide.is_child_empty(k) && !wide.is_leaf(k));
-        let depths = inner.map(|k| depth(tree, wide.child_node_index(k) as usize));
-        1 + depths.max().unwrap_or(0)
+    /// Levels below the root. Parents come before their children.
+    fn depth(tree: &Bvh2) -> u32 {
+        let mut depths = vec![0; tree.nodes.len()];
+        for (k, node) in tree.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
+            let below = depths[k] + 1;
+            depths[node.first_index as usize..][..2].fill(below);
+        }
+        depths.into_iter().max().unwrap_or(0)
     }
 
     #[test]
@@ -162,14 +169,13 @@ mod tests {
         ];
         for (what, crowd) in crowds {
             let boxes: Vec<Aabb> = (0..N).map(crowd).collect();
-            let tree = hierarchy(&boxes);
+            let tree = binary(&boxes);
             let mut there = tree.primitive_indices.clone();
             there.sort_unstable();
             assert!(there.iter().copied().eq(0..N as u32), "{what}");
-            // What the traversal remembers.
-            let depth = depth(&tree, 0);
+            let depth = depth(&tree);
             println!("{what}: {depth}");
-            assert!(depth <= 31, "{what}: {depth} levels");
+            assert!(depth <= LEVELS, "{what}: {depth} levels");
         }
     }
 }
