@@ -1,5 +1,6 @@
 //! The crate's one error: where, what was found, what would be right.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;
 
@@ -86,5 +87,36 @@ impl fmt::Debug for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         self.0.source.as_ref().map(|e| &**e as &(dyn std::error::Error + 'static))
+    }
+}
+
+/// The start of `text`, short enough for a message.
+pub(crate) fn shortened(text: &str) -> Cow<'_, str> {
+    const LONGEST: usize = 60;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
+        None => Cow::Borrowed(text),
+    }
+}
+
+/// Up to eight of `names`, quoted, and how many more there are.
+pub(crate) fn quoted<S: AsRef<str>>(names: &[S]) -> String {
+    const SHOWN: usize = 8;
+    let name = |name: &S| format!("'{}'", shortened(name.as_ref()).escape_debug());
+    let mut list = names.iter().take(SHOWN).map(name).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        list += &format!(" and {} more", names.len() - SHOWN);
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_stay_short() {
+        assert_eq!(shortened(&"é".repeat(1000)).chars().count(), 61);
+        assert_eq!(quoted(&["a"; 10]), format!("{} and 2 more", ["'a'"; 8].join(", ")));
     }
 }

@@ -1,5 +1,6 @@
 //! Files in and out; nothing outside this room opens one.
 
+mod files;
 mod image;
 mod mtl;
 mod obj;
@@ -16,7 +17,7 @@ use std::path::Path;
 use crate::error::{Error, ErrorKind};
 
 pub use image::{write_exr, write_png};
-pub use obj::load_obj;
+pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
 pub use report::{Report, Seconds};
 pub use table::{write_matrix_market, write_view_factor_list, write_view_factors};

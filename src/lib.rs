@@ -73,6 +73,7 @@ mod solve;
 mod tone;
 mod vertex;
 mod view_factors;
+mod winding;
 
 pub use accuracy::{Accuracy, Budget};
 pub use bake::{BakeSeconds, Baked, Stage};
@@ -89,7 +90,7 @@ pub use gather::rays::RayGather;
 pub use gather::{Gather, Gathered, Place, Sources};
 pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, StageSeconds};
 pub use io::{
-    Report, Seconds, load_obj, write_exr, write_matrix_market, write_ply, write_png,
+    Report, Seconds, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
     write_view_factor_list, write_view_factors,
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};

@@ -1,16 +1,17 @@
 //! Rays against triangles: the nearest hit, on the CPU.
 
 use std::ops::Range;
-use std::time::Duration;
 
 use glam::{DVec3, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 
 use crate::scene::Scene;
+
+mod hierarchy;
+
+use hierarchy::hierarchy;
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
 /// intersections are in 64.
@@ -66,7 +67,7 @@ impl Rays {
                 Aabb { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
             })
             .collect();
-        let bvh = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
+        let bvh = hierarchy(&boxes);
         let triangles = corners.into_iter().map(plane).collect();
         Rays { bvh, triangles, origin, scale }
     }
@@ -92,7 +93,8 @@ impl Rays {
             if Some(triangle) == ignored {
                 return f32::INFINITY;
             }
-            let end = best.map_or(f64::INFINITY, |b| b.distance);
+            // Rounded up, so that an equal is still looked at.
+            let end = best.map_or(f64::INFINITY, |b| b.distance * (1.0 + 4.0 * f64::EPSILON));
             let Some(hit) = self.intersect(triangle, from, direction, start..end) else {
                 return f32::INFINITY;
             };

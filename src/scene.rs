@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, quoted};
 
 /// One value per colour channel (r, g, b), linear; the unit is said where it is used.
 pub type Rgb = DVec3;
@@ -55,14 +55,15 @@ impl Scene {
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
-    /// edge, times that edge again or the largest coordinate of its corners, if that is more.
+    /// edge, times that edge again or the largest coordinate of its corners, if that is more; or when
+    /// its square underflows.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
     /// is not finite, an index out of range, or when no triangle with area is left.
     pub fn new(
         positions: Vec<DVec3>,
-        triangles: Vec<Triangle>,
+        mut triangles: Vec<Triangle>,
         groups: Vec<String>,
         materials: Vec<Material>,
     ) -> Result<Scene, Error> {
@@ -73,7 +74,6 @@ impl Scene {
             }
         }
         materials.iter().try_for_each(Material::check)?;
-        let mut kept = Vec::with_capacity(triangles.len());
         for (i, t) in triangles.iter().enumerate() {
             let tables = [
                 ("group", t.group, groups.len()),
@@ -91,34 +91,34 @@ impl Scene {
                     ));
                 }
             }
-            let [a, b, c] = t.corners.map(|k| positions[k as usize]);
-            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-            let cross = (b - a).cross(c - a).length();
+            let (longest, cross) = measures(&positions, t);
             if !(cross * cross).is_finite() || !(longest * longest).is_finite() {
                 return Err(bad(
-                    format!("triangle {} of group '{}'", i + 1, groups[t.group as usize]),
+                    format!("triangle {} of group {}", i + 1, quoted(&[&groups[t.group as usize]])),
                     format!("an extent of {longest:e}"),
                     "scale the scene down: areas must stay finite in 64-bit floats",
                 ));
             }
-            let reach =
-                [a, b, c].map(|p| p.abs().max_element()).into_iter().fold(longest, f64::max);
-            if cross > 4.0 * f64::EPSILON * longest * reach {
-                kept.push(*t);
-            }
         }
-        let degenerate = triangles.len() - kept.len();
-        if kept.is_empty() {
-            let found = match triangles.len() {
+        let given = triangles.len();
+        triangles.retain(|t| {
+            let (longest, cross) = measures(&positions, t);
+            let corners = t.corners.map(|k| positions[k as usize].abs().max_element());
+            let reach = corners.into_iter().fold(longest, f64::max);
+            cross > 4.0 * f64::EPSILON * longest * reach && cross * cross >= f64::MIN_POSITIVE
+        });
+        let degenerate = given - triangles.len();
+        if triangles.is_empty() {
+            let found = match given {
                 0 => "no triangle".to_string(),
                 n => format!("{n} triangles, none with area"),
             };
             return Err(bad("scene", found, "give at least one triangle with area"));
         }
-        let corners = kept.iter().flat_map(|t| t.corners).map(|k| positions[k as usize]);
+        let corners = triangles.iter().flat_map(|t| t.corners).map(|k| positions[k as usize]);
         let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let grain = f64::EPSILON * largest;
-        let (triangles, warnings) = (kept, vec![]);
+        let warnings = vec![];
         let mut scene =
             Scene { positions, triangles, groups, materials, degenerate, grain, warnings };
         if degenerate > 0 {
@@ -208,7 +208,7 @@ impl Material {
 
     /// Reflectance in [0, 1), exitance finite and not negative.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let place = || format!("material '{}'", self.name);
+        let place = || format!("material {}", quoted(&[&self.name]));
         for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
             if !(0.0..1.0).contains(&rho) {
                 return Err(bad(
@@ -229,6 +229,13 @@ impl Material {
         }
         Ok(())
     }
+}
+
+/// Length of the longest edge of `t`, and twice its area.
+fn measures(positions: &[DVec3], t: &Triangle) -> (f64, f64) {
+    let [a, b, c] = t.corners.map(|k| positions[k as usize]);
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    (longest, (b - a).cross(c - a).length())
 }
 
 fn bad(place: impl Into<String>, found: impl Into<String>, remedy: impl Into<String>) -> Error {

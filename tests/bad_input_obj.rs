@@ -6,7 +6,7 @@ use std::path::Path;
 
 use radiosity::{
     Error, ErrorKind, GatheredRadiosity, Gathering, Go, Mesh, RayGather, Rgb, Scene,
-    VertexRadiosity, load_obj,
+    VertexRadiosity, load_obj, read_obj,
 };
 use tempfile::TempDir;
 
@@ -81,6 +81,109 @@ fn a_missing_library_is_named_with_its_line_and_its_neighbours() {
     let parts = ["room.obj:6: ", "paints.mtl", "has 'paint.mtl'"];
     refused(load(&[("room.obj", text.as_bytes()), other]), ErrorKind::File, &parts);
     refused(obj("mtllib\nf 1\n"), ErrorKind::Scene, &["room.obj:1: ", "no file name"]);
+}
+
+#[test]
+fn libraries_lie_in_the_folder_of_the_obj_file_or_below() {
+    let folder = TempDir::new().unwrap();
+    let room = folder.path().join("room/room.obj");
+    fs::create_dir_all(folder.path().join("room/paints")).unwrap();
+    for library in ["chalk.mtl", "room/chalk.mtl", "room/paints/chalk.mtl"] {
+        fs::write(folder.path().join(library), CHALK).unwrap();
+    }
+    let load = |library: &str| {
+        fs::write(&room, format!("{SQUARE}mtllib {library}\nusemtl chalk\nf 1 2 3\n")).unwrap();
+        load_obj(&room)
+    };
+    for inside in ["chalk.mtl", "./chalk.mtl", "paints/chalk.mtl", "paints/./chalk.mtl"] {
+        assert_eq!(load(inside).unwrap().material(0).name, "chalk", "{inside}");
+    }
+    let absolute = folder.path().join("room/chalk.mtl").display().to_string();
+    for outside in ["../chalk.mtl", "paints/../chalk.mtl", "..", "/dev/zero", &absolute] {
+        let parts = ["room.obj:5: ", outside, "not in the folder of the OBJ file", "'chalk.mtl'"];
+        refused(load(outside), ErrorKind::File, &parts);
+    }
+}
+
+#[test]
+fn libraries_that_are_no_files() {
+    let folder = TempDir::new().unwrap();
+    let room = folder.path().join("room.obj");
+    fs::write(&room, "mtllib it.mtl\n").unwrap();
+    fs::create_dir(folder.path().join("it.mtl")).unwrap();
+    refused(load_obj(&room), ErrorKind::File, &["room.obj:1: ", "'it.mtl'", "folder"]);
+    fs::remove_dir(folder.path().join("it.mtl")).unwrap();
+    // Nobody will ever write to it.
+    #[cfg(unix)]
+    {
+        let pipe = folder.path().join("it.mtl");
+        assert!(std::process::Command::new("mkfifo").arg(pipe).status().unwrap().success());
+        refused(load_obj(&room), ErrorKind::File, &["room.obj:1: ", "'it.mtl'", "regular"]);
+    }
+}
+
+#[test]
+fn files_that_are_too_large() {
+    const MOST: u64 = 1 << 30;
+    let folder = TempDir::new().unwrap();
+    // With a hole, so that it takes no room on the disk.
+    let hollow = |name: &str, length: u64| {
+        let path = folder.path().join(name);
+        fs::File::create(&path).unwrap().set_len(length).unwrap();
+        path
+    };
+    let large = hollow("large.obj", MOST + 1);
+    refused(load_obj(large), ErrorKind::File, &["large.obj: ", "more than 1073741824 bytes"]);
+    // The first library leaves less for the second.
+    fs::write(folder.path().join("chalk.mtl"), CHALK).unwrap();
+    hollow("large.mtl", MOST);
+    let room = folder.path().join("room.obj");
+    fs::write(&room, "mtllib chalk.mtl\nmtllib large.mtl\n").unwrap();
+    let left = format!("more than {} bytes", MOST - CHALK.len() as u64);
+    refused(load_obj(&room), ErrorKind::File, &["room.obj:2: ", "'large.mtl'", &left]);
+}
+
+#[test]
+fn a_library_is_loaded_once_and_names_no_other() {
+    let text = format!("{}{SQUARE}usemtl chalk\nf 1 2 3\n", "mtllib room.mtl\n".repeat(1000));
+    let library = format!("mtllib room.mtl\nmtllib gone.mtl\n{CHALK}");
+    let files = [("room.obj", text.as_bytes()), ("room.mtl", library.as_bytes())];
+    let scene = load(&files).unwrap();
+    assert_eq!((scene.materials().len(), scene.warnings().len()), (1, 0));
+}
+
+#[test]
+fn scenes_from_memory() {
+    let text = format!("mtllib paints/a b.mtl\n{SQUARE}usemtl chalk\nf 1 2 3 4\n");
+    let library = ("paints/a b.mtl", CHALK.as_bytes());
+    let scene = read_obj("room.obj", text.as_bytes(), &[library]).unwrap();
+    assert_eq!((area(&scene), &*scene.material(0).name), (1.0, "chalk"));
+    let gone = read_obj("room.obj", text.as_bytes(), &[]);
+    refused(gone, ErrorKind::File, &["room.obj:1: ", "'paints/a' cannot be read", "no .mtl"]);
+    let other = read_obj("room.obj", text.as_bytes(), &[("c.mtl", b"")]);
+    refused(other, ErrorKind::File, &["room.obj:1: ", "'paints/a' cannot be read", "has 'c.mtl'"]);
+}
+
+#[test]
+fn long_names_and_control_characters_do_not_get_into_messages() {
+    for name in ["x".repeat(1_000_000), "\u{1b}[2J\u{7}\0\u{202e}".into()] {
+        let huge = "v 0 0 0\nv 1e200 0 0\nv 0 1e200 0\n";
+        let colour = format!("newmtl {name}\nKd 2\n");
+        for result in [
+            obj(&format!("mtllib {name}\n")),
+            obj(&format!("{SQUARE}usemtl {name}\n")),
+            obj(&format!("{huge}g {name}\nf 1 2 3\n")),
+            obj(&format!("{SQUARE}g {name}\nf 1 3 2 4\n")),
+            obj(&format!("{SQUARE}f 1 2 {name}\n")),
+            obj(&format!("v 0 0 {name}\n")),
+            obj(&format!("s {name}\n")),
+            with_library(&colour),
+        ] {
+            let message = result.unwrap_err().to_string();
+            assert!(message.len() < 600 && !message.contains(char::is_control), "{message:?}");
+            assert!(!message.contains('\u{202e}'), "{message:?}");
+        }
+    }
 }
 
 #[test]
@@ -183,6 +286,9 @@ fn scenes_without_a_face_or_without_area() {
     let scene = obj(&format!("{flat}f 1 2 3\n")).unwrap();
     assert_eq!((scene.triangles().len(), scene.degenerate()), (1, 6));
     warned(&scene, "6 triangles without area");
+    // Its area is a number, but that squared is not.
+    let tiny = SQUARE.replace('1', "1e-80");
+    refused(obj(&format!("{tiny}f 1 2 3\n")), ErrorKind::Scene, &["none with area"]);
 }
 
 #[test]
@@ -273,6 +379,26 @@ fn a_polygon_of_a_hundred_thousand_corners() {
     assert_eq!(scene.triangles().len(), n - 2);
     // The polygon's own area is n/2 sin(2π/n); a sum of 1e5 terms rounds by up to 1e5 ε = 2e-11.
     assert!((area(&scene) - 0.5 * n as f64 * angle(1).sin()).abs() < 1e-10);
+    // The first corner is one of all triangles: what is done around a vertex must not be done for
+    // each of its neighbours.
+    let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
+    let surface = VertexRadiosity::new(&mesh, &vec![Rgb::ONE; n - 2]);
+    assert_eq!(surface.positions.len(), n);
+    // Even light stays even, as far as the fits at the boundary let it.
+    assert!(surface.radiosity.iter().all(|b| b.abs_diff_eq(Rgb::ONE, 2e-6)));
+}
+
+#[test]
+fn a_polygon_of_very_many_corners_that_is_not_convex() {
+    // Along a parabola from below: what is cut off has all other corners near it.
+    let parabola = |n: usize| {
+        let x = |i: usize| 2.0 * i as f64 / n as f64 - 1.0;
+        let arc: String = (0..=n).map(|i| format!("v {} {} 0\n", x(i), x(i) * x(i))).collect();
+        let corners: Vec<String> = (1..=n + 3).map(|i| i.to_string()).collect();
+        obj(&format!("{arc}v 1 -1 0\nv -1 -1 0\nf {}\n", corners.join(" ")))
+    };
+    assert_eq!(parabola(9_997).unwrap().triangles().len(), 9_998);
+    refused(parabola(9_998), ErrorKind::Scene, &["10001 corners", "may have 10000 corners"]);
 }
 
 #[test]

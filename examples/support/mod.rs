@@ -90,7 +90,8 @@ impl Bake {
         writable(&self.out)?;
         let (width, height) = self.image;
         self.camera.iter().try_for_each(|c| c.check(width, height, SAMPLES))?;
-        let scene = load_obj(&self.scene)?;
+        let mut scene = load_obj(&self.scene)?;
+        scene.check_winding();
         for warning in scene.warnings() {
             eprintln!("warning: {warning}");
         }

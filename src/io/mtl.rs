@@ -2,12 +2,12 @@
 
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
-use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::text::{self, Line, finite, quoted, shortened, words};
-use crate::error::{Error, ErrorKind};
+use super::files::{Files, MOST_BYTES};
+use super::text::{self, Line, finite, words};
+use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Material, Rgb};
 
 /// The materials of all libraries loaded so far.
@@ -16,6 +16,7 @@ pub(super) struct Library {
     entries: Vec<Entry>,
     by_name: HashMap<String, u32>,
     files: HashSet<PathBuf>,
+    bytes: u64,
     redefined: Vec<String>,
 }
 
@@ -45,28 +46,44 @@ impl Library {
     }
 
     /// Loads the files that a `mtllib` line names: one name, which may contain spaces, or several.
-    pub fn load(&mut self, line: &Line, names: &str) -> Result<(), Error> {
+    pub fn load(&mut self, line: &Line, names: &str, files: &Files) -> Result<(), Error> {
         if names.is_empty() {
             return Err(line.refuse("no file name", "write `mtllib FILE`"));
         }
-        let folder = line.file.parent().unwrap_or(Path::new(""));
-        if folder.join(names).is_file() {
-            return self.load_file(line, &folder.join(names));
+        let whole = self.read(names, files);
+        if whole.is_ok() || names.split_whitespace().nth(1).is_none() {
+            return self.take(line, names, whole, files);
         }
-        names.split_whitespace().try_for_each(|name| self.load_file(line, &folder.join(name)))
+        names.split_whitespace().try_for_each(|name| {
+            let text = self.read(name, files);
+            self.take(line, name, text, files)
+        })
     }
 
-    fn load_file(&mut self, line: &Line, path: &Path) -> Result<(), Error> {
-        let unreadable = |e: io::Error| {
-            let (text, path) = (shortened(&line.text), path.display());
-            let found = format!("{text:?} names '{path}', which cannot be read: {e}");
-            Error::new(ErrorKind::File, line.place(), found, beside(line.file)).with_source(e)
-        };
-        if self.files.insert(fs::canonicalize(path).map_err(unreadable)?) {
-            let text = text::read(path).map_err(unreadable)?;
-            let start = self.entries.len();
-            text::lines(path, &text).try_for_each(|line| self.line(&line, start))?;
+    /// The text of file `name`; nothing if it is loaded already.
+    fn read(&self, name: &str, files: &Files) -> io::Result<String> {
+        match self.files.contains(&files.path(name)) {
+            true => Ok(String::new()),
+            false => files.read(name, MOST_BYTES.saturating_sub(self.bytes)),
         }
+    }
+
+    /// Takes in the `text` of file `name`.
+    fn take(
+        &mut self,
+        line: &Line,
+        name: &str,
+        text: io::Result<String>,
+        files: &Files,
+    ) -> Result<(), Error> {
+        let text = text.map_err(|e| {
+            let found = format!("{} cannot be read: {e}", quoted(&[name]));
+            line.refuse_as(ErrorKind::File, found, files.libraries()).with_source(e)
+        })?;
+        self.bytes += text.len() as u64;
+        let (path, start) = (files.path(name), self.entries.len());
+        text::lines(&path, &text).try_for_each(|line| self.line(&line, start))?;
+        self.files.insert(path);
         Ok(())
     }
 
@@ -176,21 +193,4 @@ fn colour(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
 
 fn refuse(line: &Line, name: &str, right: &str) -> Error {
     line.refuse(format!("material {}: unusable value", quoted(&[name])), format!("write {right}"))
-}
-
-/// Which libraries lie beside the OBJ file.
-fn beside(obj: &Path) -> String {
-    let folder = match obj.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let libraries = files.filter(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl")));
-    let mut names: Vec<_> =
-        libraries.filter_map(|f| Some(f.file_name()?.to_string_lossy().into_owned())).collect();
-    names.sort();
-    match names.len() {
-        0 => format!("the folder '{}' has no .mtl file", folder.display()),
-        _ => format!("the folder '{}' has {}", folder.display(), quoted(&names)),
-    }
 }

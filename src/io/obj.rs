@@ -1,14 +1,16 @@
 //! Scenes from Wavefront OBJ files and their MTL libraries.
 
 use std::collections::{HashMap, HashSet};
+use std::io;
 use std::path::Path;
 
 use glam::DVec3;
 
+use super::files::{self, Files, MOST_BYTES};
 use super::mtl::Library;
 use super::polygon::{MOST_CORNERS_TO_CLIP, triangulate};
-use super::text::{self, Line, finite, quoted, words};
-use crate::error::{Error, ErrorKind};
+use super::text::{self, Line, finite, words};
+use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{DEFAULT_REFLECTANCE, Material, Scene, Triangle};
 
 /// Group of the faces that come before any `o` or `g` line.
@@ -30,8 +32,12 @@ const DEFAULT_GROUP: &str = "default";
 ///
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
-/// material reflect [`DEFAULT_REFLECTANCE`]. MTL files are looked for from the folder of the OBJ
-/// file.
+/// material reflect [`DEFAULT_REFLECTANCE`].
+///
+/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below:
+/// absolute names and `..` are refused, so that a scene cannot have other files of the machine (or
+/// of its network) opened. Only regular files are read, of at most 1 GiB, as are all MTL files of a
+/// scene together. Memory stays within forty times the size of the files.
 ///
 /// What is read but not modelled, or replaced by a default, is in [`Scene::warnings`].
 ///
@@ -43,17 +49,37 @@ const DEFAULT_GROUP: &str = "default";
 /// area.
 pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
-    let scan = Scan::of(path)?;
-    scan.into_scene(path)
+    let text = files::read(path, MOST_BYTES);
+    read_text(path, text, &Files::Folder(path.parent().unwrap_or(Path::new(""))))
+}
+
+/// [`load_obj`] from memory: an OBJ file of this name, for messages, and this content. `libraries`
+/// are the MTL files, name and content, that its `mtllib` lines may name.
+///
+/// # Errors
+/// Those of [`load_obj`].
+pub fn read_obj(
+    name: impl AsRef<Path>,
+    obj: &[u8],
+    libraries: &[(&str, &[u8])],
+) -> Result<Scene, Error> {
+    read_text(name.as_ref(), files::limited(obj.into(), MOST_BYTES), &Files::Given(libraries))
+}
+
+fn read_text(path: &Path, text: io::Result<String>, files: &Files) -> Result<Scene, Error> {
+    let text = text.map_err(|e| {
+        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
+        Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
+    })?;
+    Scan::of(path, &text, files)?.into_scene(path)
 }
 
 /// What one pass over the lines finds. Every number is checked here, where its line is known.
 #[derive(Default)]
 struct Scan {
-    /// Vertices and faces alone, in a form that the parser takes without surprises.
-    geometry: String,
-    vertices: usize,
-    /// In the order of `geometry`.
+    positions: Vec<DVec3>,
+    /// Of all faces, one after the other, as indices into the positions.
+    corners: Vec<u32>,
     faces: Vec<Face>,
     groups: Vec<String>,
     group_by_name: HashMap<String, u32>,
@@ -75,21 +101,19 @@ struct Scan {
 /// Where a face stands and what it belongs to.
 struct Face {
     line: usize,
+    /// Where its corners end, which begin where those of the face before it end.
+    end: u32,
     group: u32,
     material: Option<u32>,
     smoothing: Option<u32>,
 }
 
 impl Scan {
-    fn of(path: &Path) -> Result<Scan, Error> {
-        let text = text::read(path).map_err(|e| {
-            let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
-            Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
-        })?;
+    fn of(path: &Path, text: &str, files: &Files) -> Result<Scan, Error> {
         let mut scan = Scan::default();
-        text::lines(path, &text).try_for_each(|line| scan.line(&line))?;
+        text::lines(path, text).try_for_each(|line| scan.line(&line, files))?;
         if scan.faces.is_empty() {
-            let mut found = format!("no face, {} vertices", scan.vertices);
+            let mut found = format!("no face, {} vertices", scan.positions.len());
             if scan.unknown > 0 {
                 found += &format!(", {} lines that are not OBJ", scan.unknown);
             }
@@ -99,7 +123,7 @@ impl Scan {
         Ok(scan)
     }
 
-    fn line(&mut self, line: &Line) -> Result<(), Error> {
+    fn line(&mut self, line: &Line, files: &Files) -> Result<(), Error> {
         let (keyword, rest) = line.keyword();
         match keyword {
             "v" => self.vertex(line, rest)?,
@@ -107,7 +131,7 @@ impl Scan {
             "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
             "usemtl" => self.material = Some(self.use_material(line, rest)?),
             "s" => self.smooth(line, rest)?,
-            "mtllib" => self.library.load(line, rest)?,
+            "mtllib" => self.library.load(line, rest, files)?,
             "p" | "l" => self.points_and_lines += 1,
             "vt" | "vn" | "" => {}
             comment if comment.starts_with('#') => {}
@@ -129,23 +153,20 @@ impl Scan {
             6 => &words[..3],
             n => return Err(line.refuse(format!("{n} words after `v`"), "a vertex is `v x y z`")),
         };
-        self.geometry.push('v');
-        for word in used {
-            if finite(word).is_none() {
+        let mut numbers = [0.0, 0.0, 0.0, 1.0];
+        for (number, word) in numbers.iter_mut().zip(used) {
+            let refuse = || {
                 let found = format!("coordinate {}", quoted(&[word]));
-                return Err(line.refuse(found, "coordinates must be finite numbers"));
-            }
-            self.geometry.push(' ');
-            self.geometry.push_str(word);
+                line.refuse(found, "coordinates must be finite numbers")
+            };
+            *number = finite(word).ok_or_else(refuse)?;
         }
-        self.geometry.push('\n');
-        if let Some(w) = used.get(3).and_then(|w| finite(w)) {
-            let divided = |word: &&str| finite(word).is_some_and(|x| (x / w).is_finite());
-            if !used[..3].iter().all(divided) {
-                return Err(line.refuse(format!("weight {w}"), "leave the fourth number out"));
-            }
+        let [x, y, z, w] = numbers;
+        let position = DVec3::new(x, y, z) / w;
+        if !position.is_finite() {
+            return Err(line.refuse(format!("weight {w}"), "leave the fourth number out"));
         }
-        self.vertices += 1;
+        self.positions.push(position);
         Ok(())
     }
 
@@ -154,21 +175,17 @@ impl Scan {
         if words(rest).next().is_none() {
             return Err(line.refuse("a face without corners", "write `f` and three or more"));
         }
-        self.geometry.push('f');
         for word in words(rest) {
-            let vertex = self.corner(line, word)?;
-            self.geometry.push(' ');
-            self.geometry.push_str(vertex);
+            self.corners.push(self.corner(line, word)?);
         }
-        self.geometry.push('\n');
         let group = self.current_group();
-        let (material, smoothing) = (self.material, self.smoothing);
-        self.faces.push(Face { line: line.number, group, material, smoothing });
+        let (material, smoothing, end) = (self.material, self.smoothing, self.corners.len() as u32);
+        self.faces.push(Face { line: line.number, end, group, material, smoothing });
         Ok(())
     }
 
-    /// The vertex index of a corner, which must exist.
-    fn corner<'a>(&self, line: &Line, word: &'a str) -> Result<&'a str, Error> {
+    /// The vertex of a corner, which must exist.
+    fn corner(&self, line: &Line, word: &str) -> Result<u32, Error> {
         let bad = |found: &str, remedy: String| {
             Err(line.refuse(format!("corner {}, {found}", quoted(&[word])), remedy))
         };
@@ -184,8 +201,9 @@ impl Scan {
         if index == 0 {
             return bad("vertex index 0", "count from 1, or back from -1".into());
         }
-        if index.unsigned_abs() > self.vertices as u64 {
-            return match self.vertices {
+        let count = self.positions.len();
+        if index.unsigned_abs() > count as u64 {
+            return match count {
                 0 => bad("but no vertex so far", "put `v` lines above the faces".into()),
                 n => bad(
                     &format!("vertex index {index} of {n} vertices so far"),
@@ -193,7 +211,7 @@ impl Scan {
                 ),
             };
         }
-        Ok(vertex)
+        Ok(if index > 0 { index - 1 } else { count as i64 + index } as u32)
     }
 
     /// Index of the group that faces belong to now.
@@ -239,8 +257,6 @@ impl Scan {
     }
 
     fn into_scene(mut self, path: &Path) -> Result<Scene, Error> {
-        let mesh = parse(path, std::mem::take(&mut self.geometry))?;
-        let positions: Vec<DVec3> = mesh.positions.chunks_exact(3).map(DVec3::from_slice).collect();
         let mut warnings = self.warnings();
         let used: HashSet<u32> = self.faces.iter().filter_map(|f| f.material).collect();
         let (mut materials, about) = std::mem::take(&mut self.library).into_materials(&used);
@@ -249,34 +265,27 @@ impl Scan {
         if self.faces.iter().any(|f| f.material.is_none()) {
             materials.push(Material::grey("(default)", DEFAULT_REFLECTANCE));
         }
-        let triangles = self.triangles(path, &mesh, &positions, default)?;
-        let scene = Scene::new(positions, triangles, self.groups, materials);
+        let triangles = self.triangles(path, default)?;
+        let scene = Scene::new(self.positions, triangles, self.groups, materials);
         let mut scene = scene.map_err(|e| e.inside(path))?;
         warnings.into_iter().for_each(|warning| scene.warn(warning));
         Ok(scene)
     }
 
     /// The faces as triangles, those without a material with that of index `default`.
-    fn triangles(
-        &self,
-        path: &Path,
-        mesh: &tobj::Mesh,
-        positions: &[DVec3],
-        default: u32,
-    ) -> Result<Vec<Triangle>, Error> {
-        let mut rest = &mesh.indices[..];
+    fn triangles(&self, path: &Path, default: u32) -> Result<Vec<Triangle>, Error> {
+        let mut start = 0;
         let mut triangles = Vec::with_capacity(self.faces.len());
         for (number, face) in self.faces.iter().enumerate() {
-            // No sizes are given where all faces are triangles.
-            let size = mesh.face_arities.get(number).map_or(3, |&n| n as usize);
-            let (corners, after) = rest.split_at_checked(size).unwrap_or((rest, &[]));
-            rest = after;
-            let points: Vec<DVec3> = corners.iter().map(|&i| positions[i as usize]).collect();
+            let corners = &self.corners[start..face.end as usize];
+            start = face.end as usize;
+            let points: Vec<DVec3> = corners.iter().map(|&i| self.positions[i as usize]).collect();
             let pieces = triangulate(&points).ok_or_else(|| {
                 let group = quoted(&[&self.groups[face.group as usize]]);
                 let found = format!(
-                    "face {} ({size} corners, group {group}) cannot be cut into triangles",
-                    number + 1
+                    "face {} ({} corners, group {group}) cannot be cut into triangles",
+                    number + 1,
+                    corners.len()
                 );
                 let remedy = format!(
                     "its outline must not cross itself, and may have {MOST_CORNERS_TO_CLIP} \
@@ -323,17 +332,4 @@ impl Scan {
         }
         warnings
     }
-}
-
-/// Vertices and faces by the OBJ parser: the vertices that a face uses, and every face, even of one
-/// corner or two.
-fn parse(path: &Path, geometry: String) -> Result<tobj::Mesh, Error> {
-    let none = |_: &Path| Ok(Default::default());
-    let parsed = tobj::load_obj_buf(&mut geometry.as_bytes(), &tobj::LoadOptions::default(), none);
-    let (models, _) = parsed.map_err(|e| {
-        let (place, found) = (path.display().to_string(), format!("refused by the parser: {e}"));
-        Error::new(ErrorKind::Scene, place, found, "give a plain OBJ file").with_source(e)
-    })?;
-    // Without names in it, the geometry is one model.
-    Ok(models.into_iter().next().map(|model| model.mesh).unwrap_or_default())
 }

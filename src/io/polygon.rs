@@ -4,7 +4,7 @@ use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
 
 /// Corners a polygon may have when no fan covers it: ear clipping is quadratic at worst.
-pub(super) const MOST_CORNERS_TO_CLIP: usize = 100_000;
+pub(super) const MOST_CORNERS_TO_CLIP: usize = 10_000;
 
 /// Height of a triangle that the rounding of its corners hides, in units of the polygon's extent or of
 /// its largest coordinate, if that is more.

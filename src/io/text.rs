@@ -1,10 +1,10 @@
 //! Text of OBJ and MTL files: numbered lines, keywords, words, and errors that name the line.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::path::Path;
-use std::{fs, io};
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, shortened};
 
 /// A line of a file, for messages.
 pub(super) struct Line<'a> {
@@ -28,29 +28,25 @@ impl Line<'_> {
     }
 
     /// The error that `found` stands in this line where `remedy` would be right.
-    pub fn refuse(&self, found: impl std::fmt::Display, remedy: impl Into<String>) -> Error {
+    pub fn refuse(&self, found: impl Display, remedy: impl Into<String>) -> Error {
+        self.refuse_as(ErrorKind::Scene, found, remedy)
+    }
+
+    /// The same, as an error of `kind`.
+    pub fn refuse_as(
+        &self,
+        kind: ErrorKind,
+        found: impl Display,
+        remedy: impl Into<String>,
+    ) -> Error {
         let found = format!("{found} in {:?}", shortened(&self.text));
-        Error::new(ErrorKind::Scene, self.place(), found, remedy)
+        Error::new(kind, self.place(), found, remedy)
     }
 }
 
 /// `file:line`.
 pub(super) fn place(file: &Path, line: usize) -> String {
     format!("{}:{line}", file.display())
-}
-
-/// The whole of a regular file; bytes that are not UTF-8 become U+FFFD.
-pub(super) fn read(path: &Path) -> io::Result<String> {
-    let about = fs::metadata(path)?;
-    if about.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
-    }
-    if !about.is_file() {
-        // A pipe or a device might never end.
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
-    }
-    let lossy = |e: std::string::FromUtf8Error| String::from_utf8_lossy(e.as_bytes()).into_owned();
-    Ok(String::from_utf8(fs::read(path)?).unwrap_or_else(lossy))
 }
 
 /// The lines of `text`, which ends them with LF, CRLF or CR. A backslash at the end of a line joins
@@ -82,26 +78,6 @@ pub(super) fn finite(word: &str) -> Option<f64> {
     word.parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-/// The start of `text`, short enough for a message.
-pub(super) fn shortened(text: &str) -> Cow<'_, str> {
-    const LONGEST: usize = 60;
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
-        None => Cow::Borrowed(text),
-    }
-}
-
-/// Up to eight of `names`, quoted, and how many more there are.
-pub(super) fn quoted<S: AsRef<str>>(names: &[S]) -> String {
-    const SHOWN: usize = 8;
-    let name = |name: &S| format!("'{}'", shortened(name.as_ref()).escape_debug());
-    let mut list = names.iter().take(SHOWN).map(name).collect::<Vec<_>>().join(", ");
-    if names.len() > SHOWN {
-        list += &format!(" and {} more", names.len() - SHOWN);
-    }
-    list
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,11 +101,5 @@ mod tests {
     fn a_backslash_joins_lines_and_keeps_the_first_number() {
         assert_eq!(split("f 1 \\\r\n 2\\\n3\nv"), owned(&[(1, "f 1  2 3"), (4, "v")]));
         assert_eq!(split("a\\"), owned(&[(1, "a")]));
-    }
-
-    #[test]
-    fn messages_stay_short() {
-        assert_eq!(shortened(&"é".repeat(1000)).chars().count(), 61);
-        assert_eq!(quoted(&["a"; 10]), format!("{} and 2 more", ["'a'"; 8].join(", ")));
     }
 }

@@ -14,6 +14,13 @@ use crate::scene::Rgb;
 /// Elements that a plane is fitted to, at least: three would let it swing freely.
 const FEWEST: usize = 4;
 
+/// How far the weights of a fit may be from a sum of one.
+const ROUNDING: f64 = 1e-6;
+
+/// A vertex with as many elements around it is a hub. Six are usual, and the pole of a fine sphere
+/// has some hundred.
+const HUB: usize = 256;
+
 /// Replaces in `radiosity` the value of every boundary vertex by that of a linear fit to the
 /// elements around it and around its neighbours, weighted by area and nearness, mended by what it
 /// gets from surfaces that meet there. Vertices with too few elements, or all of them on a line,
@@ -82,14 +89,18 @@ fn fit(mesh: &Mesh, near: Vec<u32>, at: DVec3, normal: DVec3) -> Vec<(u32, f64)>
     };
     let rows: Vec<(u32, DVec3)> = near.into_iter().map(row_of).collect();
     let first = matrix.inverse().row(0);
-    let weights = rows.into_iter().map(|(e, x)| (e, first.dot(x)));
-    if first.is_finite() { weights.collect() } else { vec![] }
+    let weights: Vec<(u32, f64)> = rows.into_iter().map(|(e, x)| (e, first.dot(x))).collect();
+    // They sum to one, but for rounding, which is all that is left of centroids close to a line.
+    let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
+    if (sum - 1.0).abs() < ROUNDING { weights } else { vec![] }
 }
 
-/// The elements that share a vertex with one of `elements`, those included, ascending.
+/// The elements that share a vertex with one of `elements`, those included, ascending. Hubs do not
+/// count: all at a hub would have all others there in their rings.
 fn ring(rims: &Rims, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
     let vertices = elements.iter().flat_map(|&e| rims.of(e as usize));
-    let mut ring: Vec<u32> = vertices.flat_map(|&v| &around[v as usize]).copied().collect();
+    let others = vertices.map(|&v| &around[v as usize]).filter(|others| others.len() < HUB);
+    let mut ring: Vec<u32> = others.flatten().chain(elements).copied().collect();
     ring.sort_unstable();
     ring.dedup();
     ring

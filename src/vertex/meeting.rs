@@ -27,6 +27,10 @@ use crate::scene::Rgb;
 /// places at binary fractions of the extent lie well inside a cell, not where rounding decides.
 const SAME_PLACE: f64 = 1.0 / (1 << 20) as f64;
 
+/// Where more vertices are at one place, none hears of another: what each hears of takes time and
+/// memory. Three meet in the corner of a room; so many are a scene that is small in its extent.
+const MOST_MEETING: usize = 256;
+
 /// How often vertices at one place hear of each other's value. Each passes on at most ρ F of what
 /// is still off, F = ½ between perpendicular walls: 3 % is left of it.
 const ROUNDS: usize = 5;
@@ -62,14 +66,17 @@ pub(super) fn mend(mesh: &Mesh, ends: &[End], elements: &[Rgb], fitted: &[Rgb]) 
     values
 }
 
-/// For each of `ends` the others at its place.
+/// For each of `ends` the others at its place, if they are not too many.
 fn meeting(mesh: &Mesh, ends: &[End]) -> Vec<Vec<usize>> {
     let (low, high) = mesh.scene().bounds();
     let unit = (high - low).max_element() * SAME_PLACE;
     let place = |end: &End| ((end.position - low) / unit).round().as_i64vec3();
     let mut places: HashMap<_, Vec<usize>> = HashMap::new();
     ends.iter().zip(0..).for_each(|(end, k)| places.entry(place(end)).or_default().push(k));
-    let others = |k: usize| places[&place(&ends[k])].iter().copied().filter(move |&m| m != k);
+    let others = |k: usize| {
+        let here = Some(&places[&place(&ends[k])]).filter(|here| here.len() <= MOST_MEETING);
+        here.into_iter().flatten().copied().filter(move |&m| m != k)
+    };
     (0..ends.len()).map(|k| others(k).collect()).collect()
 }
 
@@ -203,6 +210,33 @@ mod tests {
             rim.iter().for_each(|&v| normals[v as usize] = mesh.normal(mesh.element(e)));
         }
         normals
+    }
+
+    #[test]
+    fn in_a_crowd_nobody_hears_of_another() {
+        let heard = |triangles: usize| {
+            // A fan of separate triangles: their first corners are at one place.
+            let rim = |k: usize| {
+                let (sin, cos) = (k as f64 / triangles as f64).sin_cos();
+                DVec3::new(cos, sin, (k / 2 % 2) as f64)
+            };
+            let corners = |k: usize| [DVec3::ZERO, rim(2 * k), rim(2 * k + 1)];
+            let triangle =
+                |k: u32| Triangle { corners: [3 * k, 3 * k + 1, 3 * k + 2], ..Default::default() };
+            let scene = Scene::new(
+                (0..triangles).flat_map(corners).collect(),
+                (0..triangles as u32).map(triangle).collect(),
+                vec!["fan".into()],
+                vec![Material::grey("fan", 0.5)],
+            );
+            let mesh = Mesh::new(scene.unwrap(), f64::INFINITY).unwrap();
+            let Vertices { positions, rims, .. } = Vertices::new(&mesh, &Smooth::new(mesh.scene()));
+            let normals = normals(&mesh, &rims, positions.len());
+            let ends = ends(&mesh, &rims, &positions, &normals);
+            meeting(&mesh, &ends)[0].len()
+        };
+        assert_eq!(heard(MOST_MEETING), MOST_MEETING - 1);
+        assert_eq!(heard(MOST_MEETING + 1), 0);
     }
 
     #[test]
