@@ -86,7 +86,7 @@ pub use form_factor::viewpoints::Viewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gather::rays::RayGather;
 pub use gather::{Gather, Gathered, Place, Sources};
-pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, StageSeconds};
+pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, Limits, StageSeconds};
 pub use io::{
     Report, Seconds, load_obj, write_exr, write_matrix_market, write_ply, write_png,
     write_view_factor_list, write_view_factors,
