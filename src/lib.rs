@@ -67,6 +67,7 @@ pub mod hemicube;
 mod io;
 mod mesh;
 mod rays;
+mod relay;
 mod scene;
 mod solve;
 mod tone;
@@ -92,6 +93,7 @@ pub use io::{
     write_view_factor_list, write_view_factors,
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
+pub use relay::Relay;
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solve::{Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solver, Stop};
 pub use tone::ToneCurve;

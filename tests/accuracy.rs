@@ -154,6 +154,7 @@ fn it_can_be_stopped_at_every_stage() {
                         judged += 1;
                         at == 2
                     }
+                    Stage::Failed(error) => panic!("{error}"),
                 };
                 if stop { Go::Break(()) } else { Go::Continue(()) }
             })

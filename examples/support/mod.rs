@@ -338,6 +338,7 @@ fn show(bar: &ProgressBar, stage: &Stage) {
         Stage::Judged(certificate) => {
             bar.println(format!("estimated error {:.2} %", 100.0 * certificate.total));
         }
+        Stage::Failed(error) => bar.println(format!("rays on the CPU go on: {error}")),
     }
 }
 
