@@ -77,6 +77,13 @@ pub enum Stage {
     Shooting(Progress),
     /// Vertices gather.
     Gathering(GatherProgress),
+    /// Random places are looked at, to judge by.
+    Judging {
+        /// Places looked at so far.
+        places: usize,
+        /// How many there are.
+        of: usize,
+    },
     /// The solution was judged.
     Judged(Certificate),
     /// The graphics device failed. Nothing is lost: rays on the CPU go on from here, in more time, or
@@ -219,7 +226,13 @@ impl Shot {
         let mut looks = device.gather(&self.mesh, LOOKS, f64::INFINITY, 0.0)?;
         let ledger = &self.solution.ledger;
         let judged = Judged { light: &light, sources: &light, rest: &rest, ledger, sweeps: 0 };
-        let (certificate, error) = judged.judge(LEAST_PLACES, &mut *looks)?;
+        let of = LEAST_PLACES;
+        let mut cancelled = self.solution.stop == Stop::Cancelled;
+        let (certificate, error) = judged.judge(of, &mut *looks, &mut |places| {
+            cancelled =
+                cancelled || device.tell(&Stage::Judging { places, of }, progress).is_break();
+            if cancelled { Go::Break(()) } else { Go::Continue(()) }
+        })?;
         light.surface.error = error;
         self.seconds.certificate = lap(&mut self.since);
         let _ = device.tell(&Stage::Judged(certificate), progress);
@@ -266,7 +279,11 @@ impl Settling<'_> {
             let (sources, sweeps) = (self.state.light(), self.gathering().sweeps);
             let judged = Judged { light: &light, sources, rest: &rest, ledger, sweeps };
             let count = (light.gathers as usize / GATHERS_A_PLACE).clamp(LEAST_PLACES, MOST_PLACES);
-            let (certificate, error) = judged.judge(count, &mut *self.looks)?;
+            let mut cancelled = stop == Stop::Cancelled;
+            let (certificate, error) = judged.judge(count, &mut *self.looks, &mut |places| {
+                cancelled = cancelled || tell(Stage::Judging { places, of: count }).is_break();
+                if cancelled { Go::Break(()) } else { Go::Continue(()) }
+            })?;
             light.surface.error = error;
             light.stop = stop;
             self.shot.seconds.certificate += lap(&mut self.shot.since);
@@ -277,6 +294,7 @@ impl Settling<'_> {
             let done = certificate.total <= SURE * wanted
                 || stop != Stop::Converged
                 || go.is_break()
+                || cancelled
                 || round == ROUNDS;
             let again = if done { None } else { self.improve(&certificate, *wanted, adjust)? };
             let Some(again) = again else {

@@ -66,6 +66,7 @@ mod gpu;
 pub mod hemicube;
 mod io;
 mod mesh;
+mod pace;
 mod rays;
 mod relay;
 mod scene;
