@@ -143,6 +143,7 @@ impl Gpu {
     /// likely to bring about the next. The device stays usable unless it was lost.
     pub(super) fn attempt<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
+        self.check()?;
         let scopes = [Internal, Validation, OutOfMemory].map(|f| self.device.push_error_scope(f));
         let result = work();
         // The last one first.
@@ -185,6 +186,7 @@ impl Gpu {
             let timeout = Some(PATIENCE);
             self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout })
         };
+        self.check()?;
         // wgpu 30 panics when the device is lost while it is waited for.
         let waited = catch_unwind(AssertUnwindSafe(poll));
         self.check()?;
