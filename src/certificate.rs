@@ -336,6 +336,7 @@ mod tests {
             sorted.sort_unstable();
             assert_eq!(sorted, (0..count).collect::<Vec<_>>());
             let mut first: Vec<usize> = order.into_iter().take(FEW).collect();
+            first.push(count);
             first.sort_unstable();
             // By the three-gap theorem no gap is larger than the sum of the two others, which at the
             // golden section is below 2.7 times the mean; steps are rounded.
