@@ -25,7 +25,8 @@ impl Accuracy<'_> {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an error outside (0, 1) or an adjusted setting out of range;
-    /// [`ErrorKind::Device`] when the device fails.
+    /// [`ErrorKind::Device`] and [`ErrorKind::Memory`] when the device cannot even start. One that
+    /// fails later is in [`Baked::failure`].
     pub fn bake(
         &self,
         scene: impl Into<Arc<Scene>>,
@@ -87,12 +88,20 @@ impl Budget<'_> {
         let (mut best, mut error) = (None, FIRST);
         loop {
             let (begun, mut late, mut stopped) = (Instant::now(), false, false);
-            let baked =
-                Accuracy { error, adjust: self.adjust }.bake(scene.clone(), device, |p| {
-                    stopped |= progress(p).is_break();
-                    late |= start.elapsed() >= limit;
-                    if stopped || late { Go::Break(()) } else { Go::Continue(()) }
-                })?;
+            let baked = Accuracy { error, adjust: self.adjust }.bake(scene.clone(), device, |p| {
+                stopped |= progress(p).is_break();
+                late |= start.elapsed() >= limit;
+                if stopped || late { Go::Break(()) } else { Go::Continue(()) }
+            });
+            let baked = match (baked, best) {
+                (Err(error), Some(best)) if error.is_of_device() => {
+                    return Ok(Baked { failure: Some(error), ..best });
+                }
+                (baked, last) => {
+                    best = last;
+                    baked?
+                }
+            };
             if stopped || late {
                 return Ok(best.unwrap_or(baked));
             }

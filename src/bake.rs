@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::certificate::{Certificate, Judged};
-use crate::device::{Device, DeviceRows};
+use crate::device::Device;
+use crate::device::backed::{Backed, DeviceRelay};
 use crate::effort::Effort;
 use crate::error::Error;
 use crate::form_factor::near::NearRepair;
@@ -36,6 +37,8 @@ pub struct Baked {
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
     /// Share of a row that the proximity repair moved, in the mean.
     pub near_moved: f64,
+    /// What the graphics device failed of, if it did; from then on rays on the CPU saw.
+    pub failure: Option<Error>,
     /// Where the time went.
     pub seconds: BakeSeconds,
 }
@@ -68,14 +71,24 @@ impl BakeSeconds {
 }
 
 /// What a bake is at, told often.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Stage {
     /// Light is shot.
     Shooting(Progress),
     /// Vertices gather.
     Gathering(GatherProgress),
+    /// Random places are looked at, to judge by.
+    Judging {
+        /// Places looked at so far.
+        places: usize,
+        /// How many there are.
+        of: usize,
+    },
     /// The solution was judged.
     Judged(Certificate),
+    /// The graphics device failed. Nothing is lost: rays on the CPU go on from here, in more time, or
+    /// what was reached is returned.
+    Failed(Error),
 }
 
 /// Whoever is told of the stages of a bake, and may stop it.
@@ -86,8 +99,9 @@ impl Effort {
     /// reached is returned.
     ///
     /// # Errors
-    /// [`crate::ErrorKind::Setting`] for a setting out of range; [`crate::ErrorKind::Device`] when the
-    /// device fails.
+    /// [`crate::ErrorKind::Setting`] for a setting out of range; [`crate::ErrorKind::Device`] and
+    /// [`crate::ErrorKind::Memory`] when the device cannot even start. One that fails later is in
+    /// [`Baked::failure`].
     pub fn bake(
         &self,
         scene: impl Into<Arc<Scene>>,
@@ -105,6 +119,7 @@ impl Effort {
         goal: &Goal,
         progress: Tell,
     ) -> Result<Baked, Error> {
+        let device = &Backed::new(device);
         let shot = Shot::new(self, scene, device, progress)?;
         let light = GatheredRadiosity::from_elements(&shot.mesh, &shot.solution.radiosity)?;
         let (light, certificate, shot, effort) = match &self.gather {
@@ -112,7 +127,7 @@ impl Effort {
                 let mesh = Mesh::new(scene.clone(), gather.element_size)?;
                 let mesh = mesh.split_at_contacts(gather.contacts);
                 let state = Refined::new(mesh.clone(), &light);
-                let looks = device.gather_evenly(&mesh, gather.rays, gather.noise, state.dim())?;
+                let looks = device.gather(&mesh, gather.rays, gather.noise, state.dim())?;
                 Settling { effort: self.clone(), state, looks, device, shot }
                     .until(goal, progress)?
             }
@@ -130,6 +145,7 @@ impl Effort {
             hemicubes,
             hemicubes_by_resolution,
             near_moved,
+            failure: device.failure(),
             seconds,
         })
     }
@@ -158,33 +174,38 @@ impl Shot {
     fn new(
         effort: &Effort,
         scene: &Arc<Scene>,
-        device: &Device,
+        device: &Backed,
         progress: Tell,
     ) -> Result<Shot, Error> {
         let mut since = Instant::now();
         effort.check()?;
         let mesh =
             Mesh::new(scene.clone(), effort.element_size)?.split_at_contacts(effort.contacts);
-        let mut rows = device.rows(&mesh, effort.hemicube, effort.rotations)?;
-        if let Some(share) = effort.full_share {
-            rows = rows.with_full_share(share);
-        }
+        let rows = device.rows(&mesh, effort)?;
         let near = NearRepair::new(rows, &mesh, effort.near);
         let levels = if effort.viewpoints.is_some() { u32::MAX } else { 0 };
         let mut rows = Viewpoints::new(near, effort.viewpoints.unwrap_or(1.0), levels);
         let mut seconds = BakeSeconds { mesh: lap(&mut since), ..Default::default() };
-        let mut tell = |p: &Progress| progress(&Stage::Shooting(*p));
+        let mut tell = |p: &Progress| device.tell(&Stage::Shooting(*p), progress);
         let mut solution = effort.shooting.solve(&mesh, &mut rows, &mut tell)?;
         if effort.ambient {
             solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
         }
-        let maker: &DeviceRows = rows.inner().inner();
-        (seconds.draw, seconds.reduce, seconds.readback) = maker.stages();
-        seconds.solve = lap(&mut since) - maker.seconds();
+        let relay: &DeviceRelay = rows.inner().inner();
+        let mut in_rows = 0.0;
+        for maker in [relay.first()].into_iter().chain(relay.second()) {
+            let (draw, reduce, readback) = maker.stages();
+            seconds.draw += draw;
+            seconds.reduce += reduce;
+            seconds.readback += readback;
+            in_rows += maker.seconds();
+        }
+        seconds.solve = lap(&mut since) - in_rows;
         let rotations = u64::from(effort.rotations.get());
         let hemicubes = (solution.rows_made + rows.extra()) * rotations;
         let near_moved = rows.inner().moved();
-        let hemicubes_by_resolution = rows.inner().inner().drawn_by_resolution();
+        let hemicubes_by_resolution = relay.first().drawn_by_resolution();
+        drop(rows);
         Ok(Shot { mesh, solution, hemicubes, hemicubes_by_resolution, near_moved, seconds, since })
     }
 
@@ -193,7 +214,7 @@ impl Shot {
         mut self,
         effort: &Effort,
         mut light: GatheredRadiosity,
-        device: &Device,
+        device: &Backed,
         progress: Tell,
     ) -> Result<(GatheredRadiosity, Certificate, Shot, Effort), Error> {
         self.seconds.vertices = lap(&mut self.since);
@@ -202,13 +223,19 @@ impl Shot {
             a.distance(b).max(b.distance(c)).max(c.distance(a)) / 4.0
         };
         let rest: Vec<f64> = light.corners.iter().map(spread).collect();
-        let mut looks = device.gather(&self.mesh, LOOKS)?;
+        let mut looks = device.gather(&self.mesh, LOOKS, f64::INFINITY, 0.0)?;
         let ledger = &self.solution.ledger;
         let judged = Judged { light: &light, sources: &light, rest: &rest, ledger, sweeps: 0 };
-        let (certificate, error) = judged.judge(LEAST_PLACES, &mut *looks)?;
+        let of = LEAST_PLACES;
+        let mut cancelled = self.solution.stop == Stop::Cancelled;
+        let (certificate, error) = judged.judge(of, &mut *looks, &mut |places| {
+            cancelled =
+                cancelled || device.tell(&Stage::Judging { places, of }, progress).is_break();
+            if cancelled { Go::Break(()) } else { Go::Continue(()) }
+        })?;
         light.surface.error = error;
         self.seconds.certificate = lap(&mut self.since);
-        let _ = progress(&Stage::Judged(certificate));
+        let _ = device.tell(&Stage::Judged(certificate), progress);
         Ok((light, certificate, self, effort.clone()))
     }
 }
@@ -218,7 +245,7 @@ struct Settling<'a> {
     effort: Effort,
     state: Refined<'a>,
     looks: Box<dyn Gather>,
-    device: &'a Device,
+    device: &'a Backed<'a>,
     shot: Shot,
 }
 
@@ -232,7 +259,8 @@ impl Settling<'_> {
         if let Goal::Error(wanted, adjust) = goal {
             self.look(*wanted, adjust)?;
         }
-        let mut tell = |stage: Stage| progress(&stage);
+        let device = self.device;
+        let mut tell = |stage: Stage| device.tell(&stage, progress);
         let gather = self.effort.gather.as_ref().expect("vertices gather");
         let mut rough = match gather.gathering.sweeps {
             0 | 1 => None,
@@ -251,7 +279,11 @@ impl Settling<'_> {
             let (sources, sweeps) = (self.state.light(), self.gathering().sweeps);
             let judged = Judged { light: &light, sources, rest: &rest, ledger, sweeps };
             let count = (light.gathers as usize / GATHERS_A_PLACE).clamp(LEAST_PLACES, MOST_PLACES);
-            let (certificate, error) = judged.judge(count, &mut *self.looks)?;
+            let mut cancelled = stop == Stop::Cancelled;
+            let (certificate, error) = judged.judge(count, &mut *self.looks, &mut |places| {
+                cancelled = cancelled || tell(Stage::Judging { places, of: count }).is_break();
+                if cancelled { Go::Break(()) } else { Go::Continue(()) }
+            })?;
             light.surface.error = error;
             light.stop = stop;
             self.shot.seconds.certificate += lap(&mut self.shot.since);
@@ -262,6 +294,7 @@ impl Settling<'_> {
             let done = certificate.total <= SURE * wanted
                 || stop != Stop::Converged
                 || go.is_break()
+                || cancelled
                 || round == ROUNDS;
             let again = if done { None } else { self.improve(&certificate, *wanted, adjust)? };
             let Some(again) = again else {
@@ -293,7 +326,7 @@ impl Settling<'_> {
         let most = SAMPLING * AIM * SURE * wanted;
         // Without more where they disagree: that is for what these few places do not show.
         let mut looks = match &self.effort.gather {
-            Some(gather) => self.device.gather(&self.shot.mesh, gather.rays)?,
+            Some(gather) => self.device.gather(&self.shot.mesh, gather.rays, f64::INFINITY, 0.0)?,
             None => return Ok(()),
         };
         let sampling = judged.sampling(PROBES, &mut *looks)?;
@@ -313,7 +346,7 @@ impl Settling<'_> {
     fn looks(&self, fewer: u32) -> Result<Box<dyn Gather>, Error> {
         let gather = self.effort.gather.as_ref().expect("vertices gather");
         let (rays, noise) = (gather.rays.div_ceil(fewer), gather.noise * f64::from(fewer));
-        self.device.gather_evenly(&self.shot.mesh, rays, noise, self.state.dim())
+        self.device.gather(&self.shot.mesh, rays, noise, self.state.dim())
     }
 
     fn gathering(&self) -> &Gathering {

@@ -5,8 +5,9 @@ use glam::DVec3;
 use crate::error::Error;
 use crate::gather::turns::Turns;
 use crate::gather::{Gather, Gathered, Place};
+use crate::pace::Pace;
 use crate::scene::Rgb;
-use crate::solve::Ledger;
+use crate::solve::{Go, Ledger};
 use crate::vertex::gathering::GatheredRadiosity;
 use crate::vertex::places::{Above, is_covered};
 
@@ -74,36 +75,55 @@ const DIM: f64 = 0.05;
 
 impl Judged<'_> {
     /// Looks at `count` random places, and gives the estimate and its share at each vertex, W/m².
+    /// `progress` is told how many are done; when it stops that, they are enough.
     pub fn judge(
         &self,
         count: usize,
         gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(usize) -> Go,
     ) -> Result<(Certificate, Vec<f64>), Error> {
         let samples = self.samples(count);
         let (low, high) = self.light.mesh.scene().bounds();
         let gap = GAP * (high - low).length();
-        let places: Vec<Place> = samples.iter().map(|s| s.place).collect();
-        // A hair away hemicubes and fans are turned otherwise.
-        let turned: Vec<Place> = samples.iter().map(Sample::aside).collect();
-        let found = gather.gather(&self.sources.sources(), &places)?;
-        let again = gather.gather(&self.sources.sources(), &turned)?;
         let own = std::ptr::eq(self.light, self.sources);
-        let settled = match own {
-            true => found.clone(),
-            false => gather.gather(&self.light.sources(), &places)?,
-        };
+        let mut looks: Vec<Option<[Gathered; 3]>> = vec![None; samples.len()];
+        let order = scattered(samples.len());
+        let (mut left, mut pace) = (&order[..], Pace::new(FEW));
+        while !left.is_empty() {
+            pace.next(&mut left, |now| {
+                let places: Vec<Place> = now.iter().map(|&k| samples[k].place).collect();
+                // A hair away hemicubes and fans are turned otherwise.
+                let turned: Vec<Place> = now.iter().map(|&k| samples[k].aside()).collect();
+                let found = gather.gather(&self.sources.sources(), &places)?;
+                let again = gather.gather(&self.sources.sources(), &turned)?;
+                let settled = match own {
+                    true => found.clone(),
+                    false => gather.gather(&self.light.sources(), &places)?,
+                };
+                for (i, &k) in now.iter().enumerate() {
+                    looks[k] = Some([found[i], again[i], settled[i]]);
+                }
+                Ok::<_, Error>(())
+            })?;
+            if progress(samples.len() - left.len()).is_break() {
+                break;
+            }
+        }
+        let looked = samples.into_iter().zip(looks);
+        let (samples, looks): (Vec<Sample>, Vec<[Gathered; 3]>) =
+            looked.filter_map(|(s, looks)| Some((s, looks?))).unzip();
         let reflected = samples.iter().map(|s| (s.said - s.emitted).length()).sum::<f64>();
         let dim = (DIM * reflected / samples.len().max(1) as f64).max(f64::MIN_POSITIVE);
         let (mut off, mut noise, mut settling, mut guess) = (vec![], vec![], vec![], vec![]);
         for (k, s) in samples.iter().enumerate() {
-            let three: [&Gathered; 3] = [&found[k], &again[k], &settled[k]];
-            if three.iter().any(|g| is_covered(g, s.size)) || s.reflectance == Rgb::ZERO {
+            if looks[k].iter().any(|g| is_covered(g, s.size)) || s.reflectance == Rgb::ZERO {
                 continue;
             }
-            let [a, b, c] = three.map(|g| s.emitted + s.reflectance * g.irradiance);
+            let [a, b, c] = looks[k].map(|g| s.emitted + s.reflectance * g.irradiance);
+            let found = looks[k][0];
             let truth = (a + b) / 2.0;
-            let hidden = truth.length() < dim || found[k].back > BEHIND;
-            if hidden && found[k].nearness * gap > 1.0 {
+            let hidden = truth.length() < dim || found.back > BEHIND;
+            if hidden && found.nearness * gap > 1.0 {
                 continue;
             }
             let whole = truth.length().max(s.said.length()).max(dim);
@@ -138,7 +158,7 @@ impl Judged<'_> {
             local + tail * tail
         };
         // What was not shot is a part of what is not settled.
-        let open = found.iter().map(|g| g.open).sum::<f64>() / found.len().max(1) as f64;
+        let open = looks.iter().map(|[g, ..]| g.open).sum::<f64>() / looks.len().max(1) as f64;
         let passed = if own { 1.0 } else { reflectance * (1.0 - open) };
         let (unshot, unshot_bound) = self.unshot(dim);
         let unshot = (unshot * passed.powi(self.sweeps as i32)).powi(2) / share.max(1e-30);
@@ -279,11 +299,53 @@ impl Judged<'_> {
     }
 }
 
+/// Places that are looked at first, of those that are spread evenly: few, and no more when nobody
+/// waits for it.
+const FEW: usize = 16;
+
+/// The numbers below `count`, each once, the first of them spread over all as evenly as any.
+fn scattered(count: usize) -> Vec<usize> {
+    let divides = |mut a: usize, mut b: usize| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a != 1
+    };
+    // Steps near the golden section spread best (Knuth 1973, 6.4).
+    let mut step = (count as f64 * 0.618_033_988_749_895) as usize;
+    while divides(step, count) && step < count {
+        step += 1;
+    }
+    (0..count).map(|k| k * step % count).collect()
+}
+
 impl Sample {
     fn aside(&self) -> Place {
         let p = self.place;
         let (x, _) = p.normal.any_orthonormal_pair();
         let step = 1e-3 * self.size * (0.5 + self.turn);
         Place { position: p.position + x * step, ..p }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_taken_once_each_and_everywhere() {
+        for count in [0, 1, 2, 3, 10, 192, 1000, 1024] {
+            let order = scattered(count);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..count).collect::<Vec<_>>());
+            let mut first: Vec<usize> = order.into_iter().take(FEW).collect();
+            first.push(count);
+            first.sort_unstable();
+            // By the three-gap theorem no gap is larger than the sum of the two others, which at the
+            // golden section is below 2.7 times the mean; steps are rounded.
+            let gap = first.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
+            assert!(gap as f64 <= 3.0 * count as f64 / FEW as f64 + 1.0, "{count}: {gap}");
+        }
     }
 }

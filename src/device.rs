@@ -1,5 +1,7 @@
 //! Who sees: hemicubes on a graphics device, or rays on the CPU.
 
+pub(crate) mod backed;
+
 use std::num::NonZeroU32;
 use std::time::Instant;
 
@@ -64,6 +66,10 @@ impl Device {
         Ok(DeviceRows { rows, seconds: 0.0 })
     }
 
+    fn gathers_by_hemicubes(&self) -> bool {
+        matches!(self, Device::Gpu(gpu) if gpu.adapter().kind != "CPU")
+    }
+
     /// Whoever gathers over the scene of `mesh` with about `rays` looks a place: hemicubes on the
     /// device, or rays where that is the CPU, which takes less time there than drawing.
     ///
@@ -83,7 +89,7 @@ impl Device {
         dim: f64,
     ) -> Result<Box<dyn Gather>, Error> {
         Ok(match self {
-            Device::Gpu(gpu) if gpu.adapter().kind != "CPU" => {
+            Device::Gpu(gpu) if self.gathers_by_hemicubes() => {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
                 Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?)

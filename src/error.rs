@@ -3,18 +3,21 @@
 use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
 ///
 /// Shown with `{}`, it is one line: `place: found; remedy`.
-pub struct Error(Box<Inner>);
+#[derive(Clone)]
+pub struct Error(Arc<Inner>);
 
+#[derive(Clone)]
 struct Inner {
     kind: ErrorKind,
     place: String,
     found: String,
     remedy: String,
-    source: Option<Box<dyn std::error::Error + Send + Sync>>,
+    source: Option<Arc<dyn std::error::Error + Send + Sync>>,
 }
 
 /// The broad class of an [`Error`], for callers that react differently to each.
@@ -29,6 +32,8 @@ pub enum ErrorKind {
     File,
     /// No usable graphics device, or a device that failed.
     Device,
+    /// A graphics device without enough memory, however small the batches; it stays usable.
+    Memory,
     /// A form-factor row that breaks its contract, found by the solver.
     FormFactor,
 }
@@ -42,7 +47,7 @@ impl Error {
         remedy: impl Into<String>,
     ) -> Self {
         let (place, found, remedy) = (place.into(), found.into(), remedy.into());
-        Error(Box::new(Inner { kind, place, found, remedy, source: None }))
+        Error(Arc::new(Inner { kind, place, found, remedy, source: None }))
     }
 
     /// The same error with the lower-level one that caused it.
@@ -50,19 +55,25 @@ impl Error {
         mut self,
         source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
     ) -> Self {
-        self.0.source = Some(source.into());
+        Arc::make_mut(&mut self.0).source = Some(Arc::from(source.into()));
         self
     }
 
     /// The same error with `file` before its place.
     pub(crate) fn inside(mut self, file: &Path) -> Self {
-        self.0.place = format!("{}: {}", file.display(), self.0.place);
+        let inner = Arc::make_mut(&mut self.0);
+        inner.place = format!("{}: {}", file.display(), inner.place);
         self
     }
 
     /// The class of this error.
     pub fn kind(&self) -> ErrorKind {
         self.0.kind
+    }
+
+    /// Whether a device is at fault: with another one the same may work.
+    pub fn is_of_device(&self) -> bool {
+        matches!(self.kind(), ErrorKind::Device | ErrorKind::Memory)
     }
 
     /// Where in the input: a file and line, a material, a setting.

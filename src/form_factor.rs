@@ -46,7 +46,7 @@ impl Row {
         self.sum() as f64 / f64::from(Row::TOTAL)
     }
 
-    fn sum(&self) -> u64 {
+    pub(crate) fn sum(&self) -> u64 {
         let seen: u64 = self.entries.iter().map(|e| u64::from(e.share)).sum();
         seen + u64::from(self.open) + u64::from(self.back)
     }
@@ -147,6 +147,23 @@ pub trait FormFactors {
     fn batch(&self) -> usize {
         1
     }
+}
+
+/// The rows of `patches` by `maker`, one each, every one of which keeps its contract.
+pub(crate) fn checked_rows(
+    maker: &mut (impl FormFactors + ?Sized),
+    mesh: &Mesh,
+    patches: &[NodeId],
+    unshot_share: f64,
+) -> Result<Vec<Row>, Error> {
+    let rows = maker.rows(mesh, patches, unshot_share)?;
+    if rows.len() != patches.len() {
+        let found = format!("{} rows for {} patches", rows.len(), patches.len());
+        let remedy = "FormFactors::rows must return one row a patch";
+        return Err(Error::new(ErrorKind::FormFactor, "form factors", found, remedy));
+    }
+    patches.iter().zip(&rows).try_for_each(|(&patch, row)| row.check(mesh, patch))?;
+    Ok(rows)
 }
 
 #[cfg(test)]

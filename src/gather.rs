@@ -58,6 +58,12 @@ pub trait Gather {
     fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error>;
 }
 
+impl<G: Gather + ?Sized> Gather for Box<G> {
+    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
+        (**self).gather(sources, places)
+    }
+}
+
 impl Sources<'_> {
     /// Reflected radiosity at barycentric position (`u`, `v`) of triangle `t`.
     pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {

@@ -67,7 +67,9 @@ pub mod hemicube;
 mod io;
 mod mesh;
 mod order;
+mod pace;
 mod rays;
+mod relay;
 mod scene;
 mod solve;
 mod tone;
@@ -88,12 +90,13 @@ pub use form_factor::viewpoints::Viewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gather::rays::RayGather;
 pub use gather::{Gather, Gathered, Place, Sources};
-pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, StageSeconds};
+pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, Limits, StageSeconds};
 pub use io::{
     Report, Seconds, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
     write_view_factor_list, write_view_factors,
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
+pub use relay::Relay;
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solve::{Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solver, Stop};
 pub use tone::ToneCurve;

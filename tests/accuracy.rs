@@ -154,6 +154,11 @@ fn it_can_be_stopped_at_every_stage() {
                         judged += 1;
                         at == 2
                     }
+                    Stage::Judging { places, of } => {
+                        assert!(0 < *places && places <= of);
+                        false
+                    }
+                    Stage::Failed(error) => panic!("{error}"),
                 };
                 if stop { Go::Break(()) } else { Go::Continue(()) }
             })

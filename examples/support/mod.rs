@@ -336,9 +336,14 @@ fn show(bar: &ProgressBar, stage: &Stage) {
                 sweep + 1
             ));
         }
+        Stage::Judging { places, of } => {
+            bar.set_position((1000 * places / of.max(&1)) as u64);
+            bar.set_message(format!("judging, {places} of {of} places"));
+        }
         Stage::Judged(certificate) => {
             bar.println(format!("estimated error {:.2} %", 100.0 * certificate.total));
         }
+        Stage::Failed(error) => bar.println(format!("rays on the CPU go on: {error}")),
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 use std::ops::Range;
-use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,6 +10,7 @@ use super::{Camera, RadianceImage, Sight};
 use crate::error::Error;
 use crate::gather::{Gather, Gathered, Place};
 use crate::mesh::Smooth;
+use crate::pace::Pace;
 use crate::rays::Hit;
 use crate::scene::Rgb;
 use crate::solve::Go;
@@ -19,9 +19,6 @@ use crate::vertex::places::{Above, is_covered};
 
 /// Lines of sight that are cast at once.
 const BAND: u32 = 1 << 16;
-
-/// As many places gather at once as take about this long.
-const BATCH: Duration = Duration::from_millis(250);
 
 /// Lines of sight share a gather unless the vertices' values differ by more than this share among
 /// them: at edges of shadows.
@@ -53,8 +50,7 @@ impl Camera {
         let view = View::new(sight, light);
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let (of, band) = (pixels.len(), (BAND / (samples * samples)).max(1));
-        // How many gather at once changes nothing but when progress is told.
-        let mut batch = 64;
+        let mut pace = Pace::new(64);
         for start in (0..width * height).step_by(band as usize) {
             let end = start.saturating_add(band).min(width * height);
             let parts = view.parts(start..end);
@@ -63,21 +59,16 @@ impl Camera {
             others.iter().for_each(|part| pixels[part.pixel] += part.known);
             let mut left = &gathers[..];
             while !left.is_empty() {
-                let begun = Instant::now();
-                let now;
-                (now, left) = left.split_at(left.len().min(batch));
-                let places: Vec<Place> = now.iter().map(|part| part.place).collect();
-                let found = gather.gather(&light.sources(), &places)?;
-                for (part, found) in now.iter().zip(&found) {
-                    pixels[part.pixel] += part.radiance(found);
-                }
-                batch = match begun.elapsed() {
-                    t if t > BATCH => (batch / 2).max(1),
-                    t if t < BATCH / 3 => batch * 2,
-                    _ => batch,
-                };
-                // Of the last pixel, parts may be left.
-                if progress(now[now.len() - 1].pixel, of).is_break() {
+                let done = pace.next(&mut left, |now| {
+                    let places: Vec<Place> = now.iter().map(|part| part.place).collect();
+                    let found = gather.gather(&light.sources(), &places)?;
+                    for (part, found) in now.iter().zip(&found) {
+                        pixels[part.pixel] += part.radiance(found);
+                    }
+                    // Of the last pixel, parts may be left.
+                    Ok::<_, Error>(now.last().map_or(0, |part| part.pixel))
+                })?;
+                if progress(done, of).is_break() {
                     return Ok(None);
                 }
             }

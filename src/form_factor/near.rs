@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::analytic::point_to_polygon;
-use super::{FormFactors, Row};
+use super::{FormFactors, Row, checked_rows};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
@@ -63,14 +63,14 @@ impl<M: FormFactors> NearRepair<M> {
         if self.made == 0 { 0.0 } else { self.moved / self.made as f64 }
     }
 
-    /// The maker's own rows, nothing mended.
+    /// The maker's own rows, nothing mended; checked, since to mend what is no row may panic.
     pub(super) fn raw(
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
         unshot_share: f64,
     ) -> Result<Vec<Row>, Error> {
-        self.rows.rows(mesh, patches, unshot_share)
+        checked_rows(&mut self.rows, mesh, patches, unshot_share)
     }
 
     /// Mends `rows` as seen from the centroids of `patches`.

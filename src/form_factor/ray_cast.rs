@@ -88,9 +88,9 @@ impl FormFactors for RayCast {
         Ok(patches.par_iter().map(|&p| self.row(mesh, p, &fan, count)).collect())
     }
 
-    /// The same on every machine, since it decides the order of shots.
+    /// The same on every machine, since it decides the order of shots; fewer where each takes long.
     fn batch(&self) -> usize {
-        16
+        ((1 << 20) / self.count).clamp(1, 16) as usize
     }
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::near::NearRepair;
 use super::{FormFactors, Row};
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
 /// Rows of patches as the mean of what their parts see, finer where the parts disagree.
@@ -47,6 +47,9 @@ pub struct Viewpoints<M> {
     levels: u32,
     extra: u64,
 }
+
+/// So many views a patch takes that has parts which disagree: its own and theirs, and their parts'.
+const MANY: usize = 16;
 
 /// A node that was seen from.
 struct View {
@@ -93,11 +96,6 @@ impl<M: FormFactors> Viewpoints<M> {
     ) -> Result<(), Error> {
         let nodes: Vec<NodeId> = places.iter().map(|&k| views[k].node).collect();
         let made = self.rows.raw(mesh, &nodes, unshot_share)?;
-        if made.len() != nodes.len() {
-            let found = format!("{} rows for {} patches", made.len(), nodes.len());
-            let remedy = "FormFactors::rows must return one row a patch";
-            return Err(Error::new(ErrorKind::FormFactor, "form factors", found, remedy));
-        }
         places.iter().zip(made).for_each(|(&k, row)| views[k].raw = row);
         Ok(())
     }
@@ -153,8 +151,9 @@ impl<M: FormFactors> FormFactors for Viewpoints<M> {
         Ok((0..patches.len()).into_par_iter().map(|k| mean(&views, k)).collect())
     }
 
+    /// Patches that are seen from their parts take as many views as a batch has, or more.
     fn batch(&self) -> usize {
-        self.rows.batch()
+        if self.levels == 0 { self.rows.batch() } else { self.rows.batch().div_ceil(MANY) }
     }
 }
 

@@ -10,6 +10,7 @@ use super::chunks::Chunks;
 use super::device::Gpu;
 use super::layout::{Corner, RadianceTriangle, RadianceView, Sums, TILE, Tile};
 use super::local::Local;
+use super::memory::Memory;
 use super::radiance::{Radiance, View, image_size};
 use super::readback::{Readback, StageSeconds};
 use super::sources::SourceBuffers;
@@ -33,18 +34,30 @@ pub struct HemicubeGather {
     gpu: Gpu,
     chunks: Chunks,
     lights: Lights,
-    radiance: Radiance,
-    sum: Sum,
-    readback: Readback,
+    /// What there is memory for; none while it makes room for the light.
+    batches: Option<Batches>,
     local: Local,
     turns: Turns,
     /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
     bright: f64,
     triangles: usize,
+    resolution: u32,
     slots: u32,
-    batch: u32,
+    /// Places in a batch at most.
+    most: u32,
     seconds: StageSeconds,
     drawn: u64,
+}
+
+/// What draws and adds up hemicubes, a batch at a time.
+#[derive(Debug)]
+struct Batches {
+    radiance: Radiance,
+    sum: Sum,
+    readback: Readback,
+    /// Places at once, at most.
+    most: u32,
+    _memory: Memory,
 }
 
 /// What one place looks at: views to draw, and the lights apart with their form factors as if
@@ -66,7 +79,8 @@ impl HemicubeGather {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a
-    /// scene that does not fit the device; [`ErrorKind::Device`] when the device fails.
+    /// scene that does not fit the device; [`ErrorKind::Memory`] when there is no memory for a single
+    /// hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeGather, Error> {
         hemicube::check_resolution(resolution)?;
         let scene = mesh.scene();
@@ -78,23 +92,21 @@ impl HemicubeGather {
         let bright = if bright > 0.0 { bright.log2().floor().exp2() } else { 1.0 };
         let chunks = Chunks::new(scene);
         let order = (&chunks.order[..], &local, bright);
-        let radiance = Radiance::new(gpu, scene, &lights, order, (resolution, slots, batch));
-        let sum = Sum::new(gpu, &radiance.layers, resolution, slots)?;
-        let readback = Readback::new(gpu, sum.sums.size());
-        gpu.check()?;
+        let size = (resolution, slots);
+        let batches =
+            gpu.fit(batch, |m, most| Batches::new(m, scene, &lights, order, size, most))?;
         Ok(HemicubeGather {
             gpu: gpu.clone(),
             chunks,
             lights,
-            radiance,
-            sum,
-            readback,
+            most: batches.most,
+            batches: Some(batches),
             local,
             turns,
             bright,
             triangles: scene.triangles().len(),
+            resolution,
             slots,
-            batch,
             seconds: StageSeconds::default(),
             drawn: 0,
         })
@@ -169,39 +181,109 @@ impl HemicubeGather {
 
     fn gather_batch(
         &mut self,
-        scene: &Scene,
-        bindings: &wgpu::BindGroup,
+        batches: &Batches,
+        (scene, bindings): (&Scene, &wgpu::BindGroup),
         places: &[Place],
     ) -> Result<Vec<Gathered>, Error> {
         let start = Instant::now();
         let looks: Vec<Look> = places.par_iter().map(|p| self.look(scene, p)).collect();
         let views: Vec<&[View]> = looks.iter().map(|l| &l.views[..]).collect();
         let tiles: Vec<Tile> = looks.iter().flat_map(|l| &l.tiles).copied().collect();
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let queries = self.readback.queries();
-        self.radiance.draw(&self.gpu, &mut encoder, bindings, &views, queries);
-        self.sum.sum(&self.gpu, &mut encoder, places.len() as u32, &tiles, queries);
-        let source = (&self.sum.sums, size_of::<Sums>() as u64 * places.len() as u64);
+        let gpu = &self.gpu;
+        let Batches { radiance, sum, readback, .. } = batches;
         let mut seconds = self.seconds;
-        let time = (start, &mut seconds);
-        let gathered = self.readback.finish(&self.gpu, encoder, source, time, |bytes| {
-            let sums: &[Sums] = bytemuck::cast_slice(bytes);
-            sums.iter().zip(&looks).map(|(s, look)| self.gathered(s, look)).collect()
+        let gathered: Result<Vec<Gathered>, String> = gpu.attempt(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let queries = readback.queries();
+            radiance.draw(gpu, &mut encoder, bindings, &views, queries);
+            sum.sum(gpu, &mut encoder, places.len() as u32, &tiles, queries);
+            let source = (&sum.sums, size_of::<Sums>() as u64 * places.len() as u64);
+            readback.finish(gpu, encoder, source, (start, &mut seconds), |bytes| {
+                let sums: &[Sums] = bytemuck::cast_slice(bytes);
+                sums.iter().zip(&looks).map(|(s, look)| checked(self.gathered(s, look))).collect()
+            })
         })?;
         self.seconds = seconds;
         self.drawn += places.len() as u64;
-        Ok(gathered)
+        gathered.map_err(|found| gpu.wrong(found))
+    }
+
+    /// Puts the light on the device. Where there is no memory for it, smaller batches make room.
+    fn ready(&mut self, sources: &Sources) -> Result<(Batches, Upload), Error> {
+        let (gpu, scene) = (&self.gpu, sources.mesh.scene());
+        let order = (&self.chunks.order[..], &self.local, self.bright);
+        let size = (self.resolution, self.slots);
+        loop {
+            let batches = match self.batches.take() {
+                Some(batches) => batches,
+                None => gpu.fit(self.most, |memory, most| {
+                    Batches::new(memory, scene, &self.lights, order, size, most)
+                })?,
+            };
+            let upload = gpu.attempt(|| {
+                let memory = Memory::new(gpu);
+                let buffers = SourceBuffers::new(&memory, sources, self.triangles, self.bright)?;
+                let bindings = batches.radiance.bindings(gpu, &buffers);
+                Ok(Upload { bindings, _memory: memory })
+            });
+            match upload {
+                Ok(upload) => return Ok((batches, upload)),
+                Err(e) if e.kind() == ErrorKind::Memory && batches.most > 1 => {
+                    self.most = batches.most / 2;
+                }
+                Err(e) => {
+                    self.batches = Some(batches);
+                    return Err(e);
+                }
+            }
+        }
+    }
+}
+
+/// The light to be gathered, on the device.
+struct Upload {
+    bindings: wgpu::BindGroup,
+    _memory: Memory,
+}
+
+impl Batches {
+    fn new(
+        memory: Memory,
+        scene: &Scene,
+        lights: &Lights,
+        order: (&[u32], &Local, f64),
+        (resolution, slots): (u32, u32),
+        most: u32,
+    ) -> Result<Batches, Error> {
+        let size = (resolution, slots, most);
+        let radiance = Radiance::new(&memory, scene, lights, order, size)?;
+        let sum = Sum::new(&memory, &radiance.layers, resolution, slots)?;
+        let readback = Readback::new(&memory, sum.sums.size())?;
+        Ok(Batches { radiance, sum, readback, most, _memory: memory })
+    }
+}
+
+/// What was gathered, if it can be; or what is wrong with it.
+fn checked(found: Gathered) -> Result<Gathered, String> {
+    // Shares are sums of weights that sum to 1; of 3·4096² pixels in 32 bits to better than this.
+    let share = |x: f64| (0.0..=1.01).contains(&x);
+    let light = |c: Rgb| c.is_finite() && c.min_element() >= 0.0;
+    let good = light(found.irradiance) && light(found.direct) && share(found.open);
+    match good && share(found.back) && found.nearness.is_finite() {
+        true => Ok(found),
+        false => Err(format!("{found:?} for a place")),
     }
 }
 
 impl Gather for HemicubeGather {
     fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
-        let buffers = SourceBuffers::new(&self.gpu, sources, self.triangles, self.bright)?;
-        let bindings = self.radiance.bindings(&self.gpu, &buffers);
+        let (batches, upload) = self.ready(sources)?;
         let mut gathered = Vec::with_capacity(places.len());
-        for batch in places.chunks(self.batch as usize) {
-            gathered.extend(self.gather_batch(sources.mesh.scene(), &bindings, batch)?);
+        let light = (sources.mesh.scene(), &upload.bindings);
+        for places in places.chunks(batches.most as usize) {
+            gathered.extend(self.gather_batch(&batches, light, places)?);
         }
+        self.batches = Some(batches);
         Ok(gathered)
     }
 }
@@ -250,5 +332,27 @@ fn tile(fit: &LightView, frame: &Frame) -> Tile {
         padding: 0,
         up: local(fit.up),
         padding_2: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_light_is_an_error() {
+        let good = Gathered { irradiance: Rgb::ONE, open: 0.25, back: 0.75, ..Default::default() };
+        assert_eq!(checked(good), Ok(good));
+        let bad = [
+            Gathered { irradiance: Rgb::new(0.0, f64::NAN, 0.0), ..good },
+            Gathered { irradiance: Rgb::new(0.0, 0.0, -1.0), ..good },
+            Gathered { direct: Rgb::INFINITY, ..good },
+            Gathered { open: 1.5, ..good },
+            Gathered { back: -0.5, ..good },
+            Gathered { nearness: f64::INFINITY, ..good },
+        ];
+        for found in bad {
+            assert!(checked(found).unwrap_err().contains("Gathered"), "{found:?}");
+        }
     }
 }

@@ -12,6 +12,7 @@ use super::device::Gpu;
 use super::item_buffer::{ItemBuffer, View};
 use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
 use super::local::Local;
+use super::memory::Memory;
 use super::readback::{Readback, StageSeconds};
 use super::reduce::Reduce;
 use super::resolution::Resolution;
@@ -33,21 +34,33 @@ use crate::mesh::{Mesh, NodeId};
 pub struct Hemicubes {
     gpu: Gpu,
     chunks: Chunks,
-    item_buffer: ItemBuffer,
-    reduce: Reduce,
-    /// The full resolution, then what it is halved to.
-    resolutions: Vec<Resolution>,
-    readback: Readback,
+    batches: Batches,
     local: Local,
     slots: u32,
+    /// Rows that are best asked for at once, however many hemicubes there is memory for: it decides
+    /// the order of shots.
     batch: u32,
     rotations: NonZeroU32,
     full_share: f64,
     seconds: StageSeconds,
 }
 
-/// Item buffers of a batch take at most this many bytes, if more than one.
-const BATCH_BYTES: u64 = 64 << 20;
+/// What draws hemicubes, a batch at a time.
+#[derive(Debug)]
+struct Batches {
+    item_buffer: ItemBuffer,
+    reduce: Reduce,
+    /// The full resolution, then what it is halved to.
+    resolutions: Vec<Resolution>,
+    readback: Readback,
+    /// Hemicubes at once, at most.
+    most: u32,
+    _memory: Memory,
+}
+
+/// Item buffers of a batch take at most this many bytes, if more than one: a software device draws
+/// that much in a fraction of a second.
+const BATCH_BYTES: u64 = 32 << 20;
 
 /// Hemicubes in a batch at most.
 const MAX_BATCH: u32 = 16;
@@ -63,7 +76,8 @@ impl Hemicubes {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a mesh
-    /// whose rows do not fit the device; [`ErrorKind::Device`] when the device fails.
+    /// whose rows do not fit the device; [`ErrorKind::Memory`] when there is no memory for a single
+    /// hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<Hemicubes, Error> {
         hemicube::check_resolution(resolution)?;
         let limits = gpu.device.limits();
@@ -100,18 +114,17 @@ impl Hemicubes {
             .min(((buffer - 64) / row_bytes) as u32);
         let local = Local::new(mesh.scene());
         let (cells, chunks) = (Cells::new(mesh), Chunks::new(mesh.scene()));
-        let item_buffer = ItemBuffer::new(gpu, mesh, &cells, &chunks.order, &local, batch);
-        let reduce = Reduce::new(gpu, &cells, resolution, slots, batch);
-        let resolutions = Resolution::halved(gpu, &reduce, resolution, batch)?;
-        let readback = Readback::new(gpu, reduce.rows.size());
-        gpu.check()?;
+        let batches = gpu.fit(batch, |memory, most| {
+            let item_buffer = ItemBuffer::new(&memory, mesh, &cells, &chunks.order, &local, most)?;
+            let reduce = Reduce::new(&memory, &cells, resolution, slots, most)?;
+            let resolutions = Resolution::halved(&memory, &reduce, resolution, most)?;
+            let readback = Readback::new(&memory, reduce.rows.size())?;
+            Ok(Batches { item_buffer, reduce, resolutions, readback, most, _memory: memory })
+        })?;
         Ok(Hemicubes {
             gpu: gpu.clone(),
             chunks,
-            item_buffer,
-            reduce,
-            resolutions,
-            readback,
+            batches,
             local,
             slots,
             batch,
@@ -147,13 +160,13 @@ impl Hemicubes {
 
     /// Hemicubes drawn so far, each rotation of one counted.
     pub fn drawn(&self) -> u64 {
-        self.resolutions.iter().map(|r| r.drawn).sum()
+        self.batches.resolutions.iter().map(|r| r.drawn).sum()
     }
 
     /// Hemicubes drawn so far at each resolution: pixels along an edge of the top face, and how
     /// many; the full one first, then what it is halved to.
     pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
-        self.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
+        self.batches.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
     }
 
     /// The faces of the hemicube over `patch`, turned by `angle` (radians).
@@ -191,19 +204,24 @@ impl Hemicubes {
         let views: Vec<View> =
             patches.iter().flat_map(|&(p, turn)| self.views(mesh, p, turn)).collect();
         let count = patches.len() as u32;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let queries = self.readback.queries();
-        let resolution = &mut self.resolutions[at];
-        self.item_buffer.draw(&self.gpu, &mut encoder, resolution, &views, queries);
-        self.reduce.reduce(&mut encoder, resolution, count, queries);
-        let source = (&self.reduce.rows, u64::from(count * self.slots) * 4);
-        let time = (start, &mut self.seconds);
-        let rows = self.readback.finish(&self.gpu, encoder, source, time, |bytes| {
-            let dense: &[u32] = bytemuck::cast_slice(bytes);
-            dense.chunks_exact(self.slots as usize).map(sparse).collect()
+        let (gpu, slots) = (&self.gpu, self.slots);
+        let Batches { item_buffer, reduce, resolutions, readback, .. } = &mut self.batches;
+        let resolution = &mut resolutions[at];
+        let seconds = &mut self.seconds;
+        let rows: Result<Vec<Row>, String> = gpu.attempt(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let queries = readback.queries();
+            item_buffer.draw(gpu, &mut encoder, resolution, &views, queries);
+            reduce.reduce(&mut encoder, resolution, count, queries);
+            let source = (&reduce.rows, u64::from(count * slots) * 4);
+            readback.finish(gpu, encoder, source, (start, seconds), |bytes| {
+                let dense: &[u32] = bytemuck::cast_slice(bytes);
+                let rows = dense.chunks_exact(slots as usize).zip(patches);
+                rows.map(|(dense, &(patch, _))| sparse(dense, patch)).collect()
+            })
         })?;
         resolution.drawn += u64::from(count);
-        Ok(rows)
+        rows.map_err(|found| gpu.wrong(found))
     }
 }
 
@@ -215,13 +233,13 @@ impl FormFactors for Hemicubes {
         unshot_share: f64,
     ) -> Result<Vec<Row>, Error> {
         let halvings = effort::halvings(unshot_share, self.full_share) as usize;
-        let at = halvings.min(self.resolutions.len() - 1);
+        let at = halvings.min(self.batches.resolutions.len() - 1);
         let count = self.rotations.get();
         let step = FRAC_PI_2 / f64::from(count);
         let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
         let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
         let mut rows = Vec::with_capacity(turned.len());
-        for batch in turned.chunks(self.batch as usize) {
+        for batch in turned.chunks(self.batches.most as usize) {
             rows.extend(self.draw_batch(mesh, batch, at)?);
         }
         if count == 1 {
@@ -232,7 +250,7 @@ impl FormFactors for Hemicubes {
     }
 
     fn batch(&self) -> usize {
-        self.batch as usize
+        (self.batch / self.rotations.get()).max(1) as usize
     }
 }
 
@@ -250,14 +268,19 @@ fn rotation(patch: NodeId) -> f64 {
     unit * FRAC_PI_2
 }
 
-fn sparse(dense: &[u32]) -> Row {
+/// The row of `patch` from what the device says; or what is wrong with that.
+fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
     let seen = dense[FIRST_ELEMENT as usize..].iter();
     let entries = (0..)
         .zip(seen)
         .filter(|&(_, &share)| share != 0)
         .map(|(element, &share)| Entry { element, share })
         .collect();
-    Row { entries, open: dense[OPEN as usize], back: dense[BACK as usize] }
+    let row = Row { entries, open: dense[OPEN as usize], back: dense[BACK as usize] };
+    match row.sum() == u64::from(Row::TOTAL) {
+        true => Ok(row),
+        false => Err(format!("shares of patch {} that sum to {}", patch.0, row.closure())),
+    }
 }
 
 #[cfg(test)]
@@ -279,7 +302,7 @@ mod tests {
         });
         let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            h.resolutions[0].layers.texture.as_image_copy(),
+            h.batches.resolutions[0].layers.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout {
@@ -367,6 +390,21 @@ mod tests {
             };
             // The far one looks out by the pixels of the outline at most.
             assert!(share(near) > 10 * share(far), "{} {}", share(near), share(far));
+        }
+    }
+
+    #[test]
+    fn what_is_no_row_is_an_error() {
+        // OPEN, BACK and three elements.
+        let total = Row::TOTAL;
+        let good = sparse(&[total - 10, 3, 0, 7, 0], NodeId(5)).unwrap();
+        assert_eq!((good.open, good.back), (total - 10, 3));
+        assert_eq!(good.entries, [Entry { element: 1, share: 7 }]);
+        // Nothing written, all bits set, one unit too few, one too many: sums beyond 32 bits count.
+        let bad = [[0; 5], [total; 5], [total - 10, 3, 0, 6, 0], [total, 0, 0, 1, 0]];
+        for dense in bad {
+            let e = sparse(&dense, NodeId(5)).unwrap_err();
+            assert!(e.contains("patch 5"), "{e}");
         }
     }
 }

@@ -7,7 +7,9 @@ use super::device::Gpu;
 use super::layers::{Layers, Shown};
 use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
 use super::local::Local;
+use super::memory::Memory;
 use super::resolution::Resolution;
+use crate::error::Error;
 use crate::hemicube::Face;
 use crate::mesh::Mesh;
 
@@ -31,32 +33,29 @@ impl ItemBuffer {
 
     /// For the triangles of `mesh` in drawing order, in `local` coordinates; `batch` hemicubes.
     pub fn new(
-        gpu: &Gpu,
+        memory: &Memory,
         mesh: &Mesh,
         cells: &Cells,
         order: &[u32],
         local: &Local,
         batch: u32,
-    ) -> Self {
-        let device = &gpu.device;
+    ) -> Result<Self, Error> {
+        let device = &memory.gpu.device;
         let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
         let corners = local.corners(corners);
         let triangles: Vec<TriangleCells> =
             order.iter().map(|&t| cells.triangles[t as usize]).collect();
-        let corners = gpu.storage("corners", bytemuck::cast_slice(&corners));
-        let triangles = gpu.storage("triangles", bytemuck::cast_slice(&triangles));
-        let views = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("views"),
-            size: u64::from(batch) * 5 * size_of::<FaceView>() as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let corners = memory.storage("corners", bytemuck::cast_slice(&corners))?;
+        let triangles = memory.storage("triangles", bytemuck::cast_slice(&triangles))?;
+        let bytes = u64::from(batch) * 5 * size_of::<FaceView>() as u64;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let views = memory.buffer("views", bytes, usage)?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("item_buffer.wgsl"),
             source: wgpu::ShaderSource::Wgsl(ITEM_BUFFER_WGSL.into()),
         });
         let (target, nearest) = (ItemBuffer::FORMAT.into(), Shown::Nearest);
-        let pipeline = Layers::pipeline(gpu, &module, None, "fragment", target, nearest);
+        let pipeline = Layers::pipeline(&memory.gpu, &module, None, "fragment", target, nearest);
         let buffers = [&corners, &triangles, &views];
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("item buffer"),
@@ -66,7 +65,7 @@ impl ItemBuffer {
                 resource: buffers[k].as_entire_binding(),
             }),
         });
-        ItemBuffer { pipeline, bindings, views }
+        Ok(ItemBuffer { pipeline, bindings, views })
     }
 
     /// Records the drawing of the hemicubes that `views` (five each) look out from on the layers of

@@ -1,6 +1,8 @@
 //! What is drawn on: a layer a hemicube, so that its pixels do not depend on its place in a batch.
 
 use super::device::Gpu;
+use super::memory::Memory;
+use crate::error::Error;
 
 /// Layers of one texture, and the depth buffer that they share.
 #[derive(Debug)]
@@ -22,27 +24,16 @@ pub enum Shown {
 impl Layers {
     /// `count` layers of `width` × `height` pixels.
     pub fn new(
-        gpu: &Gpu,
+        memory: &Memory,
         format: wgpu::TextureFormat,
         [width, height]: [u32; 2],
         count: u32,
-    ) -> Layers {
-        let texture = |label, depth_or_array_layers, format, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
+    ) -> Result<Layers, Error> {
+        let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let image = texture("layers", count, format, readable);
-        let unread = wgpu::TextureUsages::empty();
-        let depth = texture("depth", 1, wgpu::TextureFormat::Depth32Float, unread);
+        let image = memory.texture("layers", [width, height, count], format, drawn | readable)?;
+        let format = wgpu::TextureFormat::Depth32Float;
+        let depth = memory.texture("depth", [width, height, 1], format, drawn)?;
         let layer = |base_array_layer| {
             image.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2),
@@ -52,7 +43,7 @@ impl Layers {
             })
         };
         let layers = (0..count).map(layer).collect();
-        Layers { texture: image, layers, depth: depth.create_view(&Default::default()) }
+        Ok(Layers { texture: image, layers, depth: depth.create_view(&Default::default()) })
     }
 
     /// A pass over layer `k` of the first `count`, cleared to zero, with timestamps before the

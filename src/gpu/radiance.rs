@@ -6,7 +6,9 @@ use super::device::Gpu;
 use super::layers::{Layers, Shown};
 use super::layout::{RADIANCE_WGSL, RadianceTriangle, RadianceView, TILE};
 use super::local::Local;
+use super::memory::Memory;
 use super::sources::SourceBuffers;
+use crate::error::Error;
 use crate::gather::lights::Lights;
 use crate::hemicube::Face;
 use crate::scene::Scene;
@@ -46,12 +48,12 @@ impl Radiance {
     /// For the triangles of `scene` in drawing order, in `local` coordinates and in units of `bright`
     /// W/m²; images of `batch` places with `slots` tiles each.
     pub fn new(
-        gpu: &Gpu,
+        memory: &Memory,
         scene: &Scene,
         lights: &Lights,
         (order, local, bright): (&[u32], &Local, f64),
         (resolution, slots, batch): (u32, u32, u32),
-    ) -> Radiance {
+    ) -> Result<Radiance, Error> {
         let mut drawn = order.to_vec();
         let mut again = vec![];
         for light in &lights.lights {
@@ -68,13 +70,10 @@ impl Radiance {
             padding: [0; 3],
         };
         let triangles: Vec<RadianceTriangle> = drawn.iter().map(triangle).collect();
-        let device = &gpu.device;
-        let views = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("views"),
-            size: u64::from(batch * (5 + slots)) * size_of::<RadianceView>() as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let device = &memory.gpu.device;
+        let bytes = u64::from(batch * (5 + slots)) * size_of::<RadianceView>() as u64;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let views = memory.buffer("views", bytes, usage)?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("radiance.wgsl"),
             source: wgpu::ShaderSource::Wgsl(RADIANCE_WGSL.into()),
@@ -110,20 +109,20 @@ impl Radiance {
         let format = wgpu::TextureFormat::Rgba32Float;
         let pipeline = |fragment, write_mask, shown| {
             let target = wgpu::ColorTargetState { format, blend: None, write_mask };
-            Layers::pipeline(gpu, &module, Some(&pipelines), fragment, target, shown)
+            Layers::pipeline(&memory.gpu, &module, Some(&pipelines), fragment, target, shown)
         };
-        Radiance {
+        Ok(Radiance {
             faces: pipeline("radiance", wgpu::ColorWrites::ALL, Shown::Nearest),
             seen: pipeline("sought", wgpu::ColorWrites::RED, Shown::Nearest),
             alone: pipeline("sought", wgpu::ColorWrites::ALPHA, Shown::AnyFront),
             layout,
-            corners: gpu.storage("corners", bytemuck::cast_slice(&corners)),
-            triangles: gpu.storage("triangles", bytemuck::cast_slice(&triangles)),
+            corners: memory.storage("corners", bytemuck::cast_slice(&corners))?,
+            triangles: memory.storage("triangles", bytemuck::cast_slice(&triangles))?,
             views,
-            layers: Layers::new(gpu, format, image_size(resolution, slots), batch),
+            layers: Layers::new(memory, format, image_size(resolution, slots), batch)?,
             lights: again,
             resolution,
-        }
+        })
     }
 
     /// What the pass reads when it draws `sources`.

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use super::device::Gpu;
-use crate::error::Error;
+use super::memory::Memory;
+use crate::error::{Error, ErrorKind};
 
 /// Time spent in the stages of drawing hemicubes, in seconds.
 ///
@@ -39,14 +40,11 @@ const TICKS: u64 = 24;
 
 impl Readback {
     /// For results of up to `bytes`.
-    pub fn new(gpu: &Gpu, bytes: u64) -> Readback {
-        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: bytes.next_multiple_of(8) + TICKS,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        Readback { staging, clock: gpu.timestamps().then(|| Clock::new(gpu)) }
+    pub fn new(memory: &Memory, bytes: u64) -> Result<Readback, Error> {
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let staging = memory.buffer("staging", bytes.next_multiple_of(8) + TICKS, usage)?;
+        let clock = memory.gpu.timestamps().then(|| Clock::new(memory)).transpose()?;
+        Ok(Readback { staging, clock })
     }
 
     /// Where the stages write their timestamps, if the device has any.
@@ -75,14 +73,12 @@ impl Readback {
         let slice = self.staging.slice(..ticks + TICKS);
         let (sender, receiver) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
-        let waited = gpu.device.poll(wgpu::PollType::wait_indefinitely());
-        gpu.check()?;
-        waited.map_err(|e| gpu.failed(e.to_string()))?;
-        let mapped = receiver.try_recv();
-        if !matches!(mapped, Ok(Ok(()))) {
-            return Err(gpu.failed("results could not be read back".into()));
+        gpu.wait()?;
+        let failed = |found: String| gpu.failed(ErrorKind::Device, found);
+        if !matches!(receiver.try_recv(), Ok(Ok(()))) {
+            return Err(failed("results could not be read back".into()));
         }
-        let view = slice.get_mapped_range().map_err(|e| gpu.failed(e.to_string()))?;
+        let view = slice.get_mapped_range().map_err(|e| failed(e.to_string()))?;
         let result = read(&view[..bytes as usize]);
         let (draw, reduce) =
             self.clock.as_ref().map_or((0.0, 0.0), |c| c.read(&view[ticks as usize..]));
@@ -96,20 +92,17 @@ impl Readback {
 }
 
 impl Clock {
-    fn new(gpu: &Gpu) -> Clock {
+    fn new(memory: &Memory) -> Result<Clock, Error> {
+        let gpu = &memory.gpu;
         let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("clock"),
             ty: wgpu::QueryType::Timestamp,
             count: 3,
         });
-        let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("clock"),
-            size: TICKS,
-            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        let resolved = memory.buffer("clock", TICKS, usage)?;
         let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
-        Clock { queries, resolved, seconds_per_tick }
+        Ok(Clock { queries, resolved, seconds_per_tick })
     }
 
     /// Seconds of draw, and from there to the end of reduce.

@@ -1,8 +1,8 @@
 //! The compute pass: item buffers to dense rows in fixed point.
 
 use super::cells::Cells;
-use super::device::Gpu;
 use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
+use super::memory::Memory;
 use super::resolution::Resolution;
 use crate::error::Error;
 use crate::hemicube;
@@ -28,17 +28,18 @@ impl Reduce {
     }
 
     /// For `batch` hemicubes of at most `resolution`, to rows of `slots` words.
-    pub fn new(gpu: &Gpu, cells: &Cells, resolution: u32, slots: u32, batch: u32) -> Self {
-        let device = &gpu.device;
-        let slot_of = gpu.storage("slots", bytemuck::cast_slice(&cells.slots));
-        let rows = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("rows"),
-            size: u64::from(batch) * u64::from(slots) * 4,
-            usage: wgpu::BufferUsages::STORAGE
-                | wgpu::BufferUsages::COPY_SRC
-                | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+    pub fn new(
+        memory: &Memory,
+        cells: &Cells,
+        resolution: u32,
+        slots: u32,
+        batch: u32,
+    ) -> Result<Self, Error> {
+        let device = &memory.gpu.device;
+        let slot_of = memory.storage("slots", bytemuck::cast_slice(&cells.slots))?;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let row_bytes = u64::from(batch) * u64::from(slots) * 4;
+        let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("reduce.wgsl"),
             source: wgpu::ShaderSource::Wgsl(REDUCE_WGSL.into()),
@@ -51,22 +52,18 @@ impl Reduce {
             compilation_options: Default::default(),
             cache: None,
         });
-        let items = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("items"),
-            size: Reduce::items_bytes(resolution) * u64::from(batch),
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        Reduce { pipeline, slot_of, items, rows, slots }
+        let item_bytes = Reduce::items_bytes(resolution) * u64::from(batch);
+        let items = memory.buffer("items", item_bytes, usage)?;
+        Ok(Reduce { pipeline, slot_of, items, rows, slots })
     }
 
     /// What the pass reads and writes for hemicubes of `resolution`, at most the one that this was
     /// made for.
-    pub fn bindings(&self, gpu: &Gpu, resolution: u32) -> Result<wgpu::BindGroup, Error> {
+    pub fn bindings(&self, memory: &Memory, resolution: u32) -> Result<wgpu::BindGroup, Error> {
         let weights = hemicube::weights(resolution)?;
-        let weights = gpu.storage("weights", bytemuck::cast_slice(&weights));
+        let weights = memory.storage("weights", bytemuck::cast_slice(&weights))?;
         let reduction = Reduction { resolution, slots: self.slots, stride: stride(resolution) };
-        let reduction = gpu.uniform("reduction", bytemuck::bytes_of(&reduction));
+        let reduction = memory.uniform("reduction", bytemuck::bytes_of(&reduction))?;
         let resources = [
             self.items.as_entire_binding(),
             weights.as_entire_binding(),
@@ -78,7 +75,7 @@ impl Reduce {
             .zip(resources)
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
-        Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        Ok(memory.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("reduce"),
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,

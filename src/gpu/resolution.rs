@@ -1,8 +1,8 @@
 //! What drawing and adding up need for each resolution; all else they share.
 
-use super::device::Gpu;
 use super::item_buffer::ItemBuffer;
 use super::layers::Layers;
+use super::memory::Memory;
 use super::reduce::Reduce;
 use crate::error::Error;
 use crate::form_factor::effort;
@@ -22,7 +22,7 @@ pub struct Resolution {
 impl Resolution {
     /// For `batch` hemicubes each: first `resolution`, then what it is halved to for little light.
     pub fn halved(
-        gpu: &Gpu,
+        memory: &Memory,
         reduce: &Reduce,
         resolution: u32,
         batch: u32,
@@ -30,11 +30,11 @@ impl Resolution {
         let halvings = 0..=effort::HALVINGS;
         let mut pixels: Vec<u32> = halvings.map(|k| effort::halved(resolution, k)).collect();
         pixels.dedup();
-        pixels.into_iter().map(|n| Resolution::new(gpu, reduce, n, batch)).collect()
+        pixels.into_iter().map(|n| Resolution::new(memory, reduce, n, batch)).collect()
     }
 
-    fn new(gpu: &Gpu, reduce: &Reduce, pixels: u32, batch: u32) -> Result<Resolution, Error> {
-        let layers = Layers::new(gpu, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch);
-        Ok(Resolution { pixels, layers, bindings: reduce.bindings(gpu, pixels)?, drawn: 0 })
+    fn new(memory: &Memory, reduce: &Reduce, pixels: u32, batch: u32) -> Result<Resolution, Error> {
+        let layers = Layers::new(memory, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch)?;
+        Ok(Resolution { pixels, layers, bindings: reduce.bindings(memory, pixels)?, drawn: 0 })
     }
 }

@@ -1,10 +1,10 @@
 //! The settled light on the device: quadtrees, and the radiosity at their elements' corners.
 
 use rayon::prelude::*;
-use wgpu::util::DeviceExt;
 
 use super::device::Gpu;
 use super::layout::{ELEMENTS_A_LINE, INNER, Lattice};
+use super::memory::Memory;
 use crate::error::{Error, ErrorKind};
 use crate::gather::Sources;
 use crate::mesh::{Mesh, NodeId};
@@ -24,12 +24,12 @@ impl SourceBuffers {
     /// Checks `sources` against a scene of so many triangles, and uploads them, in units of `bright`
     /// W/m².
     pub fn new(
-        gpu: &Gpu,
+        memory: &Memory,
         sources: &Sources,
         triangles: usize,
         bright: f64,
     ) -> Result<SourceBuffers, Error> {
-        check(gpu, sources, triangles)?;
+        check(&memory.gpu, sources, triangles)?;
         let Sources { mesh, corners, reflected } = *sources;
         let (lattices, nodes) = quadtrees(mesh);
         let value = |k: u32| (reflected[k as usize] / bright).as_vec3().extend(0.0).to_array();
@@ -43,26 +43,20 @@ impl SourceBuffers {
                 }
             },
         );
-        let descriptor = wgpu::TextureDescriptor {
-            label: Some("elements"),
-            size: wgpu::Extent3d {
-                width: ELEMENTS_A_LINE,
-                height: 3 * lines as u32,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
+        let size = [ELEMENTS_A_LINE, 3 * lines as u32, 1];
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let elements = memory.texture("elements", size, format, usage)?;
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * ELEMENTS_A_LINE),
+            rows_per_image: None,
         };
-        let order = wgpu::util::TextureDataOrder::LayerMajor;
         let texels = bytemuck::cast_slice(&texels);
-        let elements = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, texels);
+        memory.gpu.queue.write_texture(elements.as_image_copy(), texels, layout, elements.size());
         Ok(SourceBuffers {
-            lattices: gpu.storage("lattices", bytemuck::cast_slice(&lattices)),
-            nodes: gpu.storage("nodes", bytemuck::cast_slice(&nodes)),
+            lattices: memory.storage("lattices", bytemuck::cast_slice(&lattices))?,
+            nodes: memory.storage("nodes", bytemuck::cast_slice(&nodes))?,
             elements: elements.create_view(&Default::default()),
         })
     }

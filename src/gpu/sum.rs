@@ -3,6 +3,7 @@
 use super::device::Gpu;
 use super::layers::Layers;
 use super::layout::{GATHER_WGSL, LANES, Summation, Sums, Tile};
+use super::memory::Memory;
 use crate::error::Error;
 use crate::hemicube::{self, Face};
 
@@ -18,26 +19,25 @@ pub struct Sum {
 
 impl Sum {
     /// Over the images of `resolution` with `slots` tiles on `layers`.
-    pub fn new(gpu: &Gpu, layers: &Layers, resolution: u32, slots: u32) -> Result<Sum, Error> {
-        let device = &gpu.device;
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: wgpu::BufferUsages::STORAGE | usage,
-                mapped_at_creation: false,
-            })
-        };
+    pub fn new(
+        memory: &Memory,
+        layers: &Layers,
+        resolution: u32,
+        slots: u32,
+    ) -> Result<Sum, Error> {
+        let device = &memory.gpu.device;
+        let buffer =
+            |label, size, usage| memory.buffer(label, size, wgpu::BufferUsages::STORAGE | usage);
         let batch = u64::from(layers.texture.depth_or_array_layers());
         let tile_bytes = u64::from(slots.max(1)) * size_of::<Tile>() as u64;
-        let tiles = buffer("tiles", batch * tile_bytes, wgpu::BufferUsages::COPY_DST);
+        let tiles = buffer("tiles", batch * tile_bytes, wgpu::BufferUsages::COPY_DST)?;
         let sum_bytes = batch * size_of::<Sums>() as u64;
-        let sums = buffer("sums", sum_bytes, wgpu::BufferUsages::COPY_SRC);
+        let sums = buffer("sums", sum_bytes, wgpu::BufferUsages::COPY_SRC)?;
         let unread = wgpu::BufferUsages::empty();
-        let columns = buffer("columns", sum_bytes * u64::from(LANES), unread);
-        let weights = gpu.storage("weights", bytemuck::cast_slice(&weights(resolution)?));
+        let columns = buffer("columns", sum_bytes * u64::from(LANES), unread)?;
+        let weights = memory.storage("weights", bytemuck::cast_slice(&weights(resolution)?))?;
         let summation = Summation { resolution, slots };
-        let summation = gpu.uniform("summation", bytemuck::bytes_of(&summation));
+        let summation = memory.uniform("summation", bytemuck::bytes_of(&summation))?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("gather.wgsl"),
             source: wgpu::ShaderSource::Wgsl(GATHER_WGSL.into()),

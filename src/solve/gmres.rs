@@ -33,12 +33,17 @@ pub(super) fn gmres(run: &mut Run, restart: usize, steps: Option<u64>) -> Result
         };
         while stop.is_none() && !enough(&cycle, run) {
             if steps.is_some_and(|most| run.steps >= most) {
-                stop = Some(Stop::Steps);
-            } else if let Some(bounced) = bounce(run, &cycle)? {
-                cycle.extend(bounced);
-                run.steps += 1;
-            } else {
-                stop = Some(Stop::Cancelled);
+                stop = Some(Ok(Stop::Steps));
+                continue;
+            }
+            match bounce(run, &cycle) {
+                Ok(Some(bounced)) => {
+                    cycle.extend(bounced);
+                    run.steps += 1;
+                }
+                Ok(None) => stop = Some(Ok(Stop::Cancelled)),
+                // What the cycle has found by then is in the state, as when it is cancelled.
+                Err(error) => stop = Some(Err(error)),
             }
         }
         // In as many products as there are elements it would be exact: no scene holds it up for ever.
@@ -47,7 +52,7 @@ pub(super) fn gmres(run: &mut Run, restart: usize, steps: Option<u64>) -> Result
         }
         cycle.finish(&mut run.state);
         if let Some(stop) = stop {
-            return Ok(stop);
+            return stop;
         }
     }
 }
@@ -202,4 +207,45 @@ fn dot(weights: &[f64], a: &[Rgb], b: &[Rgb]) -> Rgb {
 /// `a` over `b`, and 0 where that is 0.
 fn ratio(a: Rgb, b: Rgb) -> Rgb {
     Rgb::select(b.cmpeq(Rgb::ZERO), Rgb::ZERO, a / b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Method, Solver};
+    use super::*;
+    use crate::form_factor::ray_cast::RayCast;
+    use crate::form_factor::{FormFactors, Row};
+    use crate::mesh::{Mesh, NodeId};
+
+    /// Rays that are not to be had any more after so many batches.
+    struct Failing(RayCast, u32);
+
+    impl FormFactors for Failing {
+        fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
+            let lost = Error::new(ErrorKind::Device, "device", "lost", "open it again");
+            self.1 = self.1.checked_sub(1).ok_or(lost)?;
+            self.0.rows(mesh, patches, share)
+        }
+    }
+
+    #[test]
+    fn what_was_found_before_rows_failed_is_kept() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let (mut go, steps) = (|_: &super::super::Progress| Go::Continue(()), 4);
+        let rays = || RayCast::new(&mesh, 64).unwrap();
+        // Four products, each with rows made anew; one row a batch.
+        let solver = Solver {
+            row_memory: 0,
+            steps: Some(steps),
+            ..Solver::new(Method::Gmres { restart: 50 })
+        };
+        let whole = solver.solve(&mesh, &mut rays(), &mut go).unwrap();
+        let mut failing = Failing(rays(), whole.rows_made as u32);
+        let mut run = Run::new(&mesh, &mut failing, &mut go, 0.0, 0).unwrap();
+        let e = gmres(&mut run, 50, None).unwrap_err();
+        assert_eq!((e.kind(), run.steps), (ErrorKind::Device, steps));
+        run.state.settle().unwrap();
+        assert!(run.state.radiosity() == whole.radiosity);
+    }
 }

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use crate::error::{Error, ErrorKind};
-use crate::form_factor::{FormFactors, Row};
+use crate::error::Error;
+use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 
 /// Rows by patch. Once the budget is full, nothing more is kept and nothing is given up: shooting
@@ -46,13 +46,7 @@ impl<'a> Rows<'a> {
 
     /// Makes the rows of `patches`, of which the most that one is about to shoot is `unshot_share`.
     pub fn make(&mut self, patches: &[NodeId], unshot_share: f64) -> Result<Vec<Row>, Error> {
-        let made = self.maker.rows(self.mesh, patches, unshot_share)?;
-        if made.len() != patches.len() {
-            let found = format!("{} rows for {} patches", made.len(), patches.len());
-            let remedy = "FormFactors::rows must return one row a patch";
-            return Err(Error::new(ErrorKind::FormFactor, "form factors", found, remedy));
-        }
-        patches.iter().zip(&made).try_for_each(|(&p, row)| row.check(self.mesh, p))?;
+        let made = checked_rows(self.maker, self.mesh, patches, unshot_share)?;
         self.made += made.len() as u64;
         Ok(made)
     }

@@ -13,6 +13,7 @@ use super::vertices::Vertices;
 use crate::error::Error;
 use crate::gather::{Gather, Place};
 use crate::mesh::{MAX_DEPTH, Mesh, Smooth};
+use crate::pace::Pace;
 use crate::scene::Rgb;
 use crate::solve::{Go, Stop};
 
@@ -43,7 +44,7 @@ pub(crate) struct Refined<'a> {
     pub(super) joined: HashSet<u32>,
 }
 
-/// Vertices that gather at once: progress is told of after each batch.
+/// Vertices that gather at once, to begin with: progress is told of after each batch.
 const BATCH: usize = 256;
 
 /// Where less than this share of the mean is reflected, errors are weighed against the share: the
@@ -134,15 +135,19 @@ impl<'a> Refined<'a> {
         };
         let mut left: Vec<u32> = fresh.iter().copied().filter(looks).collect();
         let sources = self.light.sources();
-        let (of, mut gathered) = (left.len(), 0);
+        let (of, mut gathered, mut pace) = (left.len(), 0, Pace::new(BATCH));
         for attempt in 0.. {
             let mut again = vec![];
-            for batch in left.chunks(BATCH) {
-                let places: Vec<Place> = batch.iter().map(|&v| stands.place(v, attempt)).collect();
-                self.gathers += places.len() as u64;
-                let found = gather.gather(&sources, &places)?;
-                let old =
-                    before.map(|light| gather.gather(&light.sources(), &places)).transpose()?;
+            let mut rest = &left[..];
+            while !rest.is_empty() {
+                let (batch, found, old) = pace.next(&mut rest, |batch| {
+                    let places: Vec<Place> =
+                        batch.iter().map(|&v| stands.place(v, attempt)).collect();
+                    let found = gather.gather(&sources, &places)?;
+                    let old = before.map(|light| gather.gather(&light.sources(), &places));
+                    Ok::<_, Error>((batch, found, old.transpose()?))
+                })?;
+                self.gathers += batch.len() as u64;
                 for (k, (&v, found)) in batch.iter().zip(&found).enumerate() {
                     let covered = stands.is_covered(v, found);
                     if covered && stands.has_more(v, attempt) {

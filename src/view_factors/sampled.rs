@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Absent, Estimate, Factor, ViewFactors};
 use crate::error::Error;
-use crate::form_factor::{FormFactors, Row};
+use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 use crate::solve::Go;
 
@@ -62,8 +62,7 @@ impl ViewFactors {
         let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
         let mut done = 0;
         for batch in elements.chunks(form_factors.batch().max(1)) {
-            for (row, &from) in form_factors.rows(mesh, batch, 1.0)?.iter().zip(batch) {
-                row.check(mesh, from)?;
+            for (row, &from) in checked_rows(form_factors, mesh, batch, 1.0)?.iter().zip(batch) {
                 let (fine, coarse) = (mesh.area(from), coarse[done]);
                 let sum = &mut sums[group(from) as usize];
                 for entry in &row.entries {
