@@ -1,15 +1,17 @@
 //! What a solver gives back and tells on its way: solution and progress.
 
+mod change;
 mod direct;
 mod gmres;
 mod ledger;
 mod relaxation;
 mod rows;
-mod run;
+mod saved;
 mod shooters;
 mod shooting;
 mod solver;
 mod state;
+mod under_way;
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -20,6 +22,7 @@ pub use direct::MAX_DIRECT;
 pub use ledger::Ledger;
 pub use shooting::Shooting;
 pub use solver::{Method, Solver};
+pub use under_way::Solve;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]
@@ -80,7 +83,7 @@ pub struct Progress {
     /// Share of the emitted flux that is unshot or overshot, in the worst channel; with GMRES no more
     /// than this is, and a direct solve has 1 until it is through.
     pub unshot_share: f64,
-    /// Time since the solver started.
+    /// Time since the solver was set going.
     pub elapsed: Duration,
 }
 

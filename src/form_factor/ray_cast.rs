@@ -92,6 +92,10 @@ impl FormFactors for RayCast {
     fn batch(&self) -> usize {
         16
     }
+
+    fn settings(&self) -> String {
+        format!("{} rays, all from {}", self.count, self.full_share)
+    }
 }
 
 const OPEN: u32 = u32::MAX;

@@ -156,6 +156,11 @@ impl<M: FormFactors> FormFactors for Viewpoints<M> {
     fn batch(&self) -> usize {
         self.rows.batch()
     }
+
+    fn settings(&self) -> String {
+        let Viewpoints { rows, tolerance, levels, .. } = self;
+        format!("{}, {levels} levels of viewpoints to {tolerance}", rows.settings())
+    }
 }
 
 /// The row of view `k`: the mean of its parts' rows, where it has parts.

@@ -1,10 +1,12 @@
 //! Where all emitted light has gone.
 
+use serde::{Deserialize, Serialize};
+
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
 /// Where all emitted flux has gone, W per channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     /// Exitance times area, over all elements.
     pub emitted: Rgb,
