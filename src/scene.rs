@@ -206,7 +206,11 @@ impl Scene {
     pub fn with_moved(&self, group: &str, by: DAffine3) -> Result<Scene, Error> {
         let Some(moved) = self.groups.iter().position(|name| name == group) else {
             let known = self.groups.join(", ");
-            return Err(bad(format!("group '{group}'"), "not in the scene", format!("use {known}")));
+            return Err(bad(
+                format!("group '{group}'"),
+                "not in the scene",
+                format!("use {known}"),
+            ));
         };
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         let mut places = HashMap::new();

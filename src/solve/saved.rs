@@ -85,11 +85,8 @@ impl Solve<'_> {
     /// What [`Solve::save`] writes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let Solve { solver, state, rows, course, done, made_by, .. } = self;
-        let name = Name {
-            mesh: state.mesh.fingerprint(),
-            method: method(solver),
-            rows: made_by.clone(),
-        };
+        let name =
+            Name { mesh: state.mesh.fingerprint(), method: method(solver), rows: made_by.clone() };
         let mut trails: Vec<(NodeId, Trail)> = rows.trails.iter().map(|(&p, &t)| (p, t)).collect();
         trails.sort_by_key(|(patch, _)| *patch);
         let doubtful = trails.iter().filter(|(_, trail)| trail.kept && trail.doubt > 0.0);
@@ -229,7 +226,9 @@ impl Saved {
                 let shooters = Shooters::from_cut(mesh, tolerance, level, cut);
                 Course::Shooting(shooters.ok_or_else(unfit)?)
             }
-            (SavedCourse::Relaxation(relaxation), Method::Jacobi) if relaxation.fits(count, true) => {
+            (SavedCourse::Relaxation(relaxation), Method::Jacobi)
+                if relaxation.fits(count, true) =>
+            {
                 Course::Relaxation(relaxation)
             }
             (SavedCourse::Relaxation(relaxation), Method::GaussSeidel)

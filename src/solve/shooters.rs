@@ -121,12 +121,7 @@ impl<'m> Shooters<'m> {
     }
 
     /// The shooters of a cut that was saved, if they are a cut through `mesh`.
-    pub fn from_cut(
-        mesh: &'m Mesh,
-        tolerance: f64,
-        level: u32,
-        cut: Cut,
-    ) -> Option<Shooters<'m>> {
+    pub fn from_cut(mesh: &'m Mesh, tolerance: f64, level: u32, cut: Cut) -> Option<Shooters<'m>> {
         let mut all = Shooters::none(mesh, tolerance, level);
         let node = |n: NodeId| mesh.contains(n);
         let mut seen = vec![false; mesh.element_count()];

@@ -137,10 +137,15 @@ impl<'m> State<'m> {
     /// Sends `flux`, which is no longer unshot anywhere, along `row`.
     pub fn pass_on(&mut self, flux: Rgb, row: &Row) {
         let Flux { reflectance, incident, unshot, .. } = &mut self.flux;
-        let sent = send(flux, row, |e| reflectance[e], |e, came| {
-            incident[e] += came;
-            unshot[e] += reflectance[e] * came;
-        });
+        let sent = send(
+            flux,
+            row,
+            |e| reflectance[e],
+            |e, came| {
+                incident[e] += came;
+                unshot[e] += reflectance[e] * came;
+            },
+        );
         self.lose(sent);
         self.ledger.unshot += sent.reflected - flux;
     }

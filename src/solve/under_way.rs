@@ -129,8 +129,9 @@ impl<'m> Solve<'m> {
     ) -> Result<Option<Stop>, Error> {
         self.made_by = maker.settings();
         let Solve { solver, state, rows, course, done, .. } = self;
-        // The rest is what may yet be wrong about rows since objects were moved.
-        let unshot = (solver.unshot - rows.doubt(state.ledger.emitted)).max(solver.unshot / 2.0);
+        // The rest is for rows that may be wrong since objects were moved, and are by a part of that.
+        let doubt = rows.doubt(state.ledger.emitted) / 4.0;
+        let unshot = (solver.unshot - doubt).max(solver.unshot / 2.0);
         let unshot = unshot.max(LEAST_UNSHOT);
         let steps = solver.steps;
         let mut batch = Batch { state, rows, maker, done, progress, start, unshot, steps };
