@@ -193,6 +193,9 @@ fn bad(place: &str, found: impl Into<String>, remedy: &str) -> Error {
     Error::new(ErrorKind::File, format!("saved state, {place}"), found, remedy)
 }
 
+/// Nobody has done more than this.
+const MOST_DONE: u64 = 1 << 60;
+
 impl Saved {
     /// `fresh` as it was when it was saved, if that is possible.
     fn restore<'m>(self, fresh: Solve<'m>, made_by: String) -> Result<Solve<'m>, Error> {
@@ -204,6 +207,12 @@ impl Saved {
         if !all(&incident) || !all(&unshot) {
             let found = format!("flux of {} and {} elements", incident.len(), unshot.len());
             return Err(bad("flux", found, &format!("must be {count} finite triples each")));
+        }
+        let Ledger { emitted, absorbed, left, back, unshot: rest, overshot } = ledger;
+        let finite = [absorbed, left, back, rest, overshot].iter().all(|w| w.is_finite());
+        if emitted != state.ledger.emitted || !finite {
+            let found = format!("{ledger:?}");
+            return Err(bad("ledger", found, &format!("must be of {} W", state.ledger.emitted)));
         }
         let mut state = State { ledger, ..state };
         state.flux.incident = incident;
@@ -219,6 +228,10 @@ impl Saved {
             let row = row.row();
             row.check(mesh, patch).map_err(|e| bad("rows", e.to_string(), REMEDY))?;
             rows.restore_row(patch, row);
+        }
+        if [done.steps, done.shots, made].into_iter().max() > Some(MOST_DONE) {
+            let found = format!("{} steps, {} shots, {made} rows", done.steps, done.shots);
+            return Err(bad("counts", found, REMEDY));
         }
         let unfit = || bad("method", "what it had in hand does not fit the mesh", REMEDY);
         let course = match (course, solver.method) {
