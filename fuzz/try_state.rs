@@ -85,7 +85,9 @@ pub fn try_state(input: &[u8]) -> bool {
             return false;
         }
     };
-    assert_eq!(solve.to_bytes(), bytes, "read and written again");
+    let written = solve.to_bytes();
+    let again = solver.resume_bytes(mesh, &rows, &written).unwrap();
+    assert!(again.to_bytes() == written, "read and written again");
     check(&solve);
     let steps = solve.solution().unwrap().steps + FURTHER;
     solve.set_limits(1e-6, Some(steps)).unwrap();

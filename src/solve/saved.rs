@@ -223,6 +223,9 @@ impl Saved {
         if let Some((patch, _)) = trails.iter().find(|(p, t)| !mesh.contains(*p) || !whole(t)) {
             return Err(bad("patches", format!("patch {}", patch.0), REMEDY));
         }
+        if trails.windows(2).any(|w| w[0].0 >= w[1].0) {
+            return Err(bad("patches", "patches out of order", REMEDY));
+        }
         rows.restore(trails.into_iter().collect(), made, free as usize);
         for (patch, row) in old {
             let row = row.row();
