@@ -169,4 +169,11 @@ impl FormFactors for DeviceRows {
             Rows::Cpu(rays) => rays.batch(),
         }
     }
+
+    fn settings(&self) -> String {
+        match &self.rows {
+            Rows::Gpu(hemicubes) => hemicubes.settings(),
+            Rows::Cpu(rays) => rays.settings(),
+        }
+    }
 }

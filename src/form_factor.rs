@@ -147,6 +147,12 @@ pub trait FormFactors {
     fn batch(&self) -> usize {
         1
     }
+
+    /// What its rows depend on beside the mesh, in words: a saved solve goes on only with rows made
+    /// alike.
+    fn settings(&self) -> String {
+        "rows".into()
+    }
 }
 
 /// The rows of `patches` by `maker`, one each, every one of which keeps its contract.

@@ -98,7 +98,9 @@ pub use io::{
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
 pub use relay::Relay;
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
-pub use solve::{Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solver, Stop};
+pub use solve::{
+    Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solve, Solver, Stop,
+};
 pub use tone::ToneCurve;
 pub use vertex::VertexRadiosity;
 pub use vertex::gathering::{GatherProgress, GatheredRadiosity, Gathering};

@@ -11,9 +11,11 @@ mod smooth;
 
 use std::collections::HashSet;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::Xxh3;
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Scene};
@@ -23,7 +25,7 @@ pub use smooth::{COPLANAR_DEGREES, CREASE_DEGREES};
 pub(crate) use smooth::{Side, Smooth};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct NodeId(pub(crate) u32);
 
 /// Levels of subdivision that a triangle can have at most: 4¹² elements.
@@ -55,6 +57,8 @@ pub struct Mesh {
     /// Unit normal and area of each triangle.
     normals: Vec<DVec3>,
     areas: Vec<f64>,
+    /// Made when they are asked for.
+    clusters: Arc<OnceLock<Clusters>>,
 }
 
 impl Mesh {
@@ -105,8 +109,8 @@ impl Mesh {
         let count = scene.triangles().len();
         let normals = (0..count).map(|t| scene.normal(t)).collect();
         let areas = (0..count).map(|t| scene.area(t)).collect();
-        let mut mesh =
-            Mesh { scene, nodes: vec![], elements: vec![], depths: vec![], normals, areas };
+        let (nodes, elements, depths, clusters) = (vec![], vec![], vec![], Arc::default());
+        let mut mesh = Mesh { scene, nodes, elements, depths, normals, areas, clusters };
         for triangle in 0..count as u32 {
             let root = Node {
                 triangle,
@@ -164,6 +168,62 @@ impl Mesh {
             }
         }
         self.nodes[n].element_count = self.elements.len() as u32 - first_element;
+    }
+
+    /// The same elements in another `scene`: one whose materials, or positions of triangles, have
+    /// changed. Clusters of triangles stay what they were.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when `scene` has another number of triangles.
+    pub fn with_scene(&self, scene: impl Into<Arc<Scene>>) -> Result<Mesh, Error> {
+        let scene = scene.into();
+        let (count, wanted) = (scene.triangles().len(), self.scene.triangles().len());
+        if count != wanted {
+            let found = format!("{count} triangles with area");
+            let remedy = format!("must be the {wanted} of the scene that it takes the place of");
+            return Err(Error::new(ErrorKind::Scene, "changed scene", found, remedy));
+        }
+        self.clusters();
+        let normals = (0..count).map(|t| scene.normal(t)).collect();
+        let areas = (0..count).map(|t| scene.area(t)).collect();
+        Ok(Mesh { scene, normals, areas, ..self.clone() })
+    }
+
+    /// Clusters of triangles.
+    pub(crate) fn clusters(&self) -> &Clusters {
+        self.clusters.get_or_init(|| Clusters::new(&self.scene))
+    }
+
+    /// A number that depends on all that light does on this mesh: positions, materials, elements,
+    /// clusters. Names do not matter, nor does the order of vertices.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mut all = Xxh3::new();
+        for t in 0..self.scene.triangles().len() {
+            let ([a, b, c], material) = (self.scene.corners(t), self.scene.material(t));
+            let triples = [a, b, c, material.reflectance, material.exitance];
+            all.update(bytemuck::bytes_of(&triples.map(|v| v.to_array())));
+        }
+        for &element in &self.elements {
+            let Node { triangle, cell: Cell { level, i, j, flipped }, .. } = *self.node(element);
+            all.update(bytemuck::bytes_of(&[triangle, level, i, j, flipped.into()]));
+        }
+        self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
+        all.digest()
+    }
+
+    /// Whether elements of `other` have the same places in the same triangles.
+    pub(crate) fn has_elements_of(&self, other: &Mesh) -> bool {
+        let places = |mesh: &Mesh, e: usize| {
+            let node = mesh.node(mesh.elements[e]);
+            (mesh.elements[e], node.triangle, node.cell)
+        };
+        let count = self.element_count();
+        count == other.element_count() && (0..count).all(|e| places(self, e) == places(other, e))
+    }
+
+    /// Whether `node` is one of this mesh.
+    pub(crate) fn contains(&self, node: NodeId) -> bool {
+        (node.0 as usize) < self.nodes.len()
     }
 
     /// The scene that was cut.

@@ -67,6 +67,10 @@ impl<A: FormFactors, B: FormFactors> FormFactors for Relay<'_, A, B> {
     fn batch(&self) -> usize {
         self.second.as_ref().map_or(self.first.batch(), |second| second.batch())
     }
+
+    fn settings(&self) -> String {
+        self.second.as_ref().map_or_else(|| self.first.settings(), |second| second.settings())
+    }
 }
 
 impl<A: Gather, B: Gather> Gather for Relay<'_, A, B> {

@@ -1,6 +1,8 @@
 //! Triangles and materials as given, checked once, here.
 
-use glam::DVec3;
+use std::collections::HashMap;
+
+use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 
@@ -193,6 +195,54 @@ impl Scene {
     /// Material of triangle `t`.
     pub fn material(&self, t: usize) -> &Material {
         &self.materials[self.triangles[t].material as usize]
+    }
+
+    /// The same scene with `materials` in the place of its own, one for one.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when their number is another, or one is out of range.
+    pub fn with_materials(&self, materials: Vec<Material>) -> Result<Scene, Error> {
+        let (count, wanted) = (materials.len(), self.materials.len());
+        if count != wanted {
+            let found = format!("{count} for {wanted}");
+            return Err(bad("materials", found, "give one for each that the scene has"));
+        }
+        materials.iter().try_for_each(Material::check)?;
+        Ok(Scene { materials, ..self.clone() })
+    }
+
+    /// The same scene with all triangles of `group` moved: turned, shifted, scaled. What they share
+    /// with other groups stays with these.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or finite
+    /// coordinates.
+    pub fn with_moved(&self, group: &str, by: DAffine3) -> Result<Scene, Error> {
+        let Some(moved) = self.groups.iter().position(|name| name == group) else {
+            let known = self.groups.join(", ");
+            return Err(bad(
+                format!("group '{group}'"),
+                "not in the scene",
+                format!("use {known}"),
+            ));
+        };
+        let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
+        let mut places = HashMap::new();
+        for t in triangles.iter_mut().filter(|t| t.group as usize == moved) {
+            t.corners = t.corners.map(|corner| {
+                *places.entry(corner).or_insert_with(|| {
+                    positions.push(by.transform_point3(self.positions[corner as usize]));
+                    positions.len() as u32 - 1
+                })
+            });
+        }
+        let (groups, materials) = (self.groups.clone(), self.materials.clone());
+        let scene = Scene::new(positions, triangles, groups, materials)?;
+        if scene.degenerate > 0 {
+            let found = format!("{} triangles without area when moved", scene.degenerate);
+            return Err(bad(format!("group '{group}'"), found, "scale it by less"));
+        }
+        Ok(scene)
     }
 
     pub(crate) fn warn(&mut self, warning: String) {

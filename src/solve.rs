@@ -1,25 +1,29 @@
 //! What a solver gives back and tells on its way: solution and progress.
 
+mod change;
 mod direct;
 mod gmres;
 mod ledger;
 mod relaxation;
 mod rows;
-mod run;
+mod saved;
 mod shooters;
 mod shooting;
 mod solver;
 mod state;
+mod under_way;
 
 use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use crate::error::{Error, ErrorKind};
 use crate::scene::Rgb;
 pub use direct::MAX_DIRECT;
 pub use ledger::Ledger;
 pub use shooting::Shooting;
 pub use solver::{Method, Solver};
+pub use under_way::Solve;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]
@@ -80,9 +84,56 @@ pub struct Progress {
     /// Share of the emitted flux that is unshot or overshot, in the worst channel; with GMRES no more
     /// than this is, and a direct solve has 1 until it is through.
     pub unshot_share: f64,
-    /// Time since the solver started.
+    /// Time since the solver was set going.
     pub elapsed: Duration,
 }
 
 /// What a progress callback answers: go on, or stop with what there is.
 pub type Go = ControlFlow<()>;
+
+impl Solution {
+    /// Lights that were solved one by one, mixed: each of `parts`, of the same mesh, by its weight a
+    /// channel, none below 0. Radiosity is linear in what is emitted; so is the ledger. Rows and shots
+    /// are those of all, the stop that of the first which did not converge.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when there are no parts, they have different numbers of elements, or a
+    /// weight is below 0 or not finite.
+    pub fn mixed(parts: &[(Rgb, &Solution)]) -> Result<Solution, Error> {
+        let wrong = |place: String, found: String, remedy: &str| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        let Some((_, first)) = parts.first() else {
+            return wrong("lights".into(), "none".into(), "mix one or more");
+        };
+        let count = first.radiosity.len();
+        let mut mixed = Solution {
+            radiosity: vec![Rgb::ZERO; count],
+            ledger: Ledger::default(),
+            steps: 0,
+            shots: 0,
+            rows_made: 0,
+            stop: Stop::Converged,
+            ..(*first).clone()
+        };
+        for (k, &(weight, part)) in parts.iter().enumerate() {
+            let place = format!("light {}", k + 1);
+            if part.radiosity.len() != count {
+                let found = format!("{} elements", part.radiosity.len());
+                return wrong(place, found, "all must be solved on the same mesh");
+            }
+            if !weight.is_finite() || weight.min_element() < 0.0 {
+                return wrong(place, format!("a weight of {weight}"), "use 0 or more");
+            }
+            mixed.radiosity.iter_mut().zip(&part.radiosity).for_each(|(m, b)| *m += weight * *b);
+            mixed.ledger.add(weight, &part.ledger);
+            mixed.steps += part.steps;
+            mixed.shots += part.shots;
+            mixed.rows_made += part.rows_made;
+            if mixed.stop == Stop::Converged {
+                mixed.stop = part.stop;
+            }
+        }
+        Ok(mixed)
+    }
+}

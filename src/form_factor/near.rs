@@ -101,6 +101,10 @@ impl<M: FormFactors> FormFactors for NearRepair<M> {
     fn batch(&self) -> usize {
         self.rows.batch()
     }
+
+    fn settings(&self) -> String {
+        format!("{}, near {}", self.rows.settings(), self.near.reach)
+    }
 }
 
 impl Near {

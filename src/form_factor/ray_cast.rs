@@ -92,6 +92,10 @@ impl FormFactors for RayCast {
     fn batch(&self) -> usize {
         ((1 << 20) / self.count).clamp(1, 16) as usize
     }
+
+    fn settings(&self) -> String {
+        format!("{} rays, all from {}", self.count, self.full_share)
+    }
 }
 
 const OPEN: u32 = u32::MAX;

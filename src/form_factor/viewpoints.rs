@@ -155,6 +155,11 @@ impl<M: FormFactors> FormFactors for Viewpoints<M> {
     fn batch(&self) -> usize {
         if self.levels == 0 { self.rows.batch() } else { self.rows.batch().div_ceil(MANY) }
     }
+
+    fn settings(&self) -> String {
+        let Viewpoints { rows, tolerance, levels, .. } = self;
+        format!("{}, {levels} levels of viewpoints to {tolerance}", rows.settings())
+    }
 }
 
 /// The row of view `k`: the mean of its parts' rows, where it has parts.

@@ -252,6 +252,12 @@ impl FormFactors for Hemicubes {
     fn batch(&self) -> usize {
         (self.batch / self.rotations.get()).max(1) as usize
     }
+
+    fn settings(&self) -> String {
+        let Hemicubes { rotations, full_share, .. } = self;
+        let resolution = self.batches.resolutions[0].pixels;
+        format!("{rotations} hemicubes of {resolution}, all from {full_share}")
+    }
 }
 
 /// Near plane, in units of the square root of the patch's area.

@@ -91,6 +91,16 @@ impl Clusters {
         &self.roots
     }
 
+    /// How many there are, triangles alone counted.
+    pub fn count(&self) -> usize {
+        self.clusters.len()
+    }
+
+    /// All parts, in the order of the clusters.
+    pub fn tree(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.parts.iter().copied()
+    }
+
     /// The two parts of `cluster`, or `None` for a triangle.
     pub fn parts(&self, cluster: u32) -> Option<[u32; 2]> {
         let triangles = self.clusters.len() - self.parts.len();

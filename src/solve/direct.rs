@@ -4,13 +4,13 @@
 //! elimination needs no pivots, and no entry grows to more than twice the largest (Higham 2002,
 //! Theorem 9.9). Each entry is a channel triple: one elimination solves all three.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::Stop;
-use super::run::Run;
-use crate::error::{Error, ErrorKind};
+use super::under_way::Batch;
+use crate::error::Error;
 use crate::form_factor::Row;
 use crate::scene::Rgb;
 
@@ -22,37 +22,33 @@ pub const MAX_DIRECT: usize = 4096;
 const PANEL: usize = 16;
 
 /// Solves all at once. Keeps its rows whatever the budget; they take less than the matrix.
-pub(super) fn direct(run: &mut Run, steps: Option<u64>) -> Result<Stop, Error> {
-    let count = run.state.reflectance.len();
-    if count > MAX_DIRECT {
-        let remedy = format!("at most {MAX_DIRECT}: use another method, such as gmres");
-        let found = format!("{count} elements");
-        return Err(Error::new(ErrorKind::Setting, "direct solve", found, remedy));
-    }
-    if run.has_converged()? {
+pub(super) fn direct(batch: &mut Batch) -> Result<Stop, Error> {
+    if batch.has_converged()? {
         return Ok(Stop::Converged);
     }
-    if steps == Some(0) {
+    if batch.is_last_step() {
         return Ok(Stop::Steps);
     }
-    let elements: Vec<usize> = (0..count).collect();
-    let mut rows: Vec<Rc<Row>> = vec![];
+    let mesh = batch.state.mesh;
+    let count = mesh.element_count();
+    let mut rows: Vec<Arc<Row>> = vec![];
     while rows.len() < count {
-        for row in run.rows.next(&elements[rows.len()..])? {
+        for (_, row) in batch.rows.next(mesh, batch.maker, rows.len()..count)? {
             rows.push(row);
-            if run.tell(1.0).is_break() {
+            if batch.tell(1.0).is_break() {
                 return Ok(Stop::Cancelled);
             }
         }
     }
     // Equation j: x_j − ρ_j Σ_i F_ij x_i = e_j, with e_j at its end.
     let stride = count + 1;
+    let flux = &batch.state.flux;
     let mut matrix = vec![Rgb::ZERO; count * stride];
     for (i, row) in rows.iter().enumerate() {
-        (matrix[i * stride + i], matrix[i * stride + count]) = (Rgb::ONE, run.state.flux.unshot[i]);
+        (matrix[i * stride + i], matrix[i * stride + count]) = (Rgb::ONE, flux.unshot[i]);
         for entry in &row.entries {
             let j = entry.element as usize;
-            matrix[j * stride + i] -= run.state.reflectance[j] * Row::form_factor(entry.share);
+            matrix[j * stride + i] -= flux.reflectance[j] * Row::form_factor(entry.share);
         }
     }
     for first in (0..count).step_by(PANEL) {
@@ -63,21 +59,21 @@ pub(super) fn direct(run: &mut Run, steps: Option<u64>) -> Result<Stop, Error> {
             eliminate(&mut rest[..stride], above, first);
         }
         below.par_chunks_mut(stride).for_each(|row| eliminate(row, panel, first));
-        if run.tell(1.0).is_break() {
+        if batch.tell(1.0).is_break() {
             return Ok(Stop::Cancelled);
         }
     }
-    let mut flux = vec![Rgb::ZERO; count];
+    let mut sent = vec![Rgb::ZERO; count];
     for (i, row) in matrix.chunks_exact(stride).enumerate().rev() {
-        let known: Rgb = (i + 1..count).map(|j| row[j] * flux[j]).sum();
-        flux[i] = (row[count] - known) / row[i];
+        let known: Rgb = (i + 1..count).map(|j| row[j] * sent[j]).sum();
+        sent[i] = (row[count] - known) / row[i];
     }
-    for (e, (flux, row)) in flux.into_iter().zip(rows).enumerate() {
-        run.state.flux.unshot[e] -= flux;
-        run.state.pass_on(flux, &row);
-        run.shots += 1;
+    for (e, (flux, row)) in sent.into_iter().zip(rows).enumerate() {
+        batch.state.flux.unshot[e] -= flux;
+        batch.pass_on(flux, mesh.element(e), &row);
+        batch.done.shots += 1;
     }
-    run.steps = 1;
+    batch.done.steps += 1;
     Ok(Stop::Converged)
 }
 

@@ -8,83 +8,112 @@
 //! Every vector is kept with what became of its light when it was sent, lost parts included. All of
 //! it is linear, so the ledger of what a cycle sends is known without sending it, whenever it ends.
 
+use serde::{Deserialize, Serialize};
+
 use super::ledger::largest_share;
-use super::run::Run;
+use super::rows::Rows;
 use super::state::{Sent, State, send};
+use super::under_way::Batch;
 use super::{Go, Stop};
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::scene::Rgb;
 
-/// Cycles of `restart` products, each a step, until done.
-pub(super) fn gmres(run: &mut Run, restart: usize, steps: Option<u64>) -> Result<Stop, Error> {
-    if restart == 0 {
-        let remedy = "use 1 or more products a cycle";
-        return Err(Error::new(ErrorKind::Setting, "restart 0", "no product", remedy));
-    }
-    let mut length = restart;
-    loop {
-        if run.has_converged()? {
-            return Ok(Stop::Converged);
-        }
-        let mut cycle = Cycle::new(&run.state);
-        let mut stop = None;
-        let enough = |cycle: &Cycle, run: &Run| {
-            !cycle.sent.is_empty() && cycle.unshot(run) <= run.unshot || cycle.sent.len() == length
-        };
-        while stop.is_none() && !enough(&cycle, run) {
-            if steps.is_some_and(|most| run.steps >= most) {
-                stop = Some(Ok(Stop::Steps));
-                continue;
-            }
-            match bounce(run, &cycle) {
-                Ok(Some(bounced)) => {
-                    cycle.extend(bounced);
-                    run.steps += 1;
-                }
-                Ok(None) => stop = Some(Ok(Stop::Cancelled)),
-                // What the cycle has found by then is in the state, as when it is cancelled.
-                Err(error) => stop = Some(Err(error)),
-            }
-        }
-        // In as many products as there are elements it would be exact: no scene holds it up for ever.
-        if cycle.stalls() {
-            length *= 2;
-        }
-        cycle.finish(&mut run.state);
-        if let Some(stop) = stop {
-            return stop;
-        }
-    }
+/// Cycles of products, each a step, until done.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Gmres {
+    /// Products in a cycle.
+    length: usize,
+    cycle: Option<Cycle>,
+    product: Option<Product>,
+}
+
+/// A vector that is being sent.
+#[derive(Clone, Serialize, Deserialize)]
+struct Product {
+    /// Received by each element.
+    incident: Vec<Rgb>,
+    /// What became of all that was sent.
+    sent: Sent,
+    /// The element whose turn it is.
+    element: usize,
 }
 
 /// A cycle that takes less than this share off what is unshot is followed by one of twice the length.
 const LEAST_GAIN: f64 = 0.5;
 
-/// Reflected by each element, and what became of all that was sent.
-type Bounced = (Vec<Rgb>, Sent);
+impl Gmres {
+    /// With `restart` products in a cycle.
+    pub fn new(restart: usize) -> Gmres {
+        Gmres { length: restart, cycle: None, product: None }
+    }
 
-/// The newest vector of `cycle`, sent. Nothing when cancelled.
-fn bounce(run: &mut Run, cycle: &Cycle) -> Result<Option<Bounced>, Error> {
-    let vector = cycle.basis.last().map_or(&[][..], |v| v);
-    let lit: Vec<usize> = (0..vector.len()).filter(|&e| vector[e] != Rgb::ZERO).collect();
-    let (mut bounced, mut all) = (vec![Rgb::ZERO; vector.len()], Sent::default());
-    let mut at = 0;
-    while at < lit.len() {
-        for row in run.rows.next(&lit[at..])? {
-            let flux = vector[lit[at]];
-            let sent = send(flux, &row, &run.state.reflectance, |e, w| bounced[e] += w);
-            all.add(Rgb::ONE, sent);
-            (at, run.shots) = (at + 1, run.shots + 1);
-            if run.tell(cycle.unshot(run)) == Go::Break(()) {
-                return Ok(None);
+    /// Whether it fits `count` elements, as one from a file may not.
+    pub fn fits(&self, count: usize) -> bool {
+        let all = |w: &[Rgb]| w.len() == count && w.iter().all(|w| w.is_finite());
+        let product = |p: &Product| all(&p.incident) && p.element <= count;
+        self.length > 0
+            && self.cycle.as_ref().is_none_or(|cycle| cycle.fits(all))
+            && self.product.as_ref().is_none_or(|p| self.cycle.is_some() && product(p))
+    }
+
+    /// Goes on by as many elements as one batch of rows reaches.
+    pub fn advance(&mut self, batch: &mut Batch) -> Result<Option<Stop>, Error> {
+        let Some(cycle) = &mut self.cycle else {
+            if batch.has_converged()? {
+                return Ok(Some(Stop::Converged));
+            }
+            self.cycle = Some(Cycle::new(batch.state));
+            return Ok(None);
+        };
+        let Some(product) = &mut self.product else {
+            let made = cycle.sent.len();
+            if made >= self.length || made > 0 && cycle.unshot(batch.state) <= batch.unshot {
+                self.finish(batch.state, batch.rows);
+            } else if batch.is_last_step() {
+                return Ok(Some(Stop::Steps));
+            } else {
+                let incident = vec![Rgb::ZERO; batch.state.flux.unshot.len()];
+                self.product = Some(Product { incident, sent: Sent::default(), element: 0 });
+            }
+            return Ok(None);
+        };
+        let vector = &cycle.basis[cycle.sent.len()];
+        let lit = (product.element..vector.len()).filter(|&e| vector[e] != Rgb::ZERO);
+        let rows = batch.rows.next(batch.state.mesh, batch.maker, lit)?;
+        let (done, unshot_share) = (rows.is_empty(), cycle.unshot(batch.state));
+        for (e, row) in rows {
+            let (incident, reflectance) = (&mut product.incident, &batch.state.flux.reflectance);
+            let sent = send(vector[e], &row, |e| reflectance[e], |e, came| incident[e] += came);
+            product.sent.add(Rgb::ONE, sent);
+            product.element = e + 1;
+            batch.done.shots += 1;
+            if batch.tell(unshot_share) == Go::Break(()) {
+                return Ok(Some(Stop::Cancelled));
             }
         }
+        if done && let Some(Product { incident, sent, .. }) = self.product.take() {
+            cycle.extend(incident, sent, &batch.state.flux.reflectance);
+            batch.done.steps += 1;
+        }
+        Ok(None)
     }
-    Ok(Some((bounced, all)))
+
+    /// Sends what leaves least unshot, by the vectors so far, and begins anew.
+    pub fn finish(&mut self, state: &mut State, rows: &mut Rows) {
+        self.product = None;
+        if let Some(cycle) = self.cycle.take() {
+            // In as many products as there are elements it would be exact: no scene holds it up for ever.
+            if cycle.stalls() && cycle.sent.len() >= self.length {
+                self.length = self.length.saturating_mul(2);
+            }
+            cycle.finish(state, rows);
+        }
+    }
 }
 
 /// One cycle, of all channels at once: as many systems that share rows. A channel that is through
 /// goes on with vectors of 0.
+#[derive(Clone, Serialize, Deserialize)]
 struct Cycle {
     /// Σ A over A of each element. With these weights a vector's norm is no less than the sum of its
     /// fluxes' magnitudes (Cauchy and Schwarz), and the product with M nearly symmetric (it is where
@@ -92,8 +121,9 @@ struct Cycle {
     weights: Vec<f64>,
     /// Orthonormal vectors, the first along what is unshot.
     basis: Vec<Vec<Rgb>>,
-    /// What became of the light of each but the last.
+    /// What became of the light of each but the last, and what came to each element.
     sent: Vec<Sent>,
+    incident: Vec<Vec<Rgb>>,
     /// A times each but the last, in terms of the basis: columns of the Hessenberg matrix.
     columns: Vec<Vec<Rgb>>,
     /// The same as an upper triangle, after these rotations (cosine and sine).
@@ -117,17 +147,19 @@ impl Cycle {
         first.iter_mut().for_each(|u| *u = ratio(*u, largest));
         let norm = dot(&weights, &first, &first).map(f64::sqrt);
         first.iter_mut().for_each(|u| *u = ratio(*u, norm));
-        let (sent, columns, triangle, rotations) = (vec![], vec![], vec![], vec![]);
+        let (sent, incident) = (vec![], vec![]);
+        let (columns, triangle, rotations) = (vec![], vec![], vec![]);
         let (basis, norm) = (vec![first], norm * largest);
         let rest = vec![norm];
-        Cycle { weights, basis, sent, columns, triangle, rotations, norm, rest }
+        Cycle { weights, basis, sent, incident, columns, triangle, rotations, norm, rest }
     }
 
-    /// Takes in the newest vector, `bounced`, and adds the direction that is new in that.
-    fn extend(&mut self, (bounced, sent): Bounced) {
+    /// Takes in what came of the newest vector, and adds the direction that is new in what is
+    /// reflected of that.
+    fn extend(&mut self, incident: Vec<Rgb>, sent: Sent, reflectance: &[Rgb]) {
         let k = self.sent.len();
-        let mut new = bounced;
-        new.iter_mut().zip(&self.basis[k]).for_each(|(m, v)| *m = *v - *m);
+        let reflected = incident.iter().zip(reflectance).map(|(&h, &rho)| rho * h);
+        let mut new: Vec<Rgb> = self.basis[k].iter().zip(reflected).map(|(&v, m)| v - m).collect();
         // Modified Gram–Schmidt, enough for GMRES (Paige, Rozložník and Strakoš 2006).
         let mut column = vec![];
         for v in &self.basis {
@@ -155,6 +187,7 @@ impl Cycle {
         new.iter_mut().for_each(|w| *w = ratio(*w, norm));
         self.basis.push(new);
         self.sent.push(sent);
+        self.incident.push(incident);
     }
 
     /// Norm of what would be unshot after the vectors so far.
@@ -163,8 +196,8 @@ impl Cycle {
     }
 
     /// The most that would be unshot, as a share of the emitted: the worst channel.
-    fn unshot(&self, run: &Run) -> f64 {
-        largest_share(self.last(), run.state.ledger.emitted)
+    fn unshot(&self, state: &State) -> f64 {
+        largest_share(self.last(), state.ledger.emitted)
     }
 
     /// Whether less than [`LEAST_GAIN`] of what was unshot is gone in some channel.
@@ -173,7 +206,7 @@ impl Cycle {
     }
 
     /// Sends what leaves least unshot.
-    fn finish(self, state: &mut State) {
+    fn finish(self, state: &mut State, rows: &mut Rows) {
         let count = self.triangle.len();
         let mut parts = vec![Rgb::ZERO; count];
         for i in (0..count).rev() {
@@ -185,17 +218,37 @@ impl Cycle {
         for (column, &part) in self.columns.iter().zip(&parts) {
             shot.iter_mut().zip(column).for_each(|(s, &h)| *s += h * part);
         }
-        let (unshot, leaving) = (&mut state.flux.unshot, &mut state.flux.leaving);
-        for (k, v) in self.basis.iter().enumerate() {
-            let part = parts.get(k).map_or(Rgb::ZERO, |&p| p);
-            for ((r, x), v) in unshot.iter_mut().zip(&mut *leaving).zip(v) {
-                *r -= shot[k] * *v;
-                *x += (part - shot[k]) * *v;
-            }
+        for (v, &shot) in self.basis.iter().zip(&shot) {
+            state.flux.unshot.iter_mut().zip(v).for_each(|(r, v)| *r -= shot * *v);
+        }
+        let mut sent = vec![Rgb::ZERO; state.flux.unshot.len()];
+        for (k, &part) in parts.iter().enumerate() {
+            sent.iter_mut().zip(&self.basis[k]).for_each(|(s, v)| *s += part * *v);
+            let incident = state.flux.incident.iter_mut();
+            incident.zip(&self.incident[k]).for_each(|(h, came)| *h += part * *came);
+        }
+        for (e, flux) in sent.into_iter().enumerate().filter(|(_, flux)| *flux != Rgb::ZERO) {
+            rows.sent(state.mesh.element(e), flux);
         }
         let mut all = Sent::default();
         parts.iter().zip(&self.sent).for_each(|(&part, &sent)| all.add(part, sent));
         state.lose(all);
+    }
+
+    /// Whether all vectors satisfy `fits` and are as many as they should be.
+    fn fits(&self, fits: impl Fn(&[Rgb]) -> bool) -> bool {
+        let made = self.sent.len();
+        let columns = |columns: &[Vec<Rgb>], more: usize| {
+            columns.len() == made && columns.iter().enumerate().all(|(k, c)| c.len() == k + more)
+        };
+        self.basis.len() == made + 1
+            && self.incident.len() == made
+            && self.rotations.len() == made
+            && self.rest.len() == made + 1
+            && columns(&self.columns, 2)
+            && columns(&self.triangle, 1)
+            && self.basis.iter().chain(&self.incident).all(|v| fits(v))
+            && self.weights.len() == self.basis[0].len()
     }
 }
 
@@ -207,45 +260,4 @@ fn dot(weights: &[f64], a: &[Rgb], b: &[Rgb]) -> Rgb {
 /// `a` over `b`, and 0 where that is 0.
 fn ratio(a: Rgb, b: Rgb) -> Rgb {
     Rgb::select(b.cmpeq(Rgb::ZERO), Rgb::ZERO, a / b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Method, Solver};
-    use super::*;
-    use crate::form_factor::ray_cast::RayCast;
-    use crate::form_factor::{FormFactors, Row};
-    use crate::mesh::{Mesh, NodeId};
-
-    /// Rays that are not to be had any more after so many batches.
-    struct Failing(RayCast, u32);
-
-    impl FormFactors for Failing {
-        fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
-            let lost = Error::new(ErrorKind::Device, "device", "lost", "open it again");
-            self.1 = self.1.checked_sub(1).ok_or(lost)?;
-            self.0.rows(mesh, patches, share)
-        }
-    }
-
-    #[test]
-    fn what_was_found_before_rows_failed_is_kept() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
-        let (mut go, steps) = (|_: &super::super::Progress| Go::Continue(()), 4);
-        let rays = || RayCast::new(&mesh, 64).unwrap();
-        // Four products, each with rows made anew; one row a batch.
-        let solver = Solver {
-            row_memory: 0,
-            steps: Some(steps),
-            ..Solver::new(Method::Gmres { restart: 50 })
-        };
-        let whole = solver.solve(&mesh, &mut rays(), &mut go).unwrap();
-        let mut failing = Failing(rays(), whole.rows_made as u32);
-        let mut run = Run::new(&mesh, &mut failing, &mut go, 0.0, 0).unwrap();
-        let e = gmres(&mut run, 50, None).unwrap_err();
-        assert_eq!((e.kind(), run.steps), (ErrorKind::Device, steps));
-        run.state.settle().unwrap();
-        assert!(run.state.radiosity() == whole.radiosity);
-    }
 }

@@ -1,10 +1,12 @@
 //! Where all emitted light has gone.
 
+use serde::{Deserialize, Serialize};
+
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
 /// Where all emitted flux has gone, W per channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     /// Exitance times area, over all elements.
     pub emitted: Rgb,
@@ -22,6 +24,16 @@ pub struct Ledger {
 }
 
 impl Ledger {
+    /// Adds `weight` times `other`.
+    pub(super) fn add(&mut self, weight: Rgb, other: &Ledger) {
+        self.emitted += weight * other.emitted;
+        self.absorbed += weight * other.absorbed;
+        self.left += weight * other.left;
+        self.back += weight * other.back;
+        self.unshot += weight * other.unshot;
+        self.overshot += weight * other.overshot;
+    }
+
     /// Emitted minus all else, relative to emitted: the worst channel. 0 when nothing is emitted.
     pub fn imbalance(&self) -> f64 {
         let accounted = self.absorbed + self.left + self.back + self.unshot - self.overshot;

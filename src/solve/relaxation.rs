@@ -5,78 +5,100 @@
 //! always the one with most to pass on, Southwell's way, is shooting (Gortler, Cohen and Slusallek
 //! 1994).
 
-use super::run::Run;
+use serde::{Deserialize, Serialize};
+
+use super::state::State;
+use super::under_way::Batch;
 use super::{Go, Stop};
 use crate::error::Error;
 use crate::scene::Rgb;
 
-/// What an element passes on in a sweep.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Sweep {
-    /// What it had when the sweep began.
-    Jacobi,
-    /// What it has when its turn comes. Elements that emit have theirs first.
-    GaussSeidel,
-}
-
 /// Sweeps until done; a step is a sweep. After k sweeps of Jacobi what leaves is e + Me + … + Mᵏe.
-pub(super) fn relax(run: &mut Run, sweep: Sweep, steps: Option<u64>) -> Result<Stop, Error> {
-    let count = run.state.flux.unshot.len();
-    let emits = |e: &usize| run.state.flux.unshot[*e] != Rgb::ZERO;
-    let (sources, mut others): (Vec<usize>, Vec<usize>) = (0..count).partition(emits);
-    // What is black never has anything to pass on.
-    others.retain(|&e| run.state.reflectance[e] != Rgb::ZERO);
-    let order = [sources, others].concat();
-    loop {
-        if run.has_converged()? {
-            return Ok(Stop::Converged);
-        }
-        if steps.is_some_and(|most| run.steps >= most) {
-            return Ok(Stop::Steps);
-        }
-        let unshot = &mut run.state.flux.unshot;
-        let go = match sweep {
-            Sweep::GaussSeidel => {
-                let due = |run: &mut Run, e: usize| std::mem::take(&mut run.state.flux.unshot[e]);
-                pass_on(run, &order, due)?
-            }
-            Sweep::Jacobi => {
-                let mut held = std::mem::replace(unshot, vec![Rgb::ZERO; count]);
-                let due: Vec<usize> =
-                    order.iter().copied().filter(|&e| held[e] != Rgb::ZERO).collect();
-                let go = pass_on(run, &due, |_, e| std::mem::take(&mut held[e]));
-                run.state.flux.unshot.iter_mut().zip(held).for_each(|(u, h)| *u += h);
-                go?
-            }
-        };
-        if go.is_break() {
-            return Ok(Stop::Cancelled);
-        }
-        run.steps += 1;
-    }
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Relaxation {
+    /// What the elements had when the sweep began and have not passed on yet, if that is what they are
+    /// to pass on: Jacobi's way. With none they pass on what they have when their turn comes.
+    held: Option<Vec<Rgb>>,
+    /// Whose turn it is: elements that emit have theirs first.
+    turn: Turn,
 }
 
-/// Passes on, of each of `elements` in turn, the flux that `due` hands out. Rows are asked for as
-/// they are needed, so that a sweep which reaches few elements makes few.
-fn pass_on(
-    run: &mut Run,
-    elements: &[usize],
-    mut due: impl FnMut(&mut Run, usize) -> Rgb,
-) -> Result<Go, Error> {
-    let mut at = 0;
-    while at < elements.len() {
-        for row in run.rows.next(&elements[at..])? {
-            let flux = due(run, elements[at]);
-            at += 1;
-            if flux != Rgb::ZERO {
-                run.state.pass_on(flux, &row);
-                run.shots += 1;
+/// A place in a sweep.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct Turn {
+    sources: bool,
+    element: usize,
+}
+
+/// Where a sweep begins.
+const FIRST: Turn = Turn { sources: true, element: 0 };
+
+impl Relaxation {
+    /// Jacobi's way.
+    pub fn jacobi(count: usize) -> Relaxation {
+        Relaxation { held: Some(vec![Rgb::ZERO; count]), turn: FIRST }
+    }
+
+    /// Gauss–Seidel's.
+    pub fn gauss_seidel() -> Relaxation {
+        Relaxation { held: None, turn: FIRST }
+    }
+
+    /// Whether it fits `count` elements and that way, as one from a file may not.
+    pub fn fits(&self, count: usize, jacobi: bool) -> bool {
+        let all = |h: &Vec<Rgb>| h.len() == count && h.iter().all(|w| w.is_finite());
+        self.turn.element <= count && self.held.as_ref().map_or(!jacobi, |h| jacobi && all(h))
+    }
+
+    /// Goes on by as many elements as one batch of rows reaches.
+    pub fn advance(&mut self, batch: &mut Batch) -> Result<Option<Stop>, Error> {
+        let count = batch.state.flux.unshot.len();
+        let begins = self.turn.sources && self.turn.element == 0;
+        if begins {
+            if batch.has_converged()? {
+                return Ok(Some(Stop::Converged));
             }
-            let unshot_share = run.state.ledger.unshot_share();
-            if run.tell(unshot_share).is_break() {
-                return Ok(Go::Break(()));
+            if batch.is_last_step() {
+                return Ok(Some(Stop::Steps));
+            }
+            if let Some(held) = &mut self.held {
+                std::mem::swap(held, &mut batch.state.flux.unshot);
             }
         }
+        let sources = self.turn.sources;
+        let flux = &batch.state.flux;
+        let due = |e: &usize| match &self.held {
+            Some(held) => held[*e] != Rgb::ZERO,
+            // What is black never has anything to pass on, unless it emits less than it did.
+            None => flux.reflectance[*e] != Rgb::ZERO || flux.unshot[*e] != Rgb::ZERO,
+        };
+        let emits = |e: &usize| flux.emitted[*e] != Rgb::ZERO;
+        let these = (self.turn.element..count).filter(|e| emits(e) == sources).filter(due);
+        let rows = batch.rows.next(batch.state.mesh, batch.maker, these)?;
+        if rows.is_empty() {
+            self.turn = Turn { sources: !sources, element: 0 };
+            batch.done.steps += u64::from(!sources);
+        }
+        for (e, row) in rows {
+            let from = self.held.as_mut().unwrap_or(&mut batch.state.flux.unshot);
+            let flux = std::mem::take(&mut from[e]);
+            self.turn.element = e + 1;
+            if flux != Rgb::ZERO {
+                batch.pass_on(flux, batch.state.mesh.element(e), &row);
+                batch.done.shots += 1;
+            }
+            let unshot_share = batch.state.ledger.unshot_share();
+            if batch.tell(unshot_share) == Go::Break(()) {
+                return Ok(Some(Stop::Cancelled));
+            }
+        }
+        Ok(None)
     }
-    Ok(Go::Continue(()))
+
+    /// Hands back what is held, and begins anew.
+    pub fn finish(&mut self, state: &mut State) {
+        let held = self.held.iter_mut().flatten();
+        state.flux.unshot.iter_mut().zip(held).for_each(|(u, h)| *u += std::mem::take(h));
+        self.turn = FIRST;
+    }
 }

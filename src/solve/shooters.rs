@@ -13,6 +13,7 @@ use std::collections::{BinaryHeap, HashSet};
 use std::ops::Range;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::state::Flux;
 use crate::form_factor::Row;
@@ -21,9 +22,10 @@ use crate::order::rank;
 use crate::scene::Rgb;
 
 /// The shooters. Together they cover every element once, and they only ever get smaller.
+#[derive(Clone)]
 pub(super) struct Shooters<'m> {
     mesh: &'m Mesh,
-    clusters: Clusters,
+    clusters: &'m Clusters,
     /// Centroid of each element.
     centroids: Vec<DVec3>,
     cut: Vec<Shooter>,
@@ -36,8 +38,10 @@ pub(super) struct Shooters<'m> {
 }
 
 /// One that shoots.
+#[derive(Clone, Serialize, Deserialize)]
 struct Shooter {
     source: Source,
+    #[serde(skip)]
     elements: Vec<Range<usize>>,
     /// The node whose row this shoots along, once it has shot or is about to.
     patch: Option<NodeId>,
@@ -48,17 +52,24 @@ struct Shooter {
     rejected: u32,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 enum Source {
     Cluster(u32),
     Node(NodeId),
 }
 
 /// Means of 1/r and 1/r² over what a patch sees, r from its centroid; 1/length unit, and squared.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct Near {
     first: f64,
     second: f64,
+}
+
+/// The shooters as they are saved.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Cut {
+    shooters: Vec<Shooter>,
+    blind: Vec<NodeId>,
 }
 
 /// A shot to be taken.
@@ -72,14 +83,15 @@ pub(super) struct Shot {
 }
 
 impl<'m> Shooters<'m> {
+    fn none(mesh: &'m Mesh, tolerance: f64, level: u32) -> Shooters<'m> {
+        let (cut, blind, centroids) = (vec![], HashSet::new(), centroids(mesh));
+        Shooters { mesh, clusters: mesh.clusters(), centroids, cut, blind, tolerance, level }
+    }
+
     /// The largest there are; but emitters that are few shoot by their elements, since what is nearest
     /// a lamp depends most on its shape.
     pub fn new(mesh: &'m Mesh, tolerance: f64, level: u32) -> Shooters<'m> {
-        let clusters = Clusters::new(mesh.scene());
-        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let centroids = elements.map(|n| mesh.centroid(n)).collect();
-        let blind = HashSet::new();
-        let mut all = Shooters { mesh, clusters, centroids, cut: vec![], blind, tolerance, level };
+        let mut all = Shooters::none(mesh, tolerance, level);
         // As in the middle of a cube of that area.
         let area: f64 = (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum();
         let near = Near { first: (6.0 / area).sqrt(), second: 6.0 / area };
@@ -100,6 +112,57 @@ impl<'m> Shooters<'m> {
             all.cut.extend(emitters);
         }
         all
+    }
+
+    /// What there is to be saved.
+    pub fn cut(&self) -> Cut {
+        let mut blind: Vec<NodeId> = self.blind.iter().copied().collect();
+        blind.sort_unstable();
+        Cut { shooters: self.cut.clone(), blind }
+    }
+
+    /// The shooters of a cut that was saved, if they are a cut through `mesh`.
+    pub fn from_cut(mesh: &'m Mesh, tolerance: f64, level: u32, cut: Cut) -> Option<Shooters<'m>> {
+        let mut all = Shooters::none(mesh, tolerance, level);
+        let node = |n: NodeId| mesh.contains(n);
+        let mut seen = vec![false; mesh.element_count()];
+        for saved in cut.shooters {
+            let known = match saved.source {
+                Source::Cluster(c) => (c as usize) < all.clusters.count(),
+                Source::Node(n) => node(n),
+            };
+            let Near { first, second } = saved.near;
+            if !known || !saved.patch.is_none_or(node) || first.is_nan() || second.is_nan() {
+                return None;
+            }
+            let elements = all.shooter(saved.source, saved.near).elements;
+            for e in self::all(&elements) {
+                if std::mem::replace(&mut seen[e], true) {
+                    return None;
+                }
+            }
+            all.cut.push(Shooter { elements, ..saved });
+        }
+        all.blind = cut.blind.into_iter().collect();
+        (seen.into_iter().all(|s| s) && all.blind.iter().all(|&n| node(n))).then_some(all)
+    }
+
+    /// Shoots over `mesh` from now on, whose elements are the same.
+    pub fn change(&mut self, mesh: &'m Mesh) {
+        (self.mesh, self.clusters, self.centroids) = (mesh, mesh.clusters(), centroids(mesh));
+    }
+
+    /// The elements of the shooter that shoots from `patch`, which sees too many backs by now, to be
+    /// shot for from elsewhere. None where there is no other place.
+    pub fn blinded(&mut self, patch: NodeId) -> Option<Vec<usize>> {
+        let shooter = self.cut.iter_mut().find(|s| s.patch == Some(patch))?;
+        let elements: Vec<usize> = all(&shooter.elements).collect();
+        if elements.len() == 1 {
+            return None;
+        }
+        shooter.patch = None;
+        self.blind.insert(patch);
+        Some(elements)
     }
 
     /// The next shots, by unshot flux, most first; emitters before all others. Ends at `rows`
@@ -145,7 +208,7 @@ impl<'m> Shooters<'m> {
             }
             wanted -= usize::from(draws);
             let shooter = &mut self.cut[k];
-            (shooter.patch, shooter.fresh) = (Some(patch), false);
+            shooter.patch = Some(patch);
             shots.push(Shot { shooter: k, patch, elements: shooter.elements.clone() });
         }
         shots
@@ -172,6 +235,11 @@ impl<'m> Shooters<'m> {
             return false;
         }
         !self.split(shot.shooter, flux)
+    }
+
+    /// Notes that `shot` was taken.
+    pub fn shot(&mut self, shot: &Shot) {
+        self.cut[shot.shooter].fresh = false;
     }
 
     /// Replaces shooter `k` by its parts where it is too coarse, and these by theirs. Parts take on
@@ -212,7 +280,7 @@ impl<'m> Shooters<'m> {
         for e in all(&shooter.elements) {
             let node = mesh.element(e);
             let (off, turned) = (self.centroids[e] - eye, mesh.normal(node) - normal);
-            let light = flux.leaving[e].element_sum();
+            let light = flux.leaving(e).element_sum();
             whole += light;
             area += mesh.area(node);
             place += light * off;
@@ -221,8 +289,11 @@ impl<'m> Shooters<'m> {
             bend += light * turned.length_squared();
         }
         let even = |e: usize| whole / area * mesh.area(mesh.element(e));
-        let uneven = |e: usize| (flux.leaving[e].element_sum() - even(e)).abs();
+        let uneven = |e: usize| (flux.leaving(e).element_sum() - even(e)).abs();
         let uneven = all(&shooter.elements).map(uneven).sum::<f64>() / whole;
+        if whole <= 0.0 {
+            return 0.0;
+        }
         let Near { first, second } = shooter.near;
         // The angle that the patch is seen under, squared.
         let wide = extent / whole * second;
@@ -239,7 +310,7 @@ impl<'m> Shooters<'m> {
             return patch;
         }
         let area = |e: usize| mesh.area(mesh.element(e));
-        let light = |e: usize| flux.leaving[e].element_sum();
+        let light = |e: usize| flux.leaving(e).element_sum();
         let elements = || all(&shooter.elements);
         let whole: f64 = elements().map(light).sum();
         let mean = whole / elements().map(area).sum::<f64>();
@@ -321,6 +392,10 @@ const UNEVEN: f64 = 3.0;
 
 fn all(elements: &[Range<usize>]) -> impl Iterator<Item = usize> {
     elements.iter().cloned().flatten()
+}
+
+fn centroids(mesh: &Mesh) -> Vec<DVec3> {
+    (0..mesh.element_count()).map(|e| mesh.centroid(mesh.element(e))).collect()
 }
 
 /// Levels below `node`, at most.

@@ -2,13 +2,14 @@
 //! flux first, which is Southwell's relaxation.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use super::run::Run;
 use super::shooters::{Shooters, Shot};
 use super::state::State;
-use super::{Go, Method, Progress, Solution, Stop};
-use crate::error::{Error, ErrorKind};
-use crate::form_factor::{FormFactors, Row};
+use super::under_way::Batch;
+use super::{Go, Method, Progress, Solution, Solver, Stop};
+use crate::error::Error;
+use crate::form_factor::FormFactors;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
@@ -66,8 +67,8 @@ impl Shooting {
     /// solver; what was reached is returned.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1] or `tolerance` not at least 0;
-    /// [`ErrorKind::Scene`] when the emitted flux is not finite; [`ErrorKind::FormFactor`] when a row
+    /// [`crate::ErrorKind::Setting`] when `unshot` is not in [0, 1] or `tolerance` not at least 0;
+    /// [`crate::ErrorKind::Scene`] when the emitted flux is not finite; [`crate::ErrorKind::FormFactor`] when a row
     /// breaks its contract; whatever `form_factors` fails with.
     pub fn solve(
         &self,
@@ -75,72 +76,82 @@ impl Shooting {
         form_factors: &mut dyn FormFactors,
         mut progress: impl FnMut(&Progress) -> Go,
     ) -> Result<Solution, Error> {
+        self.solver().solve(mesh, form_factors, &mut progress)
+    }
+
+    /// The same as a [`Solver`].
+    pub fn solver(&self) -> Solver {
         let &Shooting { unshot, shots, row_memory, tolerance, level, overshoot } = self;
-        if tolerance.is_nan() || tolerance < 0.0 {
-            let place = format!("tolerance {tolerance}");
-            return Err(Error::new(ErrorKind::Setting, place, "below 0", "use 0 or more"));
-        }
-        let mut run = Run::new(mesh, form_factors, &mut progress, unshot, row_memory)?;
-        let mut shooters = Shooters::new(mesh, tolerance, level);
-        let stop = loop {
-            if run.has_converged()? {
-                break Stop::Converged;
-            }
-            let left = shots.map_or(u64::MAX, |most| most - run.shots);
-            if left == 0 {
-                break Stop::Shots;
-            }
-            let ahead = match overshoot {
-                true => run.state.ledger.ambient(mesh).max(Rgb::ZERO),
-                false => Rgb::ZERO,
-            };
-            if shoot_batch(&mut run, &mut shooters, left, ahead)?.is_break() {
-                break Stop::Cancelled;
-            }
-        };
-        run.solution(Method::Shooting { tolerance, level, overshoot }, stop)
+        let method = Method::Shooting { tolerance, level, overshoot };
+        Solver { method, unshot, steps: shots, row_memory }
     }
 }
 
-/// Takes the next shots, at most `left`, each running `ahead` by so much radiosity per unit of
-/// reflectance.
-fn shoot_batch(run: &mut Run, shooters: &mut Shooters, left: u64, ahead: Rgb) -> Result<Go, Error> {
-    let missing = |patch| run.rows.get(patch).is_none();
-    let batch = shooters.brightest(&run.state.flux, run.rows.batch(), left, missing);
-    let draws: Vec<&Shot> = batch.iter().filter(|s| missing(s.patch)).collect();
-    let share = |s: &&Shot| run.state.flux.unshot_share(&s.elements);
-    let unshot_share = draws.iter().map(share).fold(0.0, f64::max);
-    let missing: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
-    let mut made = run.rows.make(&missing, unshot_share)?.into_iter();
-    for shot in batch {
-        match run.rows.get(shot.patch) {
-            Some(row) => {
-                run.state.shoot(&shot.elements, row, ahead);
-                run.shots += 1;
-            }
+/// Takes the next shots, if there is any to be taken.
+pub(super) fn shoot_batch(
+    batch: &mut Batch,
+    shooters: &mut Shooters,
+    overshoot: bool,
+) -> Result<Option<Stop>, Error> {
+    if batch.has_converged()? {
+        return Ok(Some(Stop::Converged));
+    }
+    let left = batch.steps.map_or(u64::MAX, |most| most.saturating_sub(batch.done.shots));
+    if left == 0 {
+        return Ok(Some(Stop::Shots));
+    }
+    let mesh = batch.state.mesh;
+    let ahead = match overshoot {
+        true => batch.state.ledger.ambient(mesh).max(Rgb::ZERO),
+        false => Rgb::ZERO,
+    };
+    let missing = |patch| !batch.rows.keeps(patch);
+    let wanted = batch.maker.batch().max(1);
+    let shots = shooters.brightest(&batch.state.flux, wanted, left, missing);
+    let draws: Vec<&Shot> = shots.iter().filter(|s| missing(s.patch)).collect();
+    let share = |s: &&Shot| batch.state.flux.unshot_share(&s.elements);
+    let share = draws.iter().map(share).fold(0.0, f64::max).min(1.0);
+    let draws: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
+    batch.rows.recall(mesh, batch.maker, shots.iter().map(|s| s.patch))?;
+    let mut made = match draws.is_empty() {
+        true => vec![],
+        false => batch.rows.make(mesh, batch.maker, &draws, share)?,
+    }
+    .into_iter();
+    for shot in shots {
+        let row = match batch.rows.get(shot.patch) {
+            Some(row) => Some(row.clone()),
             None => {
                 let Some(row) = made.next() else { break };
                 // Else the patch is too large, and its parts shoot.
-                if shooters.confirm(&shot, &row, &run.state.flux) {
-                    run.state.shoot(&shot.elements, &row, ahead);
-                    run.rows.keep(shot.patch, row);
-                    run.shots += 1;
-                }
+                let taken = shooters.confirm(&shot, &row, &batch.state.flux);
+                taken.then(|| {
+                    let row = Arc::new(row);
+                    batch.rows.keep(shot.patch, row.clone(), share);
+                    row
+                })
             }
+        };
+        if let Some(row) = row {
+            let flux = batch.state.take(&shot.elements, ahead);
+            batch.pass_on(flux.0, shot.patch, &row);
+            batch.state.book(flux.1);
+            batch.done.shots += 1;
+            shooters.shot(&shot);
         }
-        run.steps = run.shots;
-        let unshot_share = run.state.ledger.unshot_share();
-        if run.tell(unshot_share).is_break() {
-            return Ok(Go::Break(()));
+        batch.done.steps = batch.done.shots;
+        let unshot_share = batch.state.ledger.unshot_share();
+        if batch.tell(unshot_share).is_break() {
+            return Ok(Some(Stop::Cancelled));
         }
     }
-    Ok(Go::Continue(()))
+    Ok(None)
 }
 
 impl State<'_> {
-    /// Passes the unshot flux of `from` on along `row`, and `ahead`, W/m² per unit of reflectance,
-    /// beyond it.
-    fn shoot(&mut self, from: &[Range<usize>], row: &Row, ahead: Rgb) {
+    /// Takes the unshot flux of `from`, and `ahead`, W/m² per unit of reflectance, beyond it: all that
+    /// is to be passed on, and what of it is overshot.
+    fn take(&mut self, from: &[Range<usize>], ahead: Rgb) -> (Rgb, Rgb) {
         let (mut flux, mut overshot) = (Rgb::ZERO, Rgb::ZERO);
         for e in from.iter().cloned().flatten() {
             let unshot = std::mem::take(&mut self.flux.unshot[e]);
@@ -149,13 +160,17 @@ impl State<'_> {
             if ahead != Rgb::ZERO {
                 let area = self.mesh.area(self.mesh.element(e));
                 let most = MOST_OVERSHOOT * unshot.max(Rgb::ZERO);
-                let over = (self.reflectance[e] * area * ahead).min(most);
+                let over = (self.flux.reflectance[e] * area * ahead).min(most);
                 self.flux.unshot[e] -= over;
                 flux += over;
                 overshot += over;
             }
         }
-        self.pass_on(flux, row);
+        (flux, overshot)
+    }
+
+    /// Books flux that was passed on and is overshot.
+    fn book(&mut self, overshot: Rgb) {
         self.ledger.unshot += overshot;
         self.ledger.overshot += overshot;
     }

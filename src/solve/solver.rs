@@ -3,11 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::direct::direct;
-use super::gmres::gmres;
-use super::relaxation::{Sweep, relax};
-use super::run::Run;
-use super::{Go, Progress, Shooting, Solution};
+use super::rows::Rows;
+use super::state::State;
+use super::under_way::{Course, Done, Solve};
+use super::{Go, MAX_DIRECT, Progress, Shooting, Solution};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
@@ -41,7 +40,7 @@ pub enum Method {
     /// Restarted GMRES (Saad and Schultz 1986).
     Gmres {
         /// Products with all rows until it starts again, 1 or more; twice as many where that takes it
-        /// nowhere. Each takes 24 bytes an element.
+        /// nowhere. Each takes 48 bytes an element.
         restart: usize,
     },
     /// Gaussian elimination, to rounding whatever unshot share is asked for; at most [`MAX_DIRECT`]
@@ -175,19 +174,51 @@ impl Solver {
         form_factors: &mut dyn FormFactors,
         mut progress: impl FnMut(&Progress) -> Go,
     ) -> Result<Solution, Error> {
-        let &Solver { method, unshot, steps, row_memory } = self;
-        if let Method::Shooting { tolerance, level, overshoot } = method {
-            let settings =
-                Shooting { unshot, shots: steps, row_memory, tolerance, level, overshoot };
-            return settings.solve(mesh, form_factors, progress);
+        let mut solve = self.begin(mesh)?;
+        solve.run(form_factors, &mut progress)?;
+        solve.into_solution()
+    }
+
+    /// A solve of `mesh` in which nothing is shot yet.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1], a setting of the method is out of range or
+    /// the mesh too large for it; [`ErrorKind::Scene`] when the emitted flux is not finite.
+    pub fn begin<'m>(&self, mesh: &'m Mesh) -> Result<Solve<'m>, Error> {
+        self.check()?;
+        let count = mesh.element_count();
+        if self.method == Method::Direct && count > MAX_DIRECT {
+            let remedy = format!("at most {MAX_DIRECT}: use another method, such as gmres");
+            let found = format!("{count} elements");
+            return Err(Error::new(ErrorKind::Setting, "direct solve", found, remedy));
         }
-        let mut run = Run::new(mesh, form_factors, &mut progress, unshot, row_memory)?;
-        let stop = match method {
-            Method::Jacobi => relax(&mut run, Sweep::Jacobi, steps),
-            Method::GaussSeidel => relax(&mut run, Sweep::GaussSeidel, steps),
-            Method::Gmres { restart } => gmres(&mut run, restart, steps),
-            _ => direct(&mut run, steps),
-        }?;
-        run.solution(method, stop)
+        Ok(Solve {
+            solver: *self,
+            state: State::new(mesh)?,
+            rows: Rows::new(self.row_memory),
+            course: Course::new(self.method, mesh),
+            done: Done::default(),
+            stop: None,
+            made_by: String::new(),
+        })
+    }
+
+    /// Whether all settings are in range.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let wrong = |place: String, found: &str, remedy: &str| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        if !(0.0..=1.0).contains(&self.unshot) {
+            return wrong(format!("unshot share {}", self.unshot), "out of range", "use 0 to 1");
+        }
+        match self.method {
+            Method::Shooting { tolerance, .. } if tolerance.is_nan() || tolerance < 0.0 => {
+                wrong(format!("tolerance {tolerance}"), "below 0", "use 0 or more")
+            }
+            Method::Gmres { restart: 0 } => {
+                wrong("restart 0".into(), "no product", "use 1 or more products a cycle")
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -11,6 +11,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::ledger::{Ledger, largest_share};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
@@ -18,32 +20,63 @@ use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
 /// Flux of the elements, W per channel.
+#[derive(Clone)]
 pub(super) struct Flux {
     /// Emitted by all.
-    emitted: Rgb,
+    total: Rgb,
+    /// Emitted by each.
+    pub emitted: Vec<Rgb>,
+    /// The share of what it receives that each reflects; no flux.
+    pub reflectance: Vec<Rgb>,
+    /// Received by each.
+    pub incident: Vec<Rgb>,
     /// Received or emitted by each and not yet passed on; below 0 where it was passed on before.
     pub unshot: Vec<Rgb>,
-    /// Emitted or reflected by each, shot or not.
-    pub leaving: Vec<Rgb>,
 }
 
 impl Flux {
+    /// What `mesh` emits, all of it unshot.
+    pub fn emitted_by(mesh: &Mesh) -> Result<Flux, Error> {
+        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
+        let emitted: Vec<Rgb> =
+            elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
+        let reflectance: Vec<Rgb> = elements.map(|n| mesh.material(n).reflectance).collect();
+        let total: Rgb = emitted.iter().sum();
+        if !total.is_finite() {
+            let remedy = "scale exitances down: sums of flux must stay finite in 64-bit floats";
+            let found = format!("{total} W");
+            return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
+        }
+        let (incident, unshot) = (vec![Rgb::ZERO; emitted.len()], emitted.clone());
+        Ok(Flux { total, emitted, reflectance, incident, unshot })
+    }
+
+    /// Emitted by all elements.
+    pub fn total(&self) -> Rgb {
+        self.total
+    }
+
+    /// Emitted or reflected by element `e`, shot or not.
+    pub fn leaving(&self, e: usize) -> Rgb {
+        self.emitted[e] + self.reflectance[e] * self.incident[e]
+    }
+
     /// What is unshot or overshot in `elements`, as a share of the emitted: the worst channel.
     pub fn unshot_share(&self, elements: &[Range<usize>]) -> f64 {
         let all =
             |run: &Range<usize>| self.unshot[run.clone()].iter().map(|u| u.abs()).sum::<Rgb>();
-        largest_share(elements.iter().map(all).sum(), self.emitted)
+        largest_share(elements.iter().map(all).sum(), self.total)
     }
 
     /// What leaves `elements`, as a share of the emitted: the worst channel.
     pub fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
-        let all = |run: &Range<usize>| self.leaving[run.clone()].iter().sum::<Rgb>();
-        largest_share(elements.iter().map(all).sum(), self.emitted)
+        let all = |run: &Range<usize>| run.clone().map(|e| self.leaving(e)).sum::<Rgb>();
+        largest_share(elements.iter().map(all).sum(), self.total)
     }
 }
 
 /// What became of flux that was sent, W per channel.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Sent {
     pub reflected: Rgb,
     pub absorbed: Rgb,
@@ -61,20 +94,21 @@ impl Sent {
     }
 }
 
-/// Sends `flux` along `row`; `reflect` gets what each element reflects of it.
+/// Sends `flux` along `row`; `receive` gets what comes to each element, of which it reflects what
+/// `reflectance` says.
 pub(super) fn send(
     flux: Rgb,
     row: &Row,
-    reflectance: &[Rgb],
-    mut reflect: impl FnMut(usize, Rgb),
+    reflectance: impl Fn(usize) -> Rgb,
+    mut receive: impl FnMut(usize, Rgb),
 ) -> Sent {
     let per_share = flux / f64::from(Row::TOTAL);
     let (mut absorbed, mut reflected) = (Rgb::ZERO, Rgb::ZERO);
     for entry in &row.entries {
         let e = entry.element as usize;
         let incident = per_share * f64::from(entry.share);
-        let passed = incident * reflectance[e];
-        reflect(e, passed);
+        let passed = incident * reflectance(e);
+        receive(e, incident);
         reflected += passed;
         absorbed += incident - passed;
     }
@@ -83,41 +117,35 @@ pub(super) fn send(
 }
 
 /// Flux of all elements, and the ledger of it.
+#[derive(Clone)]
 pub(super) struct State<'m> {
     pub mesh: &'m Mesh,
-    /// Reflectance of each element.
-    pub reflectance: Vec<Rgb>,
     pub flux: Flux,
     pub ledger: Ledger,
 }
 
 /// The ledger must close to this after every batch: f64 sums of some 10⁹ terms stay far below.
-const IMBALANCE: f64 = 1e-9;
+pub(super) const IMBALANCE: f64 = 1e-9;
 
 impl<'m> State<'m> {
     pub fn new(mesh: &'m Mesh) -> Result<State<'m>, Error> {
-        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let unshot: Vec<Rgb> =
-            elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
-        let reflectance = elements.map(|n| mesh.material(n).reflectance).collect();
-        let emitted: Rgb = unshot.iter().sum();
-        if !emitted.is_finite() {
-            let remedy = "scale exitances down: sums of flux must stay finite in 64-bit floats";
-            let found = format!("{emitted} W");
-            return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
-        }
-        let ledger = Ledger { emitted, unshot: emitted, ..Default::default() };
-        let flux = Flux { emitted, leaving: unshot.clone(), unshot };
-        Ok(State { mesh, reflectance, flux, ledger })
+        let flux = Flux::emitted_by(mesh)?;
+        let ledger = Ledger { emitted: flux.total, unshot: flux.total, ..Default::default() };
+        Ok(State { mesh, flux, ledger })
     }
 
     /// Sends `flux`, which is no longer unshot anywhere, along `row`.
     pub fn pass_on(&mut self, flux: Rgb, row: &Row) {
-        let Flux { unshot, leaving, .. } = &mut self.flux;
-        let sent = send(flux, row, &self.reflectance, |e, passed| {
-            unshot[e] += passed;
-            leaving[e] += passed;
-        });
+        let Flux { reflectance, incident, unshot, .. } = &mut self.flux;
+        let sent = send(
+            flux,
+            row,
+            |e| reflectance[e],
+            |e, came| {
+                incident[e] += came;
+                unshot[e] += reflectance[e] * came;
+            },
+        );
         self.lose(sent);
         self.ledger.unshot += sent.reflected - flux;
     }
@@ -146,7 +174,7 @@ impl<'m> State<'m> {
     }
 
     pub fn radiosity(&self) -> Vec<Rgb> {
-        let flux = self.flux.leaving.iter().zip(0..);
-        flux.map(|(&w, e)| w / self.mesh.area(self.mesh.element(e))).collect()
+        let area = |e| self.mesh.area(self.mesh.element(e));
+        (0..self.mesh.element_count()).map(|e| self.flux.leaving(e) / area(e)).collect()
     }
 }
