@@ -5,11 +5,12 @@
 mod support;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use glam::DVec3;
 use lexopt::prelude::*;
-use radiosity::{Camera, Effort, GatherEffort};
+use radiosity::{Camera, Effort, GatherEffort, Method};
 use support::{Bake, Choice, Goal};
 
 const USAGE: &str = "\
@@ -41,7 +42,9 @@ Settings, each chosen by what is asked for unless set by hand; in brackets those
                     hemicubes or more [not done]
   --rotations K     hemicubes a viewpoint, each turned further, averaged [1]
   --unshot F        stop at this share of unshot flux [0.0001]
-  --shots N         stop after this many shots
+  --solver NAME     how light is spread: shooting, overshoot, jacobi, gauss-seidel, gmres or direct
+                    [gmres where reflectance is near one, else shooting]
+  --shots N         stop after this many shots, or steps of another solver
   --row-memory MB   memory for form-factor rows that are kept [1024]
   --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
                     patches as small as they can be [0.004]
@@ -59,6 +62,8 @@ Of vertices that gather:
   --sweeps N        times that all vertices gather, the last time what they found before
 
 Files and devices:
+  --state FILE      write the state of the solve there now and then, and go on from it if it is
+                    there: what is killed loses its last moments only
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
   --pixel-gather    every pixel of the picture looks at the settled light for itself
@@ -112,6 +117,14 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
                 let megabytes: usize = args.value()?.parse()?;
                 let bytes = megabytes.saturating_mul(1 << 20);
                 set(&mut bake, move |effort| effort.shooting.row_memory = bytes);
+            }
+            Long("solver") => {
+                let method: Method = args.value()?.parse()?;
+                set(&mut bake, move |effort| effort.method = Some(method));
+            }
+            Long("state") => {
+                let path = PathBuf::from(args.value()?);
+                set(&mut bake, move |effort| effort.state = Some(path.clone()));
             }
             Long("ambient") => set(&mut bake, |effort| effort.ambient = true),
             Long("element-size") => {

@@ -2,13 +2,14 @@
 //! accuracy is reached.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::certificate::{Certificate, Judged};
 use crate::device::Device;
 use crate::device::backed::{Backed, DeviceRelay};
 use crate::effort::Effort;
 use crate::error::Error;
+use crate::form_factor::FormFactors;
 use crate::form_factor::near::NearRepair;
 use crate::form_factor::viewpoints::Viewpoints;
 use crate::gather::Gather;
@@ -187,7 +188,7 @@ impl Shot {
         let mut rows = Viewpoints::new(near, effort.viewpoints.unwrap_or(1.0), levels);
         let mut seconds = BakeSeconds { mesh: lap(&mut since), ..Default::default() };
         let mut tell = |p: &Progress| device.tell(&Stage::Shooting(*p), progress);
-        let mut solution = effort.shooting.solve(&mesh, &mut rows, &mut tell)?;
+        let mut solution = solve(effort, &mesh, &mut rows, &mut tell)?;
         if effort.ambient {
             solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
         }
@@ -239,6 +240,36 @@ impl Shot {
         Ok((light, certificate, self, effort.clone()))
     }
 }
+
+/// Spreads the light of `mesh`; from a saved state on if there is one, and saves it.
+fn solve(
+    effort: &Effort,
+    mesh: &Mesh,
+    rows: &mut dyn FormFactors,
+    progress: &mut dyn FnMut(&Progress) -> Go,
+) -> Result<Solution, Error> {
+    let solver = effort.solver(mesh);
+    let Some(path) = &effort.state else { return solver.solve(mesh, rows, progress) };
+    let mut solve = match path.exists() {
+        true => solver.resume(mesh, rows, path)?,
+        false => solver.begin(mesh)?,
+    };
+    let (mut saved, mut took) = (Instant::now(), Duration::ZERO);
+    loop {
+        let stop = solve.advance(rows, &mut *progress)?;
+        if stop.is_some() || saved.elapsed() >= SAVING * took {
+            let start = Instant::now();
+            solve.save(path)?;
+            (saved, took) = (Instant::now(), start.elapsed());
+        }
+        if stop.is_some() {
+            return solve.into_solution();
+        }
+    }
+}
+
+/// Solving goes on for so many times what saving takes.
+const SAVING: u32 = 10;
 
 /// Vertices that gather what was shot.
 struct Settling<'a> {

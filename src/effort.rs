@@ -1,10 +1,12 @@
 //! What a bake spends: all its settings, and which of them an accuracy asks for.
 
 use std::num::NonZeroU32;
+use std::path::PathBuf;
 
 use crate::error::Error;
+use crate::mesh::Mesh;
 use crate::scene::Scene;
-use crate::solve::Shooting;
+use crate::solve::{Method, Shooting, Solver};
 use crate::vertex::gathering::Gathering;
 
 /// All settings of a bake. [`Effort::for_error`] chooses them; each can be changed by hand.
@@ -28,6 +30,13 @@ pub struct Effort {
     pub viewpoints: Option<f64>,
     /// How far light is shot, and from how large patches.
     pub shooting: Shooting,
+    /// How light is spread, as far as `shooting` says; with none by shooting, or with GMRES in scenes
+    /// as bright as [`Solver::for_mesh`] asks for.
+    pub method: Option<Method>,
+    /// A file that the state of the solve is written to, every few batches and at its end; if it is
+    /// there, the solve goes on from it: see [`Solver::resume`]. The last batches at most are lost
+    /// when a bake is killed: as many as take ten times what writing takes.
+    pub state: Option<PathBuf>,
     /// Whether the light not yet shot is added, spread evenly.
     pub ambient: bool,
     /// How vertices gather; with none, they get what the elements around them have.
@@ -55,6 +64,19 @@ impl Effort {
     /// comes before that is checked where it is used.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.gather.as_ref().map_or(Ok(()), |gather| gather.gathering.check())
+    }
+
+    /// Who spreads the light of `mesh`.
+    pub(crate) fn solver(&self, mesh: &Mesh) -> Solver {
+        let shooting = self.shooting.solver();
+        let method = match (self.method, Solver::for_mesh(mesh).method) {
+            (Some(Method::Shooting { overshoot, .. }), _) => {
+                return Shooting { overshoot, ..self.shooting.clone() }.solver();
+            }
+            (Some(method), _) | (None, method @ Method::Gmres { .. }) => method,
+            (None, _) => return shooting,
+        };
+        Solver { method, ..shooting }
     }
 
     /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
@@ -89,6 +111,8 @@ impl Effort {
                 tolerance: e.min(0.02 + 0.4 * e),
                 ..Shooting::default()
             },
+            method: None,
+            state: None,
             ambient: false,
             gather: Some(GatherEffort {
                 element_size: 0.3 * diagonal * e.powf(0.3),

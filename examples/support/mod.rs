@@ -269,6 +269,7 @@ fn settings(effort: &Effort) -> Vec<(String, Value)> {
         ("near", json!(effort.near)),
         ("viewpoints", json!(effort.viewpoints)),
         ("rotations", json!(effort.rotations.get())),
+        ("solver", json!(effort.method.map(|method| method.to_string()))),
         ("unshot", json!(shooting.unshot)),
         ("shots", json!(shooting.shots)),
         ("row_memory", json!(shooting.row_memory)),

@@ -23,7 +23,7 @@ use crate::scene::Rgb;
 pub(super) struct Gmres {
     /// Products in a cycle.
     length: usize,
-    cycle: Option<Cycle>,
+    cycle: Option<Box<Cycle>>,
     product: Option<Product>,
 }
 
@@ -62,7 +62,7 @@ impl Gmres {
             if batch.has_converged()? {
                 return Ok(Some(Stop::Converged));
             }
-            self.cycle = Some(Cycle::new(batch.state));
+            self.cycle = Some(Box::new(Cycle::new(batch.state)));
             return Ok(None);
         };
         let Some(product) = &mut self.product else {
