@@ -92,6 +92,34 @@ fn bake_writes_all_it_says() {
 }
 
 #[test]
+fn bake_goes_on_from_a_saved_state_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("light.state");
+    for solver in ["shooting", "gmres"] {
+        let bake = |name: &str, more: &[&str]| {
+            let stem = folder.path().join(name);
+            let mut args = vec![cornell(), "--cpu", "--out", stem.to_str().unwrap()];
+            args.extend(["--element-size", "200", "--hemicube", "32", "--solver", solver]);
+            args.extend(more);
+            let out = run("bake", &args);
+            assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+            std::fs::read(stem.with_extension("ply")).unwrap()
+        };
+        let path = state.to_str().unwrap();
+        let whole = bake("whole", &[]);
+        // Cut short, then on from there.
+        let cut_short = bake("part", &["--state", path, "--shots", "2"]);
+        let on = bake("on", &["--state", path]);
+        assert!(cut_short != whole && on == whole, "{solver}");
+        let mut args = vec![cornell(), "--cpu", "--element-size", "150", "--solver", solver];
+        args.extend(["--state", path]);
+        refused(&args, &["light.state", "fingerprint of the mesh"]);
+        std::fs::remove_file(&state).unwrap();
+    }
+    refused(&[cornell(), "--cpu", "--solver", "newton"], &["'newton'", "gauss-seidel"]);
+}
+
+#[test]
 fn bake_gathers_without_a_gpu() {
     let folder = tempfile::tempdir().unwrap();
     let stem = folder.path().join("lit");
