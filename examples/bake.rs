@@ -63,7 +63,8 @@ Of vertices that gather:
 
 Files and devices:
   --state FILE      write the state of the solve there now and then, and go on from it if it is
-                    there: what is killed loses its last moments only
+                    there: what is killed loses its last moments only; not with --time, which
+                    solves many times
   --camera ...      eye, target, vertical field of view in degrees
   --image W,H       size of the picture in pixels [512,512]
   --pixel-gather    every pixel of the picture looks at the settled light for itself
@@ -100,7 +101,7 @@ fn main() -> ExitCode {
 fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
     let mut scene: Option<OsString> = None;
     let mut bake = Bake::new("");
-    let (mut out, mut gather) = (None, None);
+    let (mut out, mut gather, mut state) = (None, None, false);
     while let Some(arg) = args.next()? {
         match arg {
             Long("help") | Short('h') => return Ok(None),
@@ -124,6 +125,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             }
             Long("state") => {
                 let path = PathBuf::from(args.value()?);
+                state = true;
                 set(&mut bake, move |effort| effort.state = Some(path.clone()));
             }
             Long("ambient") => set(&mut bake, |effort| effort.ambient = true),
@@ -220,6 +222,9 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Value(path) if scene.is_none() => scene = Some(path),
             _ => return Err(arg.unexpected()),
         }
+    }
+    if state && matches!(bake.goal, Goal::Seconds(_)) {
+        return Err("--state is for one solve, --time for many: use --error".into());
     }
     if let Some(everywhere) = gather {
         if let Goal::Plain { gather } = &mut bake.goal {

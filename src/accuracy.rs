@@ -68,7 +68,8 @@ const WORTHWHILE: f64 = 1.3;
 impl Budget<'_> {
     /// Bakes `scene` to one accuracy after the other, each chosen by how long the one before took,
     /// for as long as another fits in. What did not get done in time is stopped, and the last that
-    /// did is returned; if none did, what was reached.
+    /// did is returned; if none did, what was reached. No state is saved ([`Effort::state`]): it would
+    /// be that of many solves.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a time that is not above 0; else those of [`Accuracy::bake`].
@@ -86,9 +87,13 @@ impl Budget<'_> {
         };
         let (start, scene) = (Instant::now(), scene.into());
         let (mut best, mut error) = (None, FIRST);
+        let adjust = |effort: &mut Effort| {
+            (self.adjust)(effort);
+            effort.state = None;
+        };
         loop {
             let (begun, mut late, mut stopped) = (Instant::now(), false, false);
-            let baked = Accuracy { error, adjust: self.adjust }.bake(scene.clone(), device, |p| {
+            let baked = Accuracy { error, adjust: &adjust }.bake(scene.clone(), device, |p| {
                 stopped |= progress(p).is_break();
                 late |= start.elapsed() >= limit;
                 if stopped || late { Go::Break(()) } else { Go::Continue(()) }

@@ -116,6 +116,7 @@ fn bake_goes_on_from_a_saved_state_with_the_same_bytes() {
         refused(&args, &["light.state", "fingerprint of the mesh"]);
         std::fs::remove_file(&state).unwrap();
     }
+    refused(&[cornell(), "--state", "x", "--time", "1"], &["--state is for one solve"]);
     refused(&[cornell(), "--cpu", "--solver", "newton"], &["'newton'", "gauss-seidel"]);
 }
 
