@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use common::cornell_box;
 use glam::{DAffine3, DVec3};
 use radiosity::{
-    Error, ErrorKind, FormFactors, Go, Mesh, Method, NodeId, Progress, RayCast, Rgb, Row, Solution,
-    Solve, Solver, Stop,
+    Error, ErrorKind, FormFactors, Go, Mesh, Method, NodeId, Progress, RayCast, Rgb, Row, Scene,
+    Solution, Solve, Solver, Stop,
 };
 
 fn go(_: &Progress) -> Go {
@@ -187,6 +187,20 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     materials[0].reflectance.x += 1e-16;
     let repainted = mesh.scene().with_materials(materials).unwrap();
     says(solver, &mesh.with_scene(repainted).unwrap(), &rows, "fingerprint of the mesh");
+    let mut materials = mesh.scene().materials().to_vec();
+    materials.iter_mut().for_each(|m| m.exitance *= 1.0 + f64::EPSILON);
+    let brighter = mesh.scene().with_materials(materials).unwrap();
+    says(solver, &mesh.with_scene(brighter).unwrap(), &rows, "fingerprint of the mesh");
+    let by = DAffine3::from_translation(DVec3::new(0.0, 0.0, 1e-9));
+    let shifted = mesh.scene().with_moved("short_block", by).unwrap();
+    says(solver, &mesh.with_scene(shifted).unwrap(), &rows, "fingerprint of the mesh");
+    // Walls that are a group each are clusters each, though all is where it was.
+    let mut apart = mesh.scene().triangles().to_vec();
+    (0..).zip(&mut apart).for_each(|(k, t)| t.group = k);
+    let groups = (0..apart.len()).map(|k| k.to_string()).collect();
+    let (positions, materials) = (mesh.scene().positions(), mesh.scene().materials());
+    let apart = Scene::new(positions.to_vec(), apart, groups, materials.to_vec()).unwrap();
+    says(solver, &Mesh::new(apart, 300.0).unwrap(), &rows, "fingerprint of the mesh");
     says(Solver::new(Method::Jacobi), &mesh, &rows, "'GaussSeidel'; here it is 'Jacobi'");
     says(solver, &mesh, &RayCast::new(&mesh, 512).unwrap(), "here it is '512 rays");
     let whole = std::fs::read(&path).unwrap();
@@ -200,6 +214,13 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
         std::fs::write(&path, damaged).unwrap();
         says(solver, &mesh, &rows, "checksum");
     }
+    // Another file takes the place of the old one, which nobody writes into: it is still there where
+    // it has a second name.
+    std::fs::write(&path, "old").unwrap();
+    let second = folder.path().join("second");
+    std::fs::hard_link(&path, &second).unwrap();
+    solve.save(&path).unwrap();
+    assert!(std::fs::read(&path).unwrap() == whole && std::fs::read(&second).unwrap() == b"old");
     let Err(e) = solver.resume(&mesh, &rows, folder.path().join("none")) else { panic!() };
     assert!(e.kind() == ErrorKind::File && e.to_string().contains("none"), "{e}");
     let e = solve.save(folder.path().join("no/such/folder")).unwrap_err();

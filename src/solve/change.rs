@@ -8,6 +8,7 @@
 //! what they are wrong about is at most what they send to where it was and is, and those with most
 //! are drawn again until the rest is below the residual that is asked for.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::{BVec3, DVec3};
@@ -72,11 +73,16 @@ impl<'m> Solve<'m> {
         let moved = Moved::between(old, mesh)?;
         self.take_on(mesh)?;
         let mut wrong: Vec<(f64, NodeId)> = vec![];
+        // In doubt since earlier moves, along rows that cannot be had again to take it back.
+        let mut lost: BTreeMap<NodeId, f64> = BTreeMap::new();
         let patches: Vec<NodeId> = self.rows.trails.keys().copied().collect();
         let share = |&patch: &NodeId| moved.share(old, patch, self.rows.get(patch).map(|r| &**r));
         let shares: Vec<f64> = patches.par_iter().map(share).collect();
         for (patch, share) in patches.into_iter().zip(shares) {
             let trail = self.rows.trails.entry(patch).or_default();
+            if trail.doubt > KEPT_DOUBT || !trail.kept {
+                lost.insert(patch, trail.doubt);
+            }
             trail.doubt = (trail.doubt + share).min(1.0);
             if trail.doubt > 0.0 {
                 let share = largest_share(trail.sent.abs(), self.state.ledger.emitted);
@@ -90,7 +96,7 @@ impl<'m> Solve<'m> {
             let (batch, others) = rest.split_at(after.batch().clamp(1, rest.len()));
             rest = others;
             let patches: Vec<NodeId> = batch.iter().map(|(_, patch)| *patch).collect();
-            if let Err(error) = self.redirect(old, &patches, before, after) {
+            if let Err(error) = self.redirect(old, &patches, &lost, before, after) {
                 stop = Err(error);
                 break;
             }
@@ -130,11 +136,13 @@ impl<'m> Solve<'m> {
         self.state.settle()
     }
 
-    /// Takes the light that went along the rows of `patches` back, and sends it along new ones.
+    /// Takes the light that went along the rows of `patches` back, and sends it along new ones. What
+    /// stays in doubt all the same is in `doubts`.
     fn redirect(
         &mut self,
         old: &Mesh,
         patches: &[NodeId],
+        doubts: &BTreeMap<NodeId, f64>,
         before: &mut dyn FormFactors,
         after: &mut dyn FormFactors,
     ) -> Result<(), Error> {
@@ -163,7 +171,7 @@ impl<'m> Solve<'m> {
                 _ => None,
             };
             let trail = rows.trails.entry(patch).or_default();
-            trail.doubt = 0.0;
+            trail.doubt = doubts.get(&patch).copied().unwrap_or(0.0);
             if let Some(elements) = shooter {
                 // They shoot it again, from elsewhere.
                 trail.sent = Rgb::ZERO;
