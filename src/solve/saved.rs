@@ -276,3 +276,80 @@ impl SavedRow {
         Row { entries: entries.into_iter().map(entry).collect(), open, back }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::form_factor::ray_cast::RayCast;
+    use crate::solve::Go;
+    use crate::solve::shooters::Shooter;
+
+    fn shooters(saved: &mut Saved) -> &mut Vec<Shooter> {
+        match &mut saved.course {
+            SavedCourse::Shooting(cut) => &mut cut.shooters,
+            _ => panic!("saved while shooting"),
+        }
+    }
+
+    /// A state with a checksum that is right and one thing in it that cannot be is refused.
+    #[test]
+    fn states_that_cannot_be_are_refused() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let mut rows = RayCast::new(&mesh, 64).unwrap();
+        let [shooting, _, jacobi, _, gmres, _] = Method::ALL.map(Solver::new);
+        let refused = |solver: Solver, rows: &mut RayCast, what: &str, damage: fn(&mut Saved)| {
+            let mut solve = solver.begin(&mesh).unwrap();
+            for _ in 0..3 {
+                solve.advance(rows, |_| Go::Continue(())).unwrap();
+            }
+            let bytes = solve.to_bytes();
+            let body = &bytes[MAGIC.len()..bytes.len() - 8];
+            let (name, mut saved): (Name, Saved) = postcard::from_bytes(body).unwrap();
+            let whole = postcard::to_extend(&(&name, &saved), MAGIC.to_vec()).unwrap();
+            assert!(solver.resume_bytes(&mesh, rows, &seal(whole)).is_ok());
+            damage(&mut saved);
+            let damaged = postcard::to_extend(&(&name, &saved), MAGIC.to_vec()).unwrap();
+            let Err(e) = solver.resume_bytes(&mesh, rows, &seal(damaged)) else {
+                panic!("taken: {what}")
+            };
+            assert!(e.place().contains(what), "{what}: {e}");
+        };
+        let rows = &mut rows;
+        refused(shooting, rows, "flux", |s| s.incident[3].y = f64::NAN);
+        refused(shooting, rows, "flux", |s| s.unshot[0].x = f64::INFINITY);
+        refused(shooting, rows, "flux", |s| s.unshot.truncate(1));
+        refused(shooting, rows, "ledger", |s| s.unshot[0].x += 1e9);
+        refused(shooting, rows, "ledger", |s| s.ledger.absorbed.z = f64::NAN);
+        refused(shooting, rows, "ledger", |s| s.ledger.emitted *= 2.0);
+        refused(shooting, rows, "counts", |s| s.done.shots = u64::MAX);
+        refused(shooting, rows, "patches", |s| s.trails.swap(0, 1));
+        refused(shooting, rows, "patches", |s| s.trails[0].1.share = -1.0);
+        refused(shooting, rows, "patches", |s| s.trails[0].1.sent.x = f64::NAN);
+        refused(shooting, rows, "patches", |s| s.trails.push((NodeId(1 << 30), Trail::default())));
+        refused(shooting, rows, "rows", |s| {
+            let row = SavedRow { entries: vec![(0, 7)], open: 0, back: 0 };
+            s.rows.push((s.trails[0].0, row));
+        });
+        refused(shooting, rows, "method", |s| s.course = SavedCourse::Direct);
+        // A shooter that is missing, and one that is there twice.
+        for twice in [false, true] {
+            refused(
+                shooting,
+                rows,
+                "method",
+                match twice {
+                    false => |s| shooters(s).truncate(1),
+                    true => |s| shooters(s).extend_from_within(..1),
+                },
+            );
+        }
+        refused(jacobi, rows, "method", |s| {
+            s.course = SavedCourse::Relaxation(Relaxation::gauss_seidel());
+        });
+        refused(jacobi, rows, "method", |s| {
+            s.course = SavedCourse::Relaxation(Relaxation::jacobi(1));
+        });
+        refused(gmres, rows, "method", |s| s.course = SavedCourse::Gmres(Gmres::new(0)));
+    }
+}

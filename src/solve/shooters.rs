@@ -39,7 +39,7 @@ pub(super) struct Shooters<'m> {
 
 /// One that shoots.
 #[derive(Clone, Serialize, Deserialize)]
-struct Shooter {
+pub(super) struct Shooter {
     source: Source,
     #[serde(skip)]
     elements: Vec<Range<usize>>,
@@ -68,7 +68,7 @@ struct Near {
 /// The shooters as they are saved.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Cut {
-    shooters: Vec<Shooter>,
+    pub shooters: Vec<Shooter>,
     blind: Vec<NodeId>,
 }
 
