@@ -66,6 +66,7 @@ mod gpu;
 pub mod hemicube;
 mod io;
 mod mesh;
+mod mix;
 mod order;
 mod pace;
 mod rays;

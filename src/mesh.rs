@@ -4,6 +4,7 @@
 //! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
 //! a patch is one contiguous range of elements, however unequal the depths below it.
 
+mod boxes;
 mod clusters;
 mod contacts;
 mod quadtree;

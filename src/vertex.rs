@@ -54,6 +54,11 @@ impl VertexRadiosity {
     /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
     /// No value is let below zero.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
+        VertexRadiosity::with_corners(mesh, element_radiosity).0
+    }
+
+    /// The same, and the vertices at the corners of each element.
+    fn with_corners(mesh: &Mesh, element_radiosity: &[Rgb]) -> (VertexRadiosity, Vec<[u32; 3]>) {
         let smooth = Smooth::new(mesh.scene());
         let vertices = Vertices::new(mesh, &smooth);
         let (positions, rims) = (&vertices.positions, &vertices.rims);
@@ -84,7 +89,7 @@ impl VertexRadiosity {
             ..Default::default()
         };
         out.add_elements(mesh, &Seams::new(mesh, &smooth, &vertices), |_, e| element_radiosity[e]);
-        out
+        (out, vertices.corners)
     }
 
     /// Adds every element of `mesh` as a face, or as a fan where there are vertices on its sides;

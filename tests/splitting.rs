@@ -228,6 +228,22 @@ fn what_hangs_close_splits_as_deep_as_it_is_close() {
 }
 
 #[test]
+fn thousands_of_faces_in_one_place_do_not_split_each_other() {
+    let floors = vec![(FLOOR, grey()); 1500];
+    let walls = block(-0.71, 0.79, 1.0).into_iter().map(|w| (w, grey()));
+    let base = |faces: &[([[f64; 3]; 4], Material)]| Mesh::new(quads(faces), 1.5).unwrap();
+    // Each of the 3000 triangles lies in all others: their sides are its own, or its diagonal.
+    let pile = base(&floors);
+    assert_eq!(pile.split_at_contacts(2).element_count(), pile.element_count());
+    // The ten triangles of a box are smaller than they are: it splits the 256 that count.
+    let stands = base(&walls.chain(floors).collect::<Vec<_>>());
+    let cut = stands.split_at_contacts(2);
+    let elements = |mesh: &Mesh, t: usize| mesh.elements_of(mesh.root(t)).len();
+    let split = (10..3010).filter(|&t| elements(&cut, t) > elements(&stands, t)).count();
+    assert_eq!(split, 256);
+}
+
+#[test]
 fn triangles_that_cross_split_each_other_along_the_cut() {
     // The cut runs along y = 1.1, z = 0, from x = 1 to where the first one ends, 2.9: through two
     // of the second one's sides, or one and the corner opposite.

@@ -1,8 +1,11 @@
 //! Where surfaces touch: elements there are cut small, since the light on them jumps.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
+use super::boxes::{Bounds, overlap, overlaps};
 use super::{Cell, MAX_DEPTH, Mesh, Smooth};
+use crate::mix::Set;
 use crate::scene::Scene;
 
 /// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
@@ -10,6 +13,10 @@ const TOUCH: f64 = 0.15;
 
 /// Of an element's size: lines have to come this far into it to part it.
 const INSIDE: f64 = 0.02;
+
+/// Of a cell's size: lines that part some element in the cell come this far into it, since elements
+/// are at most [`MAX_DEPTH`] levels smaller.
+const LEAST: f64 = INSIDE / (1u32 << MAX_DEPTH) as f64;
 
 /// Cosine of the angle between triangles in one plane, at least: 1e-5 radians.
 const FLAT: f64 = 1.0 - 5e-11;
@@ -30,17 +37,62 @@ impl Mesh {
     ///
     /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
     /// would go beyond [`MAX_DEPTH`] are left out.
+    ///
+    /// Where more than 256 triangles have more than 256 others about them each, only the largest 256
+    /// touch the rest of these: thousands of faces in one place are not worth the time.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
-        let lines = lines(self);
+        let slack: Vec<f64> =
+            (0..self.depths.len()).map(|t| self.reach(t, self.depth(t))).collect();
+        let boxes = boxes(self.scene(), &slack);
+        let touching = overlaps(&boxes, |t| self.scene.area(t));
+        let rims = rims(self.scene());
+        let parted = |t: usize| {
+            let plane = Plane::of(self.scene(), t, slack[t]);
+            let mut lines = vec![];
+            for s in touching[t].iter().map(|&s| s as usize) {
+                plane.touch(&self.scene.corners(s), &rims[s], &boxes[t], &mut lines);
+            }
+            let mut out = vec![];
+            self.part(t, Cell::ROOT, &lines, levels, &mut out);
+            out
+        };
+        let parted: Set<(usize, Cell)> =
+            (0..slack.len()).into_par_iter().flat_map_iter(parted).collect();
         let deeper = |t: usize, cell: Cell| {
-            let base = self.level_at(t, cell);
-            let reach = TOUCH * (self.scene.area(t) / f64::from(1u32 << (2 * cell.level))).sqrt();
-            let near = |l: &&Line| l.gap <= reach;
-            cell.level < base
-                || cell.level < (base + levels).min(MAX_DEPTH)
-                    && lines[t].iter().filter(near).any(|l| parts(l, cell))
+            cell.level < self.level_at(t, cell) || parted.contains(&(t, cell))
         };
         Mesh::grown(self.scene.clone(), deeper)
+    }
+
+    /// Adds to `out` the elements in `cell` of triangle `t`, and parts of them, that `lines` part.
+    fn part(
+        &self,
+        t: usize,
+        cell: Cell,
+        lines: &[Line],
+        levels: u32,
+        out: &mut Vec<(usize, Cell)>,
+    ) {
+        let lines: Vec<Line> = lines.iter().filter(|l| parts(l, cell, LEAST)).copied().collect();
+        if lines.is_empty() {
+            return;
+        }
+        let base = self.level_at(t, cell);
+        if cell.level >= base {
+            let reach = self.reach(t, cell.level);
+            let split = cell.level < (base + levels).min(MAX_DEPTH)
+                && lines.iter().any(|l| l.gap <= reach && parts(l, cell, INSIDE));
+            if !split {
+                return;
+            }
+            out.push((t, cell));
+        }
+        cell.children().into_iter().for_each(|c| self.part(t, c, &lines, levels, out));
+    }
+
+    /// How near to a cell of triangle `t` something has to come to touch it, scene unit.
+    fn reach(&self, t: usize, level: u32) -> f64 {
+        TOUCH * (self.scene.area(t) / f64::from(1u32 << (2 * level))).sqrt()
     }
 
     /// Level of this mesh's elements at the middle of `cell` of triangle `t`.
@@ -51,16 +103,16 @@ impl Mesh {
     }
 }
 
-/// Whether `line` comes into `cell`, by more than a margin.
-fn parts(line: &Line, cell: Cell) -> bool {
-    // In the cell's own weights; all three are at least `INSIDE` well within.
+/// Whether `line` comes into `cell`, by more than `margin`, a share of its size.
+fn parts(line: &Line, cell: Cell, margin: f64) -> bool {
+    // In the cell's own weights; all three are at least `margin` well within.
     let [a, b] = line.ends.map(|p| {
         let [u, v] = cell.local(p.x, p.y);
         [1.0 - u - v, u, v]
     });
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for k in 0..3 {
-        let (start, end) = (a[k] - INSIDE, b[k] - INSIDE);
+        let (start, end) = (a[k] - margin, b[k] - margin);
         if start < 0.0 && end < 0.0 {
             return false;
         }
@@ -74,37 +126,17 @@ fn parts(line: &Line, cell: Cell) -> bool {
     from < to
 }
 
-/// For every triangle, the lines along which others touch it.
-fn lines(mesh: &Mesh) -> Vec<Vec<Line>> {
-    let scene = mesh.scene();
-    let count = scene.triangles().len();
-    let slack: Vec<f64> = (0..count)
-        .map(|t| TOUCH * (scene.area(t) / f64::from(1u32 << (2 * mesh.depth(t)))).sqrt())
-        .collect();
-    let boxes: Vec<[DVec3; 2]> = (0..count)
-        .map(|t| {
-            let [a, b, c] = scene.corners(t);
-            [a.min(b).min(c) - slack[t], a.max(b).max(c) + slack[t]]
-        })
-        .collect();
-    // Sweep along x: of the boxes that have begun, those that have not ended.
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_unstable_by(|&s, &t| boxes[s][0].x.total_cmp(&boxes[t][0].x).then(s.cmp(&t)));
-    let rims = rims(scene);
-    let mut out = vec![vec![]; count];
-    let mut begun: Vec<usize> = vec![];
-    for t in order {
-        begun.retain(|&s| boxes[s][1].x >= boxes[t][0].x);
-        for &s in &begun {
-            let apart = boxes[s][0].cmpgt(boxes[t][1]) | boxes[t][0].cmpgt(boxes[s][1]);
-            if !apart.any() {
-                touch(scene, t, s, &rims[s], slack[t], &mut out[t]);
-                touch(scene, s, t, &rims[t], slack[s], &mut out[s]);
-            }
-        }
-        begun.push(t);
-    }
-    out
+/// The box around each triangle, grown by its `slack`.
+fn boxes(scene: &Scene, slack: &[f64]) -> Vec<Bounds> {
+    let grown = |(t, &slack): (usize, &f64)| {
+        let [low, high] = around(&scene.corners(t));
+        [low - slack, high + slack]
+    };
+    slack.iter().enumerate().map(grown).collect()
+}
+
+fn around(&[a, b, c]: &[DVec3; 3]) -> Bounds {
+    [a.min(b).min(c), a.max(b).max(c)]
 }
 
 /// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
@@ -120,52 +152,74 @@ fn rims(scene: &Scene) -> Vec<[bool; 3]> {
     out
 }
 
-/// Adds the lines along which triangle `s` touches or crosses `t`: the parts of its sides `rim` that
-/// lie within `slack` of the plane of `t`, and its cut with that plane.
-fn touch(scene: &Scene, t: usize, s: usize, rim: &[bool; 3], slack: f64, lines: &mut Vec<Line>) {
-    let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
-    let corners = scene.corners(s);
-    let height = corners.map(|p| normal.dot(p - a));
-    if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
-        return;
+/// The plane of a triangle, on which others draw lines.
+struct Plane {
+    corner: DVec3,
+    edges: [DVec3; 2],
+    normal: DVec3,
+    /// How near to the plane others touch it, scene unit.
+    slack: f64,
+}
+
+impl Plane {
+    fn of(scene: &Scene, t: usize, slack: f64) -> Plane {
+        let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
+        Plane { corner: a, edges: [b - a, c - a], normal, slack }
     }
-    let (e1, e2) = (b - a, c - a);
-    let flat = |p: DVec3| {
+
+    /// Barycentric position of `p` in the triangle, seen along its normal.
+    fn flat(&self, p: DVec3) -> DVec2 {
+        let [e1, e2] = self.edges;
         let n = e1.cross(e2);
-        let d = p - a;
+        let d = p - self.corner;
         DVec2::new(d.cross(e2).dot(n), e1.cross(d).dot(n)) / n.length_squared()
-    };
-    let at = |k: usize, l: usize, h: f64| {
-        let share = (h - height[k]) / (height[l] - height[k]);
-        corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
-    };
-    let mut cut = vec![];
-    for (k, l) in [(0, 1), (1, 2), (2, 0)] {
-        let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
-        if rim[k] && low <= slack && high >= -slack {
-            let within = |k: usize, l: usize| {
-                if height[k].abs() <= slack {
-                    corners[k]
-                } else {
-                    at(k, l, slack * height[k].signum())
+    }
+
+    /// Adds the lines along which a triangle of these `corners` touches or crosses this one, whose box
+    /// with slack is `within`: the parts of its sides `rim` that lie within `slack` of the plane, and its
+    /// cut with that plane.
+    fn touch(&self, corners: &[DVec3; 3], rim: &[bool; 3], within: &Bounds, lines: &mut Vec<Line>) {
+        let slack = self.slack;
+        let height = corners.map(|p| self.normal.dot(p - self.corner));
+        if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
+            return;
+        }
+        if !overlap(&around(corners), within) {
+            return;
+        }
+        let flat = |p: DVec3| self.flat(p);
+        let at = |k: usize, l: usize, h: f64| {
+            let share = (h - height[k]) / (height[l] - height[k]);
+            corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
+        };
+        let mut cut = vec![];
+        for (k, l) in [(0, 1), (1, 2), (2, 0)] {
+            let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
+            if rim[k] && low <= slack && high >= -slack {
+                let within = |k: usize, l: usize| {
+                    if height[k].abs() <= slack {
+                        corners[k]
+                    } else {
+                        at(k, l, slack * height[k].signum())
+                    }
+                };
+                let ends = [within(k, l), within(l, k)].map(flat);
+                let crosses = low < 0.0 && high > 0.0;
+                let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
+                if ends[0] != ends[1] {
+                    lines.push(Line { ends, gap });
                 }
-            };
-            let ends = [within(k, l), within(l, k)].map(flat);
-            let crosses = low < 0.0 && high > 0.0;
-            let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
-            if ends[0] != ends[1] {
-                lines.push(Line { ends, gap });
+            }
+            if low < 0.0 && high > 0.0 {
+                cut.push(flat(at(k, l, 0.0)));
             }
         }
-        if low < 0.0 && high > 0.0 {
-            cut.push(flat(at(k, l, 0.0)));
+        if cut.len() == 1 {
+            // The cut goes through the corner opposite.
+            cut.extend((0..3).find(|&k| height[k] == 0.0).map(|k| flat(corners[k])));
         }
-    }
-    if cut.len() == 1 {
-        // The cut goes through the corner opposite.
-        cut.extend((0..3).find(|&k| height[k] == 0.0).map(|k| flat(corners[k])));
-    }
-    if let [p, q] = cut[..] {
-        lines.push(Line { ends: [p, q], gap: 0.0 });
+        if let [p, q] = cut[..] {
+            lines.push(Line { ends: [p, q], gap: 0.0 });
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use crate::mix::Map;
 use crate::scene::{Scene, Triangle};
 
 /// Neighbours of one smoothing group meet in a crease if their normals differ by more than this
@@ -55,7 +56,7 @@ impl Smooth {
     fn up_to(scene: &Scene, most: impl Fn(&Triangle, &Triangle) -> f64) -> Smooth {
         let welded = weld(scene);
         let count = scene.triangles().len();
-        let mut by_ends: HashMap<(u32, u32), Vec<(usize, usize)>> = HashMap::new();
+        let mut by_ends: Map<(u32, u32), Vec<(usize, usize)>> = Map::default();
         let ends = |t: usize, k: usize| (welded[t][k], welded[t][(k + 1) % 3]);
         for t in 0..count {
             for k in 0..3 {

@@ -1,14 +1,13 @@
 //! Vertices at the boundary of a smooth surface: extrapolated, since all their elements lie to one
 //! side and a mean would be that of a place further in.
 
-use std::collections::HashMap;
-
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::meeting;
 use super::vertices::Rims;
 use crate::mesh::Mesh;
+use crate::mix::Map;
 use crate::scene::Rgb;
 
 /// Elements that a plane is fitted to, at least: three would let it swing freely.
@@ -108,7 +107,7 @@ fn ring(rims: &Rims, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
 
 /// Vertices on a side that only one element has, ascending.
 fn boundary(rims: &Rims) -> Vec<usize> {
-    let mut sides: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut sides: Map<(u32, u32), u32> = Map::default();
     for (_, rim) in rims.iter() {
         for (k, &a) in rim.iter().enumerate() {
             let b = rim[(k + 1) % rim.len()];

@@ -3,10 +3,9 @@
 
 use super::VertexRadiosity;
 use super::refined::Refined;
-use super::vertices::Vertices;
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, Sources};
-use crate::mesh::{Mesh, Smooth};
+use crate::mesh::Mesh;
 use crate::scene::Rgb;
 use crate::solve::{Go, Stop};
 
@@ -74,8 +73,7 @@ impl GatheredRadiosity {
     /// [`ErrorKind::Setting`] when `radiosity` has not one value an element.
     pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredRadiosity, Error> {
         check_count(mesh, radiosity)?;
-        let surface = VertexRadiosity::new(mesh, radiosity);
-        let corners = Vertices::new(mesh, &Smooth::new(mesh.scene())).corners;
+        let (surface, corners) = VertexRadiosity::with_corners(mesh, radiosity);
         let mut reflected = surface.radiosity.clone();
         for (e, corners) in corners.iter().enumerate() {
             let emitted = mesh.material(mesh.element(e)).exitance;

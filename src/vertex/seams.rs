@@ -1,12 +1,11 @@
 //! Where surfaces meet in a crease: each takes the places that the others have on the edge they
 //! share, so that the mesh is watertight wherever the scene is.
 
-use std::collections::HashSet;
-
 use glam::DVec3;
 
 use super::vertices::{Key, Rims, Vertices};
 use crate::mesh::{Mesh, Smooth};
+use crate::mix::Set;
 
 /// The vertices that creases ask for beside those of the smooth surfaces.
 pub(super) struct Seams {
@@ -30,7 +29,7 @@ impl Seams {
             Key::Side { id, step } => Some((edge(id), step)),
             _ => None,
         };
-        let places: HashSet<(u32, u32)> = vertices.keys.iter().filter_map(on_edge).collect();
+        let places: Set<(u32, u32)> = vertices.keys.iter().filter_map(on_edge).collect();
         let (mut rims, mut seams) = (Rims::default(), vec![]);
         for e in 0..mesh.element_count() {
             let mut add = |key: Key, position: &dyn Fn() -> DVec3, between: [u32; 2]| {

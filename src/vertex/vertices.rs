@@ -1,10 +1,9 @@
 //! Which vertices a mesh has: places on lattices that are the same place, on one smooth surface.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
 
 use crate::mesh::{Cell, MAX_DEPTH, Mesh, Side, Smooth};
+use crate::mix::Map;
 use crate::scene::Scene;
 
 /// Steps along a triangle's side on the lattice that all depths share.
@@ -32,7 +31,7 @@ pub(super) struct Vertices {
     pub corners: Vec<[u32; 3]>,
     /// All around each element.
     pub rims: Rims,
-    numbers: HashMap<Key, u32>,
+    numbers: Map<Key, u32>,
 }
 
 /// The vertices around each element: its corners, and what finer neighbours put between them.
