@@ -3,6 +3,7 @@
 mod common;
 
 use common::closed_forms::exact;
+use common::walls::walls;
 use common::{cornell_box, cube, quads};
 use radiosity::{
     Entry, Error, ErrorKind, FormFactors, Go, MAX_DIRECT, Material, Mesh, Method, NodeId, Progress,
@@ -35,19 +36,6 @@ fn methods() -> [Method; 6] {
 /// Rays, as many for each row.
 fn rays(mesh: &Mesh) -> RayCast {
     RayCast::new(mesh, 1024).unwrap().with_full_share(0.0)
-}
-
-/// Walls x0, x1, y0, y1, z0, z1 of a box from `low` to `high`, seen from inside.
-fn walls(low: [f64; 3], high: [f64; 3]) -> [[[f64; 3]; 4]; 6] {
-    let ([a, b, c], [x, y, z]) = (low, high);
-    [
-        [[a, b, c], [a, y, c], [a, y, z], [a, b, z]],
-        [[x, b, c], [x, b, z], [x, y, z], [x, y, c]],
-        [[a, b, c], [a, b, z], [x, b, z], [x, b, c]],
-        [[a, y, c], [x, y, c], [x, y, z], [a, y, z]],
-        [[a, b, c], [x, b, c], [x, y, c], [a, y, c]],
-        [[a, b, z], [a, y, z], [x, y, z], [x, b, z]],
-    ]
 }
 
 /// A unit room with a lamp under its ceiling and a block on its floor.

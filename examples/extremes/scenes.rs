@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 use radiosity::{Material, Rgb, Scene, Triangle};
 
 use crate::common::quads;
+use crate::common::walls::walls;
 
 /// Where a scene stands and how large it is. It stands askew, so that no wall is along an axis.
 #[derive(Clone, Copy, Debug)]
@@ -42,19 +43,6 @@ impl Frame {
 
 pub fn grey(reflectance: f64, exitance: f64) -> Material {
     Material { exitance: Rgb::splat(exitance), ..Material::grey("grey", reflectance) }
-}
-
-/// Walls of a box from `low` to `high`, seen from inside: x low and high, y, z.
-pub fn walls(low: [f64; 3], high: [f64; 3]) -> [[[f64; 3]; 4]; 6] {
-    let ([a, b, c], [x, y, z]) = (low, high);
-    [
-        [[a, b, c], [a, y, c], [a, y, z], [a, b, z]],
-        [[x, b, c], [x, b, z], [x, y, z], [x, y, c]],
-        [[a, b, c], [a, b, z], [x, b, z], [x, b, c]],
-        [[a, y, c], [x, y, c], [x, y, z], [a, y, z]],
-        [[a, b, c], [x, b, c], [x, y, c], [a, y, c]],
-        [[a, b, z], [a, y, z], [x, y, z], [x, b, z]],
-    ]
 }
 
 /// A unit cube, all walls alike.

@@ -15,6 +15,7 @@ use glam::{BVec3, DVec3};
 use rayon::prelude::*;
 
 use super::ledger::largest_share;
+use super::shooters::BLIND;
 use super::state::{Flux, State};
 use super::under_way::{Course, Solve};
 use super::{Go, Progress, Stop};
@@ -101,9 +102,7 @@ impl<'m> Solve<'m> {
                 break;
             }
             let unshot_share = self.state.ledger.unshot_share() + self.doubt();
-            let (done, rows_made) = (self.done, self.rows.made);
-            let (steps, shots, elapsed) = (done.steps, done.shots, start.elapsed());
-            let told = Progress { steps, shots, rows_made, unshot_share, elapsed };
+            let told = self.done.progress(self.rows.made, unshot_share, start);
             if progress(&told).is_break() {
                 stop = Ok(Stop::Cancelled);
                 break;
@@ -190,9 +189,6 @@ const ALLOWED_DOUBT: f64 = 2.0;
 
 /// A row that is wrong about no more than this share of its light is kept when objects have moved.
 const KEPT_DOUBT: f64 = 0.1;
-
-/// Who sees more backs than this stands in or under something.
-const BLIND: f64 = 0.5;
 
 impl<'m> State<'m> {
     /// Goes over to `mesh` with the flux that it emits. What has become of light is kept in that

@@ -381,7 +381,7 @@ const BATCH_FALL: f64 = 0.25;
 
 /// Who sees more than this share of backs stands in or under something, and nobody shoots from there
 /// if another place can be found in so many attempts.
-const BLIND: f64 = 0.5;
+pub(super) const BLIND: f64 = 0.5;
 const ATTEMPTS: u32 = 4;
 
 /// An element is lit from this share of its shooter's mean radiosity.

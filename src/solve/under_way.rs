@@ -72,6 +72,14 @@ pub(super) struct Done {
     pub shots: u64,
 }
 
+impl Done {
+    /// What there is to be told, of a solve that was set going at `start`.
+    pub fn progress(self, rows_made: u64, unshot_share: f64, start: Instant) -> Progress {
+        let Done { steps, shots } = self;
+        Progress { steps, shots, rows_made, unshot_share, elapsed: start.elapsed() }
+    }
+}
+
 impl<'m> Course<'m> {
     pub fn new(method: Method, mesh: &'m Mesh) -> Course<'m> {
         match method {
@@ -246,8 +254,6 @@ impl Batch<'_, '_> {
 
     /// Tells where the solve is; whether to go on.
     pub fn tell(&mut self, unshot_share: f64) -> Go {
-        let Done { steps, shots } = *self.done;
-        let (rows_made, elapsed) = (self.rows.made, self.start.elapsed());
-        (self.progress)(&Progress { steps, shots, rows_made, unshot_share, elapsed })
+        (self.progress)(&self.done.progress(self.rows.made, unshot_share, self.start))
     }
 }

@@ -3,6 +3,7 @@
 
 pub mod closed_forms;
 pub mod surface;
+pub mod walls;
 
 use glam::DVec3;
 use radiosity::{Gpu, Material, Mesh, Scene, Triangle};
@@ -33,14 +34,7 @@ pub fn quads(quads: &[([[f64; 3]; 4], Material)]) -> Scene {
 
 /// Unit cube seen from inside, walls x0, x1, y0, y1, z0, z1.
 pub fn cube(material: &Material) -> Scene {
-    let walls = [
-        [[0., 0., 0.], [0., 1., 0.], [0., 1., 1.], [0., 0., 1.]],
-        [[1., 0., 0.], [1., 0., 1.], [1., 1., 1.], [1., 1., 0.]],
-        [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]],
-        [[0., 1., 0.], [1., 1., 0.], [1., 1., 1.], [0., 1., 1.]],
-        [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]],
-        [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]],
-    ];
+    let walls = walls::walls([0.0; 3], [1.0; 3]);
     quads(&walls.map(|w| (w, material.clone())))
 }
 
