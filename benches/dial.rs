@@ -2,11 +2,12 @@
 //! that is lit from the next one, and one full of small boxes. The device is opened, and pipelines are
 //! warm, before anything is timed. Prints the adapter, and what the certificate said.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
-use radiosity::{Accuracy, Device, Go, Material, Rgb, Scene, Triangle, load_obj};
+use radiosity::{Accuracy, Backend, Material, Rgb, Scene, Triangle, load_obj};
 
 /// A box of walls: seen from inside, or from outside. `material` says what each of the six is of.
 fn block(
@@ -68,7 +69,7 @@ fn clutter() -> Scene {
 
 fn dial(c: &mut Criterion) {
     let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let device = Device::gpu(None).expect("a graphics adapter");
+    let device = Backend::gpu(None).expect("a graphics adapter");
     let [name, kind, driver] = device.adapter();
     eprintln!("adapter: {name} ({kind}), {driver}");
     let mut group = c.benchmark_group("dial");
@@ -80,7 +81,9 @@ fn dial(c: &mut Criterion) {
         for error in [0.05, 0.02, 0.01] {
             let bake = || {
                 let accuracy = Accuracy { error, adjust: &|_| {} };
-                accuracy.bake(scene.clone(), &device, |_| Go::Continue(())).expect("a solution")
+                accuracy
+                    .bake(scene.clone(), &device, |_| ControlFlow::Continue(()))
+                    .expect("a solution")
             };
             let mut told = false;
             group.bench_function(BenchmarkId::new(name, error), |b| {

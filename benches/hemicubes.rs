@@ -8,7 +8,7 @@
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{FormFactors, Gpu, Hemicubes, Mesh, NodeId, StageSeconds, load_obj};
+use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, StageSeconds, load_obj};
 
 fn stages(c: &mut Criterion) {
     let gpu = Gpu::new(None).expect("a graphics adapter");
@@ -24,12 +24,12 @@ fn stages(c: &mut Criterion) {
 }
 
 fn measure(c: &mut Criterion, gpu: &Gpu, mesh: &Mesh, resolution: u32) {
-    let mut hemicubes = Hemicubes::new(gpu, mesh, resolution).expect("hemicubes");
-    let batch = hemicubes.batch();
+    let mut hemicubes = HemicubeRows::new(gpu, mesh, resolution).expect("hemicubes");
+    let batch = hemicubes.preferred_batch_len();
     let mut group = c.benchmark_group(format!("cornell_box/{} elements", mesh.element_count()));
     group.throughput(Throughput::Elements(batch as u64));
     let mut next = 0;
-    let mut draw_batch = |hemicubes: &mut Hemicubes| {
+    let mut draw_batch = |hemicubes: &mut HemicubeRows| {
         let patches: Vec<NodeId> =
             (next..next + batch).map(|k| mesh.element(k * 7919 % mesh.element_count())).collect();
         next += batch;

@@ -5,12 +5,11 @@
 //! unshot; what it asks for is handed out of memory.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{
-    Error, FormFactors, Go, Mesh, NodeId, RayCast, Row, Shooting, VertexRadiosity, load_obj,
-};
+use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Shooting, VertexMesh, load_obj};
 
 /// Hands out rows that were made before.
 struct Stored<'a>(&'a HashMap<NodeId, Row>);
@@ -20,13 +19,13 @@ impl FormFactors for Stored<'_> {
         Ok(patches.iter().map(|p| self.0[p].clone()).collect())
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         16
     }
 }
 
 /// Makes rows and remembers them.
-struct Recording(RayCast, HashMap<NodeId, Row>);
+struct Recording(RayRows, HashMap<NodeId, Row>);
 
 impl FormFactors for Recording {
     fn rows(
@@ -40,7 +39,7 @@ impl FormFactors for Recording {
         Ok(rows)
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         16
     }
 }
@@ -51,9 +50,9 @@ fn shooting(c: &mut Criterion) {
     let mut group = c.benchmark_group("cornell_box");
     for size in [120.0, 60.0] {
         let mesh = Mesh::new(scene.clone(), size).expect("a mesh");
-        let rays = RayCast::new(&mesh, 1 << 14).expect("rays");
+        let rays = RayRows::new(&mesh, 1 << 14).expect("rays");
         let mut recording = Recording(rays, HashMap::new());
-        let go = |_: &_| Go::Continue(());
+        let go = |_: &_| ControlFlow::Continue(());
         let solution = Shooting::default().solve(&mesh, &mut recording, go).expect("a solution");
         let elements = mesh.element_count();
         group.throughput(Throughput::Elements(solution.shots));
@@ -62,7 +61,7 @@ fn shooting(c: &mut Criterion) {
         });
         group.throughput(Throughput::Elements(elements as u64));
         group.bench_function(BenchmarkId::new("elements to vertices", elements), |b| {
-            b.iter(|| VertexRadiosity::new(&mesh, &solution.radiosity));
+            b.iter(|| VertexMesh::new(&mesh, &solution.radiosity));
         });
     }
     group.finish();

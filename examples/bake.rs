@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use glam::DVec3;
 use lexopt::prelude::*;
-use radiosity::{Camera, Effort, GatherEffort, Method};
+use radiosity::{BakeSettings, Camera, GatherSettings, Method};
 use support::{Bake, Choice, Goal};
 
 const USAGE: &str = "\
@@ -237,12 +237,12 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
     Ok(Some(bake))
 }
 
-fn set(bake: &mut Bake, change: impl Fn(&mut Effort) + 'static) {
+fn set(bake: &mut Bake, change: impl Fn(&mut BakeSettings) + 'static) {
     bake.changes.push(Box::new(change));
 }
 
 /// What vertices that do not gather do not need is left alone.
-fn set_gather(bake: &mut Bake, change: impl Fn(&mut GatherEffort) + 'static) {
+fn set_gather(bake: &mut Bake, change: impl Fn(&mut GatherSettings) + 'static) {
     set(bake, move |effort| effort.gather.iter_mut().for_each(&change));
 }
 

@@ -10,17 +10,18 @@
 //! as a share of what is emitted, and the largest difference relative to the mean radiosity.
 
 use std::num::NonZeroU32;
+use std::ops::ControlFlow;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use glam::{DAffine3, DVec3};
 use lexopt::prelude::*;
 use radiosity::{
-    Device, DeviceRows, Error, Go, Mesh, NearRepair, Rgb, Shooting, Solution, load_obj,
+    Backend, BackendRows, Error, Mesh, ProximityCorrection, Rgb, Shooting, Solution, load_obj,
 };
 
 type Failure = Box<dyn std::error::Error>;
-type Rows = NearRepair<DeviceRows>;
+type Rows = ProximityCorrection<BackendRows>;
 
 fn main() -> ExitCode {
     match run() {
@@ -38,7 +39,7 @@ struct Args {
     hemicube: u32,
     shooting: Shooting,
     full_share: Option<f64>,
-    device: Device,
+    device: Backend,
 }
 
 fn args() -> Result<Args, Failure> {
@@ -62,7 +63,7 @@ fn args() -> Result<Args, Failure> {
         return Err("give SCENE.obj MATERIAL FACTOR GROUP DX,DY,DZ".into());
     }
     let element_size = element_size.unwrap_or(f64::NAN);
-    let device = if cpu { Device::Cpu } else { Device::gpu(None)? };
+    let device = if cpu { Backend::Cpu } else { Backend::gpu(None)? };
     Ok(Args { values, element_size, hemicube, shooting, full_share, device })
 }
 
@@ -80,7 +81,7 @@ fn run() -> Result<(), Failure> {
     let lamp = materials.iter_mut().find(|m| m.name == *material).ok_or("no such material")?;
     lamp.exitance *= factor;
     let dimmed = scene.with_materials(materials)?;
-    let moved = dimmed.with_moved(group, DAffine3::from_translation(shift))?;
+    let moved = dimmed.with_transformed_group(group, DAffine3::from_translation(shift))?;
 
     let before = Mesh::new(scene, size)?;
     let dimmed = before.with_scene(dimmed)?;
@@ -102,10 +103,10 @@ fn run() -> Result<(), Failure> {
             Some(share) => rows.with_full_share(share),
             None => rows,
         };
-        Ok(NearRepair::new(rows, mesh, 1.0))
+        Ok(ProximityCorrection::new(rows, mesh, 1.0))
     };
     let mut told = Told::default();
-    let go = |_: &_| Go::Continue(());
+    let go = |_: &_| ControlFlow::Continue(());
 
     let start = Instant::now();
     let mut maker = rows(&before)?;
@@ -128,13 +129,13 @@ fn run() -> Result<(), Failure> {
 
         let start = Instant::now();
         if what == "dimmed" {
-            solve.relight(mesh)?;
+            solve.update_materials(mesh)?;
         } else {
             let mut new = rows(mesh)?;
             let made = solve.solution()?.rows_made;
-            solve.rearrange(mesh, &mut maker, &mut new, go)?;
+            solve.update_geometry(mesh, &mut maker, &mut new, go)?;
             let again = solve.solution()?.rows_made - made;
-            println!("    {again} drawn again, {:.1e} in doubt", solve.doubt());
+            println!("    {again} drawn again, {:.1e} in doubt", solve.stale_flux_bound());
             maker = new;
         }
         solve.run(&mut maker, go)?;

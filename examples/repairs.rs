@@ -9,12 +9,13 @@
 #[path = "../tests/common/truth.rs"]
 mod truth;
 
+use std::ops::ControlFlow;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use radiosity::{
-    Error, FormFactors, Go, Gpu, Hemicubes, Mesh, NearRepair, NodeId, Row, Shooting,
-    VertexRadiosity, load_obj,
+    Error, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Shooting,
+    VertexMesh, load_obj,
 };
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
@@ -47,15 +48,16 @@ fn run(size: f64, resolution: u32) -> Result<(), Error> {
         "rows", "RMS", "worst", "moved", "hemicub.", "s", "area", "median", "edge", "bias"
     );
     for (name, reach) in [("plain", -1.0), ("near 1", 1.0), ("near 3", 3.0)] {
-        let hemicubes = || Hemicubes::new(&gpu, &mesh, resolution);
-        let mut rows = NearRepair::new(hemicubes()?, &mesh, reach);
+        let hemicubes = || HemicubeRows::new(&gpu, &mesh, resolution);
+        let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
         let (rms, worst) = reciprocity(&mesh, &mut rows)?;
         let moved = rows.moved();
 
         let start = Instant::now();
-        let mut rows = NearRepair::new(hemicubes()?, &mesh, reach);
-        let solution = Shooting::default().solve(&mesh, &mut rows, |_| Go::Continue(()))?;
-        let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+        let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
+        let solution =
+            Shooting::default().solve(&mesh, &mut rows, |_| ControlFlow::Continue(()))?;
+        let surface = VertexMesh::new(&mesh, &solution.radiosity);
         let seconds = start.elapsed().as_secs_f64();
         let errors = truth::compare(&surface, TRUTH);
         let (area, edge) = (errors["area"], errors["edge"]);
@@ -77,7 +79,7 @@ fn run(size: f64, resolution: u32) -> Result<(), Error> {
 fn reciprocity(mesh: &Mesh, maker: &mut dyn FormFactors) -> Result<(f64, f64), Error> {
     let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
     let mut rows: Vec<Row> = Vec::with_capacity(elements.len());
-    for batch in elements.chunks(maker.batch()) {
+    for batch in elements.chunks(maker.preferred_batch_len()) {
         rows.extend(maker.rows(mesh, batch, 1.0)?);
     }
     let flux = |i: usize, j: usize| {

@@ -7,6 +7,7 @@ mod support;
 use std::fs::File;
 use std::io::BufWriter;
 use std::num::NonZeroU32;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -15,7 +16,7 @@ use indicatif::ProgressBar;
 use lexopt::prelude::*;
 use npyz::WriterBuilder;
 use radiosity::{
-    Error, ErrorKind, Estimate, Go, Mesh, Scene, ViewFactors, load_obj, write_matrix_market,
+    Error, ErrorKind, Estimate, Mesh, Scene, ViewFactors, load_obj, write_matrix_market,
     write_view_factor_list, write_view_factors,
 };
 use support::Choice;
@@ -115,7 +116,7 @@ impl Settings {
         let progress = |done: usize, all: usize| {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
-            Go::Continue(())
+            ControlFlow::Continue(())
         };
         let matrix = match &self.method {
             Method::Exact { error, two_sided } => {

@@ -1,6 +1,7 @@
 //! What the fuzz target does with an input, and the replay of its corpus in `tests/fuzz_corpus.rs`.
 
-use radiosity::{Error, Go, Mesh, RayCast, Scene, Shooting, VertexRadiosity, read_obj};
+use radiosity::{Error, Mesh, RayRows, Scene, Shooting, VertexMesh, read_obj};
+use std::ops::ControlFlow;
 
 /// Parts the OBJ file from the MTL file in an input. In UTF-8 there is no such byte.
 const SEPARATOR: u8 = 0xff;
@@ -63,11 +64,12 @@ fn settle(scene: &Scene) {
         Ok(mesh) => mesh,
         Err(_) => return,
     };
-    let mut rays = RayCast::new(&mesh, 16).expect("16 rays");
+    let mut rays = RayRows::new(&mesh, 16).expect("16 rays");
     let shooting = Shooting { shots: Some(16), ..Default::default() };
-    let solution = shooting.solve(&mesh, &mut rays, |_| Go::Continue(())).expect("good rows");
+    let solution =
+        shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).expect("good rows");
     assert!(solution.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
     assert!(solution.ledger.imbalance() <= 1e-9, "{:?}", solution.ledger);
-    let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+    let surface = VertexMesh::new(&mesh, &solution.radiosity);
     assert!(surface.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
 }

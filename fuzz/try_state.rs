@@ -3,11 +3,12 @@
 //! An input is a byte that picks the method and what a file has between the names of mesh and settings
 //! and the checksum: these are put around it, so that what they guard is reached.
 
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use glam::DVec3;
 use radiosity::{
-    ErrorKind, FormFactors, Go, Material, Mesh, Method, Progress, RayCast, Rgb, Scene, Solve,
+    ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, SolveSession,
     Solver, Triangle,
 };
 use xxhash_rust::xxh3::xxh3_64;
@@ -41,8 +42,8 @@ fn meshes() -> &'static [Mesh; 2] {
     })
 }
 
-fn rows() -> RayCast {
-    RayCast::new(&meshes()[0], 64).unwrap()
+fn rows() -> RayRows {
+    RayRows::new(&meshes()[0], 64).unwrap()
 }
 
 /// Every method; GMRES with few products, so that states stay small.
@@ -54,16 +55,16 @@ fn solver(pick: u8) -> Solver {
     Solver { unshot: 1e-6, row_memory: 1 << 14, ..Solver::new(method) }
 }
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 /// The bytes before what an input stands for.
-fn names(solver: &Solver, rows: &mut RayCast) -> Vec<u8> {
+fn names(solver: &Solver, rows: &mut RayRows) -> Vec<u8> {
     let mut solve = solver.begin(&meshes()[0]).unwrap();
-    solve.advance(rows, |_| Go::Break(())).unwrap();
+    solve.advance(rows, |_| ControlFlow::Break(())).unwrap();
     let mut bytes = solve.to_bytes();
-    let last = rows.settings();
+    let last = rows.fingerprint();
     let at = bytes.windows(last.len()).position(|w| w == last.as_bytes()).unwrap();
     bytes.truncate(at + last.len());
     bytes
@@ -102,14 +103,14 @@ pub fn try_state(input: &[u8]) -> bool {
             }
         }
     }
-    if solve.relight(other).is_ok() {
+    if solve.update_materials(other).is_ok() {
         check(&solve);
     }
     true
 }
 
 /// Light is finite, and all of it is accounted for.
-fn check(solve: &Solve) {
+fn check(solve: &SolveSession) {
     let Ok(solution) = solve.solution() else { return };
     assert!(solution.ledger.imbalance() <= 1e-9);
     assert_eq!(solution.radiosity.len(), solve.mesh().element_count());

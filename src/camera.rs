@@ -6,9 +6,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::rays::{Hit, Rays};
 use crate::scene::Rgb;
-use crate::vertex::VertexRadiosity;
+use crate::vertex::VertexMesh;
+use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// A pinhole camera. Up in the image is +y, or −z where the camera looks along y.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,12 +46,12 @@ impl Camera {
     /// Those of [`Camera::check`].
     pub fn image(
         &self,
-        surface: &VertexRadiosity,
+        surface: &VertexMesh,
         width: u32,
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        let sight = Sight::new(self, surface, width, height, samples)?;
+        let sight = PrimaryRays::new(self, surface, width, height, samples)?;
         let pixel = |k: u32| {
             let sum: Rgb = sight.hits(k).map(|hit| sight.at(&hit, &surface.radiosity)).sum();
             sum * sight.share / std::f64::consts::PI
@@ -97,9 +97,9 @@ impl Camera {
 }
 
 /// The lines of sight through the pixels of an image, and what they meet.
-struct Sight<'a> {
-    surface: &'a VertexRadiosity,
-    rays: Rays,
+struct PrimaryRays<'a> {
+    surface: &'a VertexMesh,
+    rays: RayScene,
     eye: DVec3,
     /// A line of sight at the image's top left corner, and from there to the right and downwards by
     /// a sample each.
@@ -112,25 +112,35 @@ struct Sight<'a> {
     share: f64,
 }
 
-impl Sight<'_> {
+impl PrimaryRays<'_> {
     fn new<'a>(
         camera: &Camera,
-        surface: &'a VertexRadiosity,
+        surface: &'a VertexMesh,
         width: u32,
         height: u32,
         samples: u32,
-    ) -> Result<Sight<'a>, Error> {
+    ) -> Result<PrimaryRays<'a>, Error> {
         camera.check(width, height, samples)?;
         let [right, up, forward] = camera.frame();
         let corner = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let rays = Rays::new(surface.faces.iter().map(corner));
+        let rays = RayScene::new(surface.faces.iter().map(corner));
         let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
         let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
         let (right, down) = (right * step, -up * step);
         let half = |pixels: u32| f64::from(pixels) * f64::from(samples) / 2.0;
         let corner = forward - right * half(width) - down * half(height);
         let share = 1.0 / f64::from(samples * samples);
-        Ok(Sight { surface, rays, eye: camera.eye, corner, right, down, width, samples, share })
+        Ok(PrimaryRays {
+            surface,
+            rays,
+            eye: camera.eye,
+            corner,
+            right,
+            down,
+            width,
+            samples,
+            share,
+        })
     }
 
     /// The fronts that the lines of sight of pixel `k` meet. The other lines meet backs or nothing.
@@ -147,7 +157,7 @@ impl Sight<'_> {
 
     /// The front that is met along `direction` from the eye, if that comes first.
     fn hit(&self, direction: DVec3) -> Option<Hit> {
-        self.rays.nearest(self.eye, direction, 0.0, None).filter(|hit| hit.front)
+        self.rays.closest_hit(self.eye, direction, 0.0, None).filter(|hit| hit.front)
     }
 
     /// What is interpolated where a line meets the surface from values at its vertices.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
 ///
-/// Shown with `{}`, it is one line: `place: found; remedy`.
+/// DepthMode with `{}`, it is one line: `place: found; remedy`.
 #[derive(Clone)]
 pub struct Error(Arc<Inner>);
 
@@ -72,7 +72,7 @@ impl Error {
     }
 
     /// Whether a device is at fault: with another one the same may work.
-    pub fn is_of_device(&self) -> bool {
+    pub fn is_device_error(&self) -> bool {
         matches!(self.kind(), ErrorKind::Device | ErrorKind::Memory)
     }
 

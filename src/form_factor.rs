@@ -1,9 +1,8 @@
 //! The contract between whoever makes form-factor rows and whoever uses them.
 
-pub mod analytic;
-pub(crate) mod effort;
-pub(crate) mod near;
-pub(crate) mod ray_cast;
+pub mod closed_form;
+pub(crate) mod proximity;
+pub(crate) mod resolution_policy;
 pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
@@ -18,9 +17,9 @@ pub struct Row {
     /// Elements that receive, by ascending index, each with its share.
     pub entries: Vec<Entry>,
     /// Share that meets nothing and leaves the scene.
-    pub open: u32,
+    pub escaped: u32,
     /// Share that meets the back of a surface and is lost there.
-    pub back: u32,
+    pub backface: u32,
 }
 
 /// One nonzero of a [`Row`].
@@ -48,7 +47,7 @@ impl Row {
 
     pub(crate) fn sum(&self) -> u64 {
         let seen: u64 = self.entries.iter().map(|e| u64::from(e.share)).sum();
-        seen + u64::from(self.open) + u64::from(self.back)
+        seen + u64::from(self.escaped) + u64::from(self.backface)
     }
 
     /// Bytes that keeping this row takes.
@@ -62,7 +61,7 @@ impl Row {
     pub(crate) fn set_factors(&mut self, factors: &[f64]) {
         let (mut sum, mut given) = (0.0, 0);
         let slots = self.entries.iter_mut().map(|e| &mut e.share);
-        for (slot, factor) in slots.chain([&mut self.open, &mut self.back]).zip(factors) {
+        for (slot, factor) in slots.chain([&mut self.escaped, &mut self.backface]).zip(factors) {
             sum += factor;
             let upto = (sum * f64::from(Row::TOTAL)).round() as u32;
             *slot = upto - given;
@@ -70,7 +69,7 @@ impl Row {
         }
         // The largest slot can take what rounding of the sum has left.
         let slots = self.entries.iter_mut().map(|e| &mut e.share);
-        let largest = slots.chain([&mut self.open, &mut self.back]).max_by_key(|s| **s);
+        let largest = slots.chain([&mut self.escaped, &mut self.backface]).max_by_key(|s| **s);
         largest.into_iter().for_each(|s| *s += Row::TOTAL - given);
         self.entries.retain(|e| e.share > 0);
     }
@@ -96,11 +95,11 @@ impl Row {
             share: part(&mut run.iter().map(|e| e.share)),
         };
         let entries = runs.map(mean).filter(|e| e.share > 0).collect();
-        let open = part(&mut rows.iter().map(|r| r.open));
-        Row { entries, open, back: part(&mut rows.iter().map(|r| r.back)) }
+        let open = part(&mut rows.iter().map(|r| r.escaped));
+        Row { entries, escaped: open, backface: part(&mut rows.iter().map(|r| r.backface)) }
     }
 
-    /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
+    /// MatrixChecks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
     ///
     /// # Errors
     /// [`ErrorKind::FormFactor`] that names `patch` and what is off.
@@ -144,13 +143,13 @@ pub trait FormFactors {
     ) -> Result<Vec<Row>, Error>;
 
     /// How many rows are best asked for at once.
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         1
     }
 
     /// What its rows depend on beside the mesh, in words: a saved solve goes on only with rows made
     /// alike.
-    fn settings(&self) -> String {
+    fn fingerprint(&self) -> String {
         "rows".into()
     }
 }
@@ -180,8 +179,8 @@ mod tests {
     fn a_mean_of_rows_is_exact() {
         let row = |entries: &[(u32, u32)], open: u32| {
             let entries = entries.iter().map(|&(element, share)| Entry { element, share });
-            let row = Row { entries: entries.collect(), open, back: 0 };
-            Row { back: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
+            let row = Row { entries: entries.collect(), escaped: open, backface: 0 };
+            Row { backface: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
         };
         // Remainders of 1, 2 and 3 in four, an entry that is in one row only, one that is lost.
         let rows = [
@@ -201,8 +200,8 @@ mod tests {
             assert!((f64::from(got) - want).abs() < 1.0, "{got} {want}");
         };
         (0..8).for_each(|k| near(share(&mean, k), rows.each_ref().map(|r| share(r, k))));
-        near(mean.open, rows.each_ref().map(|r| r.open));
-        near(mean.back, rows.each_ref().map(|r| r.back));
+        near(mean.escaped, rows.each_ref().map(|r| r.escaped));
+        near(mean.backface, rows.each_ref().map(|r| r.backface));
         // Of equal rows, the row.
         assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
     }

@@ -1,9 +1,7 @@
 //! The contract between whoever gathers the settled light at places and whoever uses it.
 
-pub(crate) mod light_view;
+pub(crate) mod light_projection;
 pub(crate) mod lights;
-pub(crate) mod rays;
-pub(crate) mod turns;
 
 use glam::DVec3;
 
@@ -13,7 +11,7 @@ use crate::scene::Rgb;
 
 /// A place on a surface at which light is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct GatherPoint {
     /// Where, in the scene's unit: a little above the surface, so that nothing hides it.
     pub position: DVec3,
     /// Unit normal; what is above its plane is seen.
@@ -22,25 +20,25 @@ pub struct Place {
     pub near: f64,
 }
 
-/// What arrives at a [`Place`].
+/// What arrives at a [`GatherPoint`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Gathered {
+pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all that is seen.
     pub irradiance: Rgb,
     /// The part of it that comes straight from lights which were looked at one by one.
     pub direct: Rgb,
     /// Share of the hemisphere's form factor in which nothing is seen.
-    pub open: f64,
+    pub escaped: f64,
     /// Share in which backs of surfaces are seen.
-    pub back: f64,
+    pub backface: f64,
     /// Mean of 1/distance over the hemisphere, weighted by form factor; what is open counts 0.
-    pub nearness: f64,
+    pub inverse_distance: f64,
 }
 
 /// The settled light: what every point of the scene's fronts reflects, interpolated linearly from
 /// the corners of the elements. What they emit is known from their materials.
 #[derive(Clone, Copy, Debug)]
-pub struct Sources<'a> {
+pub struct RadiosityField<'a> {
     /// The scene, cut into elements.
     pub mesh: &'a Mesh,
     /// Per element, where its three corners' values are in `reflected`.
@@ -55,16 +53,24 @@ pub trait Gather {
     ///
     /// # Errors
     /// Whatever keeps the gatherer from it, [`crate::ErrorKind::Device`] above all.
-    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error>;
+    fn gather(
+        &mut self,
+        sources: &RadiosityField,
+        places: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error>;
 }
 
 impl<G: Gather + ?Sized> Gather for Box<G> {
-    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
+    fn gather(
+        &mut self,
+        sources: &RadiosityField,
+        places: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
         (**self).gather(sources, places)
     }
 }
 
-impl Sources<'_> {
+impl RadiosityField<'_> {
     /// Reflected radiosity at barycentric position (`u`, `v`) of triangle `t`.
     pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
         let (element, [u, v]) = self.mesh.element_at(t, u, v);

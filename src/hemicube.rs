@@ -16,7 +16,7 @@ use crate::form_factor::Row;
 /// Smallest and largest resolution of a hemicube's top face, in pixels along an edge.
 pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 2..=4096;
 
-/// Checks a hemicube resolution: even and within [`RESOLUTIONS`].
+/// MatrixChecks a hemicube resolution: even and within [`RESOLUTIONS`].
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] otherwise.

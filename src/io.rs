@@ -7,8 +7,9 @@ mod obj;
 mod ply;
 mod polygon;
 mod report;
-mod table;
 mod text;
+mod tone;
+mod view_factor_tables;
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -20,7 +21,8 @@ pub use image::{write_exr, write_png};
 pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
 pub use report::{Report, Seconds};
-pub use table::{write_matrix_market, write_view_factor_list, write_view_factors};
+pub use tone::ToneCurve;
+pub use view_factor_tables::{write_matrix_market, write_view_factor_list, write_view_factors};
 
 /// Creates `path` and hands it to `write`; any failure names the file.
 fn write_file(

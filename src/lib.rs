@@ -3,27 +3,29 @@
 //! The crate draws a hemicube per patch with wgpu, on any Vulkan, Metal or DX12 device (software
 //! Vulkan included), turns it into form factors, lets progressive shooting on the CPU spread the
 //! light, and gives radiosity at the vertices of a mesh. The path, in one line:
-//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexRadiosity`] → file. For exact
-//! vertices, [`Gathering`] stands before the last: each sees the settled light for itself, and the
+//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexMesh`] → file. For exact
+//! vertices, [`RefinementSettings`] stands before the last: each sees the settled light for itself, and the
 //! mesh grows finer where the light asks for it. [`Solver`] has other methods beside shooting, GMRES
 //! for reflectance near one among them, and a rule that picks one.
 //!
 //! ```no_run
+//! use std::ops::ControlFlow;
+//!
 //! use radiosity::{
-//!     Go, Gpu, Hemicubes, Mesh, NearRepair, Shooting, VertexRadiosity, load_obj, write_ply,
+//!     Gpu, HemicubeRows, Mesh, ProximityCorrection, Shooting, VertexMesh, load_obj, write_ply,
 //! };
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let scene = load_obj("scenes/cornell_box.obj")?;
 //! let mesh = Mesh::new(scene, 30.0)?; // no element edge over 30 units of the file
 //! let gpu = Gpu::new(None)?;
-//! let hemicubes = Hemicubes::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
-//! let mut rows = NearRepair::new(hemicubes, &mesh, 1.0); // mends what is within one diameter
+//! let hemicubes = HemicubeRows::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
+//! let mut rows = ProximityCorrection::new(hemicubes, &mesh, 1.0); // mends what is within one diameter
 //! let solution = Shooting::default().solve(&mesh, &mut rows, |progress| {
 //!     println!("{:.2} % unshot", 100.0 * progress.unshot_share);
-//!     Go::Continue(())
+//!     ControlFlow::Continue(())
 //! })?;
-//! let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+//! let surface = VertexMesh::new(&mesh, &solution.radiosity);
 //! write_ply("cornell_box.ply", &surface)?;
 //! # Ok(())
 //! # }
@@ -52,60 +54,52 @@
 //! Specular or glossy reflection, transparency, textures, participating media, polarisation, time.
 //! Light leaves and arrives diffusely, and an emitter is a surface.
 
-mod accuracy;
-mod bake;
-mod camera;
-mod certificate;
-mod device;
-mod effort;
+pub mod backend;
+pub mod bake;
+pub mod camera;
 mod error;
-mod fan;
 pub mod form_factor;
-mod gather;
-mod gpu;
+pub mod gather;
+mod geometry;
 pub mod hemicube;
-mod io;
-mod mesh;
-mod mix;
-mod order;
-mod pace;
-mod rays;
-mod relay;
-mod scene;
-mod solve;
-mod tone;
-mod vertex;
-mod view_factors;
-mod winding;
+pub mod io;
+pub mod mesh;
+mod progress;
+mod sampling;
+pub mod scene;
+pub mod solver;
+pub mod vertex;
+pub mod view_factor;
+mod visibility;
 
-pub use accuracy::{Accuracy, Budget};
-pub use bake::{BakeSeconds, Baked, Stage};
+pub use backend::cpu::{RayGather, RayRows};
+pub use backend::fallback::Fallback;
+pub use backend::gpu::{AdapterInfo, Gpu, GpuLimits, HemicubeGather, HemicubeRows, StageSeconds};
+pub use backend::{Backend, BackendRows};
+pub use bake::{
+    Accuracy, BakeProgress, BakeResult, BakeSettings, Budget, ErrorEstimate, GatherSettings,
+    Timings,
+};
 pub use camera::{Camera, RadianceImage};
-pub use certificate::Certificate;
-pub use device::{Device, DeviceRows};
-pub use effort::{Effort, GatherEffort};
 pub use error::{Error, ErrorKind};
-pub use form_factor::near::NearRepair;
-pub use form_factor::ray_cast::RayCast;
-pub use form_factor::viewpoints::Viewpoints;
+pub use form_factor::proximity::ProximityCorrection;
+pub use form_factor::viewpoints::AdaptiveViewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
-pub use gather::rays::RayGather;
-pub use gather::{Gather, Gathered, Place, Sources};
-pub use gpu::{Adapter, Gpu, HemicubeGather, Hemicubes, Limits, StageSeconds};
+pub use gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 pub use io::{
-    Report, Seconds, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
-    write_view_factor_list, write_view_factors,
+    Report, Seconds, ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply,
+    write_png, write_view_factor_list, write_view_factors,
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
-pub use relay::Relay;
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
-pub use solve::{
-    Go, Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, Solve, Solver, Stop,
+pub use solver::{
+    Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, SolveSession, Solver, StopReason,
 };
-pub use tone::ToneCurve;
-pub use vertex::VertexRadiosity;
-pub use vertex::gathering::{GatherProgress, GatheredRadiosity, Gathering};
-pub use view_factors::{Absent, Checks, Correction, Estimate, Factor, ViewFactors, Worst};
+pub use vertex::VertexMesh;
+pub use vertex::gathering::{GatherProgress, GatheredMesh, RefinementSettings};
+pub use view_factor::{
+    EnforcementReport, ErrorStats, Estimate, Factor, MatrixChecks, Missing, ViewFactors,
+};
 
 /// The README's code compiles.
 #[cfg(doctest)]

@@ -4,11 +4,11 @@
 //! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
 //! a patch is one contiguous range of elements, however unequal the depths below it.
 
-mod boxes;
+mod box_overlap;
 mod clusters;
 mod contacts;
 mod quadtree;
-mod smooth;
+mod topology;
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -22,8 +22,8 @@ use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Scene};
 pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
-pub use smooth::{COPLANAR_DEGREES, CREASE_DEGREES};
-pub(crate) use smooth::{Side, Smooth};
+pub use topology::{COPLANAR_DEGREES, CREASE_DEGREES};
+pub(crate) use topology::{Side, SurfaceTopology};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -102,11 +102,11 @@ impl Mesh {
                 ),
             ));
         }
-        Ok(Mesh::grown(scene, |t, cell| cell.level < depths[t]))
+        Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
     /// Every triangle split wherever `deeper` says so of a triangle and a cell of it.
-    fn grown(scene: Arc<Scene>, deeper: impl Fn(usize, Cell) -> bool) -> Mesh {
+    fn refined_where(scene: Arc<Scene>, deeper: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
         let normals = (0..count).map(|t| scene.normal(t)).collect();
         let areas = (0..count).map(|t| scene.area(t)).collect();
@@ -144,7 +144,7 @@ impl Mesh {
         let split = elements.iter().map(|&e| self.node(self.element(e)));
         let inner = self.nodes.iter().filter(inner).chain(split);
         let inner: HashSet<(u32, Cell)> = inner.map(|n| (n.triangle, n.cell)).collect();
-        Ok(Mesh::grown(self.scene.clone(), |t, cell| inner.contains(&(t as u32, cell))))
+        Ok(Mesh::refined_where(self.scene.clone(), |t, cell| inner.contains(&(t as u32, cell))))
     }
 
     /// Builds the subtree of node `n` as far as `deeper` says, and numbers its elements.

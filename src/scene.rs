@@ -53,7 +53,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
+    /// MatrixChecks and takes a scene: `positions` in any length unit, `groups` by name.
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
@@ -188,7 +188,7 @@ impl Scene {
 
     /// The step between 64-bit coordinates where the scene is, its own unit: what is said to be in one
     /// plane may be off it by a few of these.
-    pub(crate) fn grain(&self) -> f64 {
+    pub(crate) fn coordinate_ulp(&self) -> f64 {
         self.grain
     }
 
@@ -217,7 +217,7 @@ impl Scene {
     /// # Errors
     /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or finite
     /// coordinates.
-    pub fn with_moved(&self, group: &str, by: DAffine3) -> Result<Scene, Error> {
+    pub fn with_transformed_group(&self, group: &str, by: DAffine3) -> Result<Scene, Error> {
         let Some(moved) = self.groups.iter().position(|name| name == group) else {
             let known = self.groups.join(", ");
             return Err(bad(

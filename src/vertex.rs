@@ -1,21 +1,21 @@
 //! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
 
-mod boundary;
-mod covered;
-mod curves;
+pub(crate) mod adaptive;
+mod boundary_fit;
+mod buried;
+mod corner_singularity;
+pub(crate) mod gather_points;
 pub(crate) mod gathering;
-mod meeting;
-pub(crate) mod places;
-pub(crate) mod refined;
-mod seams;
-mod vertices;
+mod hanging_nodes;
+mod keys;
+mod surplus;
 
 use glam::DVec3;
 
-use crate::mesh::{Mesh, Smooth};
+use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::Rgb;
-use seams::Seams;
-use vertices::Vertices;
+use hanging_nodes::HangingNodes;
+use keys::Vertices;
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
@@ -26,7 +26,7 @@ use vertices::Vertices;
 /// fanned around its centroid over the vertices on its sides, across creases too: no cracks, no
 /// T-vertices, and where the scene is watertight so is the mesh, position by position.
 #[derive(Clone, Debug, Default)]
-pub struct VertexRadiosity {
+pub struct VertexMesh {
     /// Vertex positions, in the scene's length unit.
     pub positions: Vec<DVec3>,
     /// Unit normals: area-weighted over the elements around a vertex.
@@ -44,7 +44,7 @@ pub struct VertexRadiosity {
     pub comments: Vec<String>,
 }
 
-impl VertexRadiosity {
+impl VertexMesh {
     /// Radiosity at the vertices of `mesh` from that of its elements, one value an element.
     ///
     /// First the area-weighted mean of the elements around each vertex (Cohen and Greenberg 1985),
@@ -53,13 +53,13 @@ impl VertexRadiosity {
     /// mean over an element's corners is no longer the element's value. One step of van Cittert's
     /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
     /// No value is let below zero.
-    pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
-        VertexRadiosity::with_corners(mesh, element_radiosity).0
+    pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
+        VertexMesh::with_corners(mesh, element_radiosity).0
     }
 
     /// The same, and the vertices at the corners of each element.
-    fn with_corners(mesh: &Mesh, element_radiosity: &[Rgb]) -> (VertexRadiosity, Vec<[u32; 3]>) {
-        let smooth = Smooth::new(mesh.scene());
+    fn with_corners(mesh: &Mesh, element_radiosity: &[Rgb]) -> (VertexMesh, Vec<[u32; 3]>) {
+        let smooth = SurfaceTopology::new(mesh.scene());
         let vertices = Vertices::new(mesh, &smooth);
         let (positions, rims) = (&vertices.positions, &vertices.rims);
         let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
@@ -76,25 +76,39 @@ impl VertexRadiosity {
         let normals = mean(&|e, _| mesh.normal(mesh.element(e)));
         let mut smoothed = mean(&|e, _| element_radiosity[e]);
         let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
-        boundary::extrapolate(mesh, rims, positions, &normals, element_radiosity, &mut smoothed);
+        boundary_fit::extrapolate(
+            mesh,
+            rims,
+            positions,
+            &normals,
+            element_radiosity,
+            &mut smoothed,
+        );
         let missing = mean(&|e, rim| {
             let corners = rim.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
             element_radiosity[e] - corners / rim.len() as f64
         });
         let corrected = smoothed.iter().zip(missing).map(|(&b, m)| (b + m).max(Rgb::ZERO));
-        let mut out = VertexRadiosity {
+        let mut out = VertexMesh {
             radiosity: corrected.collect(),
             normals,
             positions: positions.clone(),
             ..Default::default()
         };
-        out.add_elements(mesh, &Seams::new(mesh, &smooth, &vertices), |_, e| element_radiosity[e]);
+        out.add_elements(mesh, &HangingNodes::new(mesh, &smooth, &vertices), |_, e| {
+            element_radiosity[e]
+        });
         (out, vertices.corners)
     }
 
     /// Adds every element of `mesh` as a face, or as a fan where there are vertices on its sides;
     /// `middle` says what the fan has in its middle, W/m².
-    fn add_elements(&mut self, mesh: &Mesh, seams: &Seams, middle: impl Fn(&Self, usize) -> Rgb) {
+    fn add_elements(
+        &mut self,
+        mesh: &Mesh,
+        seams: &HangingNodes,
+        middle: impl Fn(&Self, usize) -> Rgb,
+    ) {
         for seam in &seams.vertices {
             let [a, b] = seam.between.map(|v| v as usize);
             self.positions.push(seam.position);
@@ -127,8 +141,8 @@ impl VertexRadiosity {
 
     /// The same mesh with each element's own value at all its corners: what the solver found,
     /// nothing averaged. `element_radiosity` holds one value an element.
-    pub fn flat(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexRadiosity {
-        let mut out = VertexRadiosity::default();
+    pub fn per_element(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
+        let mut out = VertexMesh::default();
         for (e, &radiosity) in element_radiosity.iter().enumerate().take(mesh.element_count()) {
             let node = mesh.element(e);
             let first = out.positions.len() as u32;
@@ -167,7 +181,7 @@ mod tests {
     const SQUARE: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
 
     /// Side of each face, as a pair of vertices, with how often it is run in each direction.
-    fn sides(s: &VertexRadiosity) -> HashMap<(u32, u32), [u32; 2]> {
+    fn sides(s: &VertexMesh) -> HashMap<(u32, u32), [u32; 2]> {
         let mut count: HashMap<(u32, u32), [u32; 2]> = HashMap::new();
         for f in &s.faces {
             for k in 0..3 {
@@ -178,7 +192,7 @@ mod tests {
         count
     }
 
-    fn surface_area(s: &VertexRadiosity) -> f64 {
+    fn surface_area(s: &VertexMesh) -> f64 {
         let area = |f: &[u32; 3]| {
             let [a, b, c] = f.map(|v| s.positions[v as usize]);
             (b - a).cross(c - a).length() / 2.0
@@ -192,7 +206,7 @@ mod tests {
             let faces = [([0, 1, 2], 0, 0), ([0, 2, 3], second.0, second.1)];
             let m = mesh(&SQUARE, &faces, 0.36);
             assert_eq!(m.element_count(), 2 * 16);
-            VertexRadiosity::new(&m, &[Rgb::ONE; 32]).positions.len()
+            VertexMesh::new(&m, &[Rgb::ONE; 32]).positions.len()
         };
         assert_eq!(count((0, 0)), 25);
         assert_eq!(count((1, 0)), 30);
@@ -205,7 +219,7 @@ mod tests {
             let a = f64::to_radians(degrees);
             let points = [[0., 0., 0.], [0., 1., 0.], [-1., 0., 0.], [a.cos(), 0., a.sin()]];
             let m = mesh(&points, &[([0, 1, 2], 0, 0), ([1, 0, 3], 0, 0)], 9.0);
-            assert_eq!(VertexRadiosity::new(&m, &[Rgb::ONE; 2]).positions.len(), vertices);
+            assert_eq!(VertexMesh::new(&m, &[Rgb::ONE; 2]).positions.len(), vertices);
         }
     }
     use crate::mesh::CREASE_DEGREES;
@@ -218,7 +232,7 @@ mod tests {
         let depths = [0, 1].map(|t| m.depth(t));
         assert_ne!(depths[0], depths[1]);
         let values: Vec<Rgb> = (0..m.element_count()).map(|e| Rgb::splat(e as f64)).collect();
-        let s = VertexRadiosity::new(&m, &values);
+        let s = VertexMesh::new(&m, &values);
         let area: f64 = [0, 1].map(|t| m.scene().area(t)).iter().sum();
         assert!((surface_area(&s) - area).abs() < 1e-14, "covered once");
         // Inside, every side is run once each way; on the outline once. The outline's length is
@@ -243,19 +257,19 @@ mod tests {
         let faces = [([0, 1, 2], 0, 0), ([0, 2, 3], 0, 0)];
         let m = mesh(&SQUARE, &faces, 0.1);
         let constant = vec![Rgb::new(1., 2., 3.); m.element_count()];
-        let s = VertexRadiosity::new(&m, &constant);
+        let s = VertexMesh::new(&m, &constant);
         assert!(s.radiosity.iter().all(|b| b.distance(Rgb::new(1., 2., 3.)) < 1e-13));
         let at_centroids = |f: &dyn Fn(DVec3) -> f64| -> Vec<Rgb> {
             let nodes = (0..m.element_count()).map(|e| m.element(e));
             nodes.map(|n| Rgb::splat(f(m.centroid(n)))).collect()
         };
         // Means of a linear function are exact inside, and linear fits at the boundary.
-        let s = VertexRadiosity::new(&m, &at_centroids(&|p| 0.3 + p.x - 0.2 * p.y));
+        let s = VertexMesh::new(&m, &at_centroids(&|p| 0.3 + p.x - 0.2 * p.y));
         for (p, b) in s.positions.iter().zip(&s.radiosity) {
             assert!((b.x - (0.3 + p.x - 0.2 * p.y)).abs() < 1e-12, "{p} {}", b.x);
         }
         // A step down to nothing would be overshot; it is not.
-        let s = VertexRadiosity::new(&m, &at_centroids(&|p| f64::from(p.x > 0.1)));
+        let s = VertexMesh::new(&m, &at_centroids(&|p| f64::from(p.x > 0.1)));
         assert!(s.radiosity.iter().all(|b| b.min_element() >= 0.0));
     }
 
@@ -263,7 +277,7 @@ mod tests {
     fn flat_keeps_every_element_its_own_value() {
         let m = mesh(&SQUARE, &[([0, 1, 2], 0, 0), ([0, 2, 3], 0, 0)], 0.8);
         let values: Vec<Rgb> = (0..m.element_count()).map(|e| Rgb::splat(e as f64)).collect();
-        let s = VertexRadiosity::flat(&m, &values);
+        let s = VertexMesh::per_element(&m, &values);
         assert_eq!(s.positions.len(), 3 * m.element_count());
         assert!((surface_area(&s) - 1.0).abs() < 1e-15);
         for (face, &e) in s.faces.iter().zip(&s.elements) {

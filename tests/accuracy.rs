@@ -7,22 +7,23 @@ mod truth;
 
 use common::{cornell_box, cube, quads};
 use radiosity::{
-    Accuracy, Baked, Budget, Device, Effort, ErrorKind, Gathering, Go, Material, Rgb, Scene,
-    Shooting, Stage, Stop,
+    Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, ErrorKind, Material,
+    RefinementSettings, Rgb, Scene, Shooting, StopReason,
 };
+use std::ops::ControlFlow;
 
 const TRUTH: &str = include_str!("data/cornell_box.truth.json");
 
-fn go(_: &Stage) -> Go {
-    Go::Continue(())
+fn go(_: &BakeProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 fn cornell() -> Scene {
     cornell_box(f64::INFINITY).scene().clone()
 }
 
-fn dial(scene: Scene, error: f64) -> Baked {
-    Accuracy { error, adjust: &|_| {} }.bake(scene, &Device::Cpu, go).unwrap()
+fn dial(scene: Scene, error: f64) -> BakeResult {
+    Accuracy { error, adjust: &|_| {} }.bake(scene, &Backend::Cpu, go).unwrap()
 }
 
 /// A closed room in which all is known: B = 1/(1 − ρ) everywhere.
@@ -80,10 +81,10 @@ fn a_furnace_is_exact_and_known_to_be() {
 fn light_that_was_not_shot_is_told_of() {
     for reflectance in [0.5, 0.8] {
         for unshot in [0.3, 0.1, 0.03] {
-            let mut effort = Effort::for_error(0.02, &furnace(reflectance));
+            let mut effort = BakeSettings::for_error(0.02, &furnace(reflectance));
             effort.shooting = Shooting { unshot, tolerance: 0.0, ..Shooting::default() };
             (effort.gather, effort.element_size) = (None, 0.5);
-            let baked = effort.bake(furnace(reflectance), &Device::Cpu, go).unwrap();
+            let baked = effort.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
             let (even, left) = (1.0 / (1.0 - reflectance), baked.solution.ledger.unshot_share());
             let mean = baked.solution.radiosity.iter().map(|b| b.x).sum::<f64>()
                 / baked.solution.radiosity.len() as f64;
@@ -103,16 +104,16 @@ fn light_that_was_not_shot_is_told_of() {
 
 #[test]
 fn what_is_set_by_hand_stays() {
-    let adjust = |effort: &mut Effort| {
+    let adjust = |effort: &mut BakeSettings| {
         effort.hemicube = 48;
         if let Some(gather) = &mut effort.gather {
             (gather.rays, gather.noise) = (77, 0.05);
-            gather.gathering = Gathering { sweeps: 1, ..Gathering::new(60.0) };
+            gather.gathering = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
         }
     };
     let baked =
-        Accuracy { error: 0.01, adjust: &adjust }.bake(cornell(), &Device::Cpu, go).unwrap();
-    let mut want = Effort::for_error(0.01, &cornell());
+        Accuracy { error: 0.01, adjust: &adjust }.bake(cornell(), &Backend::Cpu, go).unwrap();
+    let mut want = BakeSettings::for_error(0.01, &cornell());
     adjust(&mut want);
     assert_eq!(baked.effort, want);
     assert!(baked.certificate.total > 0.01, "and it says that it fell short");
@@ -130,11 +131,11 @@ fn two_runs_give_the_same_bits() {
 #[test]
 fn a_time_is_kept_and_more_of_it_gains() {
     let bake = |seconds: f64| {
-        Budget { seconds, adjust: &|_| {} }.bake(cornell(), &Device::Cpu, go).unwrap()
+        Budget { seconds, adjust: &|_| {} }.bake(cornell(), &Backend::Cpu, go).unwrap()
     };
     // No time at all: what was reached, which is little, comes back at once.
     let none = bake(1e-9);
-    assert_eq!(none.solution.stop, Stop::Cancelled);
+    assert_eq!(none.solution.stop, StopReason::Cancelled);
     assert_eq!(none.light.surface.error.len(), none.light.surface.positions.len());
     // Nothing is said of the clock here: any machine has done the first accuracy by then, or stops.
     let some = bake(4.0);
@@ -146,28 +147,28 @@ fn it_can_be_stopped_at_every_stage() {
     for at in 0..3 {
         let mut judged = 0;
         let baked = Accuracy { error: 0.05, adjust: &|_| {} }
-            .bake(cornell(), &Device::Cpu, |stage| {
+            .bake(cornell(), &Backend::Cpu, |stage| {
                 let stop = match stage {
-                    Stage::Shooting(_) => at == 0,
-                    Stage::Gathering(p) => at == 1 && p.level > 0,
-                    Stage::Judged(_) => {
+                    BakeProgress::Shooting(_) => at == 0,
+                    BakeProgress::RefinementSettings(p) => at == 1 && p.level > 0,
+                    BakeProgress::ErrorEstimator(_) => {
                         judged += 1;
                         at == 2
                     }
-                    Stage::Judging { places, of } => {
+                    BakeProgress::Judging { places, of } => {
                         assert!(0 < *places && places <= of);
                         false
                     }
-                    Stage::Failed(error) => panic!("{error}"),
+                    BakeProgress::Failed(error) => panic!("{error}"),
                 };
-                if stop { Go::Break(()) } else { Go::Continue(()) }
+                if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
             .unwrap();
         assert_eq!(judged, 1, "what was reached is judged, once");
         match at {
-            0 => assert_eq!(baked.solution.stop, Stop::Cancelled),
-            1 => assert_eq!(baked.light.stop, Stop::Cancelled),
-            _ => assert_eq!(baked.light.stop, Stop::Converged),
+            0 => assert_eq!(baked.solution.stop, StopReason::Cancelled),
+            1 => assert_eq!(baked.light.stop, StopReason::Cancelled),
+            _ => assert_eq!(baked.light.stop, StopReason::Converged),
         }
         assert_eq!(baked.light.surface.error.len(), baked.light.surface.positions.len());
     }
@@ -191,20 +192,21 @@ fn dark_and_black_scenes_are_exact() {
 fn errors_and_times_out_of_range_are_refused() {
     for error in [0.0, -0.1, 1.0, 7.0, f64::NAN, f64::INFINITY] {
         let dial = Accuracy { error, adjust: &|_| {} };
-        let e = dial.bake(furnace(0.5), &Device::Cpu, go).unwrap_err();
+        let e = dial.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains("error"), "{e}");
     }
     for seconds in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let budget = Budget { seconds, adjust: &|_| {} };
-        let e = budget.bake(furnace(0.5), &Device::Cpu, go).unwrap_err();
+        let e = budget.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
     }
-    let bad = |effort: &mut Effort| {
+    let bad = |effort: &mut BakeSettings| {
         if let Some(gather) = &mut effort.gather {
             gather.gathering.tolerance = 0.0;
         }
     };
-    let e = Accuracy { error: 0.1, adjust: &bad }.bake(furnace(0.5), &Device::Cpu, go).unwrap_err();
+    let e =
+        Accuracy { error: 0.1, adjust: &bad }.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Setting);
 }

@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use radiosity::{
-    Error, ErrorKind, GatheredRadiosity, Gathering, Go, Mesh, RayGather, Rgb, Scene,
-    VertexRadiosity, load_obj, read_obj,
+    Error, ErrorKind, GatheredMesh, Mesh, RayGather, RefinementSettings, Rgb, Scene, VertexMesh,
+    load_obj, read_obj,
 };
 use tempfile::TempDir;
 
@@ -382,7 +383,7 @@ fn a_polygon_of_a_hundred_thousand_corners() {
     // The first corner is one of all triangles: what is done around a vertex must not be done for
     // each of its neighbours.
     let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
-    let surface = VertexRadiosity::new(&mesh, &vec![Rgb::ONE; n - 2]);
+    let surface = VertexMesh::new(&mesh, &vec![Rgb::ONE; n - 2]);
     assert_eq!(surface.positions.len(), n);
     // Even light stays even, as far as the fits at the boundary let it.
     assert!(surface.radiosity.iter().all(|b| b.abs_diff_eq(Rgb::ONE, 2e-6)));
@@ -505,13 +506,13 @@ fn a_fold_of_two_smoothing_groups_is_a_crease() {
         let mesh = Mesh::new(obj(&text).unwrap(), f64::INFINITY).unwrap();
         let light = [Rgb::ONE; 2];
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        let fine = Gathering::new(9.0).gather(
-            &GatheredRadiosity::from_elements(&mesh, &light).unwrap(),
+        let fine = RefinementSettings::new(9.0).gather(
+            &GatheredMesh::from_elements(&mesh, &light).unwrap(),
             &mesh,
             &mut rays,
-            |_| Go::Continue(()),
+            |_| ControlFlow::Continue(()),
         );
-        for surface in [VertexRadiosity::new(&mesh, &light), fine.unwrap().surface] {
+        for surface in [VertexMesh::new(&mesh, &light), fine.unwrap().surface] {
             assert_eq!(surface.positions.len(), vertices, "{first}, {second}");
         }
     }

@@ -3,14 +3,15 @@
 mod common;
 
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use common::quads;
 use glam::DVec3;
-use radiosity::form_factor::analytic::point_to_polygon;
+use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
-    Camera, Error, ErrorKind, Gather, Gathered, GatheredRadiosity, Go, Material, Mesh, Place,
-    RadianceImage, RayGather, Rgb, Sources,
+    Camera, Error, ErrorKind, Gather, GatherPoint, GatheredMesh, IrradianceSample, Material, Mesh,
+    RadianceImage, RadiosityField, RayGather, Rgb,
 };
 
 /// Faces up.
@@ -22,14 +23,14 @@ const REFLECTANCE: Rgb = Rgb::new(0.5, 0.25, 0.75);
 
 /// A floor under a square lamp that reflects nothing, so that the floor has no other light. Its
 /// elements are said to have radiosity `floor`, W/m².
-fn lamp_over_floor(floor: Rgb) -> GatheredRadiosity {
+fn lamp_over_floor(floor: Rgb) -> GatheredMesh {
     let lamp = Material { exitance: EXITANCE, ..Material::grey("lamp", 0.0) };
     let tinted = Material { reflectance: REFLECTANCE, ..Material::grey("floor", 0.0) };
     let mesh = Mesh::new(quads(&[(FLOOR, tinted), (LAMP, lamp)]), 1.0).unwrap();
     let emitted = |e| mesh.material(mesh.element(e)).exitance;
     let value = |e| if emitted(e) == Rgb::ZERO { floor } else { emitted(e) };
     let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(value).collect();
-    GatheredRadiosity::from_elements(&mesh, &radiosity).unwrap()
+    GatheredMesh::from_elements(&mesh, &radiosity).unwrap()
 }
 
 /// Looks over the floor and past its end, from below the lamp, which it sees above.
@@ -40,8 +41,8 @@ const CAMERA: Camera = Camera {
 };
 const SIZE: (u32, u32) = (48, 32);
 
-fn draw(light: &GatheredRadiosity, gather: &mut dyn Gather, samples: u32) -> RadianceImage {
-    let go = |_, _| Go::Continue(());
+fn draw(light: &GatheredMesh, gather: &mut dyn Gather, samples: u32) -> RadianceImage {
+    let go = |_, _| ControlFlow::Continue(());
     let image = CAMERA.gathered_image(light, gather, SIZE.0, SIZE.1, samples, go);
     image.unwrap().expect("nobody stopped it")
 }
@@ -90,9 +91,16 @@ struct Even {
 }
 
 impl Gather for Even {
-    fn gather(&mut self, _: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
+    fn gather(
+        &mut self,
+        _: &RadiosityField,
+        places: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
         self.places += places.len();
-        Ok(vec![Gathered { irradiance: self.irradiance, ..Default::default() }; places.len()])
+        Ok(vec![
+            IrradianceSample { irradiance: self.irradiance, ..Default::default() };
+            places.len()
+        ])
     }
 }
 
@@ -132,7 +140,7 @@ fn edges_along_pixels_are_as_fine_as_there_are_lines_of_sight() {
         let quad = [[left, -9., 0.], [9., -9., 0.], [9., 9., 0.], [left, 9., 0.]];
         let mesh = Mesh::new(quads(&[(quad, lamp.clone())]), 99.0).unwrap();
         let radiosity = vec![Rgb::splat(PI); mesh.element_count()];
-        let light = GatheredRadiosity::from_elements(&mesh, &radiosity).unwrap();
+        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
         // One unit is one pixel.
         let eye = DVec3::new(0.0, 0.0, f64::from(size) / 2.0);
         let camera = Camera { eye, target: DVec3::ZERO, vertical_fov: 90.0 };
@@ -152,7 +160,11 @@ fn the_same_bits_however_many_gather_at_once_and_no_image_when_stopped() {
     // One that takes its time at first, so that fewer places gather at once from then on.
     struct Slow(RayGather, Duration);
     impl Gather for Slow {
-        fn gather(&mut self, s: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
+        fn gather(
+            &mut self,
+            s: &RadiosityField,
+            places: &[GatherPoint],
+        ) -> Result<Vec<IrradianceSample>, Error> {
             std::thread::sleep(std::mem::take(&mut self.1));
             self.0.gather(s, places)
         }
@@ -162,7 +174,7 @@ fn the_same_bits_however_many_gather_at_once_and_no_image_when_stopped() {
     let mut told = vec![];
     let stopped = CAMERA.gathered_image(&light, &mut rays(), SIZE.0, SIZE.1, 2, |done, of| {
         told.push((done, of));
-        if told.len() < 3 { Go::Continue(()) } else { Go::Break(()) }
+        if told.len() < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     assert!(stopped.unwrap().is_none());
     assert!(told.len() == 3 && told.is_sorted());
@@ -179,11 +191,11 @@ fn bad_settings_are_refused() {
         (CAMERA, 8, 257),
         (Camera { target: CAMERA.eye, ..CAMERA }, 8, 1),
     ] {
-        let go = |_, _| Go::Continue(());
+        let go = |_, _| ControlFlow::Continue(());
         let image = camera.gathered_image(&light, &mut even, width, 8, samples, go);
         assert_eq!(image.unwrap_err().kind(), ErrorKind::Setting);
     }
     assert_eq!(even.places, 0);
-    let e = GatheredRadiosity::from_elements(&light.mesh, &[Rgb::ONE]).unwrap_err();
+    let e = GatheredMesh::from_elements(&light.mesh, &[Rgb::ONE]).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Setting);
 }

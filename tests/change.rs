@@ -5,17 +5,18 @@ mod common;
 use common::cornell_box;
 use glam::{DAffine3, DVec3};
 use radiosity::{
-    ErrorKind, FormFactors, Go, Material, Mesh, Method, Progress, RayCast, Rgb, Scene, Solution,
-    Solve, Solver, Stop,
+    ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, Solution,
+    SolveSession, Solver, StopReason,
 };
+use std::ops::ControlFlow;
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
-/// Rays, as many for each row whatever light it carries: equal equations, however they are solved.
-fn rays(mesh: &Mesh) -> RayCast {
-    RayCast::new(mesh, 1024).unwrap().with_full_share(0.0)
+/// RayScene, as many for each row whatever light it carries: equal equations, however they are solved.
+fn rays(mesh: &Mesh) -> RayRows {
+    RayRows::new(mesh, 1024).unwrap().with_full_share(0.0)
 }
 
 /// Every method, shooting by elements.
@@ -37,7 +38,7 @@ fn painted(mesh: &Mesh, change: impl Fn(&mut Material)) -> Mesh {
 
 fn shifted(mesh: &Mesh, group: &str, by: [f64; 3]) -> Mesh {
     let by = DAffine3::from_translation(DVec3::from_array(by));
-    mesh.with_scene(mesh.scene().with_moved(group, by).unwrap()).unwrap()
+    mesh.with_scene(mesh.scene().with_transformed_group(group, by).unwrap()).unwrap()
 }
 
 /// Sum over elements of the differences of flux, as a share of what is emitted: the worst channel.
@@ -80,10 +81,10 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
         let solver = Solver { unshot: SETTLED, ..Solver::new(method) };
         let mut rows = rays(&mesh);
         let mut solve = solver.begin(&black).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), Stop::Converged);
+        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
         let made = solve.solution().unwrap().rows_made;
-        solve.relight(&changed).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), Stop::Converged);
+        solve.update_materials(&changed).unwrap();
+        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
         let on = solve.into_solution().unwrap();
         let over = solver.solve(&changed, &mut rows, go).unwrap();
         closes(&on);
@@ -97,7 +98,7 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
         });
         assert!(on.rows_made - made <= green.count() as u64, "{method}");
         for (a, b) in
-            [(on.ledger.absorbed, over.ledger.absorbed), (on.ledger.left, over.ledger.left)]
+            [(on.ledger.absorbed, over.ledger.absorbed), (on.ledger.escaped, over.ledger.escaped)]
         {
             assert!(((a - b) / over.ledger.emitted).abs().max_element() < SAME, "{method}");
         }
@@ -114,7 +115,7 @@ fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
         let first = solve.solution().unwrap();
         let dimmed = painted(&mesh, |m| m.exitance *= Rgb::new(0.3, 1e-12, 1e12));
         let dark = painted(&mesh, |m| m.exitance = Rgb::ZERO);
-        solve.relight(&dimmed).unwrap();
+        solve.update_materials(&dimmed).unwrap();
         solve.run(&mut rows, go).unwrap();
         let then = solve.solution().unwrap();
         assert_eq!((first.shots, first.rows_made), (then.shots, then.rows_made), "{method}");
@@ -123,8 +124,8 @@ fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
             let off = *a * Rgb::new(0.3, 1e-12, 1e12) - *b;
             assert!(off.abs().cmple(4.0 * f64::EPSILON * b.abs()).all(), "{method}: {a} {b}");
         }
-        solve.relight(&dark).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), Stop::Converged);
+        solve.update_materials(&dark).unwrap();
+        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
         let nothing = solve.into_solution().unwrap();
         closes(&nothing);
         assert!(nothing.radiosity.iter().all(|b| *b == Rgb::ZERO), "{method}");
@@ -151,14 +152,15 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
         let mut solve = solver.begin(&one).unwrap();
         solve.run(&mut rows, go).unwrap();
         let first = solve.solution().unwrap();
-        solve.relight(&other).unwrap();
+        solve.update_materials(&other).unwrap();
         solve.run(&mut rows, go).unwrap();
         let second = solve.into_solution().unwrap();
         // No lamp of the first is left in the second: light starts anew, so 0 W are 0 W.
         assert!(second.radiosity.iter().all(|b| b.x == 0.0), "{method}");
         assert!(second.rows_made <= mesh.element_count() as u64);
         let mixed =
-            Solution::mixed(&[(Rgb::splat(0.25), &first), (Rgb::splat(3.0), &second)]).unwrap();
+            Solution::linear_combination(&[(Rgb::splat(0.25), &first), (Rgb::splat(3.0), &second)])
+                .unwrap();
         let at_once = solver.solve(&both, &mut rows, go).unwrap();
         closes(&mixed);
         let off = off(&both, &mixed, &at_once);
@@ -170,9 +172,9 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
         ..Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), go).unwrap()
     };
     let whole = Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), go).unwrap();
-    let e = Solution::mixed(&[(Rgb::ONE, &whole), (Rgb::ONE, &few)]).unwrap_err();
+    let e = Solution::linear_combination(&[(Rgb::ONE, &whole), (Rgb::ONE, &few)]).unwrap_err();
     assert!(e.kind() == ErrorKind::Setting && e.to_string().contains("0 elements"), "{e}");
-    assert!(Solution::mixed(&[]).is_err());
+    assert!(Solution::linear_combination(&[]).is_err());
 }
 
 #[test]
@@ -185,8 +187,11 @@ fn an_object_moves_and_all_methods_find_what_starting_over_finds() {
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = solver.begin(&mesh).unwrap();
         solve.run(&mut before, go).unwrap();
-        assert_eq!(solve.rearrange(&moved, &mut before, &mut after, go).unwrap(), Stop::Converged);
-        assert!(solve.doubt() <= SETTLED);
+        assert_eq!(
+            solve.update_geometry(&moved, &mut before, &mut after, go).unwrap(),
+            StopReason::Converged
+        );
+        assert!(solve.stale_flux_bound() <= SETTLED);
         solve.run(&mut after, go).unwrap();
         let on = solve.into_solution().unwrap();
         let over = solver.solve(&moved, &mut after, go).unwrap();
@@ -214,10 +219,10 @@ fn a_scene_changes_while_its_light_is_on_its_way() {
             let mut left = calls;
             let stopped = solve.run(&mut rows, |_| {
                 left -= 1;
-                if left > 0 { Go::Continue(()) } else { Go::Break(()) }
+                if left > 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             });
-            assert!(stopped.unwrap() == Stop::Cancelled || method == Method::Direct);
-            solve.relight(&changed).unwrap();
+            assert!(stopped.unwrap() == StopReason::Cancelled || method == Method::Direct);
+            solve.update_materials(&changed).unwrap();
             solve.run(&mut rows, go).unwrap();
             let on = solve.into_solution().unwrap();
             closes(&on);
@@ -239,7 +244,7 @@ fn an_object_moves_while_memory_for_rows_is_full() {
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = Solver { row_memory, ..solver }.begin(&mesh).unwrap();
         solve.run(&mut before, go).unwrap();
-        solve.rearrange(&moved, &mut before, &mut after, go).unwrap();
+        solve.update_geometry(&moved, &mut before, &mut after, go).unwrap();
         solve.run(&mut after, go).unwrap();
         let on = solve.into_solution().unwrap();
         closes(&on);
@@ -258,12 +263,12 @@ fn what_one_stopped_change_leaves_wrong_is_in_doubt_after_the_next() {
     let [mut first, mut second, mut third] = [&mesh, &once, &twice].map(rays);
     let mut solve = solver.begin(&mesh).unwrap();
     solve.run(&mut first, go).unwrap();
-    let stop = |_: &Progress| Go::Break(());
-    solve.rearrange(&once, &mut first, &mut second, stop).unwrap();
+    let stop = |_: &Progress| ControlFlow::Break(());
+    solve.update_geometry(&once, &mut first, &mut second, stop).unwrap();
     solve.run(&mut second, go).unwrap();
-    solve.rearrange(&twice, &mut second, &mut third, go).unwrap();
+    solve.update_geometry(&twice, &mut second, &mut third, go).unwrap();
     solve.run(&mut third, go).unwrap();
-    let doubt = solve.doubt();
+    let doubt = solve.stale_flux_bound();
     let on = solve.into_solution().unwrap();
     closes(&on);
     let off = off(&twice, &on, &solver.solve(&twice, &mut third, go).unwrap());
@@ -312,9 +317,9 @@ fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
     let mut solve = solver.begin(&mesh).unwrap();
     solve.run(&mut before, go).unwrap();
     let first = solve.solution().unwrap();
-    solve.rearrange(&changed, &mut before, &mut after, go).unwrap();
+    solve.update_geometry(&changed, &mut before, &mut after, go).unwrap();
     solve.run(&mut after, go).unwrap();
-    let doubt = solve.doubt();
+    let doubt = solve.stale_flux_bound();
     let on = solve.into_solution().unwrap();
     let over = solver.solve(&changed, &mut after, go).unwrap();
     let judge = settled.solve(&changed, &mut after, go).unwrap();
@@ -341,14 +346,14 @@ fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
 fn what_does_not_fit_is_refused_and_changes_nothing() {
     let mesh = cornell_box(200.0);
     let mut rows = rays(&mesh);
-    let mut solve: Solve = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
+    let mut solve: SolveSession = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
     solve.run(&mut rows, go).unwrap();
     let before = solve.to_bytes();
     let moved = shifted(&mesh, "short_block", [0.0, 0.0, 10.0]);
     let finer = cornell_box(150.0);
     let bright = painted(&mesh, |m| m.exitance = Rgb::splat(1e305));
     for (mesh, says) in [(&moved, "rearrange"), (&finer, "with_scene"), (&bright, "finite")] {
-        let e = solve.relight(mesh).unwrap_err();
+        let e = solve.update_materials(mesh).unwrap_err();
         assert!(e.kind() == ErrorKind::Scene && e.to_string().contains(says), "{e}");
         assert!(solve.to_bytes() == before);
     }
@@ -356,9 +361,12 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     assert!(e.to_string().contains("12 triangles"), "{e}");
     let e = mesh.scene().with_materials(vec![]).unwrap_err();
     assert!(e.kind() == ErrorKind::Scene, "{e}");
-    let e = mesh.scene().with_moved("sofa", DAffine3::IDENTITY).unwrap_err();
+    let e = mesh.scene().with_transformed_group("sofa", DAffine3::IDENTITY).unwrap_err();
     assert!(e.to_string().contains("'sofa'") && e.to_string().contains("tall_block"), "{e}");
-    let e = mesh.scene().with_moved("floor", DAffine3::from_scale(DVec3::ZERO)).unwrap_err();
+    let e = mesh
+        .scene()
+        .with_transformed_group("floor", DAffine3::from_scale(DVec3::ZERO))
+        .unwrap_err();
     assert!(e.kind() == ErrorKind::Scene, "{e}");
 }
 
@@ -369,24 +377,27 @@ fn a_change_that_is_stopped_tells_its_doubt_and_goes_on() {
     let (mut before, mut after) = (rays(&mesh), rays(&moved));
     let mut solve = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
     solve.run(&mut before, go).unwrap();
-    let stop = |_: &Progress| Go::Break(());
-    let stopped = solve.rearrange(&moved, &mut before, &mut after, stop).unwrap();
-    assert_eq!(stopped, Stop::Cancelled);
-    let doubt = solve.doubt();
+    let stop = |_: &Progress| ControlFlow::Break(());
+    let stopped = solve.update_geometry(&moved, &mut before, &mut after, stop).unwrap();
+    assert_eq!(stopped, StopReason::Cancelled);
+    let doubt = solve.stale_flux_bound();
     assert!(doubt > 1e-3, "{doubt}");
     // All of the block has moved, so that what its rows say now is wrong: those are drawn again before
     // more light goes along them, all but one batch that has been.
     let scene = mesh.scene();
     let group = |e: usize| scene.triangles()[mesh.triangle(mesh.element(e))].group as usize;
     let block = (0..mesh.element_count()).filter(|&e| scene.groups()[group(e)] == "tall_block");
-    let redrawn = |s: &Solve| s.solution().unwrap().rows_made;
+    let redrawn = |s: &SolveSession| s.solution().unwrap().rows_made;
     let stopped = redrawn(&solve);
     let mut further = solve.clone();
     further.set_limits(1e-6, None).unwrap();
     further.run(&mut after, go).unwrap();
     let (drawn, block) = (redrawn(&further) - stopped, block.count());
-    assert!(drawn as usize + after.batch() >= block, "{drawn} rows for {block} elements");
-    assert_eq!(solve.run(&mut after, go).unwrap(), Stop::Converged);
+    assert!(
+        drawn as usize + after.preferred_batch_len() >= block,
+        "{drawn} rows for {block} elements"
+    );
+    assert_eq!(solve.run(&mut after, go).unwrap(), StopReason::Converged);
     let s = solve.into_solution().unwrap();
     closes(&s);
     assert!(s.ledger.unshot_share() <= 0.5e-3);

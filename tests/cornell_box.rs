@@ -5,17 +5,18 @@ mod common;
 mod truth;
 
 use common::{cornell_box, gpu};
-use radiosity::{Go, Hemicubes, Mesh, NearRepair, RayCast, Shooting, Solution, VertexRadiosity};
+use radiosity::{HemicubeRows, Mesh, ProximityCorrection, RayRows, Shooting, Solution, VertexMesh};
+use std::ops::ControlFlow;
 
 const TRUTH: &str = include_str!("data/cornell_box.truth.json");
 
 fn solve(mesh: &Mesh, rows: &mut dyn radiosity::FormFactors) -> Solution {
-    Shooting::default().solve(mesh, rows, |_| Go::Continue(())).expect("a solution")
+    Shooting::default().solve(mesh, rows, |_| ControlFlow::Continue(())).expect("a solution")
 }
 
 /// Prints the errors per kind of point, and checks those of kind `area`.
 fn check(mesh: &Mesh, solution: &Solution, rms: f64, median: f64) {
-    let surface = VertexRadiosity::new(mesh, &solution.radiosity);
+    let surface = VertexMesh::new(mesh, &solution.radiosity);
     let errors = truth::compare(&surface, TRUTH);
     for (kind, e) in &errors {
         println!(
@@ -36,7 +37,8 @@ fn thirty_millimetre_elements_err_by_five_per_cent_at_most() {
     // straddle a shadow or a block's foot.
     let mesh = cornell_box(30.0);
     assert_eq!(mesh.element_count(), 13_184);
-    let rows = || NearRepair::new(Hemicubes::new(&gpu, &mesh, 128).unwrap(), &mesh, 1.0);
+    let rows =
+        || ProximityCorrection::new(HemicubeRows::new(&gpu, &mesh, 128).unwrap(), &mesh, 1.0);
     let solution = solve(&mesh, &mut rows());
     check(&mesh, &solution, 0.05, 0.01);
     // Same input, same adapter: the same bits, also from a new device.
@@ -49,6 +51,6 @@ fn rays_instead_of_hemicubes_give_the_same_picture() {
     // Elements twice as large, so that rays are not waited for; the error of interpolation grows by
     // up to the square of that.
     let mesh = cornell_box(60.0);
-    let solution = solve(&mesh, &mut RayCast::new(&mesh, 4096).unwrap());
+    let solution = solve(&mesh, &mut RayRows::new(&mesh, 4096).unwrap());
     check(&mesh, &solution, 4.0 * 0.05, 4.0 * 0.01);
 }

@@ -1,12 +1,13 @@
-//! Effort follows the flux at stake: coarse rows for patches that shoot little.
+//! BakeSettings follows the flux at stake: coarse rows for patches that shoot little.
 
 mod common;
 
 use common::{cornell_box, gpu, quads};
 use radiosity::{
-    Error, FormFactors, Go, Hemicubes, Material, Mesh, NearRepair, NodeId, RayCast, Rgb, Row,
-    Shooting, Solution, Viewpoints,
+    AdaptiveViewpoints, Error, FormFactors, HemicubeRows, Material, Mesh, NodeId,
+    ProximityCorrection, RayRows, Rgb, Row, Shooting, Solution,
 };
+use std::ops::ControlFlow;
 
 /// Shares of the emitted flux for which rows are made at full resolution, half and a quarter: a
 /// halving is enough for 2^2.5 = 5.7 times less light.
@@ -22,7 +23,7 @@ fn rows_for_little_light_are_those_of_smaller_hemicubes() {
     let Some(gpu) = gpu() else { return };
     let mesh = cornell_box(100.0);
     let patches = some(&mesh);
-    let make = |n: u32| Hemicubes::new(&gpu, &mesh, n).unwrap().with_full_share(FULL);
+    let make = |n: u32| HemicubeRows::new(&gpu, &mesh, n).unwrap().with_full_share(FULL);
     for (full, resolutions) in [(128, [128, 64, 32]), (36, [36, 18, 16]), (8, [8, 8, 8])] {
         let mut maker = make(full);
         // Back and forth, so that one resolution leaves nothing behind for another.
@@ -48,7 +49,7 @@ fn rows_for_little_light_are_those_of_smaller_hemicubes() {
 fn rows_for_little_light_have_fewer_rays() {
     let mesh = cornell_box(200.0);
     let patches = some(&mesh);
-    let make = |n: u32| RayCast::new(&mesh, n).unwrap().with_full_share(FULL);
+    let make = |n: u32| RayRows::new(&mesh, n).unwrap().with_full_share(FULL);
     for (full, counts) in [(8192, [8192, 2048, 512]), (600, [600, 256, 256]), (10, [10, 10, 10])] {
         let mut maker = make(full);
         for k in [0, 1, 2] {
@@ -69,10 +70,10 @@ struct Told(Vec<(f64, usize)>);
 impl FormFactors for Told {
     fn rows(&mut self, _: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
         self.0.push((share, patches.len()));
-        Ok(vec![Row { open: Row::TOTAL, ..Default::default() }; patches.len()])
+        Ok(vec![Row { escaped: Row::TOTAL, ..Default::default() }; patches.len()])
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         3
     }
 }
@@ -94,7 +95,7 @@ fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
     let mesh = lamps();
     let mut told = Told::default();
     Shooting { unshot: 0.0, ..Default::default() }
-        .solve(&mesh, &mut told, |_| Go::Continue(()))
+        .solve(&mesh, &mut told, |_| ControlFlow::Continue(()))
         .unwrap();
     // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch is
     // three patches, or fewer where light falls to a quarter.
@@ -108,8 +109,8 @@ fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
 #[test]
 fn repairs_pass_on_what_is_at_stake() {
     let mesh = cornell_box(200.0);
-    let near = NearRepair::new(Told::default(), &mesh, 1.0);
-    let mut rows = Viewpoints::new(near, 0.0, u32::MAX);
+    let near = ProximityCorrection::new(Told::default(), &mesh, 1.0);
+    let mut rows = AdaptiveViewpoints::new(near, 0.0, u32::MAX);
     let patch = mesh.root(0);
     assert!(mesh.children(patch).is_some());
     rows.rows(&mesh, &[patch], 0.125).unwrap();
@@ -118,10 +119,11 @@ fn repairs_pass_on_what_is_at_stake() {
 }
 
 /// A solution whose energy is accounted for and whose bits are those of a second run, and its rows.
-fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, NearRepair<M>) {
+fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, ProximityCorrection<M>) {
     let solve = || {
-        let mut rows = NearRepair::new(make(), mesh, 1.0);
-        let solution = Shooting::default().solve(mesh, &mut rows, |_| Go::Continue(())).unwrap();
+        let mut rows = ProximityCorrection::new(make(), mesh, 1.0);
+        let solution =
+            Shooting::default().solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         (solution, rows)
     };
     let ((one, rows), (again, _)) = (solve(), solve());
@@ -133,7 +135,7 @@ fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, NearRe
 #[test]
 fn rows_of_several_counts_of_rays_keep_the_energy_and_the_bits() {
     let mesh = cornell_box(100.0);
-    let rays = || RayCast::new(&mesh, 4096).unwrap();
+    let rays = || RayRows::new(&mesh, 4096).unwrap();
     let (some, all) = (solve(&mesh, rays).0, solve(&mesh, || rays().with_full_share(0.0)).0);
     assert!(some.radiosity != all.radiosity);
 }
@@ -142,7 +144,7 @@ fn rows_of_several_counts_of_rays_keep_the_energy_and_the_bits() {
 fn rows_of_several_resolutions_keep_the_energy_and_the_bits() {
     let Some(gpu) = gpu() else { return };
     let mesh = cornell_box(60.0);
-    let (solution, rows) = solve(&mesh, || Hemicubes::new(&gpu, &mesh, 64).unwrap());
+    let (solution, rows) = solve(&mesh, || HemicubeRows::new(&gpu, &mesh, 64).unwrap());
     let drawn = rows.inner().drawn_by_resolution();
     println!("{drawn:?}");
     assert!(drawn.iter().map(|d| d.0).eq([64, 32, 16]) && drawn.iter().all(|d| d.1 > 0));

@@ -12,13 +12,14 @@ mod sweep;
 mod sweeps;
 
 use radiosity::{
-    Camera, Device, ErrorKind, Go, Mesh, RadianceImage, RayCast, Rgb, Shooting, VertexRadiosity,
-    load_obj, write_exr, write_ply,
+    Backend, Camera, ErrorKind, Mesh, RadianceImage, RayRows, Rgb, Shooting, VertexMesh, load_obj,
+    write_exr, write_ply,
 };
 use scenes::{Frame, HERE};
+use std::ops::ControlFlow;
 
 /// Goes all sweeps, and names those that do not hold.
-fn sweep_with(device: &Device) {
+fn sweep_with(device: &Backend) {
     let ask = sweeps::Ask { device, all: false };
     let swept: Vec<_> = sweeps::ALL.iter().map(|sweep| sweep(&ask).unwrap()).collect();
     swept.iter().for_each(|s| println!("{s:?}"));
@@ -28,20 +29,20 @@ fn sweep_with(device: &Device) {
 
 #[test]
 fn rays_hold_over_all_ranges() {
-    sweep_with(&Device::Cpu);
+    sweep_with(&Backend::Cpu);
 }
 
 #[test]
 fn hemicubes_hold_over_all_ranges() {
     let Some(gpu) = common::gpu() else { return };
-    sweep_with(&Device::Gpu(gpu));
+    sweep_with(&Backend::Gpu(gpu));
 }
 
 #[test]
 fn a_white_furnace_takes_few_products() {
     // Light that fills the scene evenly is one direction: found in a product. What is left are 48
     // elements' own, in 48 at most; shares of 2⁻³² that differ, not light, are what takes more than one.
-    let ask = sweeps::Ask { device: &Device::Cpu, all: true };
+    let ask = sweeps::Ask { device: &Backend::Cpu, all: true };
     let s = sweeps::reflectance_of_furnace(&ask).unwrap();
     assert!(s.steps >= 12 && s.off <= 1e-4 && s.most <= 48, "{s:?}");
 }
@@ -52,9 +53,9 @@ fn ties_are_ties_at_any_scale() {
     let light = |scale: f64| {
         let scene = scenes::furnace(Frame::scaled(scale), 0.5, 1.0);
         let mesh = Mesh::new(scene, 0.2 * scale).unwrap();
-        let mut rays = RayCast::new(&mesh, 256).unwrap().with_full_share(0.0);
+        let mut rays = RayRows::new(&mesh, 256).unwrap().with_full_share(0.0);
         let s = Shooting { unshot: 0.1, ..Shooting::default() };
-        s.solve(&mesh, &mut rays, |_| Go::Continue(())).unwrap().radiosity
+        s.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap().radiosity
     };
     let known = light(1.0);
     for scale in [0.1, 3.0, 10.0, 1e-7] {
@@ -66,10 +67,10 @@ fn ties_are_ties_at_any_scale() {
 }
 
 /// A surface of one radiosity over the room at `frame`.
-fn even(frame: Frame, radiosity: f64) -> VertexRadiosity {
+fn even(frame: Frame, radiosity: f64) -> VertexMesh {
     let mesh = Mesh::new(scenes::room(frame, 1.0, 1.0), f64::INFINITY).unwrap();
     let values = vec![Rgb::splat(radiosity); mesh.element_count()];
-    VertexRadiosity::flat(&mesh, &values)
+    VertexMesh::per_element(&mesh, &values)
 }
 
 #[test]

@@ -2,21 +2,22 @@
 
 mod common;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::{
-    Camera, ErrorKind, Go, Material, Mesh, RadianceImage, RayCast, Report, Rgb, Shooting,
-    VertexRadiosity, ViewFactors, write_exr, write_ply, write_png, write_view_factors,
+    Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Report, Rgb, Shooting, VertexMesh,
+    ViewFactors, write_exr, write_ply, write_png, write_view_factors,
 };
 
-fn surface() -> VertexRadiosity {
+fn surface() -> VertexMesh {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.4).unwrap();
     let ramp: Vec<Rgb> = (0..mesh.element_count())
         .map(|e| Rgb::new(1.0, 2.0, 3.0) * mesh.centroid(mesh.element(e)).x + 0.5)
         .collect();
-    VertexRadiosity::new(&mesh, &ramp)
+    VertexMesh::new(&mesh, &ramp)
 }
 
 #[test]
@@ -97,9 +98,9 @@ fn a_camera_sees_what_stands_before_it() {
     let right = [[0., -1., 0.], [1., -1., 0.], [1., 1., 0.], [0., 1., 0.]];
     let mesh = Mesh::new(quads(&[(left, glow), (right, Material::grey("d", 0.0))]), 9.0).unwrap();
     let solution = Shooting::default()
-        .solve(&mesh, &mut RayCast::new(&mesh, 16).unwrap(), |_| Go::Continue(()))
+        .solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), |_| ControlFlow::Continue(()))
         .unwrap();
-    let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+    let surface = VertexMesh::new(&mesh, &solution.radiosity);
     let camera = Camera { eye: DVec3::new(0., 0., 2.), target: DVec3::ZERO, vertical_fov: 90.0 };
     // 8 pixels span 4 at distance 2: half a unit each. Radiance of the glow is 1.
     let image = camera.image(&surface, 8, 8, 2).unwrap();
@@ -152,11 +153,11 @@ fn a_report_has_every_key() {
 #[test]
 fn view_factors_of_a_cube_as_csv() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.36).unwrap();
-    let mut rays = RayCast::new(&mesh, 4096).unwrap();
+    let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let mut done = vec![];
     let matrix = ViewFactors::sampled(&mesh, &mut rays, |k, of| {
         done.push((k, of));
-        Go::Continue(())
+        ControlFlow::Continue(())
     });
     let mut matrix = matrix.unwrap().unwrap();
     assert_eq!(done.last(), Some(&(192, 192)));
@@ -183,7 +184,7 @@ fn view_factors_of_a_cube_as_csv() {
     let first: Vec<&str> = lines[1].split(',').collect();
     assert_eq!((first[0], first.len()), ("q0", 10));
     assert!((first[2].parse::<f64>().unwrap() - matrix.factor(0, 1).value).abs() < 1e-9);
-    let stopped = ViewFactors::sampled(&mesh, &mut rays, |_, _| Go::Break(()));
+    let stopped = ViewFactors::sampled(&mesh, &mut rays, |_, _| ControlFlow::Break(()));
     assert!(stopped.unwrap().is_none());
 }
 

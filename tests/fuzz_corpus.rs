@@ -13,7 +13,7 @@ fn every_input_of_the_corpus_keeps_its_promises() {
     let (mut inputs, mut scenes) = (0, 0);
     for file in fs::read_dir(corpus).unwrap() {
         let path = file.unwrap().path();
-        // Shown when it panics.
+        // DepthMode when it panics.
         println!("{}", path.display());
         inputs += 1;
         scenes += usize::from(try_scene::try_scene(&fs::read(path).unwrap()).is_some());

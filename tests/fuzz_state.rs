@@ -13,7 +13,7 @@ fn every_input_of_the_corpus_keeps_its_promises() {
     let (mut taken, mut refused) = (0, 0);
     for file in fs::read_dir(corpus).unwrap() {
         let path = file.unwrap().path();
-        // Shown when it panics.
+        // DepthMode when it panics.
         println!("{}", path.display());
         match try_state::try_state(&fs::read(path).unwrap()) {
             true => taken += 1,

@@ -1,4 +1,4 @@
-//! Gathering with hemicubes: against closed forms, against rays, and against itself.
+//! RefinementSettings with hemicubes: against closed forms, against rays, and against itself.
 
 mod common;
 
@@ -6,10 +6,10 @@ use std::f64::consts::PI;
 
 use common::{cornell_box, cube, gpu, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::point_to_polygon;
+use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
-    ErrorKind, Gather, Gathered, Gpu, HemicubeGather, Material, Mesh, Place, RayGather, Rgb, Scene,
-    Sources, Triangle,
+    ErrorKind, Gather, GatherPoint, Gpu, HemicubeGather, IrradianceSample, Material, Mesh,
+    RadiosityField, RayGather, Rgb, Scene, Triangle,
 };
 
 /// Settled light by its value at every point.
@@ -31,22 +31,22 @@ impl Light {
         Light { mesh, corners, reflected }
     }
 
-    fn sources(&self) -> Sources<'_> {
-        Sources { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
+    fn sources(&self) -> RadiosityField<'_> {
+        RadiosityField { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
     }
 
-    fn gather(&self, gpu: &Gpu, n: u32, places: &[Place]) -> Vec<Gathered> {
+    fn gather(&self, gpu: &Gpu, n: u32, places: &[GatherPoint]) -> Vec<IrradianceSample> {
         let mut gather = HemicubeGather::new(gpu, &self.mesh, n).unwrap();
         gather.gather(&self.sources(), places).unwrap()
     }
 
     /// Places just over the middle of elements, `count` of them all over the scene.
-    fn places(&self, count: usize, above: f64) -> Vec<Place> {
+    fn places(&self, count: usize, above: f64) -> Vec<GatherPoint> {
         let place = |k: usize| {
             let node = self.mesh.element(k * 7919 % self.mesh.element_count());
             let normal = self.mesh.normal(node);
             let position = self.mesh.centroid(node) + normal * above;
-            Place { position, normal, near: above }
+            GatherPoint { position, normal, near: above }
         };
         (0..count).map(place).collect()
     }
@@ -82,12 +82,12 @@ fn dark(quad_list: &[(Quad, Material)]) -> Light {
 }
 
 /// A place that looks along `normal`.
-fn place(position: [f64; 3], normal: [f64; 3]) -> Place {
+fn place(position: [f64; 3], normal: [f64; 3]) -> GatherPoint {
     let (position, normal) = (DVec3::from_array(position), DVec3::from_array(normal));
-    Place { position, normal: normal.normalize(), near: 1e-5 }
+    GatherPoint { position, normal: normal.normalize(), near: 1e-5 }
 }
 
-fn factor(place: &Place, corners: &[[f64; 3]]) -> f64 {
+fn factor(place: &GatherPoint, corners: &[[f64; 3]]) -> f64 {
     let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
     point_to_polygon(place.position, place.normal, &corners)
 }
@@ -109,7 +109,7 @@ fn hemicubes_agree_with_rays() {
     let mut rays = RayGather::new(&light.mesh, 1 << 15).unwrap();
     let want = rays.gather(&light.sources(), &places).unwrap();
     for ((place, got), want) in places.iter().zip(&got).zip(&want) {
-        let indirect = |g: &Gathered| g.irradiance - g.direct;
+        let indirect = |g: &IrradianceSample| g.irradiance - g.direct;
         // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half of
         // the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump there,
         // 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
@@ -120,9 +120,9 @@ fn hemicubes_agree_with_rays() {
         // share, a tenth of it as the rays are stratified.
         let error = (got.direct - want.direct).abs().max_element();
         assert!(error <= 0.01 * want.irradiance.max_element(), "{place:?}: {error}");
-        assert!((got.open - want.open).abs() < 2e-3, "{place:?}");
-        assert!((got.back - want.back).abs() < 2e-3, "{place:?}");
-        assert!((got.nearness / want.nearness - 1.0).abs() < 5e-3, "{place:?}");
+        assert!((got.escaped - want.escaped).abs() < 2e-3, "{place:?}");
+        assert!((got.backface - want.backface).abs() < 2e-3, "{place:?}");
+        assert!((got.inverse_distance / want.inverse_distance - 1.0).abs() < 5e-3, "{place:?}");
     }
 }
 
@@ -140,7 +140,7 @@ fn a_furnace_is_as_bright_as_its_walls() {
     let light = Light::new(Mesh::new(cube, 0.2).unwrap(), |_, _| Rgb::ONE);
     for g in light.gather(&gpu, 64, &light.places(50, 1e-4)) {
         assert!((g.irradiance - 2.0).abs().max_element() < 2e-5, "{g:?}");
-        assert_eq!((g.open, g.back), (0.0, 0.0));
+        assert_eq!((g.escaped, g.backface), (0.0, 0.0));
     }
 }
 
@@ -306,7 +306,7 @@ fn close_to_a_large_light_its_pixels_count() {
         // The outline runs along the horizon's 8 half faces, or straight across the hemicube.
         let (want, bound) = (factor(place, &sheet), outline_bound(128, 8.0, 8.0));
         assert!((got.irradiance.x - want).abs() < bound, "{got:?} {want}");
-        assert!(((1.0 - got.open) - want).abs() < bound);
+        assert!(((1.0 - got.escaped) - want).abs() < bound);
     }
 }
 
@@ -368,17 +368,17 @@ fn what_is_open_what_shows_its_back_and_how_near_it_is() {
         // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Pixels on the
         // lowest lines of 64 look out at 1/64, above the plane's end at 1e-3. Midpoints of pixels:
         // relative (2/64)²/24 · 12 = 5e-4.
-        assert_eq!(got.open, 0.0);
-        assert!((got.back - f64::from(u8::from(back))).abs() < 1e-5, "{got:?}");
-        assert!((got.nearness * 1.5 * z - 1.0).abs() < 5e-4, "{got:?}");
+        assert_eq!(got.escaped, 0.0);
+        assert!((got.backface - f64::from(u8::from(back))).abs() < 1e-5, "{got:?}");
+        assert!((got.inverse_distance * 1.5 * z - 1.0).abs() < 5e-4, "{got:?}");
     }
     // Half the sky: what is not on one side of a wall.
     let wall = [[0.0, -1e3, -1e3], [0.0, 1e3, -1e3], [0.0, 1e3, 1e3], [0.0, -1e3, 1e3]];
-    let shifted = Place { position: DVec3::new(0.01, 0.0, 0.0), ..place };
+    let shifted = GatherPoint { position: DVec3::new(0.01, 0.0, 0.0), ..place };
     let got = dark(&[(wall, grey())]).gather(&gpu, 64, &[shifted])[0];
     // The top of the wall is 1e-5 off the zenith; 4 half faces of outline.
-    assert!((got.open - 0.5).abs() < outline_bound(64, 4.0, 2.0), "{got:?}");
-    assert!((got.open + got.back - 1.0).abs() < 1e-5 || got.back == 0.0);
+    assert!((got.escaped - 0.5).abs() < outline_bound(64, 4.0, 2.0), "{got:?}");
+    assert!((got.escaped + got.backface - 1.0).abs() < 1e-5 || got.backface == 0.0);
 }
 
 #[test]
@@ -393,8 +393,8 @@ fn what_does_not_fit_is_said() {
     let mut gather = HemicubeGather::new(&gpu, &light.mesh, 64).unwrap();
     let other = dark(&[(down([0.0, 1.0], [0.0, 1.0], 1.0), lamp())]);
     let good = light.sources();
-    let short = Sources { corners: &light.corners[1..], ..good };
-    let empty = Sources { reflected: &[], ..good };
+    let short = RadiosityField { corners: &light.corners[1..], ..good };
+    let empty = RadiosityField { reflected: &[], ..good };
     for bad in [other.sources(), short, empty] {
         assert_eq!(
             gather.gather(&bad, &light.places(1, 0.01)).unwrap_err().kind(),
@@ -405,7 +405,7 @@ fn what_does_not_fit_is_said() {
     for (size, value) in [(100.0, 0.5), (50.0, 2.0)] {
         let finer = Light::new(cornell_box(size), |_, _| Rgb::splat(value));
         let got = gather.gather(&finer.sources(), &light.places(1, 0.01)).unwrap()[0];
-        let indirect = (got.irradiance - got.direct) / (1.0 - got.open - got.back);
+        let indirect = (got.irradiance - got.direct) / (1.0 - got.escaped - got.backface);
         assert!((indirect / value - 1.0).abs().max_element() < 1e-5, "{got:?}");
     }
 }
@@ -419,9 +419,9 @@ fn rays_that_disagree_get_more() {
     let light = Light::new(Mesh::new(scene, 1.0).unwrap(), |_, _| Rgb::ONE);
     let place = |k: usize| {
         let (x, y) = (0.01 * k as f64 - 0.5, -1.5 + 0.003 * k as f64);
-        Place { position: DVec3::new(x, y, 0.0), normal: DVec3::Z, near: 1e-6 }
+        GatherPoint { position: DVec3::new(x, y, 0.0), normal: DVec3::Z, near: 1e-6 }
     };
-    let places: Vec<Place> = (0..100).map(place).collect();
+    let places: Vec<GatherPoint> = (0..100).map(place).collect();
     let off = |gather: RayGather| {
         let mut gather = gather;
         let found = gather.gather(&light.sources(), &places).unwrap();

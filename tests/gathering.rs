@@ -1,4 +1,4 @@
-//! Gathering at vertices: where it splits, what it finds, and that nothing comes apart. No GPU
+//! RefinementSettings at vertices: where it splits, what it finds, and that nothing comes apart. No GPU
 //! needed: irradiance is made up, has a closed form, or is found with rays.
 
 mod common;
@@ -6,23 +6,29 @@ mod common;
 use common::surface::{assert_watertight, assert_whole};
 use common::{cube, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::point_to_polygon;
+use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
-    Error, ErrorKind, Gather, GatherProgress, Gathered, GatheredRadiosity, Gathering, Go, Material,
-    Mesh, Place, RayGather, Rgb, Sources, Stop, VertexRadiosity,
+    Error, ErrorKind, Gather, GatherPoint, GatherProgress, GatheredMesh, IrradianceSample,
+    Material, Mesh, RadiosityField, RayGather, RefinementSettings, Rgb, StopReason, VertexMesh,
 };
+use std::ops::ControlFlow;
 
-fn go(_: &GatherProgress) -> Go {
-    Go::Continue(())
+fn go(_: &GatherProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 /// Gathers what a function of the sources and the place says arrives, W/m².
 struct Known<F>(F);
 
-impl<F: FnMut(&Sources, &Place) -> f64> Gather for Known<F> {
-    fn gather(&mut self, sources: &Sources, places: &[Place]) -> Result<Vec<Gathered>, Error> {
-        let mut at = |p: &Place| Rgb::splat((self.0)(sources, p));
-        let gathered = places.iter().map(|p| Gathered { irradiance: at(p), ..Default::default() });
+impl<F: FnMut(&RadiosityField, &GatherPoint) -> f64> Gather for Known<F> {
+    fn gather(
+        &mut self,
+        sources: &RadiosityField,
+        places: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        let mut at = |p: &GatherPoint| Rgb::splat((self.0)(sources, p));
+        let gathered =
+            places.iter().map(|p| IrradianceSample { irradiance: at(p), ..Default::default() });
         Ok(gathered.collect())
     }
 }
@@ -37,8 +43,8 @@ fn lamp() -> Material {
 }
 
 /// The light of elements, one value each, W/m².
-fn shot(mesh: &Mesh, radiosity: &[Rgb]) -> GatheredRadiosity {
-    GatheredRadiosity::from_elements(mesh, radiosity).unwrap()
+fn shot(mesh: &Mesh, radiosity: &[Rgb]) -> GatheredMesh {
+    GatheredMesh::from_elements(mesh, radiosity).unwrap()
 }
 
 type Quad = [[f64; 3]; 4];
@@ -95,22 +101,22 @@ fn unequal_depths_everywhere_leave_no_cracks() {
         }
         let dark = vec![Rgb::ZERO; mesh.element_count()];
         // One place in 25 is brighter than the others, and elements are split around it.
-        let mut spots = Known(|_: &Sources, p: &Place| {
+        let mut spots = Known(|_: &RadiosityField, p: &GatherPoint| {
             1.0 + f64::from(random(p.position) < 0.04) * random(-p.position)
         });
-        let settings = Gathering { tolerance: 0.05, ..Gathering::new(0.08) };
+        let settings = RefinementSettings { tolerance: 0.05, ..RefinementSettings::new(0.08) };
         let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut spots, go).unwrap();
         let (least, most) = sizes(&found.mesh);
         println!("{} elements from {least:.3} to {most:.3}", found.mesh.element_count());
-        assert!(found.stop == Stop::Converged && most / least > 7.9, "unequal depths");
+        assert!(found.stop == StopReason::Converged && most / least > 7.9, "unequal depths");
         assert!(found.mesh.element_count() > 2 * mesh.element_count());
-        for surface in [&found.surface, &VertexRadiosity::new(&mesh, &dark)] {
+        for surface in [&found.surface, &VertexMesh::new(&mesh, &dark)] {
             assert_eq!(surface.radiosity.len(), surface.positions.len());
             assert_eq!(surface.normals.len(), surface.positions.len());
         }
         assert_whole(&found.mesh, &found.surface);
         assert_watertight(&found.mesh, &found.surface);
-        assert_watertight(&mesh, &VertexRadiosity::new(&mesh, &dark));
+        assert_watertight(&mesh, &VertexMesh::new(&mesh, &dark));
     }
 }
 
@@ -118,9 +124,10 @@ fn unequal_depths_everywhere_leave_no_cracks() {
 fn the_cornell_box_is_as_watertight_as_its_scene() {
     let mesh = common::cornell_box(70.0).split_at_contacts(3);
     let dark = vec![Rgb::ZERO; mesh.element_count()];
-    assert_watertight(&mesh, &VertexRadiosity::new(&mesh, &dark));
-    let mut even = Known(|_: &Sources, p: &Place| 1.0 + random(p.position));
-    let settings = Gathering { tolerance: 0.2, elements: 40_000, ..Gathering::new(3.0) };
+    assert_watertight(&mesh, &VertexMesh::new(&mesh, &dark));
+    let mut even = Known(|_: &RadiosityField, p: &GatherPoint| 1.0 + random(p.position));
+    let settings =
+        RefinementSettings { tolerance: 0.2, elements: 40_000, ..RefinementSettings::new(3.0) };
     let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut even, go).unwrap();
     assert!(found.mesh.element_count() > 2 * mesh.element_count());
     assert_watertight(&found.mesh, &found.surface);
@@ -128,7 +135,7 @@ fn the_cornell_box_is_as_watertight_as_its_scene() {
 
 /// What arrives at a place in a convex room that nothing stands in, elements being as bright as the
 /// mean of their corners.
-fn convex_room(sources: &Sources, place: &Place) -> f64 {
+fn convex_room(sources: &RadiosityField, place: &GatherPoint) -> f64 {
     let arrives = |e: usize| {
         let node = sources.mesh.element(e);
         let reflected = sources.corners[e].iter().map(|&v| sources.reflected[v as usize].x);
@@ -139,7 +146,7 @@ fn convex_room(sources: &Sources, place: &Place) -> f64 {
 }
 
 /// Area-weighted sum of a surface's radiosity.
-fn flux(s: &VertexRadiosity) -> f64 {
+fn flux(s: &VertexMesh) -> f64 {
     let of = |f: &[u32; 3]| {
         let [a, b, c] = f.map(|v| s.positions[v as usize]);
         let mean = f.iter().map(|&v| s.radiosity[v as usize].x).sum::<f64>() / 3.0;
@@ -155,12 +162,12 @@ fn a_furnace_stays_as_it_is() {
         let mesh = Mesh::new(cube(&glow), 0.8).unwrap();
         let even = 1.0 / (1.0 - reflectance);
         let settled = vec![Rgb::splat(even); mesh.element_count()];
-        let settings = Gathering::new(0.01);
+        let settings = RefinementSettings::new(0.01);
         let mut rays = RayGather::new(&mesh, 64).unwrap();
         let (exact, seen): (_, &mut dyn Gather) = (&mut Known(convex_room), &mut rays);
         for gather in [exact, seen] {
             let found = settings.gather(&shot(&mesh, &settled), &mesh, gather, go).unwrap();
-            assert_eq!(found.stop, Stop::Converged);
+            assert_eq!(found.stop, StopReason::Converged);
             // Walls are lights of their own here, which rays find by closed forms too, all of each
             // visible. Those are good to 1e-14 each, edge on too; they are as many as elements.
             let bound = 1e-14 * mesh.element_count() as f64 * even;
@@ -170,7 +177,7 @@ fn a_furnace_stays_as_it_is() {
             assert_eq!(found.mesh.element_count(), mesh.element_count(), "nothing to split for");
             assert!(found.change <= bound / (even - 1.0), "{}", found.change);
             // A gather creates no energy.
-            let before = flux(&VertexRadiosity::new(&mesh, &settled));
+            let before = flux(&VertexMesh::new(&mesh, &settled));
             assert!((before - 6.0 * even).abs() < 6.0 * bound);
             assert!((flux(&found.surface) - before).abs() < 6.0 * bound);
         }
@@ -196,14 +203,14 @@ fn floor() -> (Mesh, Vec<Rgb>) {
     (mesh, light)
 }
 
-fn at_the_edge(settings: &Gathering) -> GatheredRadiosity {
+fn at_the_edge(settings: &RefinementSettings) -> GatheredMesh {
     let (mesh, light) = floor();
-    let mut gather = Known(|_: &Sources, p: &Place| half_hidden(p.position));
+    let mut gather = Known(|_: &RadiosityField, p: &GatherPoint| half_hidden(p.position));
     settings.gather(&shot(&mesh, &light), &mesh, &mut gather, go).unwrap()
 }
 
 /// Interpolated radiosity at `p` of a floor, and the element it is in.
-fn at(surface: &VertexRadiosity, p: DVec3) -> (f64, usize) {
+fn at(surface: &VertexMesh, p: DVec3) -> (f64, usize) {
     for (face, &e) in surface.faces.iter().zip(&surface.elements) {
         let [a, b, c] = face.map(|v| surface.positions[v as usize]);
         let cross = |p: DVec3, q: DVec3| p.cross(q).z / (b - a).cross(c - a).z;
@@ -223,9 +230,9 @@ fn elements_are_split_at_the_shadow_and_nowhere_else() {
     let largest = sizes(&base).1;
     let mut rms = vec![];
     for tolerance in [0.08, 0.01] {
-        let settings = Gathering { tolerance, ..Gathering::new(0.005) };
+        let settings = RefinementSettings { tolerance, ..RefinementSettings::new(0.005) };
         let found = at_the_edge(&settings);
-        assert_eq!(found.stop, Stop::Converged);
+        assert_eq!(found.stop, StopReason::Converged);
         for e in 0..found.mesh.element_count() {
             // Elements are judged with their parents, ½ wide here. In the light the irradiance goes
             // as (1 + (r/6)²)⁻²: over sides of √½ its middle is off by 4/6²·½/8 = 0.7 %.
@@ -273,18 +280,19 @@ fn vertices_between_those_that_gather_lie_on_the_parabola() {
     let lattice = |x: f64, origin: f64| ((x - origin) * 16.0).round() / 16.0 + origin;
     let belongs = |p: DVec3| DVec3::new(lattice(p.x, -0.95), lattice(p.y, -1.0), 0.0);
     let mut asked = 0;
-    let mut gather = |settings: &Gathering| {
+    let mut gather = |settings: &RefinementSettings| {
         asked = 0;
-        let mut known = Known(|_: &Sources, place: &Place| {
+        let mut known = Known(|_: &RadiosityField, place: &GatherPoint| {
             asked += 1;
             curved(belongs(place.position))
         });
         let found = settings.gather(&light, &mesh, &mut known, go).unwrap();
         (found, asked)
     };
-    let plain = Gathering { tolerance: 1.0, everywhere: 2, ..Gathering::new(1e-9) };
-    let (flat, looks) = gather(&Gathering { curve: f64::INFINITY, ..plain.clone() });
-    let (found, others) = gather(&Gathering { curve: 1e-12, ..plain });
+    let plain =
+        RefinementSettings { tolerance: 1.0, everywhere: 2, ..RefinementSettings::new(1e-9) };
+    let (flat, looks) = gather(&RefinementSettings { curve: f64::INFINITY, ..plain.clone() });
+    let (found, others) = gather(&RefinementSettings { curve: 1e-12, ..plain });
     assert_eq!(looks, others, "nobody looks for it");
     let ratio = found.mesh.element_count() as f64 / flat.mesh.element_count() as f64;
     assert!(ratio > 3.9, "all that gathers is split once more: {ratio}");
@@ -299,7 +307,11 @@ fn vertices_between_those_that_gather_lie_on_the_parabola() {
 #[test]
 fn settings_bound_how_many_and_how_small() {
     let (base, _) = floor();
-    let fine = Gathering { tolerance: 0.001, curve: f64::INFINITY, ..Gathering::new(0.02) };
+    let fine = RefinementSettings {
+        tolerance: 0.001,
+        curve: f64::INFINITY,
+        ..RefinementSettings::new(0.02)
+    };
     let (found, largest) = (at_the_edge(&fine), sizes(&base).1);
     // What is above the smallest size is split in two along its edges.
     let (least, most) = sizes(&found.mesh);
@@ -308,15 +320,19 @@ fn settings_bound_how_many_and_how_small() {
     // Each at least once; what was wrong or has grown stale, again.
     let all = places(&found);
     assert!((all..2 * all).contains(&(found.gathers as usize)), "{} {all}", found.gathers);
-    let few = at_the_edge(&Gathering { elements: base.element_count() + 100, ..fine.clone() });
-    assert_eq!(few.stop, Stop::Elements);
+    let few =
+        at_the_edge(&RefinementSettings { elements: base.element_count() + 100, ..fine.clone() });
+    assert_eq!(few.stop, StopReason::Elements);
     let count = few.mesh.element_count() - base.element_count();
     assert!(count <= 100 && count > 90, "{count}");
     assert_whole(&few.mesh, &few.surface);
     // No room at all.
-    let none = at_the_edge(&Gathering { elements: 0, ..fine.clone() });
-    assert_eq!((none.stop, none.mesh.element_count()), (Stop::Elements, base.element_count()));
-    let all = Gathering { tolerance: 1.0, everywhere: 1, ..fine };
+    let none = at_the_edge(&RefinementSettings { elements: 0, ..fine.clone() });
+    assert_eq!(
+        (none.stop, none.mesh.element_count()),
+        (StopReason::Elements, base.element_count())
+    );
+    let all = RefinementSettings { tolerance: 1.0, everywhere: 1, ..fine };
     let all = at_the_edge(&all);
     let quarters = 0..4 * base.element_count();
     assert_eq!(all.mesh.element_count(), quarters.len());
@@ -325,7 +341,7 @@ fn settings_bound_how_many_and_how_small() {
 }
 
 /// Vertices of the elements' corners: all but the middles of fans.
-fn places(found: &GatheredRadiosity) -> usize {
+fn places(found: &GatheredMesh) -> usize {
     let mut corners: Vec<[u64; 3]> = (0..found.mesh.element_count())
         .flat_map(|e| found.mesh.corners(found.mesh.element(e)))
         .map(|p| ((p + 2.0).as_vec3() * 1e4).to_array().map(|x| x.round() as u64))
@@ -350,7 +366,7 @@ fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
         let mesh = Mesh::new(quads(&all), 0.36).unwrap().split_at_contacts(3);
         let light = vec![Rgb::ZERO; mesh.element_count()];
         let mut rays = RayGather::new(&mesh, 256).unwrap();
-        let settings = Gathering { elements: 3000, ..Gathering::new(0.04) };
+        let settings = RefinementSettings { elements: 3000, ..RefinementSettings::new(0.04) };
         let found = settings.gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap();
         for k in 0..60 {
             // Before the wall that faces the lamp nothing hides it, and the light is even: on the
@@ -374,11 +390,11 @@ fn every_sweep_gathers_what_the_one_before_it_found() {
     let light = shot(&fine, &vec![Rgb::ONE; fine.element_count()]);
     for sweeps in [1, 2, 3] {
         let mut told = vec![];
-        let mut gather = Known(|s: &Sources, p: &Place| convex_room(s, p));
-        let settings = Gathering { sweeps, ..Gathering::new(0.01) };
+        let mut gather = Known(|s: &RadiosityField, p: &GatherPoint| convex_room(s, p));
+        let settings = RefinementSettings { sweeps, ..RefinementSettings::new(0.01) };
         let found = settings.gather(&light, &mesh, &mut gather, |p| {
             told.push(p.sweep);
-            Go::Continue(())
+            ControlFlow::Continue(())
         });
         let (found, want) = (found.unwrap(), 0.5f64.powi(sweeps as i32));
         told.dedup();
@@ -401,7 +417,7 @@ fn two_runs_give_the_same_bits() {
     let light = vec![Rgb::ONE; mesh.element_count()];
     let [one, two] = [0, 1].map(|_| {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        Gathering::new(0.1).gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap()
+        RefinementSettings::new(0.1).gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap()
     });
     assert!(one.mesh.element_count() > mesh.element_count());
     assert!(one.surface.radiosity == two.surface.radiosity);
@@ -418,15 +434,16 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
     let (mesh, light) = floor();
     for stop_at in [0, 1, 2] {
         let mut told: Vec<GatherProgress> = vec![];
-        let mut gather = Known(|_: &Sources, p: &Place| half_hidden(p.position));
-        let found = Gathering::new(0.01).gather(&shot(&mesh, &light), &mesh, &mut gather, |p| {
-            told.push(*p);
-            if p.level == stop_at { Go::Break(()) } else { Go::Continue(()) }
-        });
+        let mut gather = Known(|_: &RadiosityField, p: &GatherPoint| half_hidden(p.position));
+        let found =
+            RefinementSettings::new(0.01).gather(&shot(&mesh, &light), &mesh, &mut gather, |p| {
+                told.push(*p);
+                if p.level == stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
         let (found, last) = (found.unwrap(), told[told.len() - 1]);
         assert_eq!(
             (found.stop, last.level, told.len() as u32),
-            (Stop::Cancelled, stop_at, stop_at + 1)
+            (StopReason::Cancelled, stop_at, stop_at + 1)
         );
         assert_eq!(found.mesh.element_count(), last.elements);
         assert!(told.iter().all(|p| p.gathered == p.of && p.of > 0), "one batch a level");
@@ -439,22 +456,22 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
 fn settings_out_of_range_are_refused() {
     let (mesh, values) = floor();
     let light = shot(&mesh, &values);
-    let refused = |settings: Gathering, light: &GatheredRadiosity| {
-        let mut never = Known(|_: &Sources, _: &Place| unreachable!());
+    let refused = |settings: RefinementSettings, light: &GatheredMesh| {
+        let mut never = Known(|_: &RadiosityField, _: &GatherPoint| unreachable!());
         let error = settings.gather(light, &mesh, &mut never, go).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     };
-    let good = Gathering::new(0.1);
+    let good = RefinementSettings::new(0.1);
     for tolerance in [0.0, -0.1, 1.1, f64::NAN] {
-        refused(Gathering { tolerance, ..good.clone() }, &light);
+        refused(RefinementSettings { tolerance, ..good.clone() }, &light);
     }
     for smallest in [0.0, -1.0, f64::NAN] {
-        refused(Gathering { smallest, ..good.clone() }, &light);
+        refused(RefinementSettings { smallest, ..good.clone() }, &light);
     }
     let elsewhere = Mesh::new(cube(&grey()), 1.0).unwrap();
     refused(good, &shot(&elsewhere, &vec![Rgb::ONE; elsewhere.element_count()]));
     for few in [&values[1..], &[]] {
-        let error = GatheredRadiosity::from_elements(&mesh, few).unwrap_err();
+        let error = GatheredMesh::from_elements(&mesh, few).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     }
 }

@@ -7,8 +7,8 @@ use std::num::NonZeroU32;
 
 use common::{cornell_box, cube, gpu, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::{point_to_polygon, polygon_to_polygon};
-use radiosity::{ErrorKind, FormFactors, Gpu, Hemicubes, Material, Mesh, NodeId, RayCast, Row};
+use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
+use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Material, Mesh, NodeId, RayRows, Row};
 
 /// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
 fn largest_pixel(n: u32) -> f64 {
@@ -27,7 +27,7 @@ fn outline_bound(n: u32, perimeter: f64, corners: f64) -> f64 {
 }
 
 fn rows(gpu: &Gpu, mesh: &Mesh, n: u32, patches: &[NodeId]) -> Vec<Row> {
-    let rows = Hemicubes::new(gpu, mesh, n).unwrap().rows(mesh, patches, 1.0).unwrap();
+    let rows = HemicubeRows::new(gpu, mesh, n).unwrap().rows(mesh, patches, 1.0).unwrap();
     rows.iter().zip(patches).for_each(|(row, &p)| row.check(mesh, p).unwrap());
     rows
 }
@@ -60,7 +60,7 @@ fn a_square_seen_from_a_point_on_its_axis() {
         let bound = outline_bound(n, 2.0, 4.0) + 1e-6;
         println!("n {n:4}: error {:+.2e}, bound {bound:.1e}", got - exact);
         assert!((got - exact).abs() <= bound, "n {n}: {got} {exact} {bound}");
-        assert_eq!(row.back, 0);
+        assert_eq!(row.backface, 0);
     }
 }
 
@@ -122,7 +122,7 @@ fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
     let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
     for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
         // Pixels look along directions of at least 1/64 above the horizon: no gap at the edges.
-        assert_eq!((row.open, row.back), (0, 0));
+        assert_eq!((row.escaped, row.backface), (0, 0));
         assert_eq!(row.closure(), 1.0);
         let own = mesh.scene().triangles()[mesh.triangle(p)].group;
         assert_eq!(to_group(&mesh, row, own), 0.0, "a flat wall does not see itself");
@@ -148,7 +148,7 @@ fn what_is_out_of_view_is_all_that_is_left_out() {
     let patches: Vec<NodeId> =
         (0..mesh.element_count()).step_by(31).map(|e| mesh.element(e)).collect();
     for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
-        assert_eq!((row.open, row.back), (0, 0), "from {}", mesh.centroid(p));
+        assert_eq!((row.escaped, row.backface), (0, 0), "from {}", mesh.centroid(p));
     }
 }
 
@@ -164,7 +164,7 @@ fn backs_are_told_from_fronts_and_block() {
     for row in rows(&gpu, &mesh, 64, &patches) {
         assert_eq!(row.entries, []);
         // At least 8 to each side at height 0.1: all but 0.5·(1 − 8/√(64.01))·4 ≈ 3e-4 is covered.
-        assert!(Row::form_factor(row.back) > 1.0 - 4e-4, "{}", Row::form_factor(row.back));
+        assert!(Row::form_factor(row.backface) > 1.0 - 4e-4, "{}", Row::form_factor(row.backface));
     }
 }
 
@@ -175,18 +175,18 @@ fn agree(size: f64, n: u32, rays: u32, count: usize) {
     let all = mesh.element_count();
     let patches: Vec<NodeId> = (0..count).map(|k| mesh.element(k * 7919 % all)).collect();
     let gpu_rows = rows(&gpu, &mesh, n, &patches);
-    let cpu_rows = RayCast::new(&mesh, rays).unwrap().rows(&mesh, &patches, 1.0).unwrap();
+    let cpu_rows = RayRows::new(&mesh, rays).unwrap().rows(&mesh, &patches, 1.0).unwrap();
     let (pixel, mut worst) = (largest_pixel(n), 0.0f64);
     for (a, b) in gpu_rows.iter().zip(&cpu_rows) {
         let dense = |row: &Row| {
             let mut shares = vec![0; all];
             row.entries.iter().for_each(|e| shares[e.element as usize] = e.share);
-            shares.extend([row.open, row.back]);
+            shares.extend([row.escaped, row.backface]);
             shares.into_iter().map(Row::form_factor).collect::<Vec<f64>>()
         };
         for (e, (f, g)) in dense(a).into_iter().zip(dense(b)).enumerate() {
             let seen = f.max(g);
-            // Rays: a count of independent hits, variance F(1 − F)/rays. Pixels: those on the
+            // RayScene: a count of independent hits, variance F(1 − F)/rays. Pixels: those on the
             // outline, each uniform within half its weight either way, variance pixel²/12. A
             // region of p pixels has an outline of at most 7√p pixels crossed if it is compact
             // (a right triangle's is 6.8√p); foreshortened elements are longer: twice that.
@@ -218,14 +218,14 @@ fn rows_are_the_same_bits_however_they_are_batched() {
     let mesh = cornell_box(100.0);
     let patches: Vec<NodeId> =
         (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
-    let mut maker = Hemicubes::new(&gpu, &mesh, 64).unwrap();
+    let mut maker = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
     let together = maker.rows(&mesh, &patches, 1.0).unwrap();
     for (row, &p) in together.iter().zip(&patches) {
         assert!(&maker.rows(&mesh, &[p], 1.0).unwrap()[0] == row, "{p:?}");
     }
     assert_eq!(maker.drawn(), 140);
     assert!(
-        Hemicubes::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &patches, 1.0).unwrap() == together
+        HemicubeRows::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &patches, 1.0).unwrap() == together
     );
     assert_eq!(maker.rows(&mesh, &[], 1.0).unwrap(), []);
 }
@@ -233,7 +233,7 @@ fn rows_are_the_same_bits_however_they_are_batched() {
 #[test]
 fn a_far_scene_gives_the_same_rows() {
     let Some(gpu) = gpu() else { return };
-    // Moved by a thousand of its sizes, in steps that 64-bit coordinates hold exactly: the device
+    // GeometryDelta by a thousand of its sizes, in steps that 64-bit coordinates hold exactly: the device
     // works about a local origin and sees the very same numbers.
     let near = cornell_box(200.0);
     let moved: Vec<DVec3> =
@@ -258,7 +258,7 @@ fn what_a_device_cannot_do_is_said() {
     let Some(gpu) = gpu() else { return };
     let mesh = cornell_box(200.0);
     for n in [0, 7, 100_000] {
-        let e = Hemicubes::new(&gpu, &mesh, n).unwrap_err();
+        let e = HemicubeRows::new(&gpu, &mesh, n).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains(&n.to_string()), "{e}");
     }
@@ -275,7 +275,7 @@ fn turned_hemicubes_average_pixel_errors_away() {
     let patches: Vec<NodeId> = (0..20).map(|k| mesh.element(k * 150 + 7)).collect();
     let make = |k: u32| {
         let k = NonZeroU32::new(k).unwrap();
-        let mut maker = Hemicubes::new(&gpu, &mesh, 128).unwrap().with_rotations(k);
+        let mut maker = HemicubeRows::new(&gpu, &mesh, 128).unwrap().with_rotations(k);
         let rows = maker.rows(&mesh, &patches, 1.0).unwrap();
         rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
         assert_eq!(maker.drawn(), u64::from(k.get()) * patches.len() as u64);

@@ -9,6 +9,7 @@ mod common;
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::*;
+use std::ops::ControlFlow;
 
 const UNSHOT: f64 = 1e-4;
 
@@ -67,11 +68,11 @@ fn open_cube(without: usize) -> Scene {
 /// Shoots all but [`UNSHOT`] of the light with 1024 rays a row, and checks what must hold anywhere.
 fn settle(scene: Scene, size: f64) -> (Mesh, Solution) {
     let mesh = Mesh::new(scene, size).unwrap();
-    let mut rays = RayCast::new(&mesh, 1024).unwrap();
+    let mut rays = RayRows::new(&mesh, 1024).unwrap();
     let shooting = Shooting { unshot: UNSHOT, ..Default::default() };
-    let solution = shooting.solve(&mesh, &mut rays, |_| Go::Continue(())).unwrap();
+    let solution = shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
     check(&solution.radiosity);
-    check(&VertexRadiosity::new(&mesh, &solution.radiosity).radiosity);
+    check(&VertexMesh::new(&mesh, &solution.radiosity).radiosity);
     // Sums of some 1e5 terms, each rounded by 1e-16 of the whole at most.
     assert!(solution.ledger.imbalance() <= 1e-9, "{}", solution.ledger.imbalance());
     assert!(solution.ledger.unshot_share() <= UNSHOT);
@@ -92,7 +93,7 @@ fn flux(mesh: &Mesh, solution: &Solution, group: Option<u32>) -> f64 {
 /// Nothing of a furnace is lost: `lost` of the flux at most, and no flux is missing.
 fn furnace(scene: Scene, size: f64, lost: f64) -> (Mesh, Solution) {
     let (mesh, solution) = settle(scene, size);
-    let Ledger { emitted, left, back, .. } = solution.ledger;
+    let Ledger { emitted, escaped: left, backface_loss: back, .. } = solution.ledger;
     let away = (left.x + back.x) / emitted.x;
     let settled = flux(&mesh, &solution, None) / (2.0 * emitted.x);
     println!("{} elements: away {away:.1e}, flux {settled:.6}", mesh.element_count());
@@ -157,7 +158,7 @@ fn touching_and_intersecting_walls() {
         let pillar = block([0.25, 0.25, bottom], [0.5; 3], false);
         let scene = with(cube(&glowing()), "pillar", paint(0.5, 0.0), &pillar);
         let (_, solution) = settle(scene, 0.36);
-        let Ledger { emitted, left, back, .. } = solution.ledger;
+        let Ledger { emitted, escaped: left, backface_loss: back, .. } = solution.ledger;
         println!("left {left}, back {back}");
         let lost = 1.0 / 16.0;
         assert!(left.x == 0.0 && (back.x - lost).abs() <= UNSHOT * emitted.x, "{left} {back}");
@@ -189,14 +190,14 @@ fn open_scenes() {
     let black: Vec<_> = (0..2).map(|t| lid.corners(t).map(|p| p.to_array())).collect();
     let closed = settle(with(open_cube(5), "lid", paint(0.0, 0.0), &black), 0.25);
     let (open, shut) = (solution.ledger, closed.1.ledger);
-    assert_eq!((open.back.x, shut.left.x), (0.0, 0.0));
+    assert_eq!((open.backface_loss.x, shut.escaped.x), (0.0, 0.0));
     let walls = |g: u32| flux(&mesh, &solution, Some(g)) / flux(&closed.0, &closed.1, Some(g));
     for group in 0..5 {
         println!("{group} {}", walls(group));
         assert!((walls(group) - 1.0).abs() < 4.0 * UNSHOT, "{}", walls(group));
     }
     let through = shut.absorbed.x - open.absorbed.x;
-    assert!((open.left.x / through - 1.0).abs() < 4.0 * UNSHOT, "{} {through}", open.left.x);
+    assert!((open.escaped.x / through - 1.0).abs() < 4.0 * UNSHOT, "{} {through}", open.escaped.x);
 }
 
 #[test]
@@ -210,7 +211,7 @@ fn one_triangle() {
     let (mesh, solution) = settle(scene.unwrap(), 0.25);
     assert!(mesh.element_count() > 1 && solution.radiosity.iter().all(|&b| b == Rgb::ONE));
     // A row's shares are whole, and all of them are open.
-    assert!((solution.ledger.left.x - 0.5).abs() < 1e-4 * 0.5, "{}", solution.ledger.left);
+    assert!((solution.ledger.escaped.x - 0.5).abs() < 1e-4 * 0.5, "{}", solution.ledger.escaped);
 }
 
 #[test]
@@ -244,7 +245,7 @@ fn a_light_flush_in_the_ceiling() {
         scene.check_winding();
         assert_eq!(scene.warnings(), [""; 0]);
         let (mesh, solution) = settle(scene, 0.125);
-        assert_eq!((solution.ledger.left.x, solution.ledger.back.x), (0.0, 0.0));
+        assert_eq!((solution.ledger.escaped.x, solution.ledger.backface_loss.x), (0.0, 0.0));
         [0, 1, 2, 3, 4].map(|g| flux(&mesh, &solution, Some(g)))
     });
     println!("{hole:?} {first:?} {last:?}");
@@ -271,6 +272,6 @@ fn duplicated_vertices() {
     let (mesh, a) = settle(shared, 0.3);
     let (doubled, b) = settle(own, 0.3);
     assert_eq!(a.radiosity, b.radiosity);
-    let [a, b] = [(&mesh, &a), (&doubled, &b)].map(|(m, s)| VertexRadiosity::new(m, &s.radiosity));
+    let [a, b] = [(&mesh, &a), (&doubled, &b)].map(|(m, s)| VertexMesh::new(m, &s.radiosity));
     assert_eq!((a.positions, a.radiosity), (b.positions, b.radiosity));
 }

@@ -1,9 +1,10 @@
 //! Scenes of many triangles: loaded, cut, and a few shots of light, in bounded time and memory.
 
 use std::fmt::Write;
+use std::ops::ControlFlow;
 use std::time::Instant;
 
-use radiosity::{Go, Mesh, RayCast, Shooting, Solution, VertexRadiosity, read_obj};
+use radiosity::{Mesh, RayRows, Shooting, Solution, VertexMesh, read_obj};
 
 const MATERIALS: &[u8] = b"newmtl lamp\nKe 1\nnewmtl rock\nKd 0.5\n";
 
@@ -14,12 +15,12 @@ fn bake(obj: &str, shots: u64) -> (Mesh, Solution) {
     let loaded = start.elapsed();
     let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
     let cut = start.elapsed();
-    let mut rays = RayCast::new(&mesh, 4096).unwrap();
+    let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let sorted = start.elapsed();
     let shooting = Shooting { shots: Some(shots), ..Default::default() };
-    let solution = shooting.solve(&mesh, &mut rays, |_| Go::Continue(())).unwrap();
+    let solution = shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
     let shot = start.elapsed();
-    let surface = VertexRadiosity::new(&mesh, &solution.radiosity);
+    let surface = VertexMesh::new(&mesh, &solution.radiosity);
     println!(
         "{} MB, {} triangles: loaded {loaded:.1?}, cut {cut:.1?}, sorted {sorted:.1?}, {} shots \
          {shot:.1?}, vertices {:.1?}",
@@ -63,9 +64,9 @@ fn hills(n: usize) -> String {
 fn hills_are_lit(n: usize) {
     let (mesh, solution) = bake(&hills(n), 2);
     assert_eq!(mesh.element_count(), 2 * n * n + 2);
-    let caught = 1.0 - solution.ledger.left.x / solution.ledger.emitted.x;
+    let caught = 1.0 - solution.ledger.escaped.x / solution.ledger.emitted.x;
     println!("caught {caught}");
-    // Rays: √(0.0686 / 8192) = 0.003; four of them, and 10 % for the hills.
+    // RayScene: √(0.0686 / 8192) = 0.003; four of them, and 10 % for the hills.
     assert!((caught - 0.0686).abs() < 0.012 + 0.007, "{caught}");
 }
 
@@ -89,7 +90,7 @@ fn ten_thousand_triangles_at_one_place() {
     assert_eq!(mesh.element_count(), n + 2);
     // Of triangles at one place light meets the first, and all of what is caught.
     let caught = solution.radiosity[2].x * mesh.area(mesh.element(2));
-    let reflected = 0.5 * (solution.ledger.emitted.x - solution.ledger.left.x);
+    let reflected = 0.5 * (solution.ledger.emitted.x - solution.ledger.escaped.x);
     assert!(caught > 0.01 && (caught / reflected - 1.0).abs() < 1e-9, "{caught} {reflected}");
     assert!(solution.radiosity[3..].iter().all(|&b| b == radiosity::Rgb::ZERO));
 }

@@ -4,10 +4,11 @@ mod common;
 
 use common::closed_forms::{exact, from_centroid};
 use common::{cube, gpu};
-use radiosity::form_factor::analytic::point_to_polygon;
+use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
-    FormFactors, Go, Hemicubes, Material, Mesh, NearRepair, NodeId, Rgb, Row, Shooting,
+    FormFactors, HemicubeRows, Material, Mesh, NodeId, ProximityCorrection, Rgb, Row, Shooting,
 };
+use std::ops::ControlFlow;
 
 fn dense(mesh: &Mesh, row: &Row) -> Vec<f64> {
     let mut factors = vec![0.0; mesh.element_count()];
@@ -36,7 +37,7 @@ fn near_entries_come_close_to_the_area_averaged_factor() {
     let truth = exact().rows(&mesh, &patches, 1.0).unwrap();
     // Largest error of an entry against the closed form between areas, and mean share moved.
     let error = |reach: f64| {
-        let mut repair = NearRepair::new(from_centroid(), &mesh, reach);
+        let mut repair = ProximityCorrection::new(from_centroid(), &mesh, reach);
         let rows = repair.rows(&mesh, &patches, 1.0).unwrap();
         let mut worst = 0.0f64;
         for ((row, right), &patch) in rows.iter().zip(&truth).zip(&patches) {
@@ -61,7 +62,9 @@ fn near_entries_come_close_to_the_area_averaged_factor() {
 fn a_mended_entry_is_the_closed_form_from_the_receiver() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patch = patches(&mesh)[0];
-    let row = &NearRepair::new(from_centroid(), &mesh, 0.0).rows(&mesh, &[patch], 1.0).unwrap()[0];
+    let row = &ProximityCorrection::new(from_centroid(), &mesh, 0.0)
+        .rows(&mesh, &[patch], 1.0)
+        .unwrap()[0];
     let (mut touching, corners) = (0, mesh.corners(patch));
     for (e, factor) in dense(&mesh, row).into_iter().enumerate().filter(|f| f.1 > 0.0) {
         let node = mesh.element(e);
@@ -81,9 +84,9 @@ fn rows_out_of_reach_are_left_as_they_are() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patches = patches(&mesh);
     let raw = from_centroid().rows(&mesh, &patches, 1.0).unwrap();
-    let mut off = NearRepair::new(from_centroid(), &mesh, -1.0);
+    let mut off = ProximityCorrection::new(from_centroid(), &mesh, -1.0);
     assert!(off.rows(&mesh, &patches, 1.0).unwrap() == raw);
-    assert_eq!(off.batch(), from_centroid().batch());
+    assert_eq!(off.preferred_batch_len(), from_centroid().preferred_batch_len());
     assert_eq!(off.inner().made as usize, patches.len());
     // A patch in the middle of a wall touches nothing but its own plane.
     let away = |p: &NodeId| {
@@ -91,7 +94,7 @@ fn rows_out_of_reach_are_left_as_they_are() {
     };
     let middle: Vec<NodeId> = patches.iter().copied().filter(away).collect();
     assert!(!middle.is_empty());
-    let mut touching = NearRepair::new(from_centroid(), &mesh, 0.0);
+    let mut touching = ProximityCorrection::new(from_centroid(), &mesh, 0.0);
     assert!(
         touching.rows(&mesh, &middle, 1.0).unwrap()
             == from_centroid().rows(&mesh, &middle, 1.0).unwrap()
@@ -106,10 +109,10 @@ fn the_white_furnace_is_even() {
     let glow = Material { exitance: Rgb::ONE, ..Material::grey("g", 0.5) };
     let mesh = Mesh::new(cube(&glow), 0.2).unwrap();
     let uneven = |reach: f64| {
-        let hemicubes = Hemicubes::new(&gpu, &mesh, 256).unwrap();
-        let mut rows = NearRepair::new(hemicubes, &mesh, reach);
+        let hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
+        let mut rows = ProximityCorrection::new(hemicubes, &mesh, reach);
         let settings = Shooting { unshot: 1e-6, ..Default::default() };
-        let s = settings.solve(&mesh, &mut rows, |_| Go::Continue(())).unwrap();
+        let s = settings.solve(&mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         assert!(s.ledger.imbalance() < 1e-9, "energy is kept");
         s.radiosity.iter().map(|b| (b.x / 2.0 - 1.0).abs()).fold(0.0, f64::max)
     };

@@ -6,18 +6,19 @@
 mod common;
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use common::closed_forms::exact;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use radiosity::{
-    FormFactors, Go, Material, Mesh, Method, NodeId, Progress, RayCast, Rgb, Row, Scene, Solution,
+    FormFactors, Material, Mesh, Method, NodeId, Progress, RayRows, Rgb, Row, Scene, Solution,
     Solver, Triangle,
 };
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 /// The same cases on every run, unless a seed is given.
@@ -147,7 +148,7 @@ impl Made {
     }
 
     fn rays(mesh: &Mesh) -> Made {
-        Made::by(mesh, &mut RayCast::new(mesh, RAYS).unwrap().with_full_share(0.0))
+        Made::by(mesh, &mut RayRows::new(mesh, RAYS).unwrap().with_full_share(0.0))
     }
 
     fn factor(&self, i: usize, j: usize) -> f64 {
@@ -167,7 +168,7 @@ impl FormFactors for Made {
         Ok(patches.iter().map(|&p| self.0[mesh.elements_of(p).start].clone()).collect())
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         16
     }
 }
@@ -218,8 +219,8 @@ proptest! {
         let (mut rows, areas) = (Made::exact(&mesh), areas(&mesh));
         for i in 0..areas.len() {
             // Closed but for the rounding of each entry; nothing sees a back.
-            prop_assert!(Row::form_factor(rows.0[i].open) <= SHARE * areas.len() as f64);
-            prop_assert_eq!(rows.0[i].back, 0);
+            prop_assert!(Row::form_factor(rows.0[i].escaped) <= SHARE * areas.len() as f64);
+            prop_assert_eq!(rows.0[i].backface, 0);
             for j in 0..i {
                 let both = [areas[i] * rows.factor(i, j), areas[j] * rows.factor(j, i)];
                 prop_assert!((both[0] - both[1]).abs() <= SHARE * (areas[i] + areas[j]));
@@ -321,7 +322,7 @@ proptest! {
         }
     }
 
-    /// Rays past anything: all that is emitted is accounted for, and no more than E/(1−ρ) is about.
+    /// RayScene past anything: all that is emitted is accounted for, and no more than E/(1−ρ) is about.
     #[test]
     fn light_past_blockers_is_neither_lost_nor_made(room in rooms(1..6)) {
         let (mesh, materials) = (room.mesh(), room.materials());
@@ -329,7 +330,7 @@ proptest! {
         prop_assert!(s.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
         prop_assert!(s.ledger.imbalance() <= 1e-13);
         // The room is closed. What leaves in all is bounded whatever the rays: a row adds up to one.
-        prop_assert_eq!(s.ledger.left, Rgb::ZERO);
+        prop_assert_eq!(s.ledger.escaped, Rgb::ZERO);
         let (rho, _) = highest(&materials);
         let leaving: Rgb = s.radiosity.iter().zip(areas(&mesh)).map(|(b, a)| *b * a).sum();
         let most = s.ledger.emitted / (1.0 - rho) * (1.0 + 1e-13);
@@ -357,7 +358,7 @@ proptest! {
             // Ray k owns the shares from k·TOTAL/n on: the same rays in another order round otherwise.
             let off = known.iter().map(|(e, &share)| sums.get(e).map_or(share, |s| s.abs_diff(share)));
             prop_assert!(off.max().unwrap_or(0) <= 1 && known.len() == sums.len());
-            prop_assert_eq!((a.open, a.back.abs_diff(b.back) <= 1), (b.open, true));
+            prop_assert_eq!((a.escaped, a.backface.abs_diff(b.backface) <= 1), (b.escaped, true));
         }
     }
 

@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -10,17 +11,17 @@ use std::time::{Duration, Instant};
 use common::cornell_box;
 use glam::{DAffine3, DVec3};
 use radiosity::{
-    Error, ErrorKind, FormFactors, Go, Mesh, Method, NodeId, Progress, RayCast, Rgb, Row, Scene,
-    Solution, Solve, Solver, Stop,
+    Error, ErrorKind, FormFactors, Mesh, Method, NodeId, Progress, RayRows, Rgb, Row, Scene,
+    Solution, SolveSession, Solver, StopReason,
 };
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
-/// Rays, fewer for dim patches: rows depend on when they are made.
-fn rays(mesh: &Mesh) -> RayCast {
-    RayCast::new(mesh, 1024).unwrap()
+/// RayScene, fewer for dim patches: rows depend on when they are made.
+fn rays(mesh: &Mesh) -> RayRows {
+    RayRows::new(mesh, 1024).unwrap()
 }
 
 /// Every method with memory for a part of the rows; GMRES in short cycles.
@@ -64,8 +65,8 @@ fn saved_and_read_after_every_batch_a_solve_ends_with_the_same_bits() {
     }
 }
 
-/// Rays that fail after so many batches.
-struct Failing(RayCast, u32);
+/// RayScene that fail after so many batches.
+struct Failing(RayRows, u32);
 
 impl FormFactors for Failing {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
@@ -74,8 +75,8 @@ impl FormFactors for Failing {
         self.0.rows(mesh, patches, share)
     }
 
-    fn batch(&self) -> usize {
-        self.0.batch()
+    fn preferred_batch_len(&self) -> usize {
+        self.0.preferred_batch_len()
     }
 }
 
@@ -100,7 +101,7 @@ fn an_error_of_the_rows_takes_nothing_from_a_solve() {
             }
         };
         println!("{}: failed {failed} times", solver.method);
-        assert!(failed > 0 && stop == Stop::Converged);
+        assert!(failed > 0 && stop == StopReason::Converged);
         same(&solve.into_solution().unwrap(), &whole);
     }
 }
@@ -117,17 +118,19 @@ fn a_solve_that_is_stopped_at_any_call_goes_on() {
             let every = |_: &Progress| {
                 calls += 1;
                 if calls % 37 == 0 && solver.method != Method::Direct {
-                    Go::Break(())
+                    ControlFlow::Break(())
                 } else {
-                    Go::Continue(())
+                    ControlFlow::Continue(())
                 }
             };
             match solve.run(&mut rows, every).unwrap() {
-                Stop::Cancelled => assert!(solve.solution().unwrap().ledger.imbalance() <= 1e-9),
+                StopReason::Cancelled => {
+                    assert!(solve.solution().unwrap().ledger.imbalance() <= 1e-9)
+                }
                 stop => break stop,
             }
         };
-        assert_eq!(stop, Stop::Converged);
+        assert_eq!(stop, StopReason::Converged);
         let s = solve.into_solution().unwrap();
         for (a, b) in s.radiosity.iter().zip(&whole.radiosity) {
             // What 1e-12 of the light can bring, to elements with a thousandth of its mean.
@@ -141,18 +144,19 @@ fn a_solve_that_is_stopped_at_any_call_goes_on() {
 fn a_solve_that_has_changed_is_saved_with_its_old_rows() {
     let mesh = cornell_box(150.0);
     let by = DAffine3::from_translation(DVec3::new(5.0, 0.0, 5.0));
-    let moved = mesh.with_scene(mesh.scene().with_moved("short_block", by).unwrap()).unwrap();
+    let moved =
+        mesh.with_scene(mesh.scene().with_transformed_group("short_block", by).unwrap()).unwrap();
     for method in Method::ALL {
         let solver = Solver { unshot: 0.02, ..Solver::new(method) };
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = solver.begin(&mesh).unwrap();
         solve.run(&mut before, go).unwrap();
-        solve.rearrange(&moved, &mut before, &mut after, go).unwrap();
-        assert!(solve.doubt() > 0.0);
+        solve.update_geometry(&moved, &mut before, &mut after, go).unwrap();
+        assert!(solve.stale_flux_bound() > 0.0);
         solve.advance(&mut after, go).unwrap();
         let bytes = solve.to_bytes();
         let mut again = solver.resume_bytes(&moved, &after, &bytes).unwrap();
-        assert!(again.to_bytes() == bytes && again.doubt() == solve.doubt());
+        assert!(again.to_bytes() == bytes && again.stale_flux_bound() == solve.stale_flux_bound());
         for solve in [&mut solve, &mut again] {
             solve.set_limits(1e-3, None).unwrap();
             solve.run(&mut rays(&moved), go).unwrap();
@@ -171,14 +175,14 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     let mut solve = solver.begin(&mesh).unwrap();
     solve.advance(&mut rows, go).unwrap();
     solve.save(&path).unwrap();
-    let says = |solver: Solver, mesh: &Mesh, rows: &RayCast, words: &str| {
+    let says = |solver: Solver, mesh: &Mesh, rows: &RayRows, words: &str| {
         let Err(e) = solver.resume(mesh, rows, &path) else { panic!("taken: {words}") };
         let (kind, text) = (e.kind(), e.to_string());
         assert!(kind == ErrorKind::File && text.contains(words), "{words}: {text}");
         assert!(text.contains("light.state"), "{text}");
     };
     assert!(solver.resume(&mesh, &rows, &path).is_ok());
-    // Stop rules and memory are no part of what it is.
+    // StopReason rules and memory are no part of what it is.
     let other = Solver { unshot: 0.5, steps: Some(3), row_memory: 0, ..solver };
     assert!(other.resume(&mesh, &rows, &path).is_ok());
     let finer = cornell_box(200.0);
@@ -192,7 +196,7 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     let brighter = mesh.scene().with_materials(materials).unwrap();
     says(solver, &mesh.with_scene(brighter).unwrap(), &rows, "fingerprint of the mesh");
     let by = DAffine3::from_translation(DVec3::new(0.0, 0.0, 1e-9));
-    let shifted = mesh.scene().with_moved("short_block", by).unwrap();
+    let shifted = mesh.scene().with_transformed_group("short_block", by).unwrap();
     says(solver, &mesh.with_scene(shifted).unwrap(), &rows, "fingerprint of the mesh");
     // Walls that are a group each are clusters each, though all is where it was.
     let mut apart = mesh.scene().triangles().to_vec();
@@ -202,7 +206,7 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     let apart = Scene::new(positions.to_vec(), apart, groups, materials.to_vec()).unwrap();
     says(solver, &Mesh::new(apart, 300.0).unwrap(), &rows, "fingerprint of the mesh");
     says(Solver::new(Method::Jacobi), &mesh, &rows, "'GaussSeidel'; here it is 'Jacobi'");
-    says(solver, &mesh, &RayCast::new(&mesh, 512).unwrap(), "here it is '512 rays");
+    says(solver, &mesh, &RayRows::new(&mesh, 512).unwrap(), "here it is '512 rays");
     let whole = std::fs::read(&path).unwrap();
     for length in [0, 7, 8, 15, 100, whole.len() - 1] {
         std::fs::write(&path, &whole[..length]).unwrap();
@@ -228,7 +232,7 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
 }
 
 /// The solve that is killed; some 2 s where rows are kept, a state every batch or every 16.
-fn killed<'m>(mesh: &'m Mesh, rows: &RayCast, method: Method, path: &Path) -> Solve<'m> {
+fn killed<'m>(mesh: &'m Mesh, rows: &RayRows, method: Method, path: &Path) -> SolveSession<'m> {
     let solver = Solver { unshot: 1e-5, row_memory: 1 << 20, ..Solver::new(method) };
     match path.exists() {
         true => solver.resume(mesh, rows, path).expect("the state is whole"),

@@ -3,16 +3,17 @@
 mod common;
 
 use std::collections::HashSet;
+use std::ops::ControlFlow;
 
 use common::quads;
 use glam::DVec3;
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Go, Material, Mesh, NodeId, Progress, RayCast, Rgb, Row,
-    Scene, Shooting, Solution, Stop, Triangle,
+    Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, Progress, RayRows, Rgb, Row,
+    Scene, Shooting, Solution, StopReason, Triangle,
 };
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 fn lamp() -> Material {
@@ -51,7 +52,7 @@ fn room(n: u32) -> Scene {
 }
 
 fn solve(mesh: &Mesh, settings: Shooting) -> Solution {
-    settings.solve(mesh, &mut RayCast::new(mesh, 4096).unwrap(), go).unwrap()
+    settings.solve(mesh, &mut RayRows::new(mesh, 4096).unwrap(), go).unwrap()
 }
 
 #[test]
@@ -91,7 +92,7 @@ impl FormFactors for Sent {
             let to = if emits { &self.lit } else { &self.black };
             let share = Row::TOTAL / to.len() as u32;
             let entries: Vec<Entry> = to.iter().map(|&element| Entry { element, share }).collect();
-            Row { entries, open: Row::TOTAL - share * to.len() as u32, back: 0 }
+            Row { entries, escaped: Row::TOTAL - share * to.len() as u32, backface: 0 }
         };
         let rows = patches.iter().map(row).collect();
         self.asked.extend(patches.iter().filter(|&&p| mesh.material(p).exitance == Rgb::ZERO));
@@ -122,7 +123,7 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
         // row) (1/6)·2 √½ = 0.24. Uneven light is off by the angle, 0.5, times its share and more.
         let settings = Shooting { tolerance: 0.3, ..Default::default() };
         let s = settings.solve(&mesh, &mut maker, go).unwrap();
-        assert_eq!(s.stop, Stop::Converged);
+        assert_eq!(s.stop, StopReason::Converged);
         maker.asked.len()
     };
     let floor = of([2, 3]);
@@ -168,7 +169,7 @@ fn nobody_shoots_from_under_a_block() {
     for scene in [empty, quads(&walls)] {
         let mesh = Mesh::new(scene, 1.0).unwrap();
         let s = solve(&mesh, Shooting { tolerance: 5.0, ..Default::default() });
-        let back = s.ledger.back.x / s.ledger.emitted.x;
+        let back = s.ledger.backface_loss.x / s.ledger.emitted.x;
         println!("{back} of the light met backs, {} rows", s.rows_made);
         // The room is closed: backs are only seen from inside a block, where nobody is to shoot from.
         assert_eq!(back, 0.0);
@@ -199,7 +200,7 @@ fn a_tolerance_of_zero_makes_every_element_shoot() {
     assert!(four.rows_made < all.rows_made / 2);
     for tolerance in [-1.0, f64::NAN] {
         let settings = Shooting { tolerance, ..Default::default() };
-        let error = settings.solve(&mesh, &mut RayCast::new(&mesh, 16).unwrap(), go).unwrap_err();
+        let error = settings.solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), go).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     }
 }

@@ -3,18 +3,19 @@
 mod common;
 
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 use common::closed_forms::{exact, from_centroid};
 use common::{cube, gpu, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::polygon_to_polygon;
+use radiosity::form_factor::closed_form::polygon_to_polygon;
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Go, Hemicubes, Material, Mesh, NodeId, Progress, RayCast,
-    Rgb, Row, Shooting, Solution, Stop,
+    Entry, Error, ErrorKind, FormFactors, HemicubeRows, Material, Mesh, NodeId, Progress, RayRows,
+    Rgb, Row, Shooting, Solution, StopReason,
 };
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 fn material(reflectance: f64, exitance: f64) -> Material {
@@ -55,13 +56,13 @@ fn unequal_areas_exchange_by_reciprocity() {
     // Closed forms: a share is rounded by at most one unit of 2⁻³², and the smallest factor from
     // a half of the lamp to an element is 1e-3.
     check(&mut exact(), 1e-6);
-    // Rays: 2²⁰ a row, so at least 10³ hits an element: a standard error of 3 %; four of them.
+    // RayScene: 2²⁰ a row, so at least 10³ hits an element: a standard error of 3 %; four of them.
     // Each half of the lamp is seen from its centroid, 0.02 from the middle of the lamp: 1 %.
-    check(&mut RayCast::new(&mesh, 1 << 20).unwrap(), 0.13);
+    check(&mut RayRows::new(&mesh, 1 << 20).unwrap(), 0.13);
     if let Some(gpu) = gpu() {
-        // Hemicubes: at N = 512 an element of factor 1e-3 covers 200 pixels at least, and its
+        // HemicubeRows: at N = 512 an element of factor 1e-3 covers 200 pixels at least, and its
         // outline crosses up to 14·√200, each off by up to half at random: 4·√(200/12)/200 = 8 %.
-        check(&mut Hemicubes::new(&gpu, &mesh, 512).unwrap(), 0.13);
+        check(&mut HemicubeRows::new(&gpu, &mesh, 512).unwrap(), 0.13);
     }
 }
 
@@ -87,7 +88,7 @@ fn white_furnace_with_hemicubes_keeps_the_energy() {
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
         let mesh = Mesh::new(cube(&material(rho, 1.0)), 0.2).unwrap();
         let settings = Shooting { unshot: 1e-7, ..Default::default() };
-        let mut hemicubes = Hemicubes::new(&gpu, &mesh, 256).unwrap();
+        let mut hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
         let s = settings.solve(&mesh, &mut hemicubes, go).unwrap();
         let (mean, worst) = mean_and_worst(&mesh, &s, Rgb::splat(answer));
         // Flux is conserved, so the mean is short by no more than the unshot share, which would
@@ -118,9 +119,9 @@ fn the_ledger_closes_in_open_scenes_with_backs_at_every_shot() {
     let mesh = Mesh::new(scene, 0.5).unwrap();
     let mut shares = vec![];
     let s = Shooting { unshot: 1e-6, ..Default::default() }
-        .solve(&mesh, &mut RayCast::new(&mesh, 4096).unwrap(), |p| {
+        .solve(&mesh, &mut RayRows::new(&mesh, 4096).unwrap(), |p| {
             shares.push(p.unshot_share);
-            Go::Continue(())
+            ControlFlow::Continue(())
         })
         .unwrap();
     let l = s.ledger;
@@ -128,19 +129,19 @@ fn the_ledger_closes_in_open_scenes_with_backs_at_every_shot() {
     assert!(l.imbalance() <= 1e-12, "{}", l.imbalance());
     // A unit square, summed over its elements.
     assert!((l.emitted - Rgb::new(3.0, 0.0, 1e-12)).abs().cmple(Rgb::new(1e-14, 0., 1e-26)).all());
-    for part in [l.absorbed, l.left, l.back] {
+    for part in [l.absorbed, l.escaped, l.backface_loss] {
         assert!(part.x > 0.01 * l.emitted.x && part.y == 0.0);
         // Channels differ by a factor in emission alone.
         assert!((part.z / part.x * 3e12 - 1.0).abs() < 1e-9);
     }
     assert_eq!(shares.len() as u64, s.shots);
-    assert!(l.unshot_share() <= 1e-6 && s.stop == Stop::Converged);
+    assert!(l.unshot_share() <= 1e-6 && s.stop == StopReason::Converged);
     // Radiosity times area is what fronts emitted and reflected; all that is not unshot went on
     // to be absorbed, reflected once more, or lost.
     let flux = |b: Rgb, e: usize| b * mesh.area(mesh.element(e));
     let leaving: Rgb = s.radiosity.iter().zip(0..).map(|(&b, e)| flux(b, e)).sum();
     let reflected = leaving - l.emitted;
-    let arrived = l.absorbed + reflected + l.left + l.back;
+    let arrived = l.absorbed + reflected + l.escaped + l.backface_loss;
     assert!((leaving - l.unshot - arrived).abs().max_element() < 1e-12);
 }
 
@@ -183,7 +184,7 @@ fn patches_and_elements_shoot_the_same_light() {
         Mesh::new(scene.unwrap(), 0.2).unwrap()
     };
     let solve = |level| {
-        let mut rays = RayCast::new(&lit, 4096).unwrap();
+        let mut rays = RayRows::new(&lit, 4096).unwrap();
         Shooting { unshot: 1e-4, tolerance: 0.0, level, ..Default::default() }
             .solve(&lit, &mut rays, go)
             .unwrap()
@@ -193,7 +194,7 @@ fn patches_and_elements_shoot_the_same_light() {
     let flux = |s: &Solution| s.ledger.absorbed.x;
     // Absorbed is what is emitted in a closed cube, whoever shoots.
     assert!((flux(&fine) / flux(&coarse) - 1.0).abs() < 2e-4);
-    assert_eq!(coarse.ledger.left, Rgb::ZERO);
+    assert_eq!(coarse.ledger.escaped, Rgb::ZERO);
 }
 
 #[test]
@@ -204,14 +205,14 @@ fn a_solve_can_be_cut_short_and_keeps_what_it_has() {
         .solve(&mesh, &mut exact(), |p| {
             calls += 1;
             assert_eq!(p.shots, calls);
-            if calls == 7 { Go::Break(()) } else { Go::Continue(()) }
+            if calls == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-    assert_eq!((s.shots, s.stop), (7, Stop::Cancelled));
+    assert_eq!((s.shots, s.stop), (7, StopReason::Cancelled));
     assert!(s.ledger.imbalance() < 1e-12);
     let shots = Shooting { shots: Some(5), ..Default::default() };
     let s = shots.solve(&mesh, &mut exact(), go).unwrap();
-    assert_eq!((s.shots, s.stop), (5, Stop::Shots));
+    assert_eq!((s.shots, s.stop), (5, StopReason::Shots));
     let none = Shooting { shots: Some(0), ..Default::default() };
     let s = none.solve(&mesh, &mut exact(), go).unwrap();
     assert!(s.shots == 0 && s.radiosity.iter().all(|&b| b == Rgb::ONE));
@@ -221,7 +222,7 @@ fn a_solve_can_be_cut_short_and_keeps_what_it_has() {
 fn a_dark_scene_is_solved_at_once() {
     let mesh = Mesh::new(cube(&material(0.8, 0.0)), 0.36).unwrap();
     let s = Shooting::default().solve(&mesh, &mut exact(), go).unwrap();
-    assert_eq!((s.shots, s.stop, s.ledger.unshot_share()), (0, Stop::Converged, 0.0));
+    assert_eq!((s.shots, s.stop, s.ledger.unshot_share()), (0, StopReason::Converged, 0.0));
     assert!(s.radiosity.iter().all(|&b| b == Rgb::ZERO));
 }
 
@@ -243,8 +244,8 @@ fn rows_that_break_their_contract_are_refused() {
     let bad = [
         vec![],
         vec![good.clone(), good.clone()],
-        vec![Row { open: half, ..Default::default() }],
-        vec![Row { open: 1, ..good.clone() }],
+        vec![Row { escaped: half, ..Default::default() }],
+        vec![Row { escaped: 1, ..good.clone() }],
         vec![Row {
             entries: vec![entry(3, half), entry(1, Row::TOTAL - half)],
             ..Default::default()
@@ -274,12 +275,12 @@ fn ray_rows_match_a_closed_form() {
     let r = (1.0f64 + 0.0625).sqrt();
     let exact = 4.0 / PI * (0.25 / r) * (0.25 / r).atan();
     let row =
-        &RayCast::new(&mesh, 1 << 16).unwrap().rows(&mesh, &[mesh.element(0)], 1.0).unwrap()[0];
+        &RayRows::new(&mesh, 1 << 16).unwrap().rows(&mesh, &[mesh.element(0)], 1.0).unwrap()[0];
     let got: f64 = row.entries.iter().map(|e| Row::form_factor(e.share)).sum();
     let bound = 4.0 * (exact * (1.0 - exact) / 65536.0).sqrt();
     assert!((got - exact).abs() < bound, "{got} {exact} {bound}");
     assert_eq!(row.closure(), 1.0);
     for rays in [0, (1 << 28) + 1] {
-        assert_eq!(RayCast::new(&mesh, rays).unwrap_err().kind(), ErrorKind::Setting);
+        assert_eq!(RayRows::new(&mesh, rays).unwrap_err().kind(), ErrorKind::Setting);
     }
 }

@@ -6,12 +6,13 @@ use common::closed_forms::exact;
 use common::walls::walls;
 use common::{cornell_box, cube, quads};
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Go, MAX_DIRECT, Material, Mesh, Method, NodeId, Progress,
-    RayCast, Rgb, Row, Scene, Solution, Solver, Stop,
+    Entry, Error, ErrorKind, FormFactors, MAX_DIRECT, Material, Mesh, Method, NodeId, Progress,
+    RayRows, Rgb, Row, Scene, Solution, Solver, StopReason,
 };
+use std::ops::ControlFlow;
 
-fn go(_: &Progress) -> Go {
-    Go::Continue(())
+fn go(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 fn material(reflectance: [f64; 3], exitance: [f64; 3]) -> Material {
@@ -33,9 +34,9 @@ fn methods() -> [Method; 6] {
     })
 }
 
-/// Rays, as many for each row.
-fn rays(mesh: &Mesh) -> RayCast {
-    RayCast::new(mesh, 1024).unwrap().with_full_share(0.0)
+/// RayScene, as many for each row.
+fn rays(mesh: &Mesh) -> RayRows {
+    RayRows::new(mesh, 1024).unwrap().with_full_share(0.0)
 }
 
 /// A unit room with a lamp under its ceiling and a block on its floor.
@@ -88,7 +89,7 @@ fn all_methods_agree_with_a_direct_solve() {
     for (name, mesh) in scenes() {
         let mut maker = Stored::of(&mesh);
         let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, go).unwrap();
-        assert_eq!((judge.stop, judge.steps), (Stop::Converged, 1));
+        assert_eq!((judge.stop, judge.steps), (StopReason::Converged, 1));
         println!("{name}, {} elements", mesh.element_count());
         for method in methods() {
             // What 1e-11 of the flux can still bring, ten or a hundred times that in all, is less
@@ -102,14 +103,14 @@ fn all_methods_agree_with_a_direct_solve() {
                 s.steps, s.shots, s.rows_made
             );
             assert!(off < 1e-6, "{name}, {method}: {off:e}");
-            assert!(s.method == method && s.stop == Stop::Converged);
+            assert!(s.method == method && s.stop == StopReason::Converged);
             assert!(s.ledger.unshot_share() <= 1e-11 || method == Method::Direct);
             assert!(imbalance <= 1e-9 && s.rows_made <= mesh.element_count() as u64);
             // Absorbed, lost: where the light went agrees too.
             for (a, b) in [
                 (s.ledger.absorbed, judge.ledger.absorbed),
-                (s.ledger.left, judge.ledger.left),
-                (s.ledger.back, judge.ledger.back),
+                (s.ledger.escaped, judge.ledger.escaped),
+                (s.ledger.backface_loss, judge.ledger.backface_loss),
             ] {
                 assert!((a - b).abs().max_element() <= 1e-9 * s.ledger.emitted.max_element());
             }
@@ -163,7 +164,7 @@ fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
                 }
                 assert!(s.radiosity.iter().all(|b| b.is_finite()));
                 assert!(worst < 1e-6, "ρ {rho}, {method}: {worst:e}");
-                assert!(s.ledger.imbalance() <= 1e-9 && s.stop == Stop::Converged);
+                assert!(s.ledger.imbalance() <= 1e-9 && s.stop == StopReason::Converged);
                 assert!(s.steps <= 20 || !bounded, "{} steps at ρ {rho}", s.steps);
             }
         }
@@ -205,7 +206,7 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
     for bounces in 0..5 {
         let solver = Solver { unshot: 0.0, steps: Some(bounces), ..Solver::new(Method::Jacobi) };
         let s = solver.solve(&mesh, &mut maker, go).unwrap();
-        assert_eq!((s.steps, s.stop), (bounces, Stop::Steps));
+        assert_eq!((s.steps, s.stop), (bounces, StopReason::Steps));
         for (e, (&b, &flux)) in s.radiosity.iter().zip(&leaving).enumerate() {
             let known = flux / mesh.area(mesh.element(e));
             // Sums of some hundred terms, in another order.
@@ -265,11 +266,12 @@ fn large_patches_may_overshoot_too() {
         solver.solve(&mesh, &mut rays(&mesh), go).unwrap()
     });
     println!("{} shots, {} with overshoot", plain.shots, ahead.shots);
-    assert!(ahead.stop == Stop::Converged && ahead.ledger.imbalance() <= 1e-12);
+    assert!(ahead.stop == StopReason::Converged && ahead.ledger.imbalance() <= 1e-12);
     // Other patches are brightest, seen from other places: a tolerance of 0.4 % for either.
-    for (a, b) in
-        [(plain.ledger.absorbed, ahead.ledger.absorbed), (plain.ledger.left, ahead.ledger.left)]
-    {
+    for (a, b) in [
+        (plain.ledger.absorbed, ahead.ledger.absorbed),
+        (plain.ledger.escaped, ahead.ledger.escaped),
+    ] {
         assert!((a - b).abs().cmple(0.01 * plain.ledger.emitted).all(), "{a} {b}");
     }
 }
@@ -288,8 +290,11 @@ fn the_ledger_closes_wherever_a_solve_ends() {
         let whole = whole.unwrap();
         for steps in (0..whole.steps).step_by((whole.steps / 7) as usize + 1) {
             let s = Solver { steps: Some(steps), ..solver }.solve(mesh, &mut maker, go).unwrap();
-            let stop =
-                if matches!(method, Method::Shooting { .. }) { Stop::Shots } else { Stop::Steps };
+            let stop = if matches!(method, Method::Shooting { .. }) {
+                StopReason::Shots
+            } else {
+                StopReason::Steps
+            };
             assert_eq!((s.steps, s.stop), (steps, stop), "{method}");
             closes(&s, mesh);
         }
@@ -297,10 +302,10 @@ fn the_ledger_closes_wherever_a_solve_ends() {
             let mut call = 0;
             let s = solver.solve(mesh, &mut maker, |_| {
                 call += 1;
-                if call == last { Go::Break(()) } else { Go::Continue(()) }
+                if call == last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
             let s = s.unwrap();
-            assert_eq!((call, s.stop), (last, Stop::Cancelled), "{method}");
+            assert_eq!((call, s.stop), (last, StopReason::Cancelled), "{method}");
             assert!(s.steps <= whole.steps);
             closes(&s, mesh);
         }
@@ -315,7 +320,7 @@ fn closes(s: &Solution, mesh: &Mesh) {
     let leaving: Rgb = s.radiosity.iter().zip(0..).map(|(&b, e)| b * area(e)).sum();
     // What left and is not unshot was absorbed, lost or reflected.
     let sent = leaving - (l.unshot - l.overshot);
-    let arrived = l.absorbed + (leaving - l.emitted) + l.left + l.back;
+    let arrived = l.absorbed + (leaving - l.emitted) + l.escaped + l.backface_loss;
     assert!((sent - arrived).abs().max_element() < 1e-12 * l.emitted.max_element());
 }
 
@@ -329,7 +334,7 @@ fn rows_that_are_not_kept_are_made_again_and_change_nothing() {
             let mut made = 0;
             let s = solver.solve(mesh, &mut rays(mesh), |p| {
                 // Cancelled or not, no more than a batch of rows goes by unheard.
-                assert!(p.rows_made - made <= rays(mesh).batch() as u64);
+                assert!(p.rows_made - made <= rays(mesh).preferred_batch_len() as u64);
                 made = p.rows_made;
                 go(p)
             });
@@ -376,7 +381,7 @@ fn a_dark_scene_is_solved_at_once_by_all() {
     let mesh = Mesh::new(cube(&grey(0.8, 0.0)), 0.36).unwrap();
     for method in methods() {
         let s = Solver::new(method).solve(&mesh, &mut exact(), go).unwrap();
-        assert_eq!((s.steps, s.rows_made, s.stop), (0, 0, Stop::Converged));
+        assert_eq!((s.steps, s.rows_made, s.stop), (0, 0, StopReason::Converged));
         assert!(s.radiosity.iter().all(|&b| b == Rgb::ZERO));
     }
 }
@@ -399,7 +404,7 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
         let entry = |element, share| Entry { element, share };
         let bad = [
             vec![],
-            vec![Row { open: half, ..Default::default() }],
+            vec![Row { escaped: half, ..Default::default() }],
             vec![Row { entries: vec![entry(12, Row::TOTAL)], ..Default::default() }],
         ];
         for rows in bad {
@@ -469,7 +474,7 @@ impl FormFactors for Stored {
         Ok(patches.iter().map(|p| self.0[p].clone()).collect())
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         16
     }
 }

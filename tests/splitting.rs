@@ -8,9 +8,10 @@ use common::surface::assert_whole;
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::{
-    ErrorKind, Go, MAX_DEPTH, Material, Mesh, NodeId, RayCast, Rgb, Scene, Shooting, Stop,
-    Triangle, VertexRadiosity,
+    ErrorKind, MAX_DEPTH, Material, Mesh, NodeId, RayRows, Rgb, Scene, Shooting, StopReason,
+    Triangle, VertexMesh,
 };
+use std::ops::ControlFlow;
 
 fn grey() -> Material {
     Material::grey("grey", 0.5)
@@ -83,7 +84,7 @@ fn parts_tile_what_was_split_and_elements_stay_numbered() {
     let area: f64 = (0..mesh.element_count()).map(|e| mesh.area(mesh.element(e))).sum();
     assert!((area - 6.0).abs() < 1e-12);
     let values: Vec<Rgb> = (0..mesh.element_count()).map(|e| Rgb::splat(e as f64)).collect();
-    assert_whole(&mesh, &VertexRadiosity::new(&mesh, &values));
+    assert_whole(&mesh, &VertexMesh::new(&mesh, &values));
     // Looked up by its middle, each element finds itself.
     for e in 0..mesh.element_count() {
         let node = mesh.element(e);
@@ -115,8 +116,8 @@ fn unequal_depths_shoot_as_well_as_equal_ones() {
     let glow = Material { exitance: Rgb::ONE, ..grey() };
     let uneven = |mesh: &Mesh| {
         let settings = Shooting { unshot: 1e-6, ..Default::default() };
-        let mut rows = RayCast::new(mesh, 1024).unwrap();
-        let s = settings.solve(mesh, &mut rows, |_| Go::Continue(())).unwrap();
+        let mut rows = RayRows::new(mesh, 1024).unwrap();
+        let s = settings.solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         assert!(s.ledger.imbalance() <= 1e-9, "{}", s.ledger.imbalance());
         let mean = |elements: &mut dyn Iterator<Item = usize>| {
             let area = |e: usize| mesh.area(mesh.element(e));
@@ -208,7 +209,7 @@ fn surfaces_that_share_edges_split_nothing() {
 
 #[test]
 fn what_hangs_close_splits_as_deep_as_it_is_close() {
-    // Cells of legs ½, ¼, ⅛ have areas of ⅛, 1/32, 1/128; 15 % of the roots are 0.053, 0.0265,
+    // ItemTable of legs ½, ¼, ⅛ have areas of ⅛, 1/32, 1/128; 15 % of the roots are 0.053, 0.0265,
     // 0.01326. The fourth level is not asked for.
     for (gap, deeper) in [(0.054, 0), (0.052, 1), (0.027, 1), (0.026, 2), (0.0134, 2), (0.0131, 3)]
     {
@@ -278,8 +279,8 @@ fn the_ambient_of_all_unshot_light_is_exact_where_it_is_even() {
     let even = glow.exitance / (Rgb::ONE - glow.reflectance);
     let stopped = |mesh: &Mesh, shots| {
         let settings = Shooting { shots: Some(shots), ..Default::default() };
-        let s = settings.solve(mesh, &mut exact(), |_| Go::Continue(())).unwrap();
-        assert_eq!(s.stop, Stop::Shots);
+        let s = settings.solve(mesh, &mut exact(), |_| ControlFlow::Continue(())).unwrap();
+        assert_eq!(s.stop, StopReason::Shots);
         let mut radiosity = s.radiosity.clone();
         let ambient = s.ledger.add_ambient(mesh, &mut radiosity);
         (s, radiosity, ambient)

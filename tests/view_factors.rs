@@ -2,13 +2,14 @@
 
 mod common;
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use common::{cube, quads};
 use glam::DVec3;
-use radiosity::form_factor::analytic::{point_to_polygon, polygon_to_polygon};
+use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::{
-    Absent, ErrorKind, Factor, Go, Material, Mesh, RayCast, Scene, ViewFactors, load_obj,
+    ErrorKind, Factor, Material, Mesh, Missing, RayRows, Scene, ViewFactors, load_obj,
     write_matrix_market, write_view_factor_list,
 };
 use serde_json::Value;
@@ -17,8 +18,8 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-fn go(_: usize, _: usize) -> Go {
-    Go::Continue(())
+fn go(_: usize, _: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 fn exact(scene: &Scene, error: f64) -> ViewFactors {
@@ -163,7 +164,7 @@ fn neither_size_nor_place_matters() {
         let there = Scene::new(positions, triangles, groups, scene.materials().to_vec()).unwrap();
         let there = exact(&there, 1e-4);
         for (a, b) in here.factors.iter().flatten().zip(there.factors.iter().flatten()) {
-            // Cells are cut alike unless rounding tips a balance; then within both errors.
+            // ItemTable are cut alike unless rounding tips a balance; then within both errors.
             let allowed = rounding + 3.0 * a.error.hypot(b.error);
             assert!(a.to == b.to && (a.value - b.value).abs() <= allowed, "{scale}: {a:?} {b:?}");
         }
@@ -190,7 +191,7 @@ fn corners_that_are_almost_in_a_plane() {
         let (triangles, groups) = (scene.triangles().to_vec(), scene.groups().to_vec());
         let there = Scene::new(positions, triangles, groups, scene.materials().to_vec()).unwrap();
         let there = exact(&there, 1e-4);
-        // Faces have sides of 0.4: a corner moved by d changes a factor by some 4 d / 0.4. Above
+        // Faces have sides of 0.4: a corner moved by d changes a factor by some 4 d / 0.4. SurfaceOffset
         // that, a tenth of the error asked for, twice (two estimates).
         let allowed = 2e-5 + 10.0 * move_by;
         for i in 0..plain.names.len() {
@@ -220,7 +221,7 @@ fn what_is_hidden_is_zero_and_what_meets_a_back_is_told() {
     ];
     let scene = quads(&plates);
     let m = exact(&scene, 1e-4);
-    assert_eq!(m.absent, Absent::Zero);
+    assert_eq!(m.absent, Missing::Zero);
     assert_eq!(m.factors[0], []);
     assert_eq!(m.factors[1].iter().map(|f| f.to).collect::<Vec<_>>(), [2]);
     // The screen's back receives from below what its front receives from above, both closed forms.
@@ -290,9 +291,9 @@ fn sampled_factors_know_their_errors() {
     let scene = load_obj(data("view_factors/occ-box-centred-w_x0-w_y0.obj")).unwrap();
     let truth = exact(&scene, 1e-4);
     let mesh = Mesh::new(scene, 0.18).unwrap();
-    let mut rays = RayCast::new(&mesh, 4096).unwrap();
+    let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let m = ViewFactors::sampled(&mesh, &mut rays, go).unwrap().unwrap();
-    assert_eq!(m.absent, Absent::NotSeen);
+    assert_eq!(m.absent, Missing::NotSeen);
     let (mut within, mut count, mut worst) = (0, 0, 0.0_f64);
     for i in 0..m.names.len() {
         for f in &truth.factors[i] {
@@ -412,12 +413,12 @@ fn bad_settings_are_refused_and_work_can_be_cancelled() {
     }
     let e = ViewFactors::new(&scene, 1e-4, &[6], go).unwrap_err();
     assert!(e.to_string().contains("6 groups"), "{e}");
-    let stopped = ViewFactors::new(&scene, 1e-4, &[], |_, _| Go::Break(()));
+    let stopped = ViewFactors::new(&scene, 1e-4, &[], |_, _| ControlFlow::Break(()));
     assert!(stopped.unwrap().is_none());
     let mut told = vec![];
     let all = ViewFactors::new(&scene, 1e-4, &[], |done, of| {
         told.push((done, of));
-        Go::Continue(())
+        ControlFlow::Continue(())
     });
     assert!(all.unwrap().is_some());
     assert_eq!(told.last(), Some(&(6, 6)), "six walls, six pieces");

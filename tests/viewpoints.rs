@@ -4,10 +4,10 @@ mod common;
 
 use common::closed_forms::{ClosedForms, from_centroid};
 use common::{cube, quads};
-use radiosity::form_factor::analytic::polygon_to_polygon;
+use radiosity::form_factor::closed_form::polygon_to_polygon;
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Material, Mesh, NearRepair, NodeId, RayCast, Row,
-    Viewpoints,
+    AdaptiveViewpoints, Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId,
+    ProximityCorrection, RayRows, Row,
 };
 
 /// Where the plate stands: the patch's centroid is at x = 2/3, behind it.
@@ -27,8 +27,8 @@ fn screened() -> (Mesh, NodeId) {
     (mesh, patch)
 }
 
-fn rays(mesh: &Mesh) -> NearRepair<RayCast> {
-    NearRepair::new(RayCast::new(mesh, 1024).unwrap(), mesh, -1.0)
+fn rays(mesh: &Mesh) -> ProximityCorrection<RayRows> {
+    ProximityCorrection::new(RayRows::new(mesh, 1024).unwrap(), mesh, -1.0)
 }
 
 /// Form factor to the wall, the last group.
@@ -46,7 +46,7 @@ fn a_patch_half_behind_a_plate_is_seen_from_both_sides() {
     let lit = 1.0 - PLATE * PLATE;
     let exact = lit * polygon_to_polygon(&before, &wall);
     let see = |levels: u32| {
-        let mut rows = Viewpoints::new(rays(&mesh), 0.02, levels);
+        let mut rows = AdaptiveViewpoints::new(rays(&mesh), 0.02, levels);
         let row = rows.rows(&mesh, &[patch], 1.0).unwrap().remove(0);
         row.check(&mesh, patch).unwrap();
         (to_wall(&mesh, &row), rows.extra())
@@ -54,10 +54,10 @@ fn a_patch_half_behind_a_plate_is_seen_from_both_sides() {
     assert_eq!(see(0), (0.0, 0), "the centroid sees nothing of the wall");
     for levels in [4, 5] {
         let (got, extra) = see(levels);
-        // Cells of side h = 2⁻ᴸ that the plate cuts are all in one column, at most 2·0.7/h + 1 of
+        // ItemTable of side h = 2⁻ᴸ that the plate cuts are all in one column, at most 2·0.7/h + 1 of
         // them with h² of the patch each. Of a cell, the lit part is taken for all or nothing: off
         // by at most 2/3, since the centroid is a third into it, and half as much again in its
-        // factor to the wall, 0.5 at the most, there. Rays: 1024 stratified ones a cell over some
+        // factor to the wall, 0.5 at the most, there. RayScene: 1024 stratified ones a cell over some
         // 100 lit cells, below 0.4/√10⁵ = 0.002 (as if independent); parts not gone down into are
         // off by the tolerance at the most, and curve to both sides.
         let h = 0.5f64.powi(levels as i32);
@@ -75,7 +75,7 @@ fn rows_are_the_same_alone_in_company_and_again() {
     let (mesh, patch) = screened();
     let patches: Vec<NodeId> =
         mesh.children(patch).unwrap().into_iter().chain([mesh.element(0), mesh.root(3)]).collect();
-    let make = || Viewpoints::new(rays(&mesh), 0.02, 3);
+    let make = || AdaptiveViewpoints::new(rays(&mesh), 0.02, 3);
     let all = make().rows(&mesh, &patches, 1.0).unwrap();
     assert_eq!(all.len(), patches.len());
     assert!(make().rows(&mesh, &patches, 1.0).unwrap() == all);
@@ -92,8 +92,8 @@ fn rows_are_the_same_alone_in_company_and_again() {
 fn each_part_is_mended_for_itself() {
     // Near walls and four elements a patch; closed forms, so that nothing turns with a node's id.
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.4).unwrap();
-    let near = || NearRepair::new(from_centroid(), &mesh, 1.0);
-    let mut rows = Viewpoints::new(near(), 0.0, 1);
+    let near = || ProximityCorrection::new(from_centroid(), &mesh, 1.0);
+    let mut rows = AdaptiveViewpoints::new(near(), 0.0, 1);
     let mut patches = 0;
     for (patch, parts) in
         (0..12).flat_map(|t| mesh.children(mesh.root(t)).unwrap()).filter_map(|p| {
@@ -135,8 +135,8 @@ fn nothing_is_spent_beyond_the_comparison_in_the_open() {
     let patches: Vec<NodeId> = (0..4).flat_map(|t| down(mesh.root(t))).flat_map(down).collect();
     assert_eq!(mesh.elements_of(patches[0]).len(), 16);
     let spent = |tolerance: f64, levels: u32| {
-        let near = NearRepair::new(from_centroid(), &mesh, 1.0);
-        let mut rows = Viewpoints::new(near, tolerance, levels);
+        let near = ProximityCorrection::new(from_centroid(), &mesh, 1.0);
+        let mut rows = AdaptiveViewpoints::new(near, tolerance, levels);
         rows.rows(&mesh, &patches, 1.0).unwrap();
         assert_eq!(rows.inner().inner().made, rows.extra() + patches.len() as u64);
         rows.extra()
@@ -163,8 +163,9 @@ fn a_maker_that_withholds_rows_is_named() {
         }
     }
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 1.0).unwrap();
-    let near = NearRepair::new(Short(from_centroid()), &mesh, 1.0);
-    let error = Viewpoints::new(near, 0.02, 1).rows(&mesh, &[mesh.root(0)], 1.0).unwrap_err();
+    let near = ProximityCorrection::new(Short(from_centroid()), &mesh, 1.0);
+    let error =
+        AdaptiveViewpoints::new(near, 0.02, 1).rows(&mesh, &[mesh.root(0)], 1.0).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::FormFactor);
     assert!(error.to_string().contains("3 rows for 4 patches"), "{error}");
 }

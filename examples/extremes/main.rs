@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example extremes [-- --cpu]
 //!
-//! Hemicubes on the graphics adapter, or rays with `--cpu`. Fails where a deviation is larger than it
+//! HemicubeRows on the graphics adapter, or rays with `--cpu`. Fails where a deviation is larger than it
 //! may be, a number is not finite or a ledger does not close.
 
 #[path = "../../tests/common/mod.rs"]
@@ -14,7 +14,7 @@ mod sweeps;
 
 use std::process::ExitCode;
 
-use radiosity::{Device, Error};
+use radiosity::{Backend, Error};
 use sweeps::Ask;
 
 fn main() -> ExitCode {
@@ -31,8 +31,8 @@ fn main() -> ExitCode {
 /// Prints the table; whether all holds.
 fn run() -> Result<bool, Error> {
     let device = match std::env::args().nth(1).as_deref() {
-        None => Device::gpu(None)?,
-        Some("--cpu") => Device::Cpu,
+        None => Backend::gpu(None)?,
+        Some("--cpu") => Backend::Cpu,
         Some(other) => {
             eprintln!("usage: extremes [--cpu], not {other}");
             return Ok(false);

@@ -13,12 +13,12 @@ pub struct Sweep {
     /// Who found it: methods of solvers, or what was asked instead.
     pub by: String,
     pub steps: usize,
-    /// Worst relative deviation, and what it may be.
+    /// ErrorStats relative deviation, and what it may be.
     pub off: f64,
     pub within: f64,
     /// Numbers that were NaN or infinite.
     pub not_finite: usize,
-    /// Worst error of the ledger, relative to the emitted flux; none where nothing was solved.
+    /// ErrorStats error of the ledger, relative to the emitted flux; none where nothing was solved.
     pub ledger: Option<f64>,
     /// Most steps that a solve took, in the unit of its method.
     pub most: u64,

@@ -2,12 +2,13 @@
 
 use std::f64::consts::PI;
 use std::num::NonZeroU32;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::{
-    Accuracy, Device, Error, Gather, GatheredRadiosity, Gathering, Go, HemicubeGather, Mesh,
-    Method, NearRepair, Place, RayGather, Rgb, Scene, Solution, Solver, VertexRadiosity,
-    ViewFactors, Viewpoints, write_ply,
+    Accuracy, AdaptiveViewpoints, Backend, Error, Gather, GatherPoint, GatheredMesh,
+    HemicubeGather, Mesh, Method, ProximityCorrection, RayGather, RefinementSettings, Rgb, Scene,
+    Solution, Solver, VertexMesh, ViewFactors, write_ply,
 };
 
 use crate::common::closed_forms::exact;
@@ -17,7 +18,7 @@ use crate::sweep::Sweep;
 
 /// What makes rows and gathers, and how many steps are gone.
 pub struct Ask<'a> {
-    pub device: &'a Device,
+    pub device: &'a Backend,
     /// All steps, or else the first, the middle and the last.
     pub all: bool,
 }
@@ -69,8 +70,8 @@ const ROUNDING: f64 = 1e-9;
 /// of it: that is 3e-2 of it.
 const ONE_RAY: f64 = 3e-2;
 
-fn go<T>(_: &T) -> Go {
-    Go::Continue(())
+fn go<T>(_: &T) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 impl Ask<'_> {
@@ -103,8 +104,8 @@ impl Ask<'_> {
 
     fn gatherer(&self, mesh: &Mesh) -> Result<Box<dyn Gather>, Error> {
         Ok(match self.device {
-            Device::Gpu(gpu) => Box::new(HemicubeGather::new(gpu, mesh, PIXELS)?),
-            Device::Cpu => Box::new(RayGather::new(mesh, PIXELS * PIXELS)?),
+            Backend::Gpu(gpu) => Box::new(HemicubeGather::new(gpu, mesh, PIXELS)?),
+            Backend::Cpu => Box::new(RayGather::new(mesh, PIXELS * PIXELS)?),
         })
     }
 }
@@ -254,7 +255,7 @@ fn rows_of_small_plates(ask: &Ask) -> Swept {
 fn settle(scene: Scene, size: f64, ask: &Ask) -> Result<(Mesh, Solution), Error> {
     let mesh = Mesh::new(scene, size)?.split_at_contacts(1);
     let rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-    let mut rows = Viewpoints::new(NearRepair::new(rows, &mesh, 1.0), 0.05, 1);
+    let mut rows = AdaptiveViewpoints::new(ProximityCorrection::new(rows, &mesh, 1.0), 0.05, 1);
     let solution = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, go)?;
     Ok((mesh, solution))
 }
@@ -264,7 +265,7 @@ fn room(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     let light = |frame: Frame, e: f64, sweep: &mut Sweep| -> Result<Vec<f64>, Error> {
         let (mesh, s) = settle(scenes::room(frame, e, 0.1 * e), 0.25 * frame.scale, ask)?;
         sweep.solved(&s);
-        let vertices = VertexRadiosity::new(&mesh, &s.radiosity).radiosity;
+        let vertices = VertexMesh::new(&mesh, &s.radiosity).radiosity;
         Ok(channels(&[s.radiosity, vertices].concat(), e))
     };
     let known = light(HERE, 1.0, &mut sweep)?;
@@ -375,11 +376,11 @@ fn lamps_together(ask: &Ask) -> Swept {
 fn lamp(sweep: &mut Sweep, frame: Frame, side: f64, e: f64, ask: &Ask) -> Result<(), Error> {
     let scene = scenes::panelled(frame, side, grey(0.0, 0.0), grey(0.0, e));
     let mesh = Mesh::new(scene, f64::INFINITY)?;
-    let dark = GatheredRadiosity::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
+    let dark = GatheredMesh::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
     let at = |z| DVec3::from_array(frame.place([0.5, 0.5, z]));
     let normal = (at(0.0) - at(1.0)).normalize();
     let near = 1e-6 * frame.scale;
-    let place = Place { position: at(1.0) + normal * (4.0 * near), normal, near };
+    let place = GatherPoint { position: at(1.0) + normal * (4.0 * near), normal, near };
     let found = ask.gatherer(&mesh)?.gather(&dark.sources(), &[place])?[0].irradiance;
     let (x, r) = (side / 2.0, (1.0 + side * side / 4.0).sqrt());
     let known = 4.0 / PI * (x / r) * (x / r).atan();
@@ -418,12 +419,11 @@ fn exitance_next_door(ask: &Ask) -> Swept {
     sweep.by("gathering");
     for e in ask.exitances() {
         let mesh = Mesh::new(scenes::rooms(0.5, e, 0.0), f64::INFINITY)?;
-        let walls =
-            GatheredRadiosity::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
+        let walls = GatheredMesh::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
         let even = vec![Rgb::splat(1e-12 * e); walls.reflected.len()];
-        let light = GatheredRadiosity { reflected: even, ..walls };
+        let light = GatheredMesh { reflected: even, ..walls };
         let [p, q] = [0.4, 0.5].map(|z| DVec3::from_array(HERE.place([1.8, 0.6, z])));
-        let place = Place { position: p, normal: (q - p).normalize(), near: 1e-3 };
+        let place = GatherPoint { position: p, normal: (q - p).normalize(), near: 1e-3 };
         let found = ask.gatherer(&mesh)?.gather(&light.sources(), &[place])?[0].irradiance;
         sweep.step(&channels(&[found], 1e-12 * e), &[1.0; 3]);
     }
@@ -443,8 +443,9 @@ fn areas(ask: &Ask) -> Swept {
         sweep.solved(&s);
         let areas = (0..mesh.element_count()).map(|k| mesh.area(mesh.element(k)));
         let leaving: f64 = s.radiosity.iter().zip(areas).map(|(b, a)| b.x * a).sum();
-        let light = GatheredRadiosity::from_elements(&mesh, &s.radiosity)?;
-        let gathering = Gathering { elements: 0, sweeps: 3, ..Gathering::new(1.0) };
+        let light = GatheredMesh::from_elements(&mesh, &s.radiosity)?;
+        let gathering =
+            RefinementSettings { elements: 0, sweeps: 3, ..RefinementSettings::new(1.0) };
         let fine = gathering.gather(&light, &mesh, &mut *ask.gatherer(&mesh)?, go)?;
         let mut found = channels(&fine.surface.radiosity, 1.0);
         found.push(leaving / 6.0);

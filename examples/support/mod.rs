@@ -2,14 +2,16 @@
 // Each example uses a part of it.
 #![allow(dead_code)]
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
-    Accuracy, Baked, Budget, Camera, Certificate, Device, Effort, Error, ErrorKind, GatherEffort,
-    GatherProgress, Gathering, Go, Progress, RadianceImage, Report, Scene, Seconds, Shooting,
-    Stage, VertexRadiosity, load_obj, write_exr, write_ply, write_png,
+    Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, Camera, Error,
+    ErrorEstimate, ErrorKind, GatherProgress, GatherSettings, Progress, RadianceImage,
+    RefinementSettings, Report, Scene, Seconds, Shooting, VertexMesh, load_obj, write_exr,
+    write_ply, write_png,
 };
 use serde_json::{Value, json};
 
@@ -31,7 +33,7 @@ pub struct Bake {
 }
 
 /// A setting made by hand.
-pub type Change = Box<dyn Fn(&mut Effort)>;
+pub type Change = Box<dyn Fn(&mut BakeSettings)>;
 
 /// How far to go.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,17 +49,17 @@ pub enum Goal {
 /// Who makes rows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
-    /// Hemicubes on the adapter of this name, or the best.
+    /// HemicubeRows on the adapter of this name, or the best.
     Gpu(Option<String>),
-    /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
+    /// RayScene on the CPU, as many a row as the hemicube's top face has pixels.
     Cpu,
 }
 
 impl Choice {
-    pub fn open(&self) -> Result<Device, Error> {
+    pub fn open(&self) -> Result<Backend, Error> {
         match self {
-            Choice::Gpu(name) => Device::gpu(name.as_deref()),
-            Choice::Cpu => Ok(Device::Cpu),
+            Choice::Gpu(name) => Backend::gpu(name.as_deref()),
+            Choice::Cpu => Ok(Backend::Cpu),
         }
     }
 }
@@ -106,7 +108,7 @@ impl Bake {
         surface.comments = comments(&baked);
         write_ply(self.out.with_added_extension("ply"), &surface)?;
         if self.elements {
-            let flat = VertexRadiosity::flat(&baked.mesh, &baked.solution.radiosity);
+            let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
             write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
         }
         if let Some(camera) = self.camera {
@@ -159,13 +161,14 @@ impl Bake {
         Ok(report)
     }
 
-    fn bake(&self, scene: Scene, device: &Device) -> Result<Baked, Error> {
+    fn bake(&self, scene: Scene, device: &Backend) -> Result<BakeResult, Error> {
         let bar = bar();
-        let told = |stage: &Stage| {
+        let told = |stage: &BakeProgress| {
             show(&bar, stage);
-            Go::Continue(())
+            ControlFlow::Continue(())
         };
-        let adjust = |effort: &mut Effort| self.changes.iter().for_each(|change| change(effort));
+        let adjust =
+            |effort: &mut BakeSettings| self.changes.iter().for_each(|change| change(effort));
         let baked = match self.goal {
             Goal::Error(error) => Accuracy { error, adjust: &adjust }.bake(scene, device, told),
             Goal::Seconds(seconds) => Budget { seconds, adjust: &adjust }.bake(scene, device, told),
@@ -183,8 +186,8 @@ impl Bake {
     fn gathered_image(
         &self,
         camera: &Camera,
-        baked: &Baked,
-        device: &Device,
+        baked: &BakeResult,
+        device: &Backend,
     ) -> Result<RadianceImage, Error> {
         let rays = baked.effort.gather.as_ref().map_or(2048, |gather| gather.rays);
         let mut gather = device.gather(&baked.light.mesh, rays)?;
@@ -198,7 +201,7 @@ impl Bake {
             |done, of| {
                 bar.set_position((1000 * done / of) as u64);
                 bar.set_message(format!("picture, {done} of {of} pixels"));
-                Go::Continue(())
+                ControlFlow::Continue(())
             },
         )?;
         bar.finish_and_clear();
@@ -217,21 +220,21 @@ impl Goal {
 }
 
 /// Elements alone: for previews.
-pub fn plain(scene: &Scene) -> Effort {
-    Effort {
+pub fn plain(scene: &Scene) -> BakeSettings {
+    BakeSettings {
         element_size: default_element_size(scene),
         contacts: 3,
         hemicube: 128,
         shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
         gather: None,
-        ..Effort::for_error(0.02, scene)
+        ..BakeSettings::for_error(0.02, scene)
     }
 }
 
 /// Vertices that gather, with small elements at contacts: what is asked for there is not an error over
 /// the area.
-pub fn gathering(scene: &Scene) -> Effort {
-    let mut effort = Effort::for_error(PLAIN, scene);
+pub fn gathering(scene: &Scene) -> BakeSettings {
+    let mut effort = BakeSettings::for_error(PLAIN, scene);
     if let Some(gather) = &mut effort.gather {
         gather.gathering.smallest /= 2.0;
         gather.rays = 1500;
@@ -245,12 +248,12 @@ pub fn default_element_size(scene: &Scene) -> f64 {
     (high - low).length() / 32.0
 }
 
-fn comments(baked: &Baked) -> Vec<String> {
+fn comments(baked: &BakeResult) -> Vec<String> {
     let mut comments = vec![];
     if baked.effort.ambient {
         comments.push("ambient term of the unshot light added to the elements".into());
     }
-    let Certificate { total, places, .. } = baked.certificate;
+    let ErrorEstimate { total, places, .. } = baked.certificate;
     comments.push(format!(
         "estimated error {:.3} % of radiosity, RMS over area, at {places} places; vertices have \
          their own",
@@ -259,8 +262,8 @@ fn comments(baked: &Baked) -> Vec<String> {
     comments
 }
 
-fn settings(effort: &Effort) -> Vec<(String, Value)> {
-    let Effort { shooting, gather, .. } = effort;
+fn settings(effort: &BakeSettings) -> Vec<(String, Value)> {
+    let BakeSettings { shooting, gather, .. } = effort;
     let mut all = vec![
         ("element_size", json!(effort.element_size)),
         ("contacts", json!(effort.contacts)),
@@ -278,8 +281,9 @@ fn settings(effort: &Effort) -> Vec<(String, Value)> {
         ("ambient", json!(effort.ambient)),
         ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
     ];
-    if let Some(GatherEffort { element_size, contacts, rays, noise, gathering }) = gather {
-        let Gathering { tolerance, smallest, curve, elements, everywhere, sweeps } = gathering;
+    if let Some(GatherSettings { element_size, contacts, rays, noise, gathering }) = gather {
+        let RefinementSettings { tolerance, smallest, curve, elements, everywhere, sweeps } =
+            gathering;
         all.extend([
             ("gather_size", json!(element_size)),
             ("gather_contacts", json!(contacts)),
@@ -319,9 +323,9 @@ fn bar() -> ProgressBar {
 }
 
 /// The bar fills with the vertices of a level, or while shooting with the share that is shot.
-fn show(bar: &ProgressBar, stage: &Stage) {
+fn show(bar: &ProgressBar, stage: &BakeProgress) {
     match stage {
-        Stage::Shooting(Progress { shots, rows_made, unshot_share, elapsed, .. }) => {
+        BakeProgress::Shooting(Progress { shots, rows_made, unshot_share, elapsed, .. }) => {
             bar.set_position((1000.0 * (1.0 - unshot_share).clamp(0.0, 1.0)) as u64);
             bar.set_message(format!(
                 "shooting, {:.3} % unshot, {shots} shots, {rows_made} hemicubes, {:.1} s",
@@ -329,7 +333,13 @@ fn show(bar: &ProgressBar, stage: &Stage) {
                 elapsed.as_secs_f64()
             ));
         }
-        Stage::Gathering(GatherProgress { sweep, level, elements, gathered, of }) => {
+        BakeProgress::RefinementSettings(GatherProgress {
+            sweep,
+            level,
+            elements,
+            gathered,
+            of,
+        }) => {
             bar.set_position((1000 * gathered / of.max(&1)) as u64);
             bar.set_message(format!(
                 "gathering, sweep {}, split {level} times, {gathered} of {of} vertices, \
@@ -337,14 +347,14 @@ fn show(bar: &ProgressBar, stage: &Stage) {
                 sweep + 1
             ));
         }
-        Stage::Judging { places, of } => {
+        BakeProgress::Judging { places, of } => {
             bar.set_position((1000 * places / of.max(&1)) as u64);
             bar.set_message(format!("judging, {places} of {of} places"));
         }
-        Stage::Judged(certificate) => {
+        BakeProgress::ErrorEstimator(certificate) => {
             bar.println(format!("estimated error {:.2} %", 100.0 * certificate.total));
         }
-        Stage::Failed(error) => bar.println(format!("rays on the CPU go on: {error}")),
+        BakeProgress::Failed(error) => bar.println(format!("rays on the CPU go on: {error}")),
     }
 }
 
@@ -376,8 +386,8 @@ pub fn table(report: &Report) -> String {
         format!(
             "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",
             share(ledger.absorbed),
-            share(ledger.left),
-            share(ledger.back),
+            share(ledger.escaped),
+            share(ledger.backface_loss),
             share(ledger.unshot)
         ),
         format!(

@@ -2,12 +2,12 @@
 
 use std::num::NonZeroU32;
 
-use radiosity::{Effort, Scene};
+use radiosity::{BakeSettings, Scene};
 
 /// What one run is given.
 pub enum Ask {
     /// Fixed settings.
-    Settings(Box<Effort>),
+    Settings(Box<BakeSettings>),
     /// An error, by the dial.
     Dial(f64),
 }
@@ -49,7 +49,7 @@ impl Grid {
         let all = [0.1, 0.05, 0.02, 0.01];
         let (errors, middle, dial) =
             if quick { (&all[..3], 0.05, &all[..2]) } else { (&all[..], 0.02, &all[..]) };
-        let base = Effort::for_error(middle, scene);
+        let base = BakeSettings::for_error(middle, scene);
         let mut grid = Grid {
             runs: vec![],
             panels: vec![],
@@ -58,7 +58,7 @@ impl Grid {
             finest: errors.iter().copied().fold(1.0, f64::min),
         };
         for &error in errors {
-            let run = grid.add("effort", percent(error), Effort::for_error(error, scene));
+            let run = grid.add("effort", percent(error), BakeSettings::for_error(error, scene));
             if error == middle {
                 grid.base = run;
             }
@@ -70,7 +70,7 @@ impl Grid {
         grid
     }
 
-    fn turn(&mut self, base: &Effort, quick: bool) {
+    fn turn(&mut self, base: &BakeSettings, quick: bool) {
         let steps: &[f64] = if quick { &[0.5, 1.0, 2.0] } else { &[0.25, 0.5, 1.0, 2.0] };
         let resolution = self.vary(
             base,
@@ -98,18 +98,18 @@ impl Grid {
         self.panel("Element size", "edge of those that shoot; others with it", [sizes]);
 
         let steps: &[f64] = if quick { &[16.0, 4.0, 1.0] } else { &[64.0, 16.0, 4.0, 1.0, 0.25] };
-        let label = |e: &Effort| percent(e.shooting.unshot);
+        let label = |e: &BakeSettings| percent(e.shooting.unshot);
         let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.shooting.unshot *= f);
         self.panel("Unshot share", "of the light, at which shooting stops", [unshot]);
 
         let steps: &[f64] = if quick { &[1.0, 2.0] } else { &[1.0, 2.0, 4.0] };
-        let label = |e: &Effort| e.rotations.to_string();
+        let label = |e: &BakeSettings| e.rotations.to_string();
         let rotations = self.vary(base, "rotations", "", steps, label, |e, f| {
             e.rotations = NonZeroU32::new(f as u32).expect("not zero");
         });
         self.panel("Rotations", "hemicubes a viewpoint, averaged", [rotations]);
 
-        let label = |e: &Effort| match e.near {
+        let label = |e: &BakeSettings| match e.near {
             reach if reach < 0.0 => "none".into(),
             reach => reach.to_string(),
         };
@@ -121,11 +121,13 @@ impl Grid {
             e.element_size *= f;
             e.gather = None;
         });
-        let label = |e: &Effort| e.gather.as_ref().map_or(0, |g| g.gathering.sweeps).to_string();
+        let label =
+            |e: &BakeSettings| e.gather.as_ref().map_or(0, |g| g.gathering.sweeps).to_string();
         let sweeps = self.vary(base, "sweeps", "sweeps", &[1.0, 2.0, 3.0], label, |e, f| {
             e.gather.iter_mut().for_each(|g| g.gathering.sweeps = f as u32);
         });
-        let label = |e: &Effort| percent(e.gather.as_ref().map_or(0.0, |g| g.gathering.tolerance));
+        let label =
+            |e: &BakeSettings| percent(e.gather.as_ref().map_or(0.0, |g| g.gathering.tolerance));
         let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5, 0.25] };
         let bend = self.vary(base, "bend", "bend", steps, label, |e, f| {
             if let Some(gather) = &mut e.gather {
@@ -139,12 +141,12 @@ impl Grid {
     /// The runs of `base` with one knob turned to each of `values`.
     fn vary(
         &mut self,
-        base: &Effort,
+        base: &BakeSettings,
         knob: &'static str,
         name: &'static str,
         values: &[f64],
-        label: impl Fn(&Effort) -> String,
-        change: impl Fn(&mut Effort, f64),
+        label: impl Fn(&BakeSettings) -> String,
+        change: impl Fn(&mut BakeSettings, f64),
     ) -> Series {
         let run = |&value: &f64| {
             let mut effort = base.clone();
@@ -156,7 +158,7 @@ impl Grid {
     }
 
     /// A run of these settings, the one there is if they are not new.
-    fn add(&mut self, knob: &'static str, value: String, effort: Effort) -> usize {
+    fn add(&mut self, knob: &'static str, value: String, effort: BakeSettings) -> usize {
         let same = |run: &Run| matches!(&run.ask, Ask::Settings(other) if **other == effort);
         if let Some(there) = self.runs.iter().position(same) {
             return there;
@@ -175,7 +177,7 @@ impl Grid {
     }
 }
 
-fn size(effort: &Effort) -> String {
+fn size(effort: &BakeSettings) -> String {
     short(effort.element_size)
 }
 

@@ -14,6 +14,7 @@ mod truth;
 
 use std::ffi::OsString;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -22,7 +23,7 @@ use std::time::Instant;
 use grid::{Ask, Grid, Run};
 use lexopt::prelude::*;
 use measure::{Judge, Measured, Places};
-use radiosity::{Accuracy, Baked, Device, Effort, Error, ErrorKind, Go, Scene, load_obj};
+use radiosity::{Accuracy, Backend, BakeResult, BakeSettings, Error, ErrorKind, Scene, load_obj};
 use support::Choice;
 
 const USAGE: &str = "\
@@ -125,13 +126,13 @@ impl Options {
         let device = self.device.open()?;
         let grid = Grid::new(&scene, self.quick);
         // Whatever comes once, such as shaders, is not to count.
-        bake(&Ask::Settings(Box::new(Effort::for_error(0.3, &scene))), &scene, &device)?;
+        bake(&Ask::Settings(Box::new(BakeSettings::for_error(0.3, &scene))), &scene, &device)?;
         let judge = match truth {
             Some(truth) => truth,
             None => {
                 let finest = grid.finest / 3.0;
                 eprintln!("for reference: settings meant for {}", grid::percent(finest));
-                let mut effort = Effort::for_error(finest, &scene);
+                let mut effort = BakeSettings::for_error(finest, &scene);
                 effort.gather.iter_mut().for_each(|gather| gather.gathering.sweeps += 1);
                 let baked = bake(&Ask::Settings(Box::new(effort)), &scene, &device)?;
                 Judge::Finest(Places::on(&baked.light, &device)?)
@@ -204,12 +205,12 @@ impl Options {
 const SHORT: f64 = 4.0;
 const ROUNDS: u32 = 3;
 
-fn bake(ask: &Ask, scene: &Arc<Scene>, device: &Device) -> Result<Baked, Error> {
+fn bake(ask: &Ask, scene: &Arc<Scene>, device: &Backend) -> Result<BakeResult, Error> {
     match ask {
-        Ask::Settings(effort) => effort.bake(scene.clone(), device, |_| Go::Continue(())),
+        Ask::Settings(effort) => effort.bake(scene.clone(), device, |_| ControlFlow::Continue(())),
         Ask::Dial(error) => {
             Accuracy { error: *error, adjust: &|_| {} }
-                .bake(scene.clone(), device, |_| Go::Continue(()))
+                .bake(scene.clone(), device, |_| ControlFlow::Continue(()))
         }
     }
 }

@@ -1,7 +1,9 @@
 //! How far off a surface is: against points of truth, or against a finer surface.
 
 use glam::DVec3;
-use radiosity::{Baked, Device, Effort, Error, GatheredRadiosity, Place, Rgb, VertexRadiosity};
+use radiosity::{
+    Backend, BakeResult, BakeSettings, Error, GatherPoint, GatheredMesh, Rgb, VertexMesh,
+};
 
 use crate::truth::{self, Point};
 
@@ -18,7 +20,7 @@ pub struct Measured {
     pub hemicubes: u64,
     pub gathers: u64,
     /// The settings used in the end.
-    pub effort: Effort,
+    pub effort: BakeSettings,
 }
 
 /// Root mean squares of relative errors.
@@ -31,7 +33,7 @@ pub struct Errors {
 }
 
 impl Measured {
-    pub fn new(baked: &Baked, judge: &Judge) -> Result<Measured, String> {
+    pub fn new(baked: &BakeResult, judge: &Judge) -> Result<Measured, String> {
         let surface = &baked.light.surface;
         Ok(Measured {
             seconds: seconds(baked),
@@ -48,7 +50,7 @@ impl Measured {
 }
 
 /// All stages of a bake.
-pub fn seconds(baked: &Baked) -> f64 {
+pub fn seconds(baked: &BakeResult) -> f64 {
     let s = baked.seconds;
     s.mesh + s.draw + s.reduce + s.readback + s.solve + s.vertices + s.certificate
 }
@@ -80,7 +82,7 @@ impl Judge {
         }
     }
 
-    fn errors(&self, surface: &VertexRadiosity) -> Result<Errors, String> {
+    fn errors(&self, surface: &VertexMesh) -> Result<Errors, String> {
         let points = match self {
             Judge::Truth(points) => points,
             Judge::Finest(places) => return Ok(Errors { area: places.error(surface), all: None }),
@@ -128,7 +130,7 @@ const RAYS: u32 = 64;
 
 impl Places {
     /// On all of the surface that others may see.
-    pub fn on(light: &GatheredRadiosity, device: &Device) -> Result<Places, Error> {
+    pub fn on(light: &GatheredMesh, device: &Backend) -> Result<Places, Error> {
         let surface = &light.surface;
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &p in &surface.positions {
@@ -156,12 +158,12 @@ impl Places {
             }
         }
         let lift = 1e-5 * diagonal;
-        let above = |&(p, normal, _): &(DVec3, DVec3, Rgb)| Place {
+        let above = |&(p, normal, _): &(DVec3, DVec3, Rgb)| GatherPoint {
             position: p + lift * normal,
             normal,
             near: lift / 4.0,
         };
-        let above: Vec<Place> = places.iter().map(above).collect();
+        let above: Vec<GatherPoint> = places.iter().map(above).collect();
         let seen = device.gather(&light.mesh, RAYS)?.gather(&light.sources(), &above)?;
         let mean = places.iter().map(|p| p.2.length()).sum::<f64>() / places.len().max(1) as f64;
         let dim = (DIM * mean).max(f64::MIN_POSITIVE);
@@ -169,8 +171,10 @@ impl Places {
         // Nobody looks under what touches, nor into gaps, and vertices may say anything there.
         places.retain(|place| {
             let found = seen.next().expect("as many");
-            let near = found.nearness * diagonal;
-            found.back < 0.5 && near * NARROW < 1.0 && (near * GAP < 1.0 || place.2.length() >= dim)
+            let near = found.inverse_distance * diagonal;
+            found.backface < 0.5
+                && near * NARROW < 1.0
+                && (near * GAP < 1.0 || place.2.length() >= dim)
         });
         let size = (high - low) / CELLS as f64;
         let cells = vec![vec![]; CELLS * CELLS * CELLS];
@@ -187,7 +191,7 @@ impl Places {
     }
 
     /// Root mean square of what `surface` is off by, each place in the nearest face that faces alike.
-    fn error(&self, surface: &VertexRadiosity) -> f64 {
+    fn error(&self, surface: &VertexMesh) -> f64 {
         let mut best: Vec<(f64, Rgb)> = vec![(f64::INFINITY, Rgb::ZERO); self.places.len()];
         for face in &surface.faces {
             let face = Face::new(surface, face);
@@ -225,7 +229,7 @@ struct Face {
 }
 
 impl Face {
-    fn new(surface: &VertexRadiosity, face: &[u32; 3]) -> Face {
+    fn new(surface: &VertexMesh, face: &[u32; 3]) -> Face {
         let corners = face.map(|v| surface.positions[v as usize]);
         let radiosity = face.map(|v| surface.radiosity[v as usize]);
         let [a, b, c] = corners;

@@ -1,21 +1,21 @@
 //! The camera image for the final picture: each pixel gathers the light where it looks.
 
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Camera, RadianceImage, Sight};
+use super::{Camera, PrimaryRays, RadianceImage};
 use crate::error::Error;
-use crate::gather::{Gather, Gathered, Place};
-use crate::mesh::Smooth;
-use crate::pace::Pace;
-use crate::rays::Hit;
+use crate::gather::{Gather, GatherPoint, IrradianceSample};
+use crate::mesh::SurfaceTopology;
+use crate::progress::BatchSizer;
 use crate::scene::Rgb;
-use crate::solve::Go;
-use crate::vertex::gathering::GatheredRadiosity;
-use crate::vertex::places::{Above, is_covered};
+use crate::vertex::gather_points::{SurfaceOffset, is_covered};
+use crate::vertex::gathering::GatheredMesh;
+use crate::visibility::ray_scene::Hit;
 
 /// Lines of sight that are cast at once.
 const BAND: u32 = 1 << 16;
@@ -39,18 +39,18 @@ impl Camera {
     /// Those of [`Camera::check`]; whatever `gather` fails with.
     pub fn gathered_image(
         &self,
-        light: &GatheredRadiosity,
+        light: &GatheredMesh,
         gather: &mut dyn Gather,
         width: u32,
         height: u32,
         samples: u32,
-        mut progress: impl FnMut(usize, usize) -> Go,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let sight = Sight::new(self, &light.surface, width, height, samples)?;
+        let sight = PrimaryRays::new(self, &light.surface, width, height, samples)?;
         let view = View::new(sight, light);
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let (of, band) = (pixels.len(), (BAND / (samples * samples)).max(1));
-        let mut pace = Pace::new(64);
+        let mut pace = BatchSizer::new(64);
         for start in (0..width * height).step_by(band as usize) {
             let end = start.saturating_add(band).min(width * height);
             let parts = view.parts(start..end);
@@ -60,7 +60,7 @@ impl Camera {
             let mut left = &gathers[..];
             while !left.is_empty() {
                 let done = pace.next(&mut left, |now| {
-                    let places: Vec<Place> = now.iter().map(|part| part.place).collect();
+                    let places: Vec<GatherPoint> = now.iter().map(|part| part.place).collect();
                     let found = gather.gather(&light.sources(), &places)?;
                     for (part, found) in now.iter().zip(&found) {
                         pixels[part.pixel] += part.radiance(found);
@@ -83,7 +83,7 @@ impl Camera {
 /// What a pixel sees of one smooth surface.
 struct Part {
     pixel: usize,
-    place: Place,
+    place: GatherPoint,
     /// Square root of the element's area, scene unit.
     size: f64,
     /// Share of the pixel, in (0, 1].
@@ -96,7 +96,7 @@ struct Part {
 
 impl Part {
     /// What it adds to the pixel by what was gathered, W/(m² sr).
-    fn radiance(&self, found: &Gathered) -> Rgb {
+    fn radiance(&self, found: &IrradianceSample) -> Rgb {
         if is_covered(found, self.size) {
             return self.known;
         }
@@ -106,17 +106,22 @@ impl Part {
 
 /// Settled light, as it is looked at.
 struct View<'a> {
-    sight: Sight<'a>,
-    light: &'a GatheredRadiosity,
-    above: Above,
+    sight: PrimaryRays<'a>,
+    light: &'a GatheredMesh,
+    above: SurfaceOffset,
     /// Per triangle, the smooth surface that it is a part of.
     surfaces: Vec<u32>,
 }
 
 impl View<'_> {
-    fn new<'a>(sight: Sight<'a>, light: &'a GatheredRadiosity) -> View<'a> {
+    fn new<'a>(sight: PrimaryRays<'a>, light: &'a GatheredMesh) -> View<'a> {
         let scene = light.mesh.scene();
-        View { sight, light, above: Above::new(scene), surfaces: Smooth::new(scene).surfaces() }
+        View {
+            sight,
+            light,
+            above: SurfaceOffset::new(scene),
+            surfaces: SurfaceTopology::new(scene).surfaces(),
+        }
     }
 
     /// What a range of pixels sees, in their order.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::near::NearRepair;
+use super::proximity::ProximityCorrection;
 use super::{FormFactors, Row};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
@@ -27,7 +27,7 @@ use crate::mesh::{Mesh, NodeId};
 /// **What it costs**: the middle child of a patch has the patch's centroid, so the patch's row is
 /// the middle child's too. Three more rows a patch are made to compare; once made they are used,
 /// disagreement or not. Twelve more come for each patch or part that is gone down into; see
-/// [`Viewpoints::extra`].
+/// [`AdaptiveViewpoints::extra`].
 ///
 /// **What it is worth** (Cornell box in elements of 30 mm, hemicubes of 128 pixels, against rays
 /// from all over the patch; share of a row on the wrong triangle, over 60 patches): patches of 16
@@ -37,12 +37,12 @@ use crate::mesh::{Mesh, NodeId};
 /// patches whose elements are themselves cut by an occluder.
 ///
 /// **Where the proximity repair goes**: inside, since near factors are those of the node that was
-/// seen from; that is why this takes a [`NearRepair`] (with a reach below 0 for none). Each part's
-/// row is mended for that part, the middle child's anew from the unmended row. A [`NearRepair`]
+/// seen from; that is why this takes a [`ProximityCorrection`] (with a reach below 0 for none). Each part's
+/// row is mended for that part, the middle child's anew from the unmended row. A [`ProximityCorrection`]
 /// around this would take the mean for the view from the patch's centroid and mend it twice.
 #[derive(Debug)]
-pub struct Viewpoints<M> {
-    rows: NearRepair<M>,
+pub struct AdaptiveViewpoints<M> {
+    rows: ProximityCorrection<M>,
     tolerance: f64,
     levels: u32,
     extra: u64,
@@ -58,7 +58,7 @@ struct View {
     raw: Row,
     /// Mended.
     row: Row,
-    /// Place of the first of the four children's views.
+    /// GatherPoint of the first of the four children's views.
     parts: Option<usize>,
 }
 
@@ -68,16 +68,16 @@ impl View {
     }
 }
 
-impl<M: FormFactors> Viewpoints<M> {
+impl<M: FormFactors> AdaptiveViewpoints<M> {
     /// Sees patches from parts at most `levels` below them, and from more than their children where
     /// these disagree with the patch by more than `tolerance`, a share of the light in [0, 1].
     /// `levels` 0 leaves the rows as they are, `tolerance` 1 always stops at the children.
-    pub fn new(rows: NearRepair<M>, tolerance: f64, levels: u32) -> Viewpoints<M> {
-        Viewpoints { rows, tolerance, levels, extra: 0 }
+    pub fn new(rows: ProximityCorrection<M>, tolerance: f64, levels: u32) -> AdaptiveViewpoints<M> {
+        AdaptiveViewpoints { rows, tolerance, levels, extra: 0 }
     }
 
     /// The maker of the rows.
-    pub fn inner(&self) -> &NearRepair<M> {
+    pub fn inner(&self) -> &ProximityCorrection<M> {
         &self.rows
     }
 
@@ -109,7 +109,7 @@ impl<M: FormFactors> Viewpoints<M> {
     }
 }
 
-impl<M: FormFactors> FormFactors for Viewpoints<M> {
+impl<M: FormFactors> FormFactors for AdaptiveViewpoints<M> {
     fn rows(
         &mut self,
         mesh: &Mesh,
@@ -152,13 +152,17 @@ impl<M: FormFactors> FormFactors for Viewpoints<M> {
     }
 
     /// Patches that are seen from their parts take as many views as a batch has, or more.
-    fn batch(&self) -> usize {
-        if self.levels == 0 { self.rows.batch() } else { self.rows.batch().div_ceil(MANY) }
+    fn preferred_batch_len(&self) -> usize {
+        if self.levels == 0 {
+            self.rows.preferred_batch_len()
+        } else {
+            self.rows.preferred_batch_len().div_ceil(MANY)
+        }
     }
 
-    fn settings(&self) -> String {
-        let Viewpoints { rows, tolerance, levels, .. } = self;
-        format!("{}, {levels} levels of viewpoints to {tolerance}", rows.settings())
+    fn fingerprint(&self) -> String {
+        let AdaptiveViewpoints { rows, tolerance, levels, .. } = self;
+        format!("{}, {levels} levels of viewpoints to {tolerance}", rows.fingerprint())
     }
 }
 
@@ -182,8 +186,8 @@ fn disagreement(mesh: &Mesh, views: &[View], k: usize) -> f64 {
             let triangle = mesh.triangle(mesh.element(entry.element as usize));
             apart[triangle] += times * i64::from(entry.share);
         }
-        apart[triangles] += times * i64::from(row.open);
-        apart[triangles + 1] += times * i64::from(row.back);
+        apart[triangles] += times * i64::from(row.escaped);
+        apart[triangles + 1] += times * i64::from(row.backface);
     }
     apart.iter().map(|d| d.unsigned_abs()).sum::<u64>() as f64 / (8.0 * f64::from(Row::TOTAL))
 }

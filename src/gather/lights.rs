@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::Place;
-use crate::form_factor::analytic::point_to_polygon;
+use super::GatherPoint;
+use crate::form_factor::closed_form::point_to_polygon;
 use crate::scene::{Rgb, Scene};
 
 /// Emitting triangles of one material that hang together by corners.
@@ -88,7 +88,7 @@ impl Lights {
 
     /// The lights that are worth a look of their own from `place`, most first, each with the form
     /// factor from there to the whole of it, as if nothing were in between.
-    pub fn apart(&self, place: &Place) -> Vec<(u32, f64)> {
+    pub fn importance_ranked(&self, place: &GatherPoint) -> Vec<(u32, f64)> {
         let factor = |light: &Light| -> f64 {
             let corners = light.triangles.iter().map(|&t| self.scene.corners(t as usize));
             corners.map(|c| point_to_polygon(place.position, place.normal, &c)).sum()

@@ -7,8 +7,8 @@ use exr::prelude::WritableImage;
 use super::{cannot_write, write_file};
 use crate::camera::RadianceImage;
 use crate::error::{Error, ErrorKind};
+use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
-use crate::tone::ToneCurve;
 
 /// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
 ///

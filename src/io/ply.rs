@@ -8,8 +8,8 @@ use glam::DVec3;
 
 use super::write_file;
 use crate::error::Error;
-use crate::tone::ToneCurve;
-use crate::vertex::VertexRadiosity;
+use crate::io::tone::ToneCurve;
+use crate::vertex::VertexMesh;
 
 /// Writes `surface` as binary little-endian PLY.
 ///
@@ -24,7 +24,7 @@ use crate::vertex::VertexRadiosity;
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_ply(path: impl AsRef<Path>, surface: &VertexRadiosity) -> Result<(), Error> {
+pub fn write_ply(path: impl AsRef<Path>, surface: &VertexMesh) -> Result<(), Error> {
     let tone = ToneCurve::fit(&surface.radiosity);
     write_file(path.as_ref(), |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
@@ -84,7 +84,7 @@ enum Width {
 
 impl Width {
     /// Floats, where their steps are below a millionth of the mesh's size.
-    fn of_positions(surface: &VertexRadiosity) -> Width {
+    fn of_positions(surface: &VertexMesh) -> Width {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let all = surface.positions.iter();
         let (low, high) = all.fold(nothing, |(l, h), &p| (l.min(p), h.max(p)));
@@ -93,7 +93,7 @@ impl Width {
     }
 
     /// Floats, where they hold the largest value and what is a hundred million times dimmer.
-    fn of_light(surface: &VertexRadiosity, errors: bool) -> Width {
+    fn of_light(surface: &VertexMesh, errors: bool) -> Width {
         let brightest = surface.radiosity.iter().map(|b| b.max_element());
         let told = surface.error.iter().copied().filter(|_| errors);
         Width::of(brightest.chain(told).fold(0.0, f64::max), true)

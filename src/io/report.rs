@@ -6,10 +6,10 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::write_file;
-use crate::certificate::Certificate;
+use crate::bake::ErrorEstimate;
 use crate::error::Error;
 use crate::scene::Rgb;
-use crate::solve::Ledger;
+use crate::solver::Ledger;
 
 /// What was done, with what, and where the light and the time went.
 #[derive(Clone, Debug, Default)]
@@ -34,23 +34,23 @@ pub struct Report {
     pub shots: u64,
     /// Rows made: hemicubes drawn, or fans of rays cast.
     pub hemicubes: u64,
-    /// Hemicubes drawn at each resolution: pixels along an edge of the top face, and how many.
+    /// HemicubeRows drawn at each resolution: pixels along an edge of the top face, and how many.
     /// None where rays were cast.
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
     /// Places at which vertices gathered.
     pub gathers: u64,
-    /// What gathering changed of the vertices; see `GatheredRadiosity`.
+    /// What gathering changed of the vertices; see `GatheredMesh`.
     pub gather_change: f64,
     /// Why gathering stopped.
     pub gather_stop: String,
-    /// Share of a row that the proximity repair moved, in the mean; see `NearRepair`.
+    /// Share of a row that the proximity repair moved, in the mean; see `ProximityCorrection`.
     pub near_moved: f64,
     /// Why the solver stopped.
     pub stop: String,
     /// Where the light went.
     pub ledger: Ledger,
     /// How far off the result is.
-    pub certificate: Certificate,
+    pub certificate: ErrorEstimate,
     /// Where the time went.
     pub seconds: Seconds,
     /// What deserves a look.
@@ -89,7 +89,8 @@ impl Report {
     /// The report as JSON.
     pub fn to_json(&self) -> Value {
         let channels = |c: Rgb| json!(c.to_array());
-        let Ledger { emitted, absorbed, left, back, unshot, overshot } = self.ledger;
+        let Ledger { emitted, absorbed, escaped: left, backface_loss: back, unshot, overshot } =
+            self.ledger;
         let (s, c) = (self.seconds, self.certificate);
         let [name, kind, driver] = &self.adapter;
         let drawn = self.hemicubes_by_resolution.iter();

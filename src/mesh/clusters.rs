@@ -12,8 +12,8 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use glam::DVec3;
 
-use super::Smooth;
-use crate::order::rank;
+use super::SurfaceTopology;
+use crate::geometry::rounding::rank;
 use crate::scene::Scene;
 
 /// No triangle's normal is further than this from its cluster's axis, degrees.
@@ -157,7 +157,7 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
 
 /// For each triangle those across a side where the surface goes on without a sharp fold.
 fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
-    let smooth = Smooth::by_angle(scene);
+    let smooth = SurfaceTopology::by_angle(scene);
     let mut beside = vec![BTreeSet::new(); smooth.sides.len()];
     for [(s, _), (t, _)] in smooth.joins() {
         beside[s].insert(t as u32);

@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::boxes::{Bounds, overlap, overlaps};
-use super::{Cell, MAX_DEPTH, Mesh, Smooth};
-use crate::mix::Set;
+use super::box_overlap::{Bounds, overlap, overlaps};
+use super::{Cell, MAX_DEPTH, Mesh, SurfaceTopology};
+use crate::sampling::hash::Set;
 use crate::scene::Scene;
 
 /// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
@@ -23,7 +23,7 @@ const FLAT: f64 = 1.0 - 5e-11;
 
 /// A line on a triangle along which another triangle touches or crosses it.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct ContactSegment {
     /// From where to where, by barycentric weights of the second and third corner.
     ends: [DVec2; 2],
     /// How near the other comes, scene unit.
@@ -61,7 +61,7 @@ impl Mesh {
         let deeper = |t: usize, cell: Cell| {
             cell.level < self.level_at(t, cell) || parted.contains(&(t, cell))
         };
-        Mesh::grown(self.scene.clone(), deeper)
+        Mesh::refined_where(self.scene.clone(), deeper)
     }
 
     /// Adds to `out` the elements in `cell` of triangle `t`, and parts of them, that `lines` part.
@@ -69,11 +69,12 @@ impl Mesh {
         &self,
         t: usize,
         cell: Cell,
-        lines: &[Line],
+        lines: &[ContactSegment],
         levels: u32,
         out: &mut Vec<(usize, Cell)>,
     ) {
-        let lines: Vec<Line> = lines.iter().filter(|l| parts(l, cell, LEAST)).copied().collect();
+        let lines: Vec<ContactSegment> =
+            lines.iter().filter(|l| parts(l, cell, LEAST)).copied().collect();
         if lines.is_empty() {
             return;
         }
@@ -104,7 +105,7 @@ impl Mesh {
 }
 
 /// Whether `line` comes into `cell`, by more than `margin`, a share of its size.
-fn parts(line: &Line, cell: Cell, margin: f64) -> bool {
+fn parts(line: &ContactSegment, cell: Cell, margin: f64) -> bool {
     // In the cell's own weights; all three are at least `margin` well within.
     let [a, b] = line.ends.map(|p| {
         let [u, v] = cell.local(p.x, p.y);
@@ -142,7 +143,7 @@ fn around(&[a, b, c]: &[DVec3; 3]) -> Bounds {
 /// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
 /// nothing.
 fn rims(scene: &Scene) -> Vec<[bool; 3]> {
-    let smooth = Smooth::new(scene);
+    let smooth = SurfaceTopology::new(scene);
     let mut out = vec![[true; 3]; smooth.sides.len()];
     for [(s, l), (t, k)] in smooth.joins() {
         if scene.normal(s).dot(scene.normal(t)) > FLAT {
@@ -178,7 +179,13 @@ impl Plane {
     /// Adds the lines along which a triangle of these `corners` touches or crosses this one, whose box
     /// with slack is `within`: the parts of its sides `rim` that lie within `slack` of the plane, and its
     /// cut with that plane.
-    fn touch(&self, corners: &[DVec3; 3], rim: &[bool; 3], within: &Bounds, lines: &mut Vec<Line>) {
+    fn touch(
+        &self,
+        corners: &[DVec3; 3],
+        rim: &[bool; 3],
+        within: &Bounds,
+        lines: &mut Vec<ContactSegment>,
+    ) {
         let slack = self.slack;
         let height = corners.map(|p| self.normal.dot(p - self.corner));
         if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
@@ -207,7 +214,7 @@ impl Plane {
                 let crosses = low < 0.0 && high > 0.0;
                 let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
                 if ends[0] != ends[1] {
-                    lines.push(Line { ends, gap });
+                    lines.push(ContactSegment { ends, gap });
                 }
             }
             if low < 0.0 && high > 0.0 {
@@ -219,7 +226,7 @@ impl Plane {
             cut.extend((0..3).find(|&k| height[k] == 0.0).map(|k| flat(corners[k])));
         }
         if let [p, q] = cut[..] {
-            lines.push(Line { ends: [p, q], gap: 0.0 });
+            lines.push(ContactSegment { ends: [p, q], gap: 0.0 });
         }
     }
 }

@@ -1,17 +1,18 @@
 //! Vertices that gather: each looks at the settled light for itself, and elements are split where
 //! what lies between their corners is not what the corners say.
 
-use super::VertexRadiosity;
-use super::refined::Refined;
+use super::VertexMesh;
+use super::adaptive::AdaptiveGather;
 use crate::error::{Error, ErrorKind};
-use crate::gather::{Gather, Sources};
+use crate::gather::{Gather, RadiosityField};
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
-use crate::solve::{Go, Stop};
+use crate::solver::StopReason;
+use std::ops::ControlFlow;
 
 /// Settings of gathering at vertices.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Gathering {
+pub struct RefinementSettings {
     /// An element is split where the middle of a side is off the mean of the side's ends by more
     /// than this share of its radiosity, in (0, 1]. What is left then is about a quarter of it.
     /// Smaller elements are allowed more: 1.7 times as much for every halving below the largest.
@@ -20,7 +21,7 @@ pub struct Gathering {
     pub smallest: f64,
     /// Where the parabola through what was gathered leaves an element by more than this share of its
     /// radiosity in the end, the element is split once more, its new vertices are put on the parabola,
-    /// and none of them gathers. Above 0; infinity for nowhere.
+    /// and none of them gathers. SurfaceOffset 0; infinity for nowhere.
     pub curve: f64,
     /// How many elements there may be. The worst are split first.
     pub elements: usize,
@@ -47,11 +48,11 @@ pub struct GatherProgress {
 
 /// A scene cut where the light asks for it, and the radiosity that its vertices gathered.
 #[derive(Clone, Debug)]
-pub struct GatheredRadiosity {
+pub struct GatheredMesh {
     /// The mesh given, split further.
     pub mesh: Mesh,
     /// Radiosity at its vertices.
-    pub surface: VertexRadiosity,
+    pub surface: VertexMesh,
     /// Per element, where its three corners' values are in `reflected`.
     pub corners: Vec<[u32; 3]>,
     /// Reflected radiosity B − E of the vertices as others are to see it, W/m² per channel: its mean
@@ -63,17 +64,17 @@ pub struct GatheredRadiosity {
     /// had from its elements: its root mean square over that radiosity.
     pub change: f64,
     /// Whether more elements were to be split than there may be.
-    pub stop: Stop,
+    pub stop: StopReason,
 }
 
-impl GatheredRadiosity {
+impl GatheredMesh {
     /// The light of the elements of `mesh` as it is: one value an element, W/m², no vertex gathers.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `radiosity` has not one value an element.
-    pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredRadiosity, Error> {
+    pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredMesh, Error> {
         check_count(mesh, radiosity)?;
-        let (surface, corners) = VertexRadiosity::with_corners(mesh, radiosity);
+        let (surface, corners) = VertexMesh::with_corners(mesh, radiosity);
         let mut reflected = surface.radiosity.clone();
         for (e, corners) in corners.iter().enumerate() {
             let emitted = mesh.material(mesh.element(e)).exitance;
@@ -82,8 +83,8 @@ impl GatheredRadiosity {
             }
         }
         let mesh = mesh.clone();
-        let (gathers, change, stop) = (0, 0.0, Stop::Converged);
-        Ok(GatheredRadiosity { mesh, surface, corners, reflected, gathers, change, stop })
+        let (gathers, change, stop) = (0, 0.0, StopReason::Converged);
+        Ok(GatheredMesh { mesh, surface, corners, reflected, gathers, change, stop })
     }
 
     /// Whether this is light of the scene of `mesh`.
@@ -100,20 +101,20 @@ impl GatheredRadiosity {
     }
 
     /// The light, for whoever gathers it elsewhere.
-    pub fn sources(&self) -> Sources<'_> {
-        Sources { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
+    pub fn sources(&self) -> RadiosityField<'_> {
+        RadiosityField { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
     }
 }
 
 /// Elements of one sweep may bend so many times as much as those of the next.
 const COARSER: f64 = 3.0;
 
-impl Gathering {
+impl RefinementSettings {
     /// Splits to elements of `smallest` (scene unit) where sides bend by 2 %, and where parabolas do
     /// by 0.25 %, 2¹⁹ elements at most.
-    pub fn new(smallest: f64) -> Gathering {
+    pub fn new(smallest: f64) -> RefinementSettings {
         let (tolerance, curve, elements) = (0.02, 0.0025, 1 << 19);
-        Gathering { tolerance, smallest, curve, elements, everywhere: 0, sweeps: 1 }
+        RefinementSettings { tolerance, smallest, curve, elements, everywhere: 0, sweeps: 1 }
     }
 
     /// Lets the vertices of `mesh` gather `light`, splits elements, lets the new vertices gather, and
@@ -131,38 +132,39 @@ impl Gathering {
     /// `gather` fails with.
     pub fn gather(
         &self,
-        light: &GatheredRadiosity,
+        light: &GatheredMesh,
         mesh: &Mesh,
         gather: &mut dyn Gather,
-        mut progress: impl FnMut(&GatherProgress) -> Go,
-    ) -> Result<GatheredRadiosity, Error> {
+        mut progress: impl FnMut(&GatherProgress) -> ControlFlow<()>,
+    ) -> Result<GatheredMesh, Error> {
         self.check()?;
         light.check_scene(mesh)?;
-        let mut state = Refined::new(mesh.clone(), light);
+        let mut state = AdaptiveGather::new(mesh.clone(), light);
         let stop = self.settle(&mut state, gather, None, &mut progress)?;
-        let reached = if stop == Stop::Cancelled { state.reached() } else { state.curved(self)?.0 };
-        Ok(GatheredRadiosity { stop, ..reached })
+        let reached =
+            if stop == StopReason::Cancelled { state.reached() } else { state.curved(self)?.0 };
+        Ok(GatheredMesh { stop, ..reached })
     }
 
     /// All sweeps: the first ones over coarser elements and, if there is one, by a rough gatherer,
     /// since they only light the last.
     pub(crate) fn settle(
         &self,
-        state: &mut Refined,
+        state: &mut AdaptiveGather,
         gather: &mut dyn Gather,
         mut rough: Option<&mut dyn Gather>,
-        progress: &mut dyn FnMut(&GatherProgress) -> Go,
-    ) -> Result<Stop, Error> {
+        progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
+    ) -> Result<StopReason, Error> {
         for left in (1..self.sweeps).rev() {
             let coarser = COARSER.powi(left as i32);
             let tolerance = (self.tolerance * coarser).min(1.0);
             let smallest = self.smallest * coarser;
-            let coarse = Gathering { tolerance, smallest, ..self.clone() };
+            let coarse = RefinementSettings { tolerance, smallest, ..self.clone() };
             let stop = match &mut rough {
                 Some(rough) => state.sweep(&coarse, *rough, progress)?,
                 None => state.sweep(&coarse, gather, progress)?,
             };
-            if stop == Stop::Cancelled {
+            if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
             state.shine();
@@ -170,7 +172,7 @@ impl Gathering {
         state.sweep(self, gather, progress)
     }
 
-    /// Whether [`Gathering::gather`] would take these settings: worth asking before a long solve.
+    /// Whether [`RefinementSettings::gather`] would take these settings: worth asking before a long solve.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a tolerance outside (0, 1] or a smallest edge that is not above 0.

@@ -1,6 +1,6 @@
 //! A row maker for scenes without occluders.
 
-use radiosity::form_factor::analytic::{point_to_polygon, polygon_to_polygon};
+use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::{Entry, Error, FormFactors, Mesh, NodeId, Row};
 
 /// Rows of closed forms, for scenes without occluders: exact, from all of the patch's area, or
@@ -42,12 +42,12 @@ impl FormFactors for ClosedForms {
                     given = upto;
                 }
             }
-            Row { entries, open: Row::TOTAL - given, back: 0 }
+            Row { entries, escaped: Row::TOTAL - given, backface: 0 }
         };
         Ok(patches.iter().map(row).collect())
     }
 
-    fn batch(&self) -> usize {
+    fn preferred_batch_len(&self) -> usize {
         4
     }
 }

@@ -4,11 +4,11 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use radiosity::{Mesh, VertexRadiosity};
+use radiosity::{Mesh, VertexMesh};
 
 /// Panics unless `surface` covers each group of the scene of `mesh`, all of them flat quads as
 /// [`super::quads`] makes them, once and without cracks.
-pub fn assert_whole(mesh: &Mesh, surface: &VertexRadiosity) {
+pub fn assert_whole(mesh: &Mesh, surface: &VertexMesh) {
     assert_eq!(surface.faces.len(), surface.elements.len());
     let scene = mesh.scene();
     let groups = scene.groups().len();
@@ -31,7 +31,7 @@ pub fn assert_whole(mesh: &Mesh, surface: &VertexRadiosity) {
 /// Panics unless `surface` is watertight wherever the scene of `mesh` is: vertices at the very same
 /// position taken as one, every side of its faces is run as often one way as the other, but for
 /// those on edges where the scene's triangles do not match either.
-pub fn assert_watertight(mesh: &Mesh, surface: &VertexRadiosity) {
+pub fn assert_watertight(mesh: &Mesh, surface: &VertexMesh) {
     let scene = mesh.scene();
     let sides = |corners: [DVec3; 3]| [0, 1, 2].map(|k| (corners[k], corners[(k + 1) % 3]));
     let triangles = (0..scene.triangles().len()).flat_map(|t| sides(scene.corners(t)));
@@ -71,13 +71,7 @@ fn unmatched(sides: impl Iterator<Item = (DVec3, DVec3)>) -> Vec<(DVec3, DVec3)>
     runs.into_values().flat_map(open).collect()
 }
 
-fn assert_quad(
-    surface: &VertexRadiosity,
-    faces: &[[u32; 3]],
-    normal: DVec3,
-    area: f64,
-    outline: f64,
-) {
+fn assert_quad(surface: &VertexMesh, faces: &[[u32; 3]], normal: DVec3, area: f64, outline: f64) {
     let at = |v: u32| surface.positions[v as usize];
     // Every face faces the front and the areas add up: with sides that match, nothing is covered
     // twice. Coordinates round by 1e-16 of their size, a few hundred times over.

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use radiosity::{Rgb, VertexRadiosity};
+use radiosity::{Rgb, VertexMesh};
 use serde_json::Value;
 
 /// Error |B − truth|/|truth| of one kind of points, lengths over the channels.
@@ -50,7 +50,7 @@ pub fn points(truth: &str) -> Result<Vec<Point>, String> {
 
 /// Compares `surface`, interpolated in its faces, with the points of a truth file. Panics when a
 /// point lies on no face.
-pub fn compare(surface: &VertexRadiosity, truth: &str) -> BTreeMap<String, Errors> {
+pub fn compare(surface: &VertexMesh, truth: &str) -> BTreeMap<String, Errors> {
     let points = points(truth).expect("a truth file");
     let mut errors: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
     for point in points {
@@ -61,7 +61,7 @@ pub fn compare(surface: &VertexRadiosity, truth: &str) -> BTreeMap<String, Error
 }
 
 /// |B − truth|/|truth| and (|B| − |truth|)/|truth| at a point, if it lies on a face of `surface`.
-pub fn off(surface: &VertexRadiosity, point: &Point) -> Option<(f64, f64)> {
+pub fn off(surface: &VertexMesh, point: &Point) -> Option<(f64, f64)> {
     let (got, _) = at(surface, point.position, point.normal)?;
     let whole = point.radiosity.length();
     Some((got.distance(point.radiosity) / whole, got.length() / whole - 1.0))
@@ -77,7 +77,7 @@ fn summary(errors: Vec<(f64, f64)>) -> Errors {
 }
 
 /// Interpolated radiosity, and the error it may have, at `p` with unit normal `n`, in the nearest face that faces alike.
-pub fn at(surface: &VertexRadiosity, p: DVec3, n: DVec3) -> Option<(Rgb, f64)> {
+pub fn at(surface: &VertexMesh, p: DVec3, n: DVec3) -> Option<(Rgb, f64)> {
     let mut best: Option<(f64, (Rgb, f64))> = None;
     for face in &surface.faces {
         let [a, b, c] = face.map(|v| surface.positions[v as usize]);

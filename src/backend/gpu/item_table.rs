@@ -1,0 +1,39 @@
+//! From what a pixel shows to the slot of the row that it counts for.
+
+use super::layout::{BACK, FIRST_CELL, FIRST_ELEMENT, OPEN, TriangleCells};
+use crate::mesh::Mesh;
+
+/// Every triangle as a lattice of the finest cells in its quadtree. A pixel's item is OPEN, BACK or
+/// a cell; how the cells make up elements, of whatever depths, is known to this table alone.
+pub struct ItemTable {
+    /// Where each triangle's items start, and how many cells lie along its edge.
+    pub triangles: Vec<TriangleCells>,
+    /// The row slot of each item.
+    pub slots: Vec<u32>,
+}
+
+impl ItemTable {
+    /// How many items there are for `mesh`; known before the table is made.
+    pub fn count(mesh: &Mesh) -> u64 {
+        let triangles = 0..mesh.scene().triangles().len();
+        u64::from(FIRST_CELL) + triangles.map(|t| 1 << (2 * mesh.depth(t))).sum::<u64>()
+    }
+
+    /// The table for `mesh`.
+    pub fn new(mesh: &Mesh) -> ItemTable {
+        let mut slots = vec![OPEN, BACK];
+        let mut triangles = vec![];
+        for t in 0..mesh.scene().triangles().len() {
+            let (first, depth) = (slots.len(), mesh.depth(t));
+            triangles.push(TriangleCells { first: first as u32, side: 1 << depth });
+            slots.resize(first + (1 << (2 * depth)), OPEN);
+            for e in mesh.elements_of(mesh.root(t)) {
+                let cell = mesh.cell(mesh.element(e));
+                cell.for_each_descendant(depth, &mut |c| {
+                    slots[first + c.index() as usize] = FIRST_ELEMENT + e as u32;
+                });
+            }
+        }
+        ItemTable { triangles, slots }
+    }
+}

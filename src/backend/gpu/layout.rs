@@ -1,0 +1,284 @@
+//! Structs shared with the shaders, under the same names; a test compares every offset.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::gather::lights::APART;
+
+/// A corner of a triangle, in two parts: see [`super::split_float`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Corner {
+    pub high: [f32; 3],
+    pub padding: u32,
+    pub low: [f32; 3],
+    pub padding_2: u32,
+}
+
+/// One face of one hemicube, as `item_buffer.wgsl` draws it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct FaceView {
+    pub eye: [f32; 3],
+    pub near: f32,
+    pub right: [f32; 3],
+    pub bottom: f32,
+    pub up: [f32; 3],
+    pub own_triangle: u32,
+    pub forward: [f32; 3],
+    pub padding: u32,
+    pub eye_low: [f32; 3],
+    pub padding_2: u32,
+}
+
+/// Where a triangle's items start, and how many cells lie along its edge.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TriangleCells {
+    pub first: u32,
+    pub side: u32,
+}
+
+/// What `reduce.wgsl` needs to know of a batch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Reduction {
+    pub resolution: u32,
+    pub slots: u32,
+    pub stride: u32,
+}
+
+/// One face of one hemicube, or the tile of a light, as `radiance.wgsl` draws it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RadianceView {
+    pub eye: [f32; 3],
+    pub near: f32,
+    pub right: [f32; 3],
+    pub bottom: f32,
+    pub up: [f32; 3],
+    pub light: u32,
+    pub forward: [f32; 3],
+    pub apart: u32,
+    pub eye_low: [f32; 3],
+    pub padding: u32,
+    pub lights: [u32; APART],
+}
+
+/// What a triangle emits, and which of the scene's it is.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RadianceTriangle {
+    pub exitance: [f32; 3],
+    pub light: u32,
+    pub index: u32,
+    pub padding: [u32; 3],
+}
+
+/// A triangle's nodes at the deepest level that its quadtree is complete to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Lattice {
+    pub first: u32,
+    pub side: u32,
+}
+
+/// What `hemisphere_sum.wgsl` needs to know of a batch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Summation {
+    pub resolution: u32,
+    pub slots: u32,
+}
+
+/// Where the pixels of a light's tile look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Tile {
+    pub middle: [f32; 3],
+    pub scale: f32,
+    pub right: [f32; 3],
+    pub padding: u32,
+    pub up: [f32; 3],
+    pub padding_2: u32,
+}
+
+/// What a place receives, but for the exitance of the lights apart: form factors of what is seen of
+/// each, and of all of it as if nothing were in between.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Sums {
+    pub radiosity: [f32; 3],
+    pub open: f32,
+    pub back: f32,
+    pub nearness: f32,
+    pub padding: [f32; 2],
+    pub lights: [[f32; 2]; APART],
+}
+
+/// Pixels along an edge of a light's tile.
+pub const TILE: u32 = 32;
+
+/// Elements side by side in the texture of their corners' radiosity.
+pub const ELEMENTS_A_LINE: u32 = 2048;
+
+/// Threads of `hemisphere_sum.wgsl` that add up a place's pixels.
+pub const LANES: u32 = 64;
+
+/// A node with children: this plus the first of the four. A leaf holds its element.
+pub const INNER: u32 = 1 << 31;
+
+/// What a pixel shows: nothing, the back of a triangle, or from here on a cell of a front. Slots
+/// of a row start alike: open, back, then the elements.
+pub const OPEN: u32 = 0;
+pub const BACK: u32 = 1;
+pub const FIRST_CELL: u32 = 2;
+pub const FIRST_ELEMENT: u32 = 2;
+
+/// Image lines that one thread of `reduce.wgsl` walks down, and threads in its workgroup.
+pub const STRIP: u32 = 16;
+pub const WORKGROUP: u32 = 64;
+
+pub const ITEM_BUFFER_WGSL: &str = include_str!("../../../shaders/item_buffer.wgsl");
+pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
+pub const RADIANCE_WGSL: &str = include_str!("../../../shaders/radiance.wgsl");
+pub const HEMISPHERE_SUM_WGSL: &str = include_str!("../../../shaders/hemisphere_sum.wgsl");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::offset_of;
+
+    fn parsed(source: &str) -> naga::Module {
+        let module = naga::front::wgsl::parse_str(source).expect("WGSL parses");
+        // Nothing beyond what every WebGPU device has.
+        let none = naga::valid::Capabilities::empty();
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), none)
+            .validate(&module)
+            .expect("WGSL is valid");
+        module
+    }
+
+    /// Name, offset and size of each member, and the size of the whole.
+    fn wgsl_layout(module: &naga::Module, name: &str) -> (Vec<(String, usize, usize)>, usize) {
+        let (_, ty) = module
+            .types
+            .iter()
+            .find(|(_, t)| t.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("no struct {name}"));
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };
+        let size = |m: &naga::StructMember| module.types[m.ty].inner.size(module.to_ctx());
+        let list = members
+            .iter()
+            .map(|m| (m.name.clone().unwrap(), m.offset as usize, size(m) as usize))
+            .collect();
+        (list, *span as usize)
+    }
+
+    macro_rules! rust_layout {
+        ($t:ident { $($field:ident),* }) => {{
+            let v = $t::default();
+            // Destructured without `..`, so that a new field cannot be forgotten here.
+            let $t { $($field),* } = v;
+            (
+                vec![$((
+                    stringify!($field).to_string(),
+                    offset_of!($t, $field),
+                    size_of_val(&$field),
+                )),*],
+                size_of::<$t>(),
+            )
+        }};
+    }
+
+    #[test]
+    fn shared_structs_have_one_layout() {
+        let (item, reduce) = (parsed(ITEM_BUFFER_WGSL), parsed(REDUCE_WGSL));
+        assert_eq!(
+            wgsl_layout(&item, "FaceView"),
+            rust_layout!(FaceView {
+                eye,
+                near,
+                right,
+                bottom,
+                up,
+                own_triangle,
+                forward,
+                padding,
+                eye_low,
+                padding_2
+            })
+        );
+        assert_eq!(
+            wgsl_layout(&item, "TriangleCells"),
+            rust_layout!(TriangleCells { first, side })
+        );
+        assert_eq!(
+            wgsl_layout(&reduce, "Reduction"),
+            rust_layout!(Reduction { resolution, slots, stride })
+        );
+        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
+        assert_eq!(
+            wgsl_layout(&radiance, "RadianceView"),
+            rust_layout!(RadianceView {
+                eye,
+                near,
+                right,
+                bottom,
+                up,
+                light,
+                forward,
+                apart,
+                eye_low,
+                padding,
+                lights
+            })
+        );
+        assert_eq!(
+            wgsl_layout(&radiance, "RadianceTriangle"),
+            rust_layout!(RadianceTriangle { exitance, light, index, padding })
+        );
+        for module in [&item, &radiance] {
+            assert_eq!(
+                wgsl_layout(module, "Corner"),
+                rust_layout!(Corner { high, padding, low, padding_2 })
+            );
+        }
+        assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));
+        assert_eq!(
+            wgsl_layout(&gather, "Summation"),
+            rust_layout!(Summation { resolution, slots })
+        );
+        assert_eq!(
+            wgsl_layout(&gather, "Tile"),
+            rust_layout!(Tile { middle, scale, right, padding, up, padding_2 })
+        );
+    }
+
+    #[test]
+    fn shared_constants_have_one_value() {
+        let (item, reduce) = (parsed(ITEM_BUFFER_WGSL), parsed(REDUCE_WGSL));
+        let constant = |module: &naga::Module, name: &str| {
+            let (_, c) =
+                module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name)).unwrap();
+            match module.global_expressions[c.init] {
+                naga::Expression::Literal(naga::Literal::U32(value)) => value,
+                ref other => panic!("{name}: {other:?}"),
+            }
+        };
+        assert_eq!(constant(&item, "BACK"), BACK);
+        assert_eq!(constant(&reduce, "STRIP"), STRIP);
+        assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
+        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
+        assert_eq!(constant(&radiance, "INNER"), INNER);
+        assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
+        assert_eq!(constant(&radiance, "APART"), APART as u32);
+        assert_eq!(constant(&gather, "TILE"), TILE);
+        assert_eq!(constant(&gather, "LANES"), LANES);
+        // The shader writes a place's numbers one after the other.
+        assert_eq!(constant(&gather, "WORDS") as usize * 4, size_of::<Sums>());
+        let (nearness, lights) = (offset_of!(Sums, nearness), offset_of!(Sums, lights));
+        assert_eq!((nearness, lights), (5 * 4, 8 * 4));
+        // OPEN is the clear value of the item buffer: wgpu clears to zero.
+        assert_eq!(OPEN, 0);
+    }
+}

@@ -1,0 +1,156 @@
+//! What is drawn on: a layer a hemicube, so that its pixels do not depend on its place in a batch.
+
+use super::device::Gpu;
+use super::memory::Memory;
+use crate::error::Error;
+
+/// RenderTargets of one texture, and the depth buffer that they share.
+#[derive(Debug)]
+pub struct RenderTargets {
+    pub texture: wgpu::Texture,
+    layers: Vec<wgpu::TextureView>,
+    depth: wgpu::TextureView,
+}
+
+/// What of the triangles drawn ends up in a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthMode {
+    /// The nearest triangle, front or back.
+    Nearest,
+    /// Whether there is any front, hidden or not.
+    AnyFront,
+}
+
+impl RenderTargets {
+    /// `count` layers of `width` × `height` pixels.
+    pub fn new(
+        memory: &Memory,
+        format: wgpu::TextureFormat,
+        [width, height]: [u32; 2],
+        count: u32,
+    ) -> Result<RenderTargets, Error> {
+        let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let readable = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let image = memory.texture("layers", [width, height, count], format, drawn | readable)?;
+        let format = wgpu::TextureFormat::Depth32Float;
+        let depth = memory.texture("depth", [width, height, 1], format, drawn)?;
+        let layer = |base_array_layer| {
+            image.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        let layers = (0..count).map(layer).collect();
+        Ok(RenderTargets { texture: image, layers, depth: depth.create_view(&Default::default()) })
+    }
+
+    /// A pass over layer `k` of the first `count`, cleared to zero, with timestamps before the
+    /// first (query 0) and after the last (query 1).
+    pub fn pass<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        k: usize,
+        count: usize,
+        queries: Option<&wgpu::QuerySet>,
+    ) -> wgpu::RenderPass<'e> {
+        let (first, last) = (k == 0, k + 1 == count);
+        // wgpu refuses a set of timestamps that writes none.
+        let queries = queries.filter(|_| first || last);
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("layer"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.layers[k],
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: queries.map(|query_set| wgpu::RenderPassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: first.then_some(0),
+                end_of_pass_write_index: last.then_some(1),
+            }),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        })
+    }
+
+    /// Records the copy of the first `count` layers into `buffer`, whose lines are
+    /// `bytes_per_line` long.
+    pub fn copy(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        buffer: &wgpu::Buffer,
+        bytes_per_line: u32,
+        count: u32,
+    ) {
+        let height = self.texture.height();
+        encoder.copy_texture_to_buffer(
+            self.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(bytes_per_line),
+                    rows_per_image: Some(height),
+                },
+            },
+            wgpu::Extent3d { width: self.texture.width(), height, depth_or_array_layers: count },
+        );
+    }
+
+    /// A pipeline that draws on layers of `target`: entry point `vertex` of `module`, then
+    /// `fragment`. Depth is reversed: nearer is greater.
+    pub fn pipeline(
+        gpu: &Gpu,
+        module: &wgpu::ShaderModule,
+        layout: Option<&wgpu::PipelineLayout>,
+        fragment: &str,
+        target: wgpu::ColorTargetState,
+        shown: DepthMode,
+    ) -> wgpu::RenderPipeline {
+        let (compare, cull_mode) = match shown {
+            DepthMode::Nearest => (wgpu::CompareFunction::Greater, None),
+            DepthMode::AnyFront => (wgpu::CompareFunction::Always, Some(wgpu::Face::Back)),
+        };
+        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(fragment),
+            layout,
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(shown == DepthMode::Nearest),
+                depth_compare: Some(compare),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some(fragment),
+                compilation_options: Default::default(),
+                targets: &[Some(target)],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}

@@ -1,0 +1,41 @@
+//! What drawing and adding up need for each resolution; all else they share.
+
+use super::item_buffer::ItemBuffer;
+use super::memory::Memory;
+use super::reduce::Reduce;
+use super::render_targets::RenderTargets;
+use crate::error::Error;
+use crate::form_factor::resolution_policy;
+
+/// Item buffers of a batch of hemicubes of one resolution, and the weights of their pixels.
+#[derive(Debug)]
+pub struct Resolution {
+    /// Pixels along an edge of the top face.
+    pub pixels: u32,
+    pub layers: RenderTargets,
+    /// What `reduce` reads and writes.
+    pub bindings: wgpu::BindGroup,
+    /// HemicubeRows drawn so far.
+    pub drawn: u64,
+}
+
+impl Resolution {
+    /// For `batch` hemicubes each: first `resolution`, then what it is halved to for little light.
+    pub fn halved(
+        memory: &Memory,
+        reduce: &Reduce,
+        resolution: u32,
+        batch: u32,
+    ) -> Result<Vec<Resolution>, Error> {
+        let halvings = 0..=resolution_policy::HALVINGS;
+        let mut pixels: Vec<u32> =
+            halvings.map(|k| resolution_policy::halved(resolution, k)).collect();
+        pixels.dedup();
+        pixels.into_iter().map(|n| Resolution::new(memory, reduce, n, batch)).collect()
+    }
+
+    fn new(memory: &Memory, reduce: &Reduce, pixels: u32, batch: u32) -> Result<Resolution, Error> {
+        let layers = RenderTargets::new(memory, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch)?;
+        Ok(Resolution { pixels, layers, bindings: reduce.bindings(memory, pixels)?, drawn: 0 })
+    }
+}

@@ -1,0 +1,417 @@
+//! Form-factor rows from hemicubes: batches drawn, reduced and read back.
+
+use std::f64::consts::FRAC_PI_2;
+use std::num::NonZeroU32;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::device::Gpu;
+use super::draw_list::DrawList;
+use super::item_buffer::{ItemBuffer, View};
+use super::item_table::ItemTable;
+use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
+use super::memory::Memory;
+use super::readback::{Readback, StageSeconds};
+use super::reduce::Reduce;
+use super::resolution::Resolution;
+use super::split_float::SplitFloat;
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
+use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
+use crate::mesh::{Mesh, NodeId};
+
+/// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
+///
+/// The scene's own triangles are drawn over the five faces of a hemicube at a patch's centroid; a
+/// pixel sees a triangle, and the element is found from the barycentric position there. A row is
+/// the sum of exact pixel weights: its error is that of pixels that straddle a border between
+/// elements, and of seeing the patch from one point.
+///
+/// Rows for patches that shoot little are made at a half or a quarter of the resolution: see
+/// [`HemicubeRows::with_full_share`].
+#[derive(Debug)]
+pub struct HemicubeRows {
+    gpu: Gpu,
+    chunks: DrawList,
+    batches: Batches,
+    local: SplitFloat,
+    slots: u32,
+    /// Rows that are best asked for at once, however many hemicubes there is memory for: it decides
+    /// the order of shots.
+    batch: u32,
+    rotations: NonZeroU32,
+    full_share: f64,
+    seconds: StageSeconds,
+}
+
+/// What draws hemicubes, a batch at a time.
+#[derive(Debug)]
+struct Batches {
+    item_buffer: ItemBuffer,
+    reduce: Reduce,
+    /// The full resolution, then what it is halved to.
+    resolutions: Vec<Resolution>,
+    readback: Readback,
+    /// HemicubeRows at once, at most.
+    most: u32,
+    _memory: Memory,
+}
+
+/// Item buffers of a batch take at most this many bytes, if more than one: a software device draws
+/// that much in a fraction of a second.
+const BATCH_BYTES: u64 = 32 << 20;
+
+/// HemicubeRows in a batch at most.
+const MAX_BATCH: u32 = 16;
+
+impl HemicubeRows {
+    /// Share of the emitted flux from which on a patch gets the full resolution, unless set. With
+    /// 128 pixels the error of a whole bake grows by 1 % of itself, at most by 3 %, over full
+    /// resolution for all, and the time that rows take falls by a third (measured in three scenes).
+    pub const FULL_SHARE: f64 = 4e-3;
+
+    /// HemicubeRows with a top face of `resolution` × `resolution` pixels over `mesh`, and fewer for
+    /// patches that shoot little.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a mesh
+    /// whose rows do not fit the device; [`ErrorKind::Memory`] when there is no memory for a single
+    /// hemicube; [`ErrorKind::Device`] when the device fails.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeRows, Error> {
+        hemicube::check_resolution(resolution)?;
+        let limits = gpu.device.limits();
+        let setting = |place: String, found: String, remedy: String| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        let texture = limits.max_texture_dimension_2d;
+        let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let fits = |n: &u32| 3 * n <= texture && Reduce::items_bytes(*n) <= buffer;
+        if !fits(&resolution) {
+            let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
+            return setting(
+                format!("hemicube resolution {resolution}"),
+                format!("an item buffer of {resolution} × {} pixels", 3 * resolution),
+                format!("this device allows resolutions up to {most}"),
+            );
+        }
+        let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
+        let triangles = mesh.scene().triangles().len() as u64;
+        let (row_bytes, items) = (u64::from(slots) * 4, ItemTable::count(mesh));
+        let triangle_bytes = 3 * size_of::<Corner>() as u64;
+        if (row_bytes + 64).max(items * 4).max(triangles * triangle_bytes) > buffer {
+            return setting(
+                "mesh".into(),
+                format!("{items} finest cells of elements in {triangles} triangles"),
+                format!("this device holds {} and {}", buffer / 4 - 16, buffer / triangle_bytes),
+            );
+        }
+        let item_bytes = Reduce::items_bytes(resolution);
+        let batch = MAX_BATCH
+            .min((BATCH_BYTES / item_bytes).max(1) as u32)
+            .min(limits.max_texture_array_layers)
+            .min((buffer / item_bytes) as u32)
+            .min(((buffer - 64) / row_bytes) as u32);
+        let local = SplitFloat::new(mesh.scene());
+        let (cells, chunks) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
+        let batches = gpu.fit(batch, |memory, most| {
+            let item_buffer = ItemBuffer::new(&memory, mesh, &cells, &chunks.order, &local, most)?;
+            let reduce = Reduce::new(&memory, &cells, resolution, slots, most)?;
+            let resolutions = Resolution::halved(&memory, &reduce, resolution, most)?;
+            let readback = Readback::new(&memory, reduce.rows.size())?;
+            Ok(Batches { item_buffer, reduce, resolutions, readback, most, _memory: memory })
+        })?;
+        Ok(HemicubeRows {
+            gpu: gpu.clone(),
+            chunks,
+            batches,
+            local,
+            slots,
+            batch,
+            rotations: NonZeroU32::MIN,
+            full_share: HemicubeRows::FULL_SHARE,
+            seconds: StageSeconds::default(),
+        })
+    }
+
+    /// A row from this many hemicubes at the patch's centroid, each turned a further 90°/`rotations`
+    /// about the normal, and their mean taken; one unless set.
+    ///
+    /// This is for the aliasing assumption of Baum, Rushmeier and Winget (1989): a pixel is in an
+    /// element or not, by its centre. Pixels that straddle a border err independently from one turn
+    /// to the next, so the error of an entry falls with the square root of `rotations`, and the
+    /// time grows in proportion to them. What is off because the patch is seen from one point stays.
+    pub fn with_rotations(self, rotations: NonZeroU32) -> HemicubeRows {
+        HemicubeRows { rotations, ..self }
+    }
+
+    /// Full resolution for patches that shoot at least this share of the emitted flux, in [0, 1];
+    /// for others it is halved once or twice, but to no less than 16 pixels along an edge, by what
+    /// is at stake: resolution ∝ share^0.4 errs least for the time. [`HemicubeRows::FULL_SHARE`]
+    /// unless set; with 0 all rows are at full resolution.
+    pub fn with_full_share(self, full_share: f64) -> HemicubeRows {
+        HemicubeRows { full_share, ..self }
+    }
+
+    /// Time spent so far.
+    pub fn seconds(&self) -> StageSeconds {
+        self.seconds
+    }
+
+    /// HemicubeRows drawn so far, each rotation of one counted.
+    pub fn drawn(&self) -> u64 {
+        self.batches.resolutions.iter().map(|r| r.drawn).sum()
+    }
+
+    /// HemicubeRows drawn so far at each resolution: pixels along an edge of the top face, and how
+    /// many; the full one first, then what it is halved to.
+    pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
+        self.batches.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
+    }
+
+    /// The faces of the hemicube over `patch`, turned by `angle` (radians).
+    fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
+        let frame = Frame::new(mesh.normal(patch), angle);
+        let near = self.local.length(mesh.area(patch).sqrt() * NEAR);
+        let centre = mesh.centroid(patch);
+        let [eye, eye_low] = self.local.parts(centre);
+        let own_triangle = self.chunks.places[mesh.triangle(patch)];
+        Face::all(&frame).map(|face| View {
+            face: FaceView {
+                eye,
+                near,
+                right: face.right.as_vec3().to_array(),
+                bottom: face.bottom as f32,
+                up: face.up.as_vec3().to_array(),
+                own_triangle,
+                forward: face.forward.as_vec3().to_array(),
+                padding: 0,
+                eye_low,
+                padding_2: 0,
+            },
+            places: self.chunks.in_view(centre, &face),
+        })
+    }
+
+    /// One hemicube a patch, each with its turn, of resolution number `at`.
+    fn draw_batch(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[(NodeId, f64)],
+        at: usize,
+    ) -> Result<Vec<Row>, Error> {
+        let start = Instant::now();
+        let views: Vec<View> =
+            patches.iter().flat_map(|&(p, turn)| self.views(mesh, p, turn)).collect();
+        let count = patches.len() as u32;
+        let (gpu, slots) = (&self.gpu, self.slots);
+        let Batches { item_buffer, reduce, resolutions, readback, .. } = &mut self.batches;
+        let resolution = &mut resolutions[at];
+        let seconds = &mut self.seconds;
+        let rows: Result<Vec<Row>, String> = gpu.attempt(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let queries = readback.queries();
+            item_buffer.draw(gpu, &mut encoder, resolution, &views, queries);
+            reduce.reduce(&mut encoder, resolution, count, queries);
+            let source = (&reduce.rows, u64::from(count * slots) * 4);
+            readback.finish(gpu, encoder, source, (start, seconds), |bytes| {
+                let dense: &[u32] = bytemuck::cast_slice(bytes);
+                let rows = dense.chunks_exact(slots as usize).zip(patches);
+                rows.map(|(dense, &(patch, _))| sparse(dense, patch)).collect()
+            })
+        })?;
+        resolution.drawn += u64::from(count);
+        rows.map_err(|found| gpu.wrong(found))
+    }
+}
+
+impl FormFactors for HemicubeRows {
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let halvings = resolution_policy::halvings(unshot_share, self.full_share) as usize;
+        let at = halvings.min(self.batches.resolutions.len() - 1);
+        let count = self.rotations.get();
+        let step = FRAC_PI_2 / f64::from(count);
+        let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
+        let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
+        let mut rows = Vec::with_capacity(turned.len());
+        for batch in turned.chunks(self.batches.most as usize) {
+            rows.extend(self.draw_batch(mesh, batch, at)?);
+        }
+        if count == 1 {
+            return Ok(rows);
+        }
+        let mean = |turns: &[Row]| Row::mean(&turns.iter().collect::<Vec<_>>());
+        Ok(rows.par_chunks(count as usize).map(mean).collect())
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        (self.batch / self.rotations.get()).max(1) as usize
+    }
+
+    fn fingerprint(&self) -> String {
+        let HemicubeRows { rotations, full_share, .. } = self;
+        let resolution = self.batches.resolutions[0].pixels;
+        format!("{rotations} hemicubes of {resolution}, all from {full_share}")
+    }
+}
+
+/// Near plane, in units of the square root of the patch's area.
+const NEAR: f64 = 1e-4;
+
+/// Turn of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours do
+/// not repeat one another's pixel pattern and every run turns alike.
+fn rotation(patch: NodeId) -> f64 {
+    // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+    let mut z = (u64::from(patch.0) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
+    unit * FRAC_PI_2
+}
+
+/// The row of `patch` from what the device says; or what is wrong with that.
+fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
+    let seen = dense[FIRST_ELEMENT as usize..].iter();
+    let entries = (0..)
+        .zip(seen)
+        .filter(|&(_, &share)| share != 0)
+        .map(|(element, &share)| Entry { element, share })
+        .collect();
+    let row = Row { entries, escaped: dense[OPEN as usize], backface: dense[BACK as usize] };
+    match row.sum() == u64::from(Row::TOTAL) {
+        true => Ok(row),
+        false => Err(format!("shares of patch {} that sum to {}", patch.0, row.closure())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::backend::gpu::layout::FIRST_CELL;
+    use crate::scene::{Material, Scene, Triangle};
+
+    /// The item buffer of the last hemicube drawn alone, line by line; 64 pixels wide.
+    fn items(h: &HemicubeRows) -> Vec<u32> {
+        let size = 64 * 192 * 4;
+        let buffer = h.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            h.batches.resolutions[0].layers.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(64 * 4),
+                    rows_per_image: None,
+                },
+            },
+            wgpu::Extent3d { width: 64, height: 192, depth_or_array_layers: 1 },
+        );
+        h.gpu.queue.submit([encoder.finish()]);
+        buffer.slice(..).map_async(wgpu::MapMode::Read, |r| r.unwrap());
+        h.gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let bytes = buffer.slice(..).get_mapped_range().unwrap();
+        bytemuck::pod_collect_to_vec(&bytes)
+    }
+
+    /// A patch at the origin that faces +z, and small triangles around each given centre, facing
+    /// the origin or away from it.
+    fn around_origin(centres: &[(DVec3, bool)]) -> Mesh {
+        let mut corners = vec![[DVec3::X, DVec3::Y, -DVec3::X - DVec3::Y].map(|p| p * 0.01)];
+        for &(centre, front) in centres {
+            let (x, y) = centre.normalize().any_orthonormal_pair();
+            let (x, y) = if front { (y, x) } else { (x, y) };
+            let small = centre.length() * 0.1;
+            corners.push([x, -0.5 * x + 0.9 * y, -0.5 * x - 0.9 * y].map(|p| centre + p * small));
+        }
+        let triangles = (0..corners.len() as u32)
+            .map(|t| Triangle { corners: [3 * t, 3 * t + 1, 3 * t + 2], ..Default::default() });
+        let triangles = triangles.collect();
+        let materials = vec![Material::grey("grey", 0.5)];
+        let scene = Scene::new(
+            corners.into_iter().flatten().collect(),
+            triangles,
+            vec!["g".into()],
+            materials,
+        );
+        Mesh::new(scene.unwrap(), f64::INFINITY).unwrap()
+    }
+
+    /// The device; a test without one fails unless RADIOSITY_NO_GPU says that none is there.
+    fn gpu() -> Option<Gpu> {
+        let without = std::env::var_os("RADIOSITY_NO_GPU").is_some();
+        (!without).then(|| Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set"))
+    }
+
+    #[test]
+    fn every_face_looks_where_its_frame_says() {
+        let Some(gpu) = gpu() else { return };
+        // Pixels off all symmetries, in each face's own image.
+        let pixels = [(40, 11), (9, 20), (50, 7), (30, 26), (13, 13)];
+        let patch = NodeId(0);
+        let frame = Frame::new(DVec3::Z, rotation(patch));
+        let faces = Face::all(&frame);
+        let toward =
+            |f: usize| (faces[f].direction(64, pixels[f].0, pixels[f].1), f.is_multiple_of(2));
+        let mesh = around_origin(&[0, 1, 2, 3, 4].map(toward));
+        let mut h = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
+        h.rows(&mesh, &[patch], 1.0).unwrap();
+        let items = items(&h);
+        for (f, &(x, y)) in pixels.iter().enumerate() {
+            let line = Face::rows(f, 64).start + y;
+            // Triangle f + 1 has one cell; the patch's own triangle has the first.
+            let want = if f.is_multiple_of(2) { FIRST_CELL + 1 + f as u32 } else { BACK };
+            assert_eq!(items[(line * 64 + x) as usize], want, "face {f}");
+        }
+        // A marker is 0.1 wide at distance 1 or more: below 12 pixels across, so most see nothing.
+        let open = items.iter().filter(|&&i| i == OPEN).count();
+        assert!(open > 192 * 64 - 5 * 12 * 12 && open < 192 * 64, "{open}");
+        assert!(!items.contains(&FIRST_CELL), "its own triangle is never hit");
+    }
+
+    #[test]
+    fn the_nearer_of_two_is_seen() {
+        let Some(gpu) = gpu() else { return };
+        // Same cone of directions, drawn far first and near first.
+        for (near, far) in [(1, 2), (2, 1)] {
+            let at = |k: u32| (DVec3::new(0.3, 0.2, 1.0) * if k == near { 1.0 } else { 2.0 }, true);
+            let mesh = around_origin(&[at(1), at(2)]);
+            let row = &HemicubeRows::new(&gpu, &mesh, 64)
+                .unwrap()
+                .rows(&mesh, &[NodeId(0)], 1.0)
+                .unwrap()[0];
+            let share = |k: u32| {
+                row.entries.iter().find(|e| e.element == k).map_or(0, |e| u64::from(e.share))
+            };
+            // The far one looks out by the pixels of the outline at most.
+            assert!(share(near) > 10 * share(far), "{} {}", share(near), share(far));
+        }
+    }
+
+    #[test]
+    fn what_is_no_row_is_an_error() {
+        // OPEN, BACK and three elements.
+        let total = Row::TOTAL;
+        let good = sparse(&[total - 10, 3, 0, 7, 0], NodeId(5)).unwrap();
+        assert_eq!((good.escaped, good.backface), (total - 10, 3));
+        assert_eq!(good.entries, [Entry { element: 1, share: 7 }]);
+        // Nothing written, all bits set, one unit too few, one too many: sums beyond 32 bits count.
+        let bad = [[0; 5], [total; 5], [total - 10, 3, 0, 6, 0], [total, 0, 0, 1, 0]];
+        for dense in bad {
+            let e = sparse(&dense, NodeId(5)).unwrap_err();
+            assert!(e.contains("patch 5"), "{e}");
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The settled light on the device: quadtrees, and the radiosity at their elements' corners.
+
+use rayon::prelude::*;
+
+use super::device::Gpu;
+use super::layout::{ELEMENTS_A_LINE, INNER, Lattice};
+use super::memory::Memory;
+use crate::error::{Error, ErrorKind};
+use crate::gather::RadiosityField;
+use crate::mesh::{Mesh, NodeId};
+
+/// Arrays that `radiance.wgsl` reads.
+#[derive(Debug)]
+pub struct SourceBuffers {
+    /// Per triangle, where in `nodes` those of its deepest complete level are.
+    pub lattices: wgpu::Buffer,
+    /// Per node, [`INNER`] plus the first of its four children, or its element.
+    pub nodes: wgpu::Buffer,
+    /// Per element, the reflected radiosity at its three corners, per channel, one below the other; [`ELEMENTS_A_LINE`] side by side.
+    pub elements: wgpu::TextureView,
+}
+
+impl SourceBuffers {
+    /// MatrixChecks `sources` against a scene of so many triangles, and uploads them, in units of `bright`
+    /// W/m².
+    pub fn new(
+        memory: &Memory,
+        sources: &RadiosityField,
+        triangles: usize,
+        bright: f64,
+    ) -> Result<SourceBuffers, Error> {
+        check(&memory.gpu, sources, triangles)?;
+        let RadiosityField { mesh, corners, reflected } = *sources;
+        let (lattices, nodes) = quadtrees(mesh);
+        let value = |k: u32| (reflected[k as usize] / bright).as_vec3().extend(0.0).to_array();
+        let line = ELEMENTS_A_LINE as usize;
+        let lines = corners.len().div_ceil(line);
+        let mut texels = vec![[0f32; 4]; lines * 3 * line];
+        texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(
+            |(texels, corners)| {
+                for (x, corner) in corners.iter().enumerate() {
+                    (0..3).for_each(|k| texels[k * line + x] = value(corner[k]));
+                }
+            },
+        );
+        let size = [ELEMENTS_A_LINE, 3 * lines as u32, 1];
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let elements = memory.texture("elements", size, format, usage)?;
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * ELEMENTS_A_LINE),
+            rows_per_image: None,
+        };
+        let texels = bytemuck::cast_slice(&texels);
+        memory.gpu.queue.write_texture(elements.as_image_copy(), texels, layout, elements.size());
+        Ok(SourceBuffers {
+            lattices: memory.storage("lattices", bytemuck::cast_slice(&lattices))?,
+            nodes: memory.storage("nodes", bytemuck::cast_slice(&nodes))?,
+            elements: elements.create_view(&Default::default()),
+        })
+    }
+}
+
+/// All quadtrees' nodes as numbers, and once more those of each triangle's deepest complete level.
+fn quadtrees(mesh: &Mesh) -> (Vec<Lattice>, Vec<u32>) {
+    let first_child = |n: usize| mesh.children(NodeId(n as u32)).map_or(0, |c| INNER | c[0].0);
+    let mut nodes: Vec<u32> = (0..mesh.node_count()).map(first_child).collect();
+    let mut complete = vec![u32::MAX; mesh.scene().triangles().len()];
+    for e in 0..mesh.element_count() {
+        let node = mesh.element(e);
+        nodes[node.0 as usize] = e as u32;
+        let level = &mut complete[mesh.triangle(node)];
+        *level = mesh.cell(node).level.min(*level);
+    }
+    let mut lattices = Vec::with_capacity(complete.len());
+    for (t, level) in complete.into_iter().enumerate() {
+        let first = nodes.len();
+        nodes.resize(first + (1 << (2 * level)), 0);
+        let mut level_nodes = vec![mesh.root(t)];
+        for _ in 0..level {
+            level_nodes =
+                level_nodes.into_iter().filter_map(|n| mesh.children(n)).flatten().collect();
+        }
+        for node in level_nodes {
+            nodes[first + mesh.cell(node).index() as usize] = nodes[node.0 as usize];
+        }
+        lattices.push(Lattice { first: first as u32, side: 1 << level });
+    }
+    (lattices, nodes)
+}
+
+fn check(gpu: &Gpu, sources: &RadiosityField, triangles: usize) -> Result<(), Error> {
+    let RadiosityField { mesh, corners, reflected } = *sources;
+    let setting = |found: String, remedy: String| {
+        Err(Error::new(ErrorKind::Setting, "sources".to_string(), found, remedy))
+    };
+    let (count, elements) = (mesh.scene().triangles().len(), mesh.element_count());
+    if count != triangles {
+        let remedy = format!("the scene gathered in has {triangles}: give a mesh of the same");
+        return setting(format!("a mesh of {count} triangles"), remedy);
+    }
+    if corners.len() != elements {
+        let found = format!("corners of {} elements", corners.len());
+        return setting(found, format!("the mesh has {elements}"));
+    }
+    if let Some(k) = corners.iter().flatten().find(|&&k| k as usize >= reflected.len()) {
+        return setting(format!("corner value {k}"), format!("must be below {}", reflected.len()));
+    }
+    let limits = gpu.device.limits();
+    let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    // There are fewer than three nodes an element: less than 4/3 in trees and one in lattices.
+    let most = u64::from(limits.max_texture_dimension_2d / 3 * ELEMENTS_A_LINE).min(buffer / 12);
+    if elements as u64 > most {
+        return setting(format!("{elements} elements"), format!("this device holds {most}"));
+    }
+    Ok(())
+}

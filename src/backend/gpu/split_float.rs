@@ -1,0 +1,49 @@
+//! Coordinates as a device takes them: from the middle of the scene, in units of its size, each as the
+//! sum of two 32-bit numbers. They are the same for a scene of any scale, wherever it stands.
+
+use glam::DVec3;
+
+use super::layout::Corner;
+use crate::scene::Scene;
+
+/// A scene's own coordinates on the device.
+#[derive(Clone, Copy, Debug)]
+pub struct SplitFloat {
+    origin: DVec3,
+    /// Longest side of the box around the scene, its own unit.
+    unit: f64,
+}
+
+impl SplitFloat {
+    pub fn new(scene: &Scene) -> SplitFloat {
+        let (low, high) = scene.bounds();
+        SplitFloat { origin: low + (high - low) / 2.0, unit: (high - low).max_element() }
+    }
+
+    /// The two parts of `p`: what 32 bits hold of it, and of the rest. What lies near an eye is told
+    /// apart however small it is: differences of the parts are added, and the first of them is exact.
+    pub fn parts(&self, p: DVec3) -> [[f32; 3]; 2] {
+        let p = (p - self.origin) / self.unit;
+        let high = p.as_vec3();
+        [high.to_array(), (p - high.as_dvec3()).as_vec3().to_array()]
+    }
+
+    /// Corners one after the other, as `item_buffer.wgsl` and `radiance.wgsl` read them.
+    pub fn corners(&self, corners: impl Iterator<Item = DVec3>) -> Vec<Corner> {
+        let corner = |p| {
+            let [high, low] = self.parts(p);
+            Corner { high, padding: 0, low, padding_2: 0 }
+        };
+        corners.map(corner).collect()
+    }
+
+    /// A length.
+    pub fn length(&self, length: f64) -> f32 {
+        (length / self.unit) as f32
+    }
+
+    /// One over a length, from the device's to the scene's unit.
+    pub fn inverse_length(&self, inverse: f32) -> f64 {
+        f64::from(inverse) / self.unit
+    }
+}

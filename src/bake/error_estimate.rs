@@ -1,0 +1,352 @@
+//! How far off a solution is, by its own account.
+
+use glam::DVec3;
+use std::ops::ControlFlow;
+
+use crate::error::Error;
+use crate::gather::{Gather, GatherPoint, IrradianceSample};
+use crate::progress::BatchSizer;
+use crate::sampling::rotation::CellRotation;
+use crate::scene::Rgb;
+use crate::solver::Ledger;
+use crate::vertex::gather_points::{SurfaceOffset, is_covered};
+use crate::vertex::gathering::GatheredMesh;
+
+/// An estimate of the error of vertex radiosity: root mean square over the area, as a share of the
+/// radiosity. The squares of the parts add up to that of the whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorEstimate {
+    /// All of it.
+    pub total: f64,
+    /// Light that was not shot, if it fell as evenly as the ambient term.
+    pub unshot: f64,
+    /// HemicubeRows have so many pixels, fans so many rays.
+    pub sampling: f64,
+    /// Radiosity is linear over the faces.
+    pub mesh: f64,
+    /// What was gathered is not settled: it would change if it shone itself.
+    pub settling: f64,
+    /// An exact bound: no more than this share of all radiosity times area is missing because it was
+    /// not shot, in the worst channel.
+    pub unshot_bound: f64,
+    /// Random places that were looked at.
+    pub places: usize,
+}
+
+/// What there is to be judged.
+pub(crate) struct ErrorEstimator<'a> {
+    /// What the vertices gathered, or the elements' own light.
+    pub light: &'a GatheredMesh,
+    /// What shone on them.
+    pub sources: &'a GatheredMesh,
+    /// How far off the middle of each element may be, by what is known of it: W/m², in units that
+    /// have yet to be found.
+    pub rest: &'a [f64],
+    pub ledger: &'a Ledger,
+    /// Times that all vertices have gathered.
+    pub sweeps: u32,
+}
+
+/// A place that is dim or behind something, and sees what is nearer than this share of the scene's
+/// diagonal, lies in a gap that nobody looks into. It is not judged.
+const GAP: f64 = 0.1;
+
+/// Behind something are places that see more than this share of backs.
+const BEHIND: f64 = 0.5;
+
+/// Errors have heavier tails than a normal distribution of the same spread: so much wider are those
+/// of vertices given, that one in twenty is off by more than twice as much.
+const HEAVY: f64 = 1.8;
+
+/// A random place, and what is there.
+struct Sample {
+    element: usize,
+    reflectance: Rgb,
+    place: GatherPoint,
+    /// Radiosity that the surface says, W/m².
+    said: Rgb,
+    emitted: Rgb,
+    size: f64,
+    /// Of the place, in [0, 1).
+    turn: f64,
+}
+
+/// Dim is what reflects less than this share of the mean: its errors are weighed against that.
+const DIM: f64 = 0.05;
+
+impl ErrorEstimator<'_> {
+    /// Looks at `count` random places, and gives the estimate and its share at each vertex, W/m².
+    /// `progress` is told how many are done; when it stops that, they are enough.
+    pub fn judge(
+        &self,
+        count: usize,
+        gather: &mut dyn Gather,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(ErrorEstimate, Vec<f64>), Error> {
+        let samples = self.samples(count);
+        let (low, high) = self.light.mesh.scene().bounds();
+        let gap = GAP * (high - low).length();
+        let own = std::ptr::eq(self.light, self.sources);
+        let mut looks: Vec<Option<[IrradianceSample; 3]>> = vec![None; samples.len()];
+        let order = scattered(samples.len());
+        let (mut left, mut pace) = (&order[..], BatchSizer::new(FEW));
+        while !left.is_empty() {
+            pace.next(&mut left, |now| {
+                let places: Vec<GatherPoint> = now.iter().map(|&k| samples[k].place).collect();
+                // A hair away hemicubes and fans are turned otherwise.
+                let turned: Vec<GatherPoint> = now.iter().map(|&k| samples[k].aside()).collect();
+                let found = gather.gather(&self.sources.sources(), &places)?;
+                let again = gather.gather(&self.sources.sources(), &turned)?;
+                let settled = match own {
+                    true => found.clone(),
+                    false => gather.gather(&self.light.sources(), &places)?,
+                };
+                for (i, &k) in now.iter().enumerate() {
+                    looks[k] = Some([found[i], again[i], settled[i]]);
+                }
+                Ok::<_, Error>(())
+            })?;
+            if progress(samples.len() - left.len()).is_break() {
+                break;
+            }
+        }
+        let looked = samples.into_iter().zip(looks);
+        let (samples, looks): (Vec<Sample>, Vec<[IrradianceSample; 3]>) =
+            looked.filter_map(|(s, looks)| Some((s, looks?))).unzip();
+        let reflected = samples.iter().map(|s| (s.said - s.emitted).length()).sum::<f64>();
+        let dim = (DIM * reflected / samples.len().max(1) as f64).max(f64::MIN_POSITIVE);
+        let (mut off, mut noise, mut settling, mut guess) = (vec![], vec![], vec![], vec![]);
+        for (k, s) in samples.iter().enumerate() {
+            if looks[k].iter().any(|g| is_covered(g, s.size)) || s.reflectance == Rgb::ZERO {
+                continue;
+            }
+            let [a, b, c] = looks[k].map(|g| s.emitted + s.reflectance * g.irradiance);
+            let found = looks[k][0];
+            let truth = (a + b) / 2.0;
+            let hidden = truth.length() < dim || found.backface > BEHIND;
+            if hidden && found.inverse_distance * gap > 1.0 {
+                continue;
+            }
+            let whole = truth.length().max(s.said.length()).max(dim);
+            off.push((s.said - truth) / whole);
+            noise.push(((a - b) / whole).length_squared() / 2.0);
+            settling.push((c - a) / whole);
+            guess.push((self.rest[s.element] / whole).powi(2));
+        }
+        let used = off.len().max(1) as f64;
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / used;
+        // Of places that reflect nothing all is known.
+        let share = used / samples.len().max(1) as f64;
+        let noise = mean(&noise);
+        let squares = off.iter().map(|d| d.length_squared()).sum::<f64>() / used;
+        // Rare places are the worst: a standard error of that mean is added to it.
+        let spread = off.iter().map(|d| (d.length_squared() - squares).powi(2)).sum::<f64>() / used;
+        let squares = squares + (spread / used).sqrt();
+        // Two looks have half the noise of one; between three vertices that are as wrong, on the
+        // average half of it is left.
+        let all = (squares - noise / 2.0).max(0.1 * squares);
+        let sampling = (noise / 2.0).min(0.7 * all);
+        let mesh = all - sampling;
+        let drift: Vec<DVec3> = if own { off.iter().map(|&d| -d).collect() } else { settling };
+        let bias = drift.iter().sum::<DVec3>() / used;
+        let reflectance = self.mean_reflectance();
+        let tail = bias.length() / (1.0 - reflectance);
+        let settling = if own {
+            (tail * reflectance).powi(2)
+        } else {
+            let local = drift.iter().map(|d| (*d - bias).length_squared()).sum::<f64>() / used;
+            // What rays that differ say of a difference is small: they are the same.
+            local + tail * tail
+        };
+        // What was not shot is a part of what is not settled.
+        let open = looks.iter().map(|[g, ..]| g.escaped).sum::<f64>() / looks.len().max(1) as f64;
+        let passed = if own { 1.0 } else { reflectance * (1.0 - open) };
+        let (unshot, unshot_bound) = self.unshot(dim);
+        let unshot = (unshot * passed.powi(self.sweeps as i32)).powi(2) / share.max(1e-30);
+        let settling = (settling - unshot).max(0.0);
+        let calibration = (mesh / mean(&guess).max(1e-30)).sqrt();
+        let certificate = ErrorEstimate {
+            total: ((all + settling + unshot) * share).sqrt(),
+            unshot: (unshot * share).sqrt(),
+            sampling: (sampling * share).sqrt(),
+            mesh: (mesh * share).sqrt(),
+            settling: (settling * share).sqrt(),
+            unshot_bound,
+            places: samples.len(),
+        };
+        let even = sampling + settling + unshot;
+        Ok((certificate, self.at_vertices(calibration, even.sqrt())))
+    }
+
+    /// The root mean square of what `gather` is off by because it looks so many times and not more,
+    /// where it is to be interpolated; by `count` places.
+    pub fn sampling(&self, count: usize, gather: &mut dyn Gather) -> Result<f64, Error> {
+        let samples = self.samples(count);
+        let places = |aside: bool| -> Vec<GatherPoint> {
+            samples.iter().map(|s| if aside { s.aside() } else { s.place }).collect()
+        };
+        let sources = self.sources.sources();
+        let one = gather.gather(&sources, &places(false))?;
+        let two = gather.gather(&sources, &places(true))?;
+        let reflected = samples.iter().map(|s| (s.said - s.emitted).length()).sum::<f64>();
+        let dim = (DIM * reflected / samples.len().max(1) as f64).max(f64::MIN_POSITIVE);
+        let off = samples.iter().zip(one.iter().zip(&two)).map(|(s, (a, b))| {
+            let [a, b] = [a, b].map(|g| s.emitted + s.reflectance * g.irradiance);
+            ((a - b) / a.length().max(s.said.length()).max(dim)).length_squared() / 2.0
+        });
+        Ok((off.sum::<f64>() / samples.len().max(1) as f64 / 2.0).sqrt())
+    }
+
+    /// Places spread evenly over the area of the faces.
+    fn samples(&self, count: usize) -> Vec<Sample> {
+        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
+        let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
+        let area = |f: &[u32; 3]| {
+            let [a, b, c] = corners(f);
+            (b - a).cross(c - a).length() / 2.0
+        };
+        let whole: f64 = surface.faces.iter().map(area).sum();
+        let (above, turns) = (SurfaceOffset::new(mesh.scene()), CellRotation::new(mesh.scene()));
+        let (mut below, mut samples) = (0.0, Vec::with_capacity(count));
+        for (face, &element) in surface.faces.iter().zip(&surface.elements) {
+            below += area(face);
+            while samples.len() < count {
+                let k = samples.len() as f64;
+                if (k + 0.5) / count as f64 * whole >= below {
+                    break;
+                }
+                // The additive recurrence of the plastic number (Roberts 2018), folded into the triangle.
+                let (u, v) = (
+                    (0.5 + k * 0.754_877_666_246_693).fract(),
+                    (0.5 + k * 0.569_840_290_998_053_2).fract(),
+                );
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let mix = |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
+                let element = element as usize;
+                let node = mesh.element(element);
+                let (material, size) = (mesh.material(node), mesh.area(node).sqrt());
+                let place = above.place(mix(corners(face)), mesh.normal(node), size);
+                samples.push(Sample {
+                    element,
+                    reflectance: material.reflectance,
+                    place,
+                    said: mix(face.map(|v| surface.radiosity[v as usize])),
+                    emitted: material.exitance,
+                    size,
+                    turn: turns.of(&place),
+                });
+            }
+        }
+        samples
+    }
+
+    /// Mean reflectance over the area: the largest of the channels.
+    fn mean_reflectance(&self) -> f64 {
+        let mesh = &self.light.mesh;
+        let (mut sum, mut area) = (Rgb::ZERO, 0.0);
+        for e in 0..mesh.element_count() {
+            let node = mesh.element(e);
+            sum += mesh.material(node).reflectance * mesh.area(node);
+            area += mesh.area(node);
+        }
+        (sum / area).max_element()
+    }
+
+    /// Root mean square of the ambient term over the radiosity, or `dim` where that is more, and the
+    /// bound.
+    fn unshot(&self, dim: f64) -> (f64, f64) {
+        let mesh = &self.sources.mesh;
+        let mut ambient = vec![Rgb::ZERO; mesh.element_count()];
+        self.ledger.add_ambient(mesh, &mut ambient);
+        let (mut squares, mut area, mut flux) = (0.0, 0.0, Rgb::ZERO);
+        let mut most = Rgb::ZERO;
+        for (e, ambient) in ambient.iter().enumerate() {
+            let node = mesh.element(e);
+            let material = mesh.material(node);
+            let reflected =
+                self.sources.corners[e].iter().map(|&v| self.sources.reflected[v as usize]);
+            let radiosity = material.exitance + reflected.sum::<Rgb>() / 3.0;
+            let size = mesh.area(node);
+            let whole = (radiosity + *ambient).length().max(dim);
+            squares += (ambient.length() / whole).powi(2) * size;
+            area += size;
+            flux += radiosity * size;
+            most = most.max(material.reflectance);
+        }
+        // Every bounce returns the largest reflectance of what is left, at most.
+        let bound = self.ledger.unshot * most / (Rgb::ONE - most) / flux;
+        let bound = if flux == Rgb::ZERO { 0.0 } else { bound.max_element() };
+        ((squares / area).sqrt(), bound)
+    }
+
+    /// The error that each vertex of the surface may have, W/m²: what is known of the elements around
+    /// it, times `calibration`; and `even`, a share of its radiosity, that is everywhere.
+    fn at_vertices(&self, calibration: f64, even: f64) -> Vec<f64> {
+        let surface = &self.light.surface;
+        let mut sums = vec![(0.0, 0.0); surface.positions.len()];
+        for (face, &e) in surface.faces.iter().zip(&surface.elements) {
+            let area = self.light.mesh.area(self.light.mesh.element(e as usize));
+            for &v in face {
+                sums[v as usize].0 += area * self.rest[e as usize].powi(2);
+                sums[v as usize].1 += area;
+            }
+        }
+        let all = sums.into_iter().zip(&surface.radiosity);
+        all.map(|((sum, area), b)| {
+            let mesh = if area > 0.0 { sum / area } else { 0.0 };
+            HEAVY * (mesh * calibration * calibration + (even * b.length()).powi(2)).sqrt()
+        })
+        .collect()
+    }
+}
+
+/// Places that are looked at first, of those that are spread evenly: few, and no more when nobody
+/// waits for it.
+const FEW: usize = 16;
+
+/// The numbers below `count`, each once, the first of them spread over all as evenly as any.
+fn scattered(count: usize) -> Vec<usize> {
+    let divides = |mut a: usize, mut b: usize| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a != 1
+    };
+    // Steps near the golden section spread best (Knuth 1973, 6.4).
+    let mut step = (count as f64 * 0.618_033_988_749_895) as usize;
+    while divides(step, count) && step < count {
+        step += 1;
+    }
+    (0..count).map(|k| k * step % count).collect()
+}
+
+impl Sample {
+    fn aside(&self) -> GatherPoint {
+        let p = self.place;
+        let (x, _) = p.normal.any_orthonormal_pair();
+        let step = 1e-3 * self.size * (0.5 + self.turn);
+        GatherPoint { position: p.position + x * step, ..p }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_taken_once_each_and_everywhere() {
+        for count in [0, 1, 2, 3, 10, 192, 1000, 1024] {
+            let order = scattered(count);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..count).collect::<Vec<_>>());
+            let mut first: Vec<usize> = order.into_iter().take(FEW).collect();
+            first.push(count);
+            first.sort_unstable();
+            // By the three-gap theorem no gap is larger than the sum of the two others, which at the
+            // golden section is below 2.7 times the mean; steps are rounded.
+            let gap = first.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
+            assert!(gap as f64 <= 3.0 * count as f64 / FEW as f64 + 1.0, "{count}: {gap}");
+        }
+    }
+}

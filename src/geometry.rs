@@ -1,0 +1,3 @@
+//! Geometry that knows nothing of light.
+
+pub(crate) mod rounding;

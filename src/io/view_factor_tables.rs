@@ -1,0 +1,155 @@
+//! View factors out: a CSV matrix, a CSV list with errors, Matrix Market.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::write_file;
+use crate::error::Error;
+use crate::view_factor::{Estimate, Missing, ViewFactors};
+
+/// Writes the matrix as CSV: a header row and a first column of names, row leaves, column receives;
+/// then `open`, what leaves the scene, `back`, what meets the backs of surfaces, and the `area` of
+/// each row's group. Values have nine decimals; below 1e-5, five digits. Zero is `0`; what is merely
+/// not seen is left empty.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_view_factors(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+    write_file(path.as_ref(), |out| {
+        let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
+        writeln!(out, "F from row to column,{},open,back,area", names.join(","))?;
+        for (i, name) in names.iter().enumerate() {
+            write!(out, "{name}")?;
+            let mut row = matrix.factors[i].iter().peekable();
+            for j in 0..names.len() as u32 {
+                match row.next_if(|f| f.to == j) {
+                    Some(f) => write!(out, ",{}", RoundedValue::of(f.value))?,
+                    None if matrix.absent == Missing::NotSeen => write!(out, ",")?,
+                    None => write!(out, ",0")?,
+                }
+            }
+            let [open, back] =
+                [&matrix.open[i], &matrix.back[i]].map(|e| RoundedValue::of(e.value));
+            writeln!(out, ",{open},{back},{}", matrix.areas[i])?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes every nonzero as a line of CSV, with its standard error beside it, rounding of the value
+/// as it is printed included: for matrices with many zeros, and for errors. After the groups that a
+/// group sees come `open`, what leaves the scene, and `back`, what meets the backs of surfaces.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_view_factor_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+    write_file(path.as_ref(), |out| {
+        let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
+        writeln!(out, "from,to,factor,standard_error,from_area,to_area")?;
+        for (i, name) in names.iter().enumerate() {
+            let area = matrix.areas[i];
+            for f in &matrix.factors[i] {
+                let (to, other) = (&names[f.to as usize], matrix.areas[f.to as usize]);
+                let printed = RoundedValue::of(f.value);
+                writeln!(
+                    out,
+                    "{name},{to},{printed},{:.2e},{area},{other}",
+                    printed.error(f.error)
+                )?;
+            }
+            for (to, Estimate { value, error }) in
+                [("open", matrix.open[i]), ("back", matrix.back[i])]
+            {
+                let printed = RoundedValue::of(value);
+                writeln!(out, "{name},{to},{printed},{:.2e},{area},", printed.error(error))?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes the nonzeros in Matrix Market's coordinate format (R. F. Boisvert, R. Pozo,
+/// K. A. Remington, NISTIR 5935, 1996), rows leave and columns receive, both counted from 1; names,
+/// areas, `open` and `back` of the groups are in comments.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+    write_file(path.as_ref(), |out| {
+        let n = matrix.names.len();
+        writeln!(out, "%%MatrixMarket matrix coordinate real general")?;
+        writeln!(
+            out,
+            "% view factors: entry (i, j) is the share of the flux leaving group i (row)"
+        )?;
+        writeln!(
+            out,
+            "% that arrives at group j (column); what is absent is {}",
+            match matrix.absent {
+                Missing::Zero => "zero",
+                Missing::NotSeen => "not seen, zero or small",
+            }
+        )?;
+        writeln!(out, "% group area open back name")?;
+        for (i, name) in matrix.names.iter().enumerate() {
+            let (open, back) = (matrix.open[i].value, matrix.back[i].value);
+            writeln!(
+                out,
+                "% {} {:e} {open:e} {back:e} {}",
+                i + 1,
+                matrix.areas[i],
+                one_line(name)
+            )?;
+        }
+        let count: usize = matrix.factors.iter().map(Vec::len).sum();
+        writeln!(out, "{n} {n} {count}")?;
+        for (i, row) in matrix.factors.iter().enumerate() {
+            for f in row {
+                writeln!(out, "{} {} {:e}", i + 1, f.to + 1, f.value)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// A value with nine decimals, or five digits where it is small.
+struct RoundedValue {
+    text: String,
+    /// Of the last digit.
+    unit: f64,
+}
+
+impl RoundedValue {
+    fn of(value: f64) -> RoundedValue {
+        if value.abs() >= 1e-5 || value == 0.0 {
+            return RoundedValue { text: format!("{value:.9}"), unit: 1e-9 };
+        }
+        RoundedValue {
+            text: format!("{value:.4e}"),
+            unit: 1e-4 * 10f64.powf(value.abs().log10().floor()),
+        }
+    }
+
+    /// `error` and that of rounding: a uniform distribution over one unit of the last digit.
+    fn error(&self, error: f64) -> f64 {
+        error.hypot(self.unit / 12f64.sqrt())
+    }
+}
+
+impl std::fmt::Display for RoundedValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// A CSV field (RFC 4180): quoted where a comma, quote or line break is in it.
+fn quoted(name: &str) -> String {
+    match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")),
+        false => name.to_string(),
+    }
+}
+
+fn one_line(name: &str) -> String {
+    name.replace(['\n', '\r'], " ")
+}

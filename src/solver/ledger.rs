@@ -1,0 +1,79 @@
+//! Where all emitted light has gone.
+
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+/// Where all emitted flux has gone, W per channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ledger {
+    /// Exitance times area, over all elements.
+    pub emitted: Rgb,
+    /// Not reflected at the fronts of elements.
+    pub absorbed: Rgb,
+    /// Met no surface.
+    pub escaped: Rgb,
+    /// Met the back of a surface and was lost there.
+    pub backface_loss: Rgb,
+    /// Received or emitted, not yet passed on.
+    pub unshot: Rgb,
+    /// Passed on before it was received: 0 but for solvers that run ahead of the light (shooting
+    /// with overshoot, GMRES, a direct solve's rounding). What is unshot may yet make up for it.
+    pub overshot: Rgb,
+}
+
+impl Ledger {
+    /// Adds `weight` times `other`.
+    pub(super) fn add(&mut self, weight: Rgb, other: &Ledger) {
+        self.emitted += weight * other.emitted;
+        self.absorbed += weight * other.absorbed;
+        self.escaped += weight * other.escaped;
+        self.backface_loss += weight * other.backface_loss;
+        self.unshot += weight * other.unshot;
+        self.overshot += weight * other.overshot;
+    }
+
+    /// Emitted minus all else, relative to emitted: the worst channel. 0 when nothing is emitted.
+    pub fn imbalance(&self) -> f64 {
+        let accounted =
+            self.absorbed + self.escaped + self.backface_loss + self.unshot - self.overshot;
+        largest_share((self.emitted - accounted).abs(), self.emitted)
+    }
+
+    /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
+    /// fell evenly on all surfaces, again and again: the ambient term of Cohen, Chen, Wallace and
+    /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing of
+    /// where that would have gone. Gives the ambient radiosity, per unit of reflectance.
+    pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
+        let ambient = self.ambient(mesh);
+        for (e, b) in radiosity.iter_mut().enumerate() {
+            *b += mesh.material(mesh.element(e)).reflectance * ambient;
+        }
+        ambient
+    }
+
+    /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell evenly.
+    pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
+        let (mut area, mut reflects) = (0.0, Rgb::ZERO);
+        for e in 0..mesh.element_count() {
+            let node = mesh.element(e);
+            area += mesh.area(node);
+            reflects += mesh.material(node).reflectance * mesh.area(node);
+        }
+        let lost = (Rgb::ONE - reflects / area).max(Rgb::splat(f64::EPSILON));
+        (self.unshot - self.overshot) / area / lost
+    }
+
+    /// Share of the emitted flux that is unshot or overshot: the worst channel. 0 when nothing is
+    /// emitted.
+    pub fn unshot_share(&self) -> f64 {
+        largest_share(self.unshot + self.overshot, self.emitted)
+    }
+}
+
+/// Largest ratio part/whole over the channels in which the whole is above zero.
+pub(super) fn largest_share(part: Rgb, whole: Rgb) -> f64 {
+    let share = |(p, w): (f64, f64)| if w > 0.0 { p / w } else { 0.0 };
+    part.to_array().into_iter().zip(whole.to_array()).map(share).fold(0.0, f64::max)
+}

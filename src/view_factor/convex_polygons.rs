@@ -1,0 +1,264 @@
+//! Convex pieces of a scene: coplanar neighbouring triangles, merged.
+
+use std::collections::{BTreeMap, HashMap};
+
+use glam::DVec3;
+
+use crate::form_factor::closed_form::area_vector;
+use crate::scene::Scene;
+
+/// Corners off a common plane by less than this, in units of the scene's size, are in it: above the
+/// rounding of coordinates, and below what counts as contact elsewhere, so that nothing stands
+/// before its own plane.
+pub(super) const PLANAR: f64 = 4e-15;
+
+/// A turn at a corner, as the sine of its angle, that is straight on.
+const STRAIGHT: f64 = 1e-9;
+
+/// A convex plane polygon, counter-clockwise seen from its front, in units of the scene's size.
+#[derive(Clone, Debug)]
+pub(super) struct ConvexPolygon {
+    pub corners: Vec<DVec3>,
+    pub normal: DVec3,
+    pub area: f64,
+    /// Group of its triangles; that of the first one where groups are merged.
+    pub group: u32,
+}
+
+impl ConvexPolygon {
+    /// Nothing without area.
+    pub fn new(corners: Vec<DVec3>, group: u32) -> Option<ConvexPolygon> {
+        let vector = area_vector(&corners);
+        let area = vector.length();
+        let normal = vector.normalize_or_zero();
+        (normal != DVec3::ZERO).then_some(ConvexPolygon { corners, normal, area, group })
+    }
+
+    /// The same polygon with its front on the other side.
+    pub fn reversed(&self) -> ConvexPolygon {
+        let corners = self.corners.iter().rev().copied().collect();
+        ConvexPolygon { corners, normal: -self.normal, ..*self }
+    }
+}
+
+/// Which triangles may become one piece.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Merge {
+    /// Those of one group: pieces that give and receive.
+    WithinGroups,
+    /// Any: pieces that stand in the way.
+    AcrossGroups,
+}
+
+/// The scene as convex pieces around its middle, every length divided by `unit`, in the order of
+/// first triangles.
+///
+/// A connected coplanar region that is convex as a whole becomes one piece; of any other region
+/// neighbours are joined across their longest common sides as long as the union stays convex.
+pub(super) fn pieces(scene: &Scene, unit: f64, merge: Merge) -> Vec<ConvexPolygon> {
+    let mut outlines = Outlines::new(scene, unit, merge);
+    outlines.join_whole_regions();
+    outlines.join_neighbours();
+    outlines.finish(scene)
+}
+
+/// Polygons under way: loops of welded corners.
+struct Outlines {
+    corners: Vec<DVec3>,
+    /// Per triangle its polygon's loop while it stands for that polygon, else empty.
+    loops: Vec<Vec<u32>>,
+    /// Per triangle, the one that stands for its polygon, or one nearer to it.
+    parent: Vec<usize>,
+    normals: Vec<DVec3>,
+    /// Pairs of triangles that may merge, and the squared length of their common side.
+    neighbours: Vec<(f64, usize, usize)>,
+}
+
+impl Outlines {
+    fn new(scene: &Scene, unit: f64, merge: Merge) -> Outlines {
+        let count = scene.triangles().len();
+        let (loops, corners) = weld(scene, unit);
+        let normals: Vec<DVec3> = (0..count).map(|t| scene.normal(t)).collect();
+        let mut sides: HashMap<(u32, u32), Vec<usize>> = HashMap::new();
+        for (t, outline) in loops.iter().enumerate() {
+            for k in 0..3 {
+                sides.entry((outline[k], outline[(k + 1) % 3])).or_default().push(t);
+            }
+        }
+        let mut neighbours = Vec::new();
+        for (t, outline) in loops.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (outline[k], outline[(k + 1) % 3]);
+                let beyond = match (sides.get(&(a, b)), sides.get(&(b, a))) {
+                    // Where more than two triangles meet, none is the continuation.
+                    (Some(here), Some(there)) if here.len() == 1 && there.len() == 1 => there[0],
+                    _ => continue,
+                };
+                let group = |t: usize| scene.triangles()[t].group;
+                let allowed = merge == Merge::AcrossGroups || group(t) == group(beyond);
+                if t < beyond && allowed && normals[t].dot(normals[beyond]) > 0.0 {
+                    let side = corners[a as usize].distance_squared(corners[b as usize]);
+                    neighbours.push((side, t, beyond));
+                }
+            }
+        }
+        neighbours.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        Outlines { corners, loops, parent: (0..count).collect(), normals, neighbours }
+    }
+
+    fn find(&self, mut t: usize) -> usize {
+        while self.parent[t] != t {
+            t = self.parent[t];
+        }
+        t
+    }
+
+    /// Regions of triangles coplanar with the region's first; those convex as a whole are joined.
+    fn join_whole_regions(&mut self) {
+        let mut region: Vec<usize> = vec![usize::MAX; self.loops.len()];
+        let mut beside: Vec<Vec<usize>> = vec![Vec::new(); self.loops.len()];
+        for &(_, a, b) in &self.neighbours {
+            beside[a].push(b);
+            beside[b].push(a);
+        }
+        for seed in 0..self.loops.len() {
+            if region[seed] != usize::MAX {
+                continue;
+            }
+            let mut members = vec![seed];
+            region[seed] = seed;
+            let mut next = 0;
+            while let Some(&t) = members.get(next) {
+                next += 1;
+                for &n in &beside[t] {
+                    if region[n] == usize::MAX && self.coplanar(seed, &self.loops[n]) {
+                        region[n] = seed;
+                        members.push(n);
+                    }
+                }
+            }
+            if members.len() > 1
+                && let Some(outline) = self.union(&members, self.normals[seed])
+            {
+                for &t in &members {
+                    self.parent[t] = seed;
+                    self.loops[t].clear();
+                }
+                self.loops[seed] = outline;
+            }
+        }
+    }
+
+    fn join_neighbours(&mut self) {
+        for k in 0..self.neighbours.len() {
+            let (_, a, b) = self.neighbours[k];
+            let (a, b) = (self.find(a), self.find(b));
+            let (first, second) = (a.min(b), a.max(b));
+            if first == second || !self.coplanar(first, &self.loops[second]) {
+                continue;
+            }
+            if let Some(outline) = self.union(&[first, second], self.normals[first]) {
+                self.parent[second] = first;
+                self.loops[second].clear();
+                self.loops[first] = outline;
+            }
+        }
+    }
+
+    /// Whether `outline` lies in the plane of triangle `t`'s polygon.
+    fn coplanar(&self, t: usize, outline: &[u32]) -> bool {
+        let own = self.loops[t].iter().map(|&k| self.corners[k as usize]);
+        let other = outline.iter().map(|&k| self.corners[k as usize]);
+        let Some(origin) = own.clone().next() else { return false };
+        let all = own.chain(other);
+        let mut off = all.map(|p| self.normals[t].dot(p - origin).abs());
+        off.all(|off| off <= PLANAR)
+    }
+
+    /// The loop around all of `members`, if it is one and convex.
+    fn union(&self, members: &[usize], normal: DVec3) -> Option<Vec<u32>> {
+        // A corner visited twice would make the walk below ambiguous, and is never convex.
+        let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for &t in members {
+            let outline = &self.loops[t];
+            for (k, &a) in outline.iter().enumerate() {
+                let b = outline[(k + 1) % outline.len()];
+                // A side against one already there is inside the union: both go.
+                match next.get_mut(&b).map(|ends| (ends.iter().position(|&e| e == a), ends)) {
+                    Some((Some(at), ends)) => drop(ends.swap_remove(at)),
+                    _ => next.entry(a).or_default().push(b),
+                }
+            }
+        }
+        next.retain(|_, ends| !ends.is_empty());
+        let start = *next.keys().next()?;
+        let mut outline = vec![start];
+        let mut at = start;
+        loop {
+            let &[end] = next.get(&at)?.as_slice() else { return None };
+            if end == start {
+                break;
+            }
+            outline.push(end);
+            at = end;
+            if outline.len() > next.len() {
+                return None;
+            }
+        }
+        (outline.len() == next.len() && self.convex(&outline, normal)).then_some(outline)
+    }
+
+    /// Whether a loop turns left or goes straight on everywhere, and once around.
+    fn convex(&self, outline: &[u32], normal: DVec3) -> bool {
+        let mut around = 0.0;
+        for k in 0..outline.len() {
+            let (sine, cosine) = self.turn(outline, k, normal);
+            if sine < -STRAIGHT || (cosine < 0.0 && sine <= STRAIGHT) {
+                return false;
+            }
+            around += sine.atan2(cosine);
+        }
+        around < 1.5 * std::f64::consts::TAU
+    }
+
+    /// Sine and cosine of the turn at corner `k` of a loop.
+    fn turn(&self, outline: &[u32], k: usize, normal: DVec3) -> (f64, f64) {
+        let n = outline.len();
+        let at = |k: usize| self.corners[outline[k % n] as usize];
+        let (into, out) = (at(k) - at(k + n - 1), at(k + 1) - at(k));
+        let scale = into.length() * out.length();
+        (normal.dot(into.cross(out)) / scale, into.dot(out) / scale)
+    }
+
+    fn finish(self, scene: &Scene) -> Vec<ConvexPolygon> {
+        let mut pieces = Vec::new();
+        for (t, outline) in self.loops.iter().enumerate() {
+            let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT;
+            let kept = (0..outline.len()).filter(bend);
+            let corners = kept.map(|k| self.corners[outline[k] as usize]).collect();
+            pieces.extend(ConvexPolygon::new(corners, scene.triangles()[t].group));
+        }
+        pieces
+    }
+}
+
+/// Per triangle its corners as numbers of distinct positions, and these positions, from the middle
+/// of the scene and over `unit`.
+fn weld(scene: &Scene, unit: f64) -> (Vec<Vec<u32>>, Vec<DVec3>) {
+    let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut corners: Vec<DVec3> = Vec::new();
+    let (low, high) = scene.bounds();
+    let centre = low + (high - low) / 2.0;
+    let mut number = |p: DVec3| {
+        // Adding zero makes -0 equal to 0, bit for bit.
+        let bits = (p + DVec3::ZERO).to_array().map(f64::to_bits);
+        *seen.entry(bits).or_insert_with(|| {
+            corners.push((p - centre) / unit);
+            corners.len() as u32 - 1
+        })
+    };
+    let loops = (0..scene.triangles().len())
+        .map(|t| scene.corners(t).into_iter().map(&mut number).collect())
+        .collect();
+    (loops, corners)
+}

@@ -1,0 +1,421 @@
+//! Who can stand between two polygons.
+
+use glam::DVec3;
+
+use super::convex_polygons::ConvexPolygon;
+use crate::form_factor::closed_form::{clip, polygon_area};
+
+/// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
+/// and above what pieces may be off their own planes ([`super::convex_polygons::PLANAR`]).
+pub(super) const CONTACT: f64 = 1e-12;
+
+/// An edge shorter than this share of the shaft has a direction too uncertain to lean on: rounding of
+/// its ends, 1e-16, moves the plane by up to [`CONTACT`] at the far end.
+const SHORT: f64 = 1e-4;
+
+/// What is left of a piece within a shaft is only contact if its area is less than its length times
+/// this: its edges may be out of order.
+const SLIVER: f64 = 4.0 * CONTACT;
+
+/// Corners closer than this share of a polygon's extent are one: the line through both is too
+/// uncertain to cut by.
+const ONE: f64 = 1e-9;
+
+/// Pieces in one leaf of the tree.
+const LEAF: usize = 4;
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Bounds {
+    pub const NOTHING: Bounds = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    pub const EVERYTHING: Bounds = Bounds { low: DVec3::NEG_INFINITY, high: DVec3::INFINITY };
+
+    pub fn around<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Bounds {
+        let mut bounds = Bounds::NOTHING;
+        points.into_iter().for_each(|&p| bounds.include(p));
+        bounds
+    }
+
+    pub fn include(&mut self, point: DVec3) {
+        (self.low, self.high) = (self.low.min(point), self.high.max(point));
+    }
+
+    pub fn grown(self, margin: f64) -> Bounds {
+        Bounds { low: self.low - margin, high: self.high + margin }
+    }
+
+    pub fn meets(&self, other: &Bounds) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+}
+
+/// The plane of all points with n·p = offset; its upper side is where n, a unit vector, points.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+impl Plane {
+    fn through(point: DVec3, normal: DVec3) -> Plane {
+        Plane { normal, offset: normal.dot(point) }
+    }
+
+    fn height(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) - self.offset
+    }
+
+    /// Largest height in a box.
+    fn highest(&self, bounds: &Bounds) -> f64 {
+        let up = self.normal.cmpge(DVec3::ZERO);
+        self.height(DVec3::select(up, bounds.high, bounds.low))
+    }
+}
+
+/// The convex hull of two polygons that are all before one another: every segment between them.
+pub(super) struct Shaft {
+    planes: Vec<Plane>,
+    bounds: Bounds,
+}
+
+impl Shaft {
+    /// Of the hull's faces, the two polygons themselves and the one beside each of their edges,
+    /// which leans on a corner of the other polygon. These are all.
+    pub fn new(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Shaft {
+        let bounds = Bounds::around(a.iter().chain(b));
+        let mut planes = Vec::with_capacity(a.len() + b.len() + 2);
+        planes.extend(a.first().map(|&p| Plane::through(p, a_normal)));
+        planes.extend(b.first().map(|&p| Plane::through(p, b_normal)));
+        lean(a, a_normal, b, &mut planes);
+        lean(b, b_normal, a, &mut planes);
+        Shaft { planes, bounds }
+    }
+
+    /// What of `polygon` is strictly within the shaft; nothing if that has no area.
+    pub fn clip(&self, polygon: &[DVec3]) -> Option<Vec<DVec3>> {
+        for plane in &self.planes {
+            if polygon.iter().all(|&p| plane.height(p) <= CONTACT) {
+                return None;
+            }
+        }
+        let mut kept = polygon.to_vec();
+        for plane in &self.planes {
+            if kept.iter().any(|&p| plane.height(p) < -CONTACT) {
+                let origin = plane.normal * plane.offset;
+                kept = clip(&kept, origin, plane.normal);
+            }
+            if kept.len() < 3 || kept.iter().all(|&p| plane.height(p) <= CONTACT) {
+                return None;
+            }
+        }
+        distinct(&mut kept);
+        let size = kept.iter().map(|p| p.distance(kept[0])).fold(0.0, f64::max);
+        (polygon_area(&kept) > SLIVER * size).then_some(kept)
+    }
+
+    fn meets(&self, bounds: &Bounds) -> bool {
+        self.bounds.meets(bounds) && self.planes.iter().all(|plane| plane.highest(bounds) > CONTACT)
+    }
+}
+
+/// Leaves one of corners that are one.
+pub(super) fn distinct(polygon: &mut Vec<DVec3>) {
+    let Some(&first) = polygon.first() else { return };
+    let near = ONE * polygon.iter().map(|p| p.distance(first)).fold(0.0, f64::max);
+    polygon.dedup_by(|a, b| a.distance(*b) <= near);
+    while polygon.len() > 1 && polygon[polygon.len() - 1].distance(first) <= near {
+        polygon.pop();
+    }
+}
+
+/// The planes along the edges of `a`, `b` before it, that have both on their upper side. None along
+/// an edge that has a corner of `b` beside it in the plane of `a`: there that plane is the hull's.
+fn lean(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
+    let Some(&origin) = a.first() else { return };
+    let size = a.iter().chain(b).map(|p| p.distance(origin)).fold(0.0, f64::max);
+    let (flat, raised): (Vec<DVec3>, Vec<DVec3>) =
+        b.iter().partition(|p| normal.dot(**p - origin) <= CONTACT);
+    for (k, &start) in a.iter().enumerate() {
+        let edge = a[(k + 1) % a.len()] - start;
+        if edge.length() < SHORT * size {
+            continue;
+        }
+        let along = edge.normalize_or_zero();
+        let outwards = along.cross(normal);
+        if flat.iter().any(|p| outwards.dot(p - start) > CONTACT) {
+            continue;
+        }
+        // Upright to the edge first: its length times an error of angle is far above contact.
+        let upright = |p: DVec3| {
+            let n = (p - start).cross(along).normalize_or_zero();
+            n.reject_from_normalized(along).normalize_or_zero()
+        };
+        let mut n = DVec3::ZERO;
+        for &p in &raised {
+            if n == DVec3::ZERO || n.dot(p - start) < 0.0 {
+                n = upright(p);
+            }
+        }
+        if n != DVec3::ZERO {
+            planes.push(Plane::through(start, n));
+        }
+    }
+}
+
+/// A convex polygon that stands in the way, and its unit normal.
+#[derive(Clone, Debug)]
+pub(super) struct Blocker {
+    pub corners: Vec<DVec3>,
+    pub normal: DVec3,
+}
+
+/// Whether every segment between `a` and `b` crosses `blocker`: those between corners tell.
+pub(super) fn covers(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
+    let Blocker { corners: blocker, normal } = blocker;
+    let Some(&p) = blocker.first() else { return false };
+    let reach = a.iter().chain(b).map(|v| v.distance(p)).fold(0.0, f64::max);
+    let contact = CONTACT * reach;
+    let above = |v: &DVec3| normal.dot(*v - p) >= -contact;
+    let below = |v: &DVec3| normal.dot(*v - p) <= contact;
+    let (front, rear) = if a.iter().all(above) && b.iter().all(below) {
+        (a, b)
+    } else if a.iter().all(below) && b.iter().all(above) {
+        (b, a)
+    } else {
+        return false;
+    };
+    front.iter().all(|&eye| {
+        (0..blocker.len()).all(|k| {
+            let (u, v) = (blocker[k] - eye, blocker[(k + 1) % blocker.len()] - eye);
+            // Seen from its front the blocker runs counter-clockwise: inwards is v × u.
+            let across = v.cross(u);
+            let least = -CONTACT * across.length() * reach;
+            rear.iter().all(|&w| across.dot(w - eye) >= least)
+        })
+    })
+}
+
+/// Whether two pieces face the same way in the same plane.
+fn lies_on(piece: &ConvexPolygon, other: &ConvexPolygon) -> bool {
+    let Some(&origin) = other.corners.first() else { return false };
+    let size = piece.corners.iter().map(|p| p.distance(origin)).fold(0.0, f64::max);
+    let flat = |p: &DVec3| other.normal.dot(*p - origin).abs() <= 1e-9 * size;
+    piece.normal.dot(other.normal) > 0.0 && piece.corners.iter().all(flat)
+}
+
+/// What `cover`, convex and in the same plane, leaves of a convex polygon, in convex parts.
+fn minus(polygon: &[DVec3], cover: &ConvexPolygon) -> Vec<Vec<DVec3>> {
+    let mut parts = Vec::new();
+    let mut inside = polygon.to_vec();
+    for (k, &a) in cover.corners.iter().enumerate() {
+        let b = cover.corners[(k + 1) % cover.corners.len()];
+        let outwards = (b - a).cross(cover.normal).normalize_or_zero();
+        let outside = clip(&inside, a, outwards);
+        if outside.len() > 2 {
+            parts.push(outside);
+        }
+        inside = clip(&inside, a, -outwards);
+    }
+    // Nothing inside: no overlap, and no need to have cut.
+    if inside.len() > 2 { parts } else { vec![polygon.to_vec()] }
+}
+
+/// Pieces in a tree of boxes.
+pub(super) struct Tree {
+    pieces: Vec<ConvexPolygon>,
+    /// The root is the last.
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    bounds: Bounds,
+    kind: Kind,
+}
+
+enum Kind {
+    Inner(usize, usize),
+    /// Range of pieces.
+    Leaf(usize, usize),
+}
+
+impl Tree {
+    pub fn new(pieces: Vec<ConvexPolygon>) -> Tree {
+        let mut tree = Tree { pieces, nodes: Vec::new() };
+        let count = tree.pieces.len();
+        if count > 0 {
+            tree.build(0, count);
+        }
+        tree
+    }
+
+    /// Halves a range of pieces at the median along the longest side of their box.
+    fn build(&mut self, start: usize, end: usize) -> usize {
+        let pieces = &mut self.pieces[start..end];
+        let bounds = Bounds::around(pieces.iter().flat_map(|piece| &piece.corners));
+        let kind = if pieces.len() <= LEAF {
+            Kind::Leaf(start, end)
+        } else {
+            let size = bounds.high - bounds.low;
+            let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);
+            let key = |piece: &ConvexPolygon| {
+                let b = Bounds::around(&piece.corners);
+                (b.low + b.high)[axis]
+            };
+            pieces.sort_by(|p, q| key(p).total_cmp(&key(q)));
+            let middle = start + pieces.len() / 2;
+            Kind::Inner(self.build(start, middle), self.build(middle, end))
+        };
+        self.nodes.push(Node { bounds, kind });
+        self.nodes.len() - 1
+    }
+
+    /// The backs of all pieces, less what is hidden right there by a piece of `fronts` that lies on
+    /// it: such a plate has two fronts.
+    pub fn backs(&self, fronts: &Tree) -> Vec<ConvexPolygon> {
+        let mut backs = Vec::new();
+        for piece in &self.pieces {
+            let back = piece.reversed();
+            let mut parts = vec![back.corners.clone()];
+            for front in fronts.nearby(&Bounds::around(&piece.corners)) {
+                if lies_on(front, &back) {
+                    parts = parts.iter().flat_map(|part| minus(part, front)).collect();
+                }
+            }
+            backs
+                .extend(parts.into_iter().filter_map(|part| ConvexPolygon::new(part, piece.group)));
+        }
+        backs
+    }
+
+    /// The pieces in boxes of the tree that meet `bounds`, and perhaps some more.
+    fn nearby(&self, bounds: &Bounds) -> impl Iterator<Item = &ConvexPolygon> {
+        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
+        let mut ranges = Vec::new();
+        while let Some(node) = open.pop() {
+            match self.nodes[node].kind {
+                _ if !self.nodes[node].bounds.meets(bounds) => {}
+                Kind::Inner(a, b) => open.extend([b, a]),
+                Kind::Leaf(start, end) => ranges.push(start..end),
+            }
+        }
+        ranges.into_iter().flat_map(|range| &self.pieces[range])
+    }
+
+    /// What of the pieces is strictly within `shaft`.
+    pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
+        let mut found = Vec::new();
+        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
+        while let Some(node) = open.pop() {
+            let Node { bounds, kind } = &self.nodes[node];
+            if !shaft.meets(bounds) {
+                continue;
+            }
+            match *kind {
+                Kind::Inner(a, b) => open.extend([b, a]),
+                Kind::Leaf(start, end) => {
+                    let pieces = &self.pieces[start..end];
+                    found.extend(pieces.iter().filter_map(|piece| {
+                        let corners = shaft.clip(&piece.corners)?;
+                        Some(Blocker { corners, normal: piece.normal })
+                    }));
+                }
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// G. Marsaglia's xorshift64, in (-1, 1).
+    fn random(state: &mut u64) -> f64 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn triangle(height: f64, spread: f64, up: bool, state: &mut u64) -> ([DVec3; 3], DVec3) {
+        let tilt = spread * random(state);
+        let mut corner = || DVec3::new(random(state), random(state), 0.0);
+        let mut corners =
+            [corner(), corner(), corner()].map(|p| p + (height + tilt * p.x) * DVec3::Z);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        if (normal.z > 0.0) != up {
+            corners.swap(1, 2);
+        }
+        (corners, (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize())
+    }
+
+    /// A point of a triangle, its corners included.
+    fn within(t: &[DVec3; 3], state: &mut u64) -> DVec3 {
+        let (u, v) = (random(state).abs(), random(state).abs());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
+    }
+
+    #[test]
+    fn every_segment_is_in_the_shaft_and_clipping_keeps_what_it_meets() {
+        let mut state = 88_172_645_463_325_252;
+        let mut met = 0;
+        for _ in 0..300 {
+            // Tilts of 0.3 over 2 across never reach the other's plane, 2 above.
+            let (a, up) = triangle(-1.0, 0.3, true, &mut state);
+            let (b, down) = triangle(1.0, 0.3, false, &mut state);
+            let (c, n) = triangle(0.0, 0.9, true, &mut state);
+            let shaft = Shaft::new(&a, up, &b, down);
+            let kept = shaft.clip(&c);
+            for _ in 0..50 {
+                let (p, q) = (within(&a, &mut state), within(&b, &mut state));
+                let middle = p.lerp(q, random(&mut state).abs());
+                // Rounding of a few operations on lengths below 4.
+                assert!(shaft.planes.iter().all(|plane| plane.height(middle) > -1e-14));
+                let hit = p + (q - p) * (n.dot(c[0] - p) / n.dot(q - p));
+                let inside = |t: &[DVec3], least: f64| {
+                    let side = |k: usize| n.cross(t[(k + 1) % t.len()] - t[k]).dot(hit - t[k]);
+                    (0..t.len()).all(|k| side(k) >= least)
+                };
+                if inside(&c, 1e-9) {
+                    met += 1;
+                    assert!(kept.as_ref().is_some_and(|kept| inside(kept, -1e-11)));
+                }
+            }
+        }
+        assert!(met > 500, "{met}");
+    }
+
+    #[test]
+    fn what_covers_is_crossed_by_every_segment() {
+        let mut state = 88_172_645_463_325_252;
+        let mut covered = 0;
+        for _ in 0..2000 {
+            let (mut a, _) = triangle(-1.0, 0.3, true, &mut state);
+            let (mut b, _) = triangle(1.0, 0.3, false, &mut state);
+            for p in a.iter_mut().chain(&mut b) {
+                *p *= DVec3::new(0.3, 0.3, 1.0);
+            }
+            let (corners, normal) = triangle(0.0, 0.5, true, &mut state);
+            let blocker = Blocker { corners: corners.to_vec(), normal };
+            if !covers(&blocker, &a, &b) {
+                continue;
+            }
+            covered += 1;
+            for _ in 0..50 {
+                let (p, q) = (within(&a, &mut state), within(&b, &mut state));
+                let hit = p + (q - p) * (normal.dot(corners[0] - p) / normal.dot(q - p));
+                for k in 0..3 {
+                    let edge = corners[(k + 1) % 3] - corners[k];
+                    assert!(normal.cross(edge).dot(hit - corners[k]) > -1e-11);
+                }
+            }
+        }
+        assert!(covered > 50, "{covered}");
+    }
+}

@@ -1,0 +1,5 @@
+//! What a ray meets first, and whether anything is in between.
+
+pub(crate) mod ray_scene;
+mod wide_bvh;
+pub(crate) mod winding;

@@ -1,0 +1,215 @@
+//! RayScene against triangles: the nearest hit, on the CPU.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::ray::{Ray, RayHit};
+
+use crate::scene::Scene;
+
+use super::wide_bvh::hierarchy;
+
+/// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
+/// intersections are in 64.
+#[derive(Debug)]
+pub(crate) struct RayScene {
+    bvh: CwBvh,
+    /// See [`plane`].
+    triangles: Vec<[DVec3; 4]>,
+    origin: DVec3,
+    scale: f64,
+}
+
+/// Where a ray first met a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hit {
+    pub triangle: usize,
+    /// Distance in units of the ray's direction.
+    pub distance: f64,
+    /// Barycentric weights of the second and third corner.
+    pub u: f64,
+    pub v: f64,
+    /// Whether the triangle's front was met.
+    pub front: bool,
+}
+
+/// Size of the scene in the hierarchy's own unit. The traversal skips boxes that end nearer than
+/// 1e-4 units: 1e-9 of the scene at this size.
+const SPAN: f64 = 1e5;
+
+/// Boxes grow by this much, 1e-6 of the scene: several roundings of a 32-bit coordinate, so that
+/// no hit is lost between the hierarchy and the exact test.
+const MARGIN: f32 = 1e-6 * SPAN as f32;
+
+/// Barycentric slack that closes the seam between neighbours: far above the rounding of the
+/// test (some 1e-15), far below anything visible.
+const SEAM: f64 = 1e-12;
+
+impl RayScene {
+    /// For triangles by their corners.
+    pub fn new(corners: impl Iterator<Item = [DVec3; 3]>) -> RayScene {
+        let corners: Vec<[DVec3; 3]> = corners.collect();
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let all = corners.iter().flatten();
+        let (low, high) = all.fold(nothing, |(l, h), &p| (l.min(p), h.max(p)));
+        let origin = low + (high - low) / 2.0;
+        let scale = SPAN / (high - low).max_element().max(f64::MIN_POSITIVE);
+        let local = |p: DVec3| Vec3A::from(((p - origin) * scale).as_vec3());
+        let boxes: Vec<Aabb> = corners
+            .iter()
+            .map(|c| {
+                let [a, b, c] = c.map(local);
+                let margin = Vec3A::splat(MARGIN);
+                Aabb { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
+            })
+            .collect();
+        let bvh = hierarchy(&boxes);
+        let triangles = corners.into_iter().map(plane).collect();
+        RayScene { bvh, triangles, origin, scale }
+    }
+
+    /// For the triangles of `scene`, by their numbers.
+    pub fn of_scene(scene: &Scene) -> RayScene {
+        RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)))
+    }
+
+    /// The nearest triangle along `direction` (any length) from `from`, further than `start` and
+    /// not triangle `ignored`. Distances are in units of `direction`.
+    pub fn closest_hit(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        start: f64,
+        ignored: Option<usize>,
+    ) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        let (ray, reach) = self.ray(from, direction);
+        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
+            let triangle = self.bvh.primitive_indices[id] as usize;
+            if Some(triangle) == ignored {
+                return f32::INFINITY;
+            }
+            // Rounded up, so that an equal is still looked at.
+            let end = best.map_or(f64::INFINITY, |b| b.distance * (1.0 + 4.0 * f64::EPSILON));
+            let Some(hit) = self.intersect(triangle, from, direction, start..end) else {
+                return f32::INFINITY;
+            };
+            // Between equals the lower index wins, whatever the order of the visit.
+            if best.is_some_and(|b| (b.distance, b.triangle) < (hit.distance, triangle)) {
+                return f32::INFINITY;
+            }
+            best = Some(hit);
+            // Only prunes: rounded up, so that an equal in 32 bits is still looked at.
+            (hit.distance * reach) as f32 * (1.0 + 4.0 * f32::EPSILON) + MARGIN
+        });
+        best
+    }
+
+    /// Whether any hit that `counts` lies along `direction` (any length) from `from`, within `reach` in
+    /// units of it.
+    pub fn occluded(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        reach: Range<f64>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> bool {
+        let (mut ray, length) = self.ray(from, direction);
+        ray.tmax = (reach.end * length) as f32 * (1.0 + 4.0 * f32::EPSILON) + MARGIN;
+        let mut blocked = false;
+        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
+            let triangle = self.bvh.primitive_indices[id] as usize;
+            let hit = self.intersect(triangle, from, direction, reach.clone());
+            blocked |= hit.is_some_and(|h| counts(&h));
+            // Nothing is nearer than that: the rest is left out.
+            if blocked { f32::NEG_INFINITY } else { f32::INFINITY }
+        });
+        blocked
+    }
+
+    /// A ray in the hierarchy's own unit, and the length of `direction` in it.
+    fn ray(&self, from: DVec3, direction: DVec3) -> (Ray, f64) {
+        let local = ((from - self.origin) * self.scale).as_vec3();
+        let (unit, length) = direction.normalize_and_length();
+        // Adding zero turns -0 into 0: the traversal takes its octant and its inverse from the sign.
+        let ray = Ray::new_inf(local.into(), (unit.as_vec3() + Vec3::ZERO).into());
+        (ray, length * self.scale)
+    }
+
+    /// Where the line meets a triangle, within `reach` in units of `direction`, in 64 bits: its plane
+    /// first (Badouel 1990), because most are met too far off or not at all.
+    #[inline(always)]
+    fn intersect(
+        &self,
+        triangle: usize,
+        from: DVec3,
+        direction: DVec3,
+        reach: Range<f64>,
+    ) -> Option<Hit> {
+        let [a, normal, second, third] = self.triangles[triangle];
+        let (facing, to) = (normal.dot(direction), a - from);
+        // Most are too far off or behind, which is told without a division. Written so that NaN is no
+        // hit, as of a line in the plane.
+        let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
+        if !(rise > reach.start * steep && rise <= reach.end * steep) || steep == 0.0 {
+            return None;
+        }
+        let distance = rise / steep;
+        let at = direction * distance - to;
+        let (u, v) = (at.dot(second), at.dot(third));
+        let inside = u >= -SEAM && v >= -SEAM && u + v <= 1.0 + SEAM;
+        inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
+    }
+}
+
+/// First corner and normal (of any length) of a triangle, and the gradients of its barycentric
+/// weights: of its second and of its third corner.
+fn plane([a, b, c]: [DVec3; 3]) -> [DVec3; 4] {
+    let (u, v) = (b - a, c - a);
+    // A length of the order of one keeps squares of tiny and of huge triangles within range.
+    let size = u.length().max(v.length()).max(f64::MIN_POSITIVE);
+    let (u, v) = (u / size, v / size);
+    let normal = u.cross(v);
+    let square = normal.length_squared();
+    let gradient = |edge: DVec3| if square > 0.0 { edge / (square * size) } else { DVec3::ZERO };
+    [a, normal, gradient(v.cross(normal)), gradient(normal.cross(u))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_front_or_back_is_found_and_the_ignored_is_not() {
+        let at = |z: f64| [DVec3::new(0., 0., z), DVec3::new(1., 0., z), DVec3::new(0., 1., z)];
+        let rays = RayScene::new([at(2.0), at(1.0), at(1.0)].into_iter());
+        let from = DVec3::new(0.2, 0.3, 0.0);
+        let hit = rays.closest_hit(from, DVec3::Z, 0.0, None).unwrap();
+        assert_eq!((hit.triangle, hit.distance, hit.front), (1, 1.0, false));
+        assert!((hit.u - 0.2).abs() < 1e-15 && (hit.v - 0.3).abs() < 1e-15);
+        assert_eq!(rays.closest_hit(from, DVec3::Z, 0.0, Some(1)).unwrap().triangle, 2);
+        assert_eq!(rays.closest_hit(from, DVec3::Z, 1.5, None).unwrap().triangle, 0);
+        assert_eq!(rays.closest_hit(from, -DVec3::Z, 0.0, None), None);
+        let above = rays.closest_hit(from + 3.0 * DVec3::Z, -2.0 * DVec3::Z, 0.0, None).unwrap();
+        assert_eq!((above.triangle, above.distance, above.front), (0, 0.5, true));
+    }
+
+    #[test]
+    fn no_ray_slips_through_a_seam() {
+        // A fan of thin triangles tiles the square; every ray through it hits, also along seams.
+        let rim = |k: usize| {
+            let a = k as f64 / 100.0 * std::f64::consts::TAU;
+            DVec3::new(a.cos(), a.sin(), 0.1 * a.sin())
+        };
+        let fan = (0..100).map(|k| [DVec3::ZERO, rim(k), rim(k + 1)]);
+        let rays = RayScene::new(fan);
+        let eye = DVec3::new(0.01, -0.02, 5.0);
+        for k in 0..100 {
+            for r in [0.0, 1e-9, 0.1, 0.5, 0.9] {
+                assert!(rays.closest_hit(eye, rim(k) * r - eye, 0.0, None).is_some(), "{k} {r}");
+            }
+        }
+    }
+}
