@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Shooting, VertexMesh, load_obj};
+use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Solver, VertexMesh, load_obj};
 
 /// Hands out rows that were made before.
 struct Stored<'a>(&'a HashMap<NodeId, Row>);
@@ -53,11 +53,11 @@ fn shooting(c: &mut Criterion) {
         let rays = RayRows::new(&mesh, 1 << 14).expect("rays");
         let mut recording = Recording(rays, HashMap::new());
         let go = |_: &_| ControlFlow::Continue(());
-        let solution = Shooting::default().solve(&mesh, &mut recording, go).expect("a solution");
+        let solution = Solver::default().solve(&mesh, &mut recording, go).expect("a solution");
         let elements = mesh.element_count();
         group.throughput(Throughput::Elements(solution.shots));
         group.bench_function(BenchmarkId::new("shoot to 0.1 %", elements), |b| {
-            b.iter(|| Shooting::default().solve(&mesh, &mut Stored(&recording.1), go));
+            b.iter(|| Solver::default().solve(&mesh, &mut Stored(&recording.1), go));
         });
         group.throughput(Throughput::Elements(elements as u64));
         group.bench_function(BenchmarkId::new("elements to vertices", elements), |b| {

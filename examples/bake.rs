@@ -117,11 +117,14 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("row-memory") => {
                 let megabytes: usize = args.value()?.parse()?;
                 let bytes = megabytes.saturating_mul(1 << 20);
-                set(&mut bake, move |effort| effort.shooting.row_memory = bytes);
+                set(&mut bake, move |effort| effort.solver.row_memory = bytes);
             }
             Long("solver") => {
                 let method: Method = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.method = Some(method));
+                set(&mut bake, move |effort| {
+                    effort.solver.method = method;
+                    effort.gmres_if_bright = false;
+                });
             }
             Long("state") => {
                 let path = PathBuf::from(args.value()?);
@@ -159,19 +162,19 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             }
             Long("unshot") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.shooting.unshot = value);
+                set(&mut bake, move |effort| effort.solver.unshot = value);
             }
             Long("shots") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.shooting.shots = Some(value));
+                set(&mut bake, move |effort| effort.solver.max_steps = Some(value));
             }
             Long("patch-tolerance") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.shooting.tolerance = value);
+                set(&mut bake, move |effort| effort.solver.patch_tolerance = value);
             }
             Long("patch-level") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.shooting.level = value);
+                set(&mut bake, move |effort| effort.solver.min_patch_level = value);
             }
             Long("gather-size") => {
                 let value = args.value()?.parse()?;

@@ -17,7 +17,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3};
 use lexopt::prelude::*;
 use radiosity::{
-    Backend, BackendRows, Error, Mesh, ProximityCorrection, Rgb, Shooting, Solution, load_obj,
+    Backend, BackendRows, Error, Mesh, ProximityCorrection, Rgb, Solution, Solver, load_obj,
 };
 
 type Failure = Box<dyn std::error::Error>;
@@ -37,7 +37,7 @@ struct Args {
     values: Vec<String>,
     element_size: f64,
     hemicube: u32,
-    shooting: Shooting,
+    solver: Solver,
     full_share: Option<f64>,
     device: Backend,
 }
@@ -46,13 +46,13 @@ fn args() -> Result<Args, Failure> {
     let mut parser = lexopt::Parser::from_env();
     let (mut values, mut cpu) = (vec![], false);
     let (mut element_size, mut hemicube, mut full_share) = (None, 128, None);
-    let mut shooting = Shooting::default();
+    let mut solver = Solver::default();
     while let Some(arg) = parser.next()? {
         match arg {
             Long("element-size") => element_size = Some(parser.value()?.parse()?),
             Long("hemicube") => hemicube = parser.value()?.parse()?,
-            Long("unshot") => shooting.unshot = parser.value()?.parse()?,
-            Long("tolerance") => shooting.tolerance = parser.value()?.parse()?,
+            Long("unshot") => solver.unshot = parser.value()?.parse()?,
+            Long("tolerance") => solver.patch_tolerance = parser.value()?.parse()?,
             Long("full-share") => full_share = Some(parser.value()?.parse()?),
             Long("cpu") => cpu = true,
             Value(value) => values.push(value.string()?),
@@ -64,11 +64,11 @@ fn args() -> Result<Args, Failure> {
     }
     let element_size = element_size.unwrap_or(f64::NAN);
     let device = if cpu { Backend::Cpu } else { Backend::gpu(None)? };
-    Ok(Args { values, element_size, hemicube, shooting, full_share, device })
+    Ok(Args { values, element_size, hemicube, solver, full_share, device })
 }
 
 fn run() -> Result<(), Failure> {
-    let Args { values, element_size, hemicube, shooting, full_share, device } = args()?;
+    let Args { values, element_size, hemicube, solver, full_share, device } = args()?;
     let [path, material, factor, group, shift] = &values[..] else { unreachable!("counted") };
     let shift: Vec<f64> = shift.split(',').map(str::parse).collect::<Result<_, _>>()?;
     let shift = DVec3::from_slice(shift.get(..3).ok_or("DX,DY,DZ are three numbers")?);
@@ -91,7 +91,7 @@ fn run() -> Result<(), Failure> {
         "{path}, {} elements, hemicube {hemicube}, {name} ({kind}), {driver}",
         before.element_count()
     );
-    println!("unshot {}, tolerance {}", shooting.unshot, shooting.tolerance);
+    println!("unshot {}, tolerance {}", solver.unshot, solver.patch_tolerance);
     println!(
         "{:22} {:>9} {:>8} {:>7} {:>9} {:>9} {:>9}",
         "", "hemicubes", "shots", "s", "off", "worst", "unshot"
@@ -110,17 +110,17 @@ fn run() -> Result<(), Failure> {
 
     let start = Instant::now();
     let mut maker = rows(&before)?;
-    let mut solve = shooting.solver().begin(&before)?;
+    let mut solve = solver.begin(&before)?;
     solve.run(&mut maker, go)?;
     told.line("as it was", &solve.solution()?, start.elapsed().as_secs_f64(), None);
 
     for (what, mesh) in [("dimmed", &dimmed), ("moved", &after)] {
         let start = Instant::now();
         let mut over_maker = rows(mesh)?;
-        let mut over = shooting.solver().begin(mesh)?;
+        let mut over = solver.begin(mesh)?;
         over.run(&mut over_maker, go)?;
         let (over_solution, over_seconds) = (over.solution()?, start.elapsed().as_secs_f64());
-        over.set_limits(shooting.unshot / 1000.0, None)?;
+        over.set_limits(solver.unshot / 1000.0, None)?;
         over.run(&mut over_maker, go)?;
         let settled = over.into_solution()?;
         let judge = Some((mesh, &settled));

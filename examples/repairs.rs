@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use radiosity::{
-    Error, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Shooting,
+    Error, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver,
     VertexMesh, load_obj,
 };
 
@@ -55,8 +55,7 @@ fn run(size: f64, resolution: u32) -> Result<(), Error> {
 
         let start = Instant::now();
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
-        let solution =
-            Shooting::default().solve(&mesh, &mut rows, |_| ControlFlow::Continue(()))?;
+        let solution = Solver::default().solve(&mesh, &mut rows, |_| ControlFlow::Continue(()))?;
         let surface = VertexMesh::new(&mesh, &solution.radiosity);
         let seconds = start.elapsed().as_secs_f64();
         let errors = truth::compare(&surface, TRUTH);

@@ -1,6 +1,6 @@
 //! What the fuzz target does with an input, and the replay of its corpus in `tests/fuzz_corpus.rs`.
 
-use radiosity::{Error, Mesh, RayRows, Scene, Shooting, VertexMesh, read_obj};
+use radiosity::{Error, Mesh, RayRows, Scene, Solver, VertexMesh, read_obj};
 use std::ops::ControlFlow;
 
 /// Parts the OBJ file from the MTL file in an input. In UTF-8 there is no such byte.
@@ -65,9 +65,9 @@ fn settle(scene: &Scene) {
         Err(_) => return,
     };
     let mut rays = RayRows::new(&mesh, 16).expect("16 rays");
-    let shooting = Shooting { shots: Some(16), ..Default::default() };
+    let solver = Solver { max_steps: Some(16), ..Default::default() };
     let solution =
-        shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).expect("good rows");
+        solver.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).expect("good rows");
     assert!(solution.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
     assert!(solution.ledger.imbalance() <= 1e-9, "{:?}", solution.ledger);
     let surface = VertexMesh::new(&mesh, &solution.radiosity);

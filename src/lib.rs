@@ -3,7 +3,7 @@
 //! The crate draws a hemicube per patch with wgpu, on any Vulkan, Metal or DX12 device (software
 //! Vulkan included), turns it into form factors, lets progressive shooting on the CPU spread the
 //! light, and gives radiosity at the vertices of a mesh. The path, in one line:
-//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Shooting`] → [`VertexMesh`] → file. For exact
+//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Solver`] → [`VertexMesh`] → file. For exact
 //! vertices, [`RefinementSettings`] stands before the last: each sees the settled light for itself, and the
 //! mesh grows finer where the light asks for it. [`Solver`] has other methods beside shooting, GMRES
 //! for reflectance near one among them, and a rule that picks one.
@@ -12,7 +12,7 @@
 //! use std::ops::ControlFlow;
 //!
 //! use radiosity::{
-//!     Gpu, HemicubeRows, Mesh, ProximityCorrection, Shooting, VertexMesh, load_obj, write_ply,
+//!     Gpu, HemicubeRows, Mesh, ProximityCorrection, Solver, VertexMesh, load_obj, write_ply,
 //! };
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
@@ -21,7 +21,7 @@
 //! let gpu = Gpu::new(None)?;
 //! let hemicubes = HemicubeRows::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
 //! let mut rows = ProximityCorrection::new(hemicubes, &mesh, 1.0); // mends what is within one diameter
-//! let solution = Shooting::default().solve(&mesh, &mut rows, |progress| {
+//! let solution = Solver::default().solve(&mesh, &mut rows, |progress| {
 //!     println!("{:.2} % unshot", 100.0 * progress.unshot_share);
 //!     ControlFlow::Continue(())
 //! })?;
@@ -92,9 +92,7 @@ pub use io::{
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
-pub use solver::{
-    Ledger, MAX_DIRECT, Method, Progress, Shooting, Solution, SolveSession, Solver, StopReason,
-};
+pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver, StopReason};
 pub use vertex::VertexMesh;
 pub use vertex::gathering::{GatherProgress, GatheredMesh, RefinementSettings};
 pub use view_factor::{

@@ -11,6 +11,7 @@ mod patch_cut;
 mod relaxation;
 mod row_cache;
 mod session;
+mod settings;
 mod shooting;
 
 use std::fmt;
@@ -18,11 +19,10 @@ use std::time::Duration;
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::Rgb;
-pub use direct::MAX_DIRECT;
 pub use ledger::Ledger;
-pub use method::{Method, Solver};
+pub use method::Method;
 pub use session::SolveSession;
-pub use shooting::Shooting;
+pub use settings::Solver;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]

@@ -8,7 +8,7 @@ mod truth;
 use common::{cornell_box, cube, quads};
 use radiosity::{
     Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, ErrorKind, Material,
-    RefinementSettings, Rgb, Scene, Shooting, StopReason,
+    RefinementSettings, Rgb, Scene, Solver, StopReason,
 };
 use std::ops::ControlFlow;
 
@@ -82,7 +82,7 @@ fn light_that_was_not_shot_is_told_of() {
     for reflectance in [0.5, 0.8] {
         for unshot in [0.3, 0.1, 0.03] {
             let mut effort = BakeSettings::for_error(0.02, &furnace(reflectance));
-            effort.shooting = Shooting { unshot, tolerance: 0.0, ..Shooting::default() };
+            effort.solver = Solver { unshot, patch_tolerance: 0.0, ..Solver::default() };
             (effort.gather, effort.element_size) = (None, 0.5);
             let baked = effort.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
             let (even, left) = (1.0 / (1.0 - reflectance), baked.solution.ledger.unshot_share());

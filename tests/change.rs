@@ -19,14 +19,9 @@ fn rays(mesh: &Mesh) -> RayRows {
     RayRows::new(mesh, 1024).unwrap().with_full_share(0.0)
 }
 
-/// Every method, shooting by elements.
-fn methods() -> [Method; 6] {
-    Method::ALL.map(|method| match method {
-        Method::Shooting { level, overshoot, .. } => {
-            Method::Shooting { tolerance: 0.0, level, overshoot }
-        }
-        other => other,
-    })
+/// `method`, shooting by elements.
+fn by_elements(method: Method) -> Solver {
+    Solver { patch_tolerance: 0.0, ..Solver::new(method) }
 }
 
 /// `mesh` with what `change` makes of its materials.
@@ -77,8 +72,8 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
         "red" => (m.reflectance, m.exitance) = (Rgb::splat(0.3), Rgb::new(1.0, 0.0, 0.2)),
         _ => m.reflectance = Rgb::new(0.2, 0.7, 0.6),
     });
-    for method in methods() {
-        let solver = Solver { unshot: SETTLED, ..Solver::new(method) };
+    for method in Method::ALL {
+        let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
         let mut solve = solver.begin(&black).unwrap();
         assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
@@ -108,9 +103,9 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
 #[test]
 fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
     let mesh = cornell_box(200.0);
-    for method in methods() {
+    for method in Method::ALL {
         let mut rows = rays(&mesh);
-        let mut solve = Solver::new(method).begin(&mesh).unwrap();
+        let mut solve = by_elements(method).begin(&mesh).unwrap();
         solve.run(&mut rows, go).unwrap();
         let first = solve.solution().unwrap();
         let dimmed = painted(&mesh, |m| m.exitance *= Rgb::new(0.3, 1e-12, 1e12));
@@ -146,8 +141,8 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
     let (one, other) = (lit(lamp, [0.0; 3]), lit([0.0; 3], wall));
     let weight = |e: [f64; 3], w: f64| e.map(|c| c * w);
     let both = lit(weight(lamp, 0.25), weight(wall, 3.0));
-    for method in methods() {
-        let solver = Solver { unshot: SETTLED, ..Solver::new(method) };
+    for method in Method::ALL {
+        let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
         let mut solve = solver.begin(&one).unwrap();
         solve.run(&mut rows, go).unwrap();
@@ -181,9 +176,9 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
 fn an_object_moves_and_all_methods_find_what_starting_over_finds() {
     let mesh = cornell_box(150.0);
     let moved = shifted(&mesh, "short_block", [40.0, 0.0, -25.0]);
-    for method in methods() {
+    for method in Method::ALL {
         // Asking for nothing unshot asks for all that is wrong to be drawn again.
-        let solver = Solver { unshot: SETTLED, ..Solver::new(method) };
+        let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = solver.begin(&mesh).unwrap();
         solve.run(&mut before, go).unwrap();
@@ -210,8 +205,8 @@ fn a_scene_changes_while_its_light_is_on_its_way() {
         "light" => m.exitance *= Rgb::new(0.5, 0.25, 3.0),
         _ => m.reflectance = Rgb::new(0.2, 0.7, 0.6),
     });
-    for method in methods() {
-        let solver = Solver { unshot: SETTLED, ..Solver::new(method) };
+    for method in Method::ALL {
+        let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
         let over = solver.solve(&changed, &mut rows, go).unwrap();
         for calls in [5, 400] {
@@ -310,8 +305,7 @@ fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
     let mesh = Mesh::new(furnished(), 0.06).unwrap();
     let changed = painted(&mesh, |m| m.exitance *= 0.5);
     let changed = shifted(&changed, "box", [0.05, 0.02, 0.0]);
-    let solver = Method::Shooting { tolerance: 0.0, level: 0, overshoot: false };
-    let solver = Solver::new(solver);
+    let solver = by_elements(Method::Shooting { overshoot: false });
     let settled = Solver { unshot: 1e-6, ..solver };
     let (mut before, mut after) = (rays(&mesh), rays(&changed));
     let mut solve = solver.begin(&mesh).unwrap();

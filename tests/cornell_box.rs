@@ -5,13 +5,13 @@ mod common;
 mod truth;
 
 use common::{cornell_box, gpu};
-use radiosity::{HemicubeRows, Mesh, ProximityCorrection, RayRows, Shooting, Solution, VertexMesh};
+use radiosity::{HemicubeRows, Mesh, ProximityCorrection, RayRows, Solution, Solver, VertexMesh};
 use std::ops::ControlFlow;
 
 const TRUTH: &str = include_str!("data/cornell_box.truth.json");
 
 fn solve(mesh: &Mesh, rows: &mut dyn radiosity::FormFactors) -> Solution {
-    Shooting::default().solve(mesh, rows, |_| ControlFlow::Continue(())).expect("a solution")
+    Solver::default().solve(mesh, rows, |_| ControlFlow::Continue(())).expect("a solution")
 }
 
 /// Prints the errors per kind of point, and checks those of kind `area`.

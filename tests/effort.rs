@@ -5,7 +5,7 @@ mod common;
 use common::{cornell_box, gpu, quads};
 use radiosity::{
     AdaptiveViewpoints, Error, FormFactors, HemicubeRows, Material, Mesh, NodeId,
-    ProximityCorrection, RayRows, Rgb, Row, Shooting, Solution,
+    ProximityCorrection, RayRows, Rgb, Row, Solution, Solver,
 };
 use std::ops::ControlFlow;
 
@@ -94,7 +94,7 @@ fn lamps() -> Mesh {
 fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
     let mesh = lamps();
     let mut told = Told::default();
-    Shooting { unshot: 0.0, ..Default::default() }
+    Solver { unshot: 0.0, ..Default::default() }
         .solve(&mesh, &mut told, |_| ControlFlow::Continue(()))
         .unwrap();
     // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch is
@@ -123,7 +123,7 @@ fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, Proxim
     let solve = || {
         let mut rows = ProximityCorrection::new(make(), mesh, 1.0);
         let solution =
-            Shooting::default().solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
+            Solver::default().solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         (solution, rows)
     };
     let ((one, rows), (again, _)) = (solve(), solve());

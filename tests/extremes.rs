@@ -12,7 +12,7 @@ mod sweep;
 mod sweeps;
 
 use radiosity::{
-    Backend, Camera, ErrorKind, Mesh, RadianceImage, RayRows, Rgb, Shooting, VertexMesh, load_obj,
+    Backend, Camera, ErrorKind, Mesh, RadianceImage, RayRows, Rgb, Solver, VertexMesh, load_obj,
     write_exr, write_ply,
 };
 use scenes::{Frame, HERE};
@@ -54,7 +54,7 @@ fn ties_are_ties_at_any_scale() {
         let scene = scenes::furnace(Frame::scaled(scale), 0.5, 1.0);
         let mesh = Mesh::new(scene, 0.2 * scale).unwrap();
         let mut rays = RayRows::new(&mesh, 256).unwrap().with_full_share(0.0);
-        let s = Shooting { unshot: 0.1, ..Shooting::default() };
+        let s = Solver { unshot: 0.1, ..Solver::default() };
         s.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap().radiosity
     };
     let known = light(1.0);

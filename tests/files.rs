@@ -8,7 +8,7 @@ use std::path::Path;
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::{
-    Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Report, Rgb, Shooting, VertexMesh,
+    Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Report, Rgb, Solver, VertexMesh,
     ViewFactors, write_exr, write_ply, write_png, write_view_factors,
 };
 
@@ -97,7 +97,7 @@ fn a_camera_sees_what_stands_before_it() {
     let left = [[-1., -1., 0.], [0., -1., 0.], [0., 1., 0.], [-1., 1., 0.]];
     let right = [[0., -1., 0.], [1., -1., 0.], [1., 1., 0.], [0., 1., 0.]];
     let mesh = Mesh::new(quads(&[(left, glow), (right, Material::grey("d", 0.0))]), 9.0).unwrap();
-    let solution = Shooting::default()
+    let solution = Solver::default()
         .solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), |_| ControlFlow::Continue(()))
         .unwrap();
     let surface = VertexMesh::new(&mesh, &solution.radiosity);

@@ -69,8 +69,8 @@ fn open_cube(without: usize) -> Scene {
 fn settle(scene: Scene, size: f64) -> (Mesh, Solution) {
     let mesh = Mesh::new(scene, size).unwrap();
     let mut rays = RayRows::new(&mesh, 1024).unwrap();
-    let shooting = Shooting { unshot: UNSHOT, ..Default::default() };
-    let solution = shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
+    let solver = Solver { unshot: UNSHOT, ..Default::default() };
+    let solution = solver.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
     check(&solution.radiosity);
     check(&VertexMesh::new(&mesh, &solution.radiosity).radiosity);
     // Sums of some 1e5 terms, each rounded by 1e-16 of the whole at most.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use radiosity::{Mesh, RayRows, Shooting, Solution, VertexMesh, read_obj};
+use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh, read_obj};
 
 const MATERIALS: &[u8] = b"newmtl lamp\nKe 1\nnewmtl rock\nKd 0.5\n";
 
@@ -17,8 +17,8 @@ fn bake(obj: &str, shots: u64) -> (Mesh, Solution) {
     let cut = start.elapsed();
     let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let sorted = start.elapsed();
-    let shooting = Shooting { shots: Some(shots), ..Default::default() };
-    let solution = shooting.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
+    let solver = Solver { max_steps: Some(shots), ..Default::default() };
+    let solution = solver.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
     let shot = start.elapsed();
     let surface = VertexMesh::new(&mesh, &solution.radiosity);
     println!(

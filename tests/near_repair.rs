@@ -6,7 +6,7 @@ use common::closed_forms::{exact, from_centroid};
 use common::{cube, gpu};
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
-    FormFactors, HemicubeRows, Material, Mesh, NodeId, ProximityCorrection, Rgb, Row, Shooting,
+    FormFactors, HemicubeRows, Material, Mesh, NodeId, ProximityCorrection, Rgb, Row, Solver,
 };
 use std::ops::ControlFlow;
 
@@ -111,7 +111,7 @@ fn the_white_furnace_is_even() {
     let uneven = |reach: f64| {
         let hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
         let mut rows = ProximityCorrection::new(hemicubes, &mesh, reach);
-        let settings = Shooting { unshot: 1e-6, ..Default::default() };
+        let settings = Solver { unshot: 1e-6, ..Default::default() };
         let s = settings.solve(&mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         assert!(s.ledger.imbalance() < 1e-9, "energy is kept");
         s.radiosity.iter().map(|b| (b.x / 2.0 - 1.0).abs()).fold(0.0, f64::max)

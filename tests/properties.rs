@@ -376,7 +376,7 @@ proptest! {
         split(&mut faces, which, side, at);
         let parts = mesh(&faces, materials.clone());
         let steps = if black { None } else { Some(1) };
-        let solver = Solver { unshot: 1e-13, steps, ..Solver::new(Method::Jacobi) };
+        let solver = Solver { unshot: 1e-13, max_steps: steps, ..Solver::new(Method::Jacobi) };
         let [one, two] = [&whole, &parts].map(|mesh| {
             solver.solve(mesh, &mut Made::exact(mesh), go).unwrap().radiosity
         });

@@ -183,7 +183,7 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     };
     assert!(solver.resume(&mesh, &rows, &path).is_ok());
     // StopReason rules and memory are no part of what it is.
-    let other = Solver { unshot: 0.5, steps: Some(3), row_memory: 0, ..solver };
+    let other = Solver { unshot: 0.5, max_steps: Some(3), row_memory: 0, ..solver };
     assert!(other.resume(&mesh, &rows, &path).is_ok());
     let finer = cornell_box(200.0);
     says(solver, &finer, &rows, "fingerprint of the mesh");

@@ -9,7 +9,7 @@ use common::quads;
 use glam::DVec3;
 use radiosity::{
     Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, Progress, RayRows, Rgb, Row,
-    Scene, Shooting, Solution, StopReason, Triangle,
+    Scene, Solution, Solver, StopReason, Triangle,
 };
 
 fn go(_: &Progress) -> ControlFlow<()> {
@@ -51,7 +51,7 @@ fn room(n: u32) -> Scene {
     Scene::new(positions, triangles, names, materials).unwrap()
 }
 
-fn solve(mesh: &Mesh, settings: Shooting) -> Solution {
+fn solve(mesh: &Mesh, settings: Solver) -> Solution {
     settings.solve(mesh, &mut RayRows::new(mesh, 4096).unwrap(), go).unwrap()
 }
 
@@ -68,8 +68,8 @@ fn many_small_triangles_need_no_more_rows_than_a_few_large_ones() {
     };
     assert_eq!(plain.element_count() as u64 - lamp(&plain), 6 * 512);
     assert_eq!(cut.element_count() as u64 - lamp(&cut), 6 * 512);
-    let settings = Shooting { tolerance: 8e-3, ..Default::default() };
-    let rows = |mesh: &Mesh| solve(mesh, settings.clone()).rows_made - lamp(mesh);
+    let settings = Solver { patch_tolerance: 8e-3, ..Default::default() };
+    let rows = |mesh: &Mesh| solve(mesh, settings).rows_made - lamp(mesh);
     let (few, many) = (rows(&plain), rows(&cut));
     println!("{few} rows for large triangles, {many} for small ones, of {}", 6 * 512);
     // Clusters halve where quadtrees quarter, so they stop up to a halving earlier or go one
@@ -121,7 +121,7 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
         // Half of the emitted light is at stake. Lit evenly it lies √(1/6) from the middle, RMS, and
         // goes a distance of 5: (1/6)/25 √½ = 0.005, or seen from a cube of area 3 (before there is a
         // row) (1/6)·2 √½ = 0.24. Uneven light is off by the angle, 0.5, times its share and more.
-        let settings = Shooting { tolerance: 0.3, ..Default::default() };
+        let settings = Solver { patch_tolerance: 0.3, ..Default::default() };
         let s = settings.solve(&mesh, &mut maker, go).unwrap();
         assert_eq!(s.stop, StopReason::Converged);
         maker.asked.len()
@@ -168,7 +168,7 @@ fn nobody_shoots_from_under_a_block() {
     }
     for scene in [empty, quads(&walls)] {
         let mesh = Mesh::new(scene, 1.0).unwrap();
-        let s = solve(&mesh, Shooting { tolerance: 5.0, ..Default::default() });
+        let s = solve(&mesh, Solver { patch_tolerance: 5.0, ..Default::default() });
         let back = s.ledger.backface_loss.x / s.ledger.emitted.x;
         println!("{back} of the light met backs, {} rows", s.rows_made);
         // The room is closed: backs are only seen from inside a block, where nobody is to shoot from.
@@ -179,13 +179,13 @@ fn nobody_shoots_from_under_a_block() {
 #[test]
 fn clusters_keep_the_energy_and_give_the_same_bits_every_time() {
     let mesh = Mesh::new(room(8), f64::INFINITY).unwrap();
-    let [one, two] = [0, 1].map(|_| solve(&mesh, Shooting::default()));
+    let [one, two] = [0, 1].map(|_| solve(&mesh, Solver::default()));
     assert!(one.ledger.imbalance() <= 1e-9, "{}", one.ledger.imbalance());
     assert!(one.radiosity == two.radiosity && one.ledger == two.ledger);
     assert_eq!((one.shots, one.rows_made), (two.shots, two.rows_made));
     // Without room for rows the order may differ, the light may not: within what is unshot, and
     // what patches of another size put elsewhere.
-    let none = solve(&mesh, Shooting { row_memory: 0, ..Default::default() });
+    let none = solve(&mesh, Solver { row_memory: 0, ..Default::default() });
     assert!(none.rows_made >= none.shots && none.ledger.imbalance() <= 1e-9);
     let absorbed = |s: &Solution| s.ledger.absorbed.x / s.ledger.emitted.x;
     assert!((absorbed(&one) / absorbed(&none) - 1.0).abs() < 2e-3);
@@ -194,12 +194,13 @@ fn clusters_keep_the_energy_and_give_the_same_bits_every_time() {
 #[test]
 fn a_tolerance_of_zero_makes_every_element_shoot() {
     let mesh = Mesh::new(room(2), 0.8).unwrap();
-    let all = solve(&mesh, Shooting { tolerance: 0.0, ..Default::default() });
+    let all = solve(&mesh, Solver { patch_tolerance: 0.0, ..Default::default() });
     assert_eq!(all.rows_made as usize, mesh.element_count());
-    let four = solve(&mesh, Shooting { tolerance: 0.0, level: 1, ..Default::default() });
+    let four =
+        solve(&mesh, Solver { patch_tolerance: 0.0, min_patch_level: 1, ..Default::default() });
     assert!(four.rows_made < all.rows_made / 2);
     for tolerance in [-1.0, f64::NAN] {
-        let settings = Shooting { tolerance, ..Default::default() };
+        let settings = Solver { patch_tolerance: tolerance, ..Default::default() };
         let error = settings.solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), go).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     }

@@ -11,7 +11,7 @@ use glam::DVec3;
 use radiosity::form_factor::closed_form::polygon_to_polygon;
 use radiosity::{
     Entry, Error, ErrorKind, FormFactors, HemicubeRows, Material, Mesh, NodeId, Progress, RayRows,
-    Rgb, Row, Shooting, Solution, StopReason,
+    Rgb, Row, Solution, Solver, StopReason,
 };
 
 fn go(_: &Progress) -> ControlFlow<()> {
@@ -46,7 +46,7 @@ fn unequal_areas_exchange_by_reciprocity() {
         mesh.material(n).exitance.x + mesh.material(n).reflectance.x * 7.0 * factor
     };
     let check = |maker: &mut dyn FormFactors, tolerance: f64| {
-        let all = Shooting { unshot: 0.0, ..Default::default() };
+        let all = Solver { unshot: 0.0, ..Default::default() };
         let s = all.solve(&mesh, maker, go).unwrap();
         let off = |(e, b): (usize, &Rgb)| (b.x / expected(e) - 1.0).abs();
         let worst = s.radiosity.iter().enumerate().map(off).fold(0.0, f64::max);
@@ -70,7 +70,7 @@ fn unequal_areas_exchange_by_reciprocity() {
 fn white_furnace_with_exact_rows_is_exact_at_every_element() {
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
         let mesh = Mesh::new(cube(&material(rho, 1.0)), 0.36).unwrap();
-        let settings = Shooting { unshot: 1e-7, tolerance: 0.0, ..Default::default() };
+        let settings = Solver { unshot: 1e-7, patch_tolerance: 0.0, ..Default::default() };
         let s = settings.solve(&mesh, &mut exact(), go).unwrap();
         let (mean, worst) = mean_and_worst(&mesh, &s, Rgb::splat(answer));
         println!("ρ {rho}: mean {}, worst {worst:.1e}, {} shots", mean.x, s.shots);
@@ -87,7 +87,7 @@ fn white_furnace_with_hemicubes_keeps_the_energy() {
     let Some(gpu) = gpu() else { return };
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
         let mesh = Mesh::new(cube(&material(rho, 1.0)), 0.2).unwrap();
-        let settings = Shooting { unshot: 1e-7, ..Default::default() };
+        let settings = Solver { unshot: 1e-7, ..Default::default() };
         let mut hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
         let s = settings.solve(&mesh, &mut hemicubes, go).unwrap();
         let (mean, worst) = mean_and_worst(&mesh, &s, Rgb::splat(answer));
@@ -118,7 +118,7 @@ fn the_ledger_closes_in_open_scenes_with_backs_at_every_shot() {
     let scene = quads(&[(lamp, lit), (wall, material(0.9, 0.0)), (back, material(0.5, 0.0))]);
     let mesh = Mesh::new(scene, 0.5).unwrap();
     let mut shares = vec![];
-    let s = Shooting { unshot: 1e-6, ..Default::default() }
+    let s = Solver { unshot: 1e-6, ..Default::default() }
         .solve(&mesh, &mut RayRows::new(&mesh, 4096).unwrap(), |p| {
             shares.push(p.unshot_share);
             ControlFlow::Continue(())
@@ -150,7 +150,8 @@ fn a_kept_row_is_made_once_and_budget_changes_nothing_but_the_work() {
     let mesh = Mesh::new(cube(&material(0.8, 1.0)), 0.36).unwrap();
     let solve = |row_memory: usize| {
         let mut maker = exact();
-        let settings = Shooting { unshot: 1e-3, row_memory, tolerance: 0.0, ..Default::default() };
+        let settings =
+            Solver { unshot: 1e-3, row_memory, patch_tolerance: 0.0, ..Default::default() };
         let s = settings.solve(&mesh, &mut maker, go).unwrap();
         assert_eq!(maker.made, s.rows_made);
         s
@@ -185,7 +186,7 @@ fn patches_and_elements_shoot_the_same_light() {
     };
     let solve = |level| {
         let mut rays = RayRows::new(&lit, 4096).unwrap();
-        Shooting { unshot: 1e-4, tolerance: 0.0, level, ..Default::default() }
+        Solver { unshot: 1e-4, patch_tolerance: 0.0, min_patch_level: level, ..Default::default() }
             .solve(&lit, &mut rays, go)
             .unwrap()
     };
@@ -201,7 +202,7 @@ fn patches_and_elements_shoot_the_same_light() {
 fn a_solve_can_be_cut_short_and_keeps_what_it_has() {
     let mesh = Mesh::new(cube(&material(0.8, 1.0)), 0.36).unwrap();
     let mut calls = 0;
-    let s = Shooting::default()
+    let s = Solver::default()
         .solve(&mesh, &mut exact(), |p| {
             calls += 1;
             assert_eq!(p.shots, calls);
@@ -210,10 +211,10 @@ fn a_solve_can_be_cut_short_and_keeps_what_it_has() {
         .unwrap();
     assert_eq!((s.shots, s.stop), (7, StopReason::Cancelled));
     assert!(s.ledger.imbalance() < 1e-12);
-    let shots = Shooting { shots: Some(5), ..Default::default() };
+    let shots = Solver { max_steps: Some(5), ..Default::default() };
     let s = shots.solve(&mesh, &mut exact(), go).unwrap();
     assert_eq!((s.shots, s.stop), (5, StopReason::Shots));
-    let none = Shooting { shots: Some(0), ..Default::default() };
+    let none = Solver { max_steps: Some(0), ..Default::default() };
     let s = none.solve(&mesh, &mut exact(), go).unwrap();
     assert!(s.shots == 0 && s.radiosity.iter().all(|&b| b == Rgb::ONE));
 }
@@ -221,7 +222,7 @@ fn a_solve_can_be_cut_short_and_keeps_what_it_has() {
 #[test]
 fn a_dark_scene_is_solved_at_once() {
     let mesh = Mesh::new(cube(&material(0.8, 0.0)), 0.36).unwrap();
-    let s = Shooting::default().solve(&mesh, &mut exact(), go).unwrap();
+    let s = Solver::default().solve(&mesh, &mut exact(), go).unwrap();
     assert_eq!((s.shots, s.stop, s.ledger.unshot_share()), (0, StopReason::Converged, 0.0));
     assert!(s.radiosity.iter().all(|&b| b == Rgb::ZERO));
 }
@@ -253,13 +254,13 @@ fn rows_that_break_their_contract_are_refused() {
         vec![Row { entries: vec![entry(12, Row::TOTAL)], ..Default::default() }],
     ];
     for rows in bad {
-        let e = Shooting::default().solve(&mesh, &mut Given(rows), go).unwrap_err();
+        let e = Solver::default().solve(&mesh, &mut Given(rows), go).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");
     }
-    let one = Shooting { shots: Some(1), ..Default::default() };
+    let one = Solver { max_steps: Some(1), ..Default::default() };
     assert!(one.solve(&mesh, &mut Given(vec![good]), go).is_ok());
     for unshot in [-0.1, 1.1, f64::NAN] {
-        let settings = Shooting { unshot, ..Default::default() };
+        let settings = Solver { unshot, ..Default::default() };
         let e = settings.solve(&mesh, &mut exact(), go).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
     }

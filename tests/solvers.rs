@@ -6,8 +6,8 @@ use common::closed_forms::exact;
 use common::walls::walls;
 use common::{cornell_box, cube, quads};
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, MAX_DIRECT, Material, Mesh, Method, NodeId, Progress,
-    RayRows, Rgb, Row, Scene, Solution, Solver, StopReason,
+    Entry, Error, ErrorKind, FormFactors, Material, Mesh, Method, NodeId, Progress, RayRows, Rgb,
+    Row, Scene, Solution, Solver, StopReason,
 };
 use std::ops::ControlFlow;
 
@@ -24,14 +24,9 @@ fn grey(reflectance: f64, exitance: f64) -> Material {
     material([reflectance; 3], [exitance; 3])
 }
 
-/// Every method, all on elements.
-fn methods() -> [Method; 6] {
-    Method::ALL.map(|method| match method {
-        Method::Shooting { level, overshoot, .. } => {
-            Method::Shooting { tolerance: 0.0, level, overshoot }
-        }
-        other => other,
-    })
+/// `method`, shooting by elements.
+fn by_elements(method: Method) -> Solver {
+    Solver { patch_tolerance: 0.0, ..Solver::new(method) }
 }
 
 /// RayScene, as many for each row.
@@ -91,10 +86,10 @@ fn all_methods_agree_with_a_direct_solve() {
         let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, go).unwrap();
         assert_eq!((judge.stop, judge.steps), (StopReason::Converged, 1));
         println!("{name}, {} elements", mesh.element_count());
-        for method in methods() {
+        for method in Method::ALL {
             // What 1e-11 of the flux can still bring, ten or a hundred times that in all, is less
             // than 1e-6 of an element that leaves as little as 1e-3 of its share among a thousand.
-            let solver = Solver { unshot: 1e-11, ..Solver::new(method) };
+            let solver = Solver { unshot: 1e-11, ..by_elements(method) };
             let s = solver.solve(&mesh, &mut maker, go).unwrap();
             let off = off(&s, &judge);
             let imbalance = s.ledger.imbalance();
@@ -145,12 +140,12 @@ fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
         let uneven = [rho, 0.5 * rho, rho, 0.9 * rho, 0.0, rho];
         for walls in [even, uneven] {
             let mesh = repainted(&mesh, walls.map(|rho| grey(rho, 3.0 * (1.0 - rho))));
-            for method in methods() {
+            for method in Method::ALL {
                 let bounded = matches!(method, Method::Gmres { .. } | Method::Direct);
                 if !bounded && rho > 0.99 {
                     continue;
                 }
-                let solver = Solver { unshot: 1e-9, ..Solver::new(method) };
+                let solver = Solver { unshot: 1e-9, ..by_elements(method) };
                 let s = solver.solve(&mesh, &mut maker, go).unwrap();
                 let worst = s.radiosity.iter().map(|b| (*b / 3.0 - 1.0).abs().max_element());
                 let worst = worst.fold(0.0, f64::max);
@@ -204,7 +199,8 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
     let mut bounce: Vec<Rgb> = (0..count).map(flux).collect();
     let mut leaving = bounce.clone();
     for bounces in 0..5 {
-        let solver = Solver { unshot: 0.0, steps: Some(bounces), ..Solver::new(Method::Jacobi) };
+        let solver =
+            Solver { unshot: 0.0, max_steps: Some(bounces), ..Solver::new(Method::Jacobi) };
         let s = solver.solve(&mesh, &mut maker, go).unwrap();
         assert_eq!((s.steps, s.stop), (bounces, StopReason::Steps));
         for (e, (&b, &flux)) in s.radiosity.iter().zip(&leaving).enumerate() {
@@ -230,7 +226,7 @@ fn gauss_seidel_takes_fewer_sweeps_than_jacobi() {
     let (_, mesh) = &scenes()[3];
     let mut maker = Stored::of(mesh);
     let [jacobi, gauss_seidel] = [Method::Jacobi, Method::GaussSeidel].map(|method| {
-        let solver = Solver { unshot: 1e-6, ..Solver::new(method) };
+        let solver = Solver { unshot: 1e-6, ..by_elements(method) };
         solver.solve(mesh, &mut maker, go).unwrap().steps
     });
     println!("{jacobi} bounces, {gauss_seidel} sweeps");
@@ -245,8 +241,8 @@ fn overshoot_saves_shots_where_light_goes_round_long() {
     let mesh = Mesh::new(scene, 0.2).unwrap();
     let mut maker = Stored::of(&mesh);
     let mut shots = |overshoot, unshot| {
-        let method = Method::Shooting { tolerance: 0.0, level: 0, overshoot };
-        let s = Solver { unshot, ..Solver::new(method) }.solve(&mesh, &mut maker, go).unwrap();
+        let method = Method::Shooting { overshoot };
+        let s = Solver { unshot, ..by_elements(method) }.solve(&mesh, &mut maker, go).unwrap();
         assert!(s.ledger.imbalance() < 1e-12);
         assert!(overshoot || s.ledger.overshot == Rgb::ZERO);
         s.shots
@@ -280,8 +276,8 @@ fn large_patches_may_overshoot_too() {
 fn the_ledger_closes_wherever_a_solve_ends() {
     let (_, mesh) = &scenes()[2];
     let mut maker = Stored::of(mesh);
-    for method in methods() {
-        let solver = Solver { unshot: 1e-9, ..Solver::new(method) };
+    for method in Method::ALL {
+        let solver = Solver { unshot: 1e-9, ..by_elements(method) };
         let mut calls = 0;
         let whole = solver.solve(mesh, &mut maker, |p| {
             calls += 1;
@@ -289,7 +285,8 @@ fn the_ledger_closes_wherever_a_solve_ends() {
         });
         let whole = whole.unwrap();
         for steps in (0..whole.steps).step_by((whole.steps / 7) as usize + 1) {
-            let s = Solver { steps: Some(steps), ..solver }.solve(mesh, &mut maker, go).unwrap();
+            let s =
+                Solver { max_steps: Some(steps), ..solver }.solve(mesh, &mut maker, go).unwrap();
             let stop = if matches!(method, Method::Shooting { .. }) {
                 StopReason::Shots
             } else {
@@ -328,9 +325,9 @@ fn closes(s: &Solution, mesh: &Mesh) {
 fn rows_that_are_not_kept_are_made_again_and_change_nothing() {
     let (_, mesh) = &scenes()[4];
     let all: usize = Stored::of(mesh).0.values().map(Row::bytes).sum();
-    for method in methods() {
+    for method in Method::ALL {
         let solve = |row_memory| {
-            let solver = Solver { unshot: 1e-4, row_memory, ..Solver::new(method) };
+            let solver = Solver { unshot: 1e-4, row_memory, ..by_elements(method) };
             let mut made = 0;
             let s = solver.solve(mesh, &mut rays(mesh), |p| {
                 // Cancelled or not, no more than a batch of rows goes by unheard.
@@ -364,8 +361,8 @@ fn channels_of_any_scale_are_solved_alike() {
     let e = [1e150, 0.0, 1e-150];
     let scene = room([(); 6].map(|_| grey(0.8, 0.0)), material([0.5; 3], e), grey(0.6, 0.0));
     let mesh = Mesh::new(scene, 0.4).unwrap();
-    for method in methods() {
-        let solver = Solver { unshot: 1e-12, ..Solver::new(method) };
+    for method in Method::ALL {
+        let solver = Solver { unshot: 1e-12, ..by_elements(method) };
         let s = solver.solve(&mesh, &mut Stored::of(&mesh), go).unwrap();
         for b in &s.radiosity {
             assert!(
@@ -379,8 +376,8 @@ fn channels_of_any_scale_are_solved_alike() {
 #[test]
 fn a_dark_scene_is_solved_at_once_by_all() {
     let mesh = Mesh::new(cube(&grey(0.8, 0.0)), 0.36).unwrap();
-    for method in methods() {
-        let s = Solver::new(method).solve(&mesh, &mut exact(), go).unwrap();
+    for method in Method::ALL {
+        let s = by_elements(method).solve(&mesh, &mut exact(), go).unwrap();
         assert_eq!((s.steps, s.rows_made, s.stop), (0, 0, StopReason::Converged));
         assert!(s.radiosity.iter().all(|&b| b == Rgb::ZERO));
     }
@@ -393,12 +390,12 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
         let e = solver.solve(mesh, &mut exact(), go).unwrap_err();
         assert!(e.kind() == ErrorKind::Setting && e.to_string().contains(says), "{e}");
     };
-    for method in methods() {
+    for method in Method::ALL {
         for unshot in [-0.1, 1.1, f64::NAN] {
-            refused(Solver { unshot, ..Solver::new(method) }, &mesh, "use 0 to 1");
+            refused(Solver { unshot, ..by_elements(method) }, &mesh, "use 0 to 1");
         }
         let bright = Mesh::new(cube(&grey(0.8, 1e308)), 2.0).unwrap();
-        let e = Solver::new(method).solve(&bright, &mut exact(), go).unwrap_err();
+        let e = by_elements(method).solve(&bright, &mut exact(), go).unwrap_err();
         assert!(e.kind() == ErrorKind::Scene && e.place() == "emitted flux", "{e}");
         let half = Row::TOTAL / 2;
         let entry = |element, share| Entry { element, share };
@@ -408,17 +405,18 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
             vec![Row { entries: vec![entry(12, Row::TOTAL)], ..Default::default() }],
         ];
         for rows in bad {
-            let e = Solver::new(method).solve(&mesh, &mut Given(rows), go).unwrap_err();
+            let e = by_elements(method).solve(&mesh, &mut Given(rows), go).unwrap_err();
             assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");
         }
     }
     refused(Solver::new(Method::Gmres { restart: 0 }), &mesh, "1 or more");
-    for tolerance in [-1.0, f64::NAN] {
-        let method = Method::Shooting { tolerance, level: 0, overshoot: true };
-        refused(Solver::new(method), &mesh, "use 0 or more");
+    for patch_tolerance in [-1.0, f64::NAN] {
+        let method = Method::Shooting { overshoot: true };
+        let solver = Solver { patch_tolerance, ..Solver::new(method) };
+        refused(solver, &mesh, "use 0 or more");
     }
     let large = Mesh::new(cube(&grey(0.8, 1.0)), 0.07).unwrap();
-    assert!(large.element_count() > MAX_DIRECT);
+    assert!(large.element_count() > Solver::DIRECT_MAX_ELEMENTS);
     refused(Solver::new(Method::Direct), &large, "at most 4096");
     let e = "newton".parse::<Method>().unwrap_err();
     assert!(e.to_string().contains("'newton'") && e.to_string().contains("gauss-seidel"), "{e}");

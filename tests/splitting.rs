@@ -8,7 +8,7 @@ use common::surface::assert_whole;
 use common::{cube, quads};
 use glam::DVec3;
 use radiosity::{
-    ErrorKind, MAX_DEPTH, Material, Mesh, NodeId, RayRows, Rgb, Scene, Shooting, StopReason,
+    ErrorKind, MAX_DEPTH, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason,
     Triangle, VertexMesh,
 };
 use std::ops::ControlFlow;
@@ -115,7 +115,7 @@ fn what_is_split_takes_the_place_of_one_and_no_split_goes_too_deep() {
 fn unequal_depths_shoot_as_well_as_equal_ones() {
     let glow = Material { exitance: Rgb::ONE, ..grey() };
     let uneven = |mesh: &Mesh| {
-        let settings = Shooting { unshot: 1e-6, ..Default::default() };
+        let settings = Solver { unshot: 1e-6, ..Default::default() };
         let mut rows = RayRows::new(mesh, 1024).unwrap();
         let s = settings.solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
         assert!(s.ledger.imbalance() <= 1e-9, "{}", s.ledger.imbalance());
@@ -278,7 +278,7 @@ fn the_ambient_of_all_unshot_light_is_exact_where_it_is_even() {
     let mesh = split_at_random(Mesh::new(cube(&glow), 0.8).unwrap(), 1);
     let even = glow.exitance / (Rgb::ONE - glow.reflectance);
     let stopped = |mesh: &Mesh, shots| {
-        let settings = Shooting { shots: Some(shots), ..Default::default() };
+        let settings = Solver { max_steps: Some(shots), ..Default::default() };
         let s = settings.solve(mesh, &mut exact(), |_| ControlFlow::Continue(())).unwrap();
         assert_eq!(s.stop, StopReason::Shots);
         let mut radiosity = s.radiosity.clone();

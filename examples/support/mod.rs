@@ -10,8 +10,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
     Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, Camera, Error,
     ErrorEstimate, ErrorKind, GatherProgress, GatherSettings, Progress, RadianceImage,
-    RefinementSettings, Report, Scene, Seconds, Shooting, VertexMesh, load_obj, write_exr,
-    write_ply, write_png,
+    RefinementSettings, Report, Scene, Seconds, Solver, VertexMesh, load_obj, write_exr, write_ply,
+    write_png,
 };
 use serde_json::{Value, json};
 
@@ -225,7 +225,7 @@ pub fn plain(scene: &Scene) -> BakeSettings {
         element_size: default_element_size(scene),
         contacts: 3,
         hemicube: 128,
-        shooting: Shooting { unshot: 1e-4, ..Shooting::default() },
+        solver: Solver { unshot: 1e-4, ..Solver::default() },
         gather: None,
         ..BakeSettings::for_error(0.02, scene)
     }
@@ -263,7 +263,7 @@ fn comments(baked: &BakeResult) -> Vec<String> {
 }
 
 fn settings(effort: &BakeSettings) -> Vec<(String, Value)> {
-    let BakeSettings { shooting, gather, .. } = effort;
+    let BakeSettings { solver, gather, .. } = effort;
     let mut all = vec![
         ("element_size", json!(effort.element_size)),
         ("contacts", json!(effort.contacts)),
@@ -272,12 +272,12 @@ fn settings(effort: &BakeSettings) -> Vec<(String, Value)> {
         ("near", json!(effort.near)),
         ("viewpoints", json!(effort.viewpoints)),
         ("rotations", json!(effort.rotations.get())),
-        ("solver", json!(effort.method.map(|method| method.to_string()))),
-        ("unshot", json!(shooting.unshot)),
-        ("shots", json!(shooting.shots)),
-        ("row_memory", json!(shooting.row_memory)),
-        ("patch_tolerance", json!(shooting.tolerance)),
-        ("patch_level", json!(shooting.level)),
+        ("solver", json!((!effort.gmres_if_bright).then(|| solver.method.to_string()))),
+        ("unshot", json!(solver.unshot)),
+        ("shots", json!(solver.max_steps)),
+        ("row_memory", json!(solver.row_memory)),
+        ("patch_tolerance", json!(solver.patch_tolerance)),
+        ("patch_level", json!(solver.min_patch_level)),
         ("ambient", json!(effort.ambient)),
         ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
     ];

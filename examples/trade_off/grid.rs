@@ -98,8 +98,8 @@ impl Grid {
         self.panel("Element size", "edge of those that shoot; others with it", [sizes]);
 
         let steps: &[f64] = if quick { &[16.0, 4.0, 1.0] } else { &[64.0, 16.0, 4.0, 1.0, 0.25] };
-        let label = |e: &BakeSettings| percent(e.shooting.unshot);
-        let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.shooting.unshot *= f);
+        let label = |e: &BakeSettings| percent(e.solver.unshot);
+        let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.solver.unshot *= f);
         self.panel("Unshot share", "of the light, at which shooting stops", [unshot]);
 
         let steps: &[f64] = if quick { &[1.0, 2.0] } else { &[1.0, 2.0, 4.0] };

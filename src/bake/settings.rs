@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
-use crate::solver::{Method, Shooting, Solver};
+use crate::solver::{Method, Solver};
 use crate::vertex::gathering::RefinementSettings;
 
 /// All settings of a bake. [`BakeSettings::for_error`] chooses them; each can be changed by hand.
@@ -28,11 +28,11 @@ pub struct BakeSettings {
     /// Patches whose parts disagree by more than this share of light are seen from finer parts; with
     /// none, each only from its centroid.
     pub viewpoints: Option<f64>,
-    /// How far light is shot, and from how large patches.
-    pub shooting: Shooting,
-    /// How light is spread, as far as `shooting` says; with none by shooting, or with GMRES in scenes
-    /// as bright as [`Solver::for_mesh`] asks for.
-    pub method: Option<Method>,
+    /// How light is spread, how far, and from how large patches.
+    pub solver: Solver,
+    /// Whether GMRES takes the place of `solver.method` in scenes for which [`Solver::for_mesh`]
+    /// chooses it.
+    pub gmres_if_bright: bool,
     /// A file that the state of the solve is written to, every few batches and at its end; if it is
     /// there, the solve goes on from it: see [`Solver::resume`]. The last batches at most are lost
     /// when a bake is killed: as many as take ten times what writing takes.
@@ -66,17 +66,14 @@ impl BakeSettings {
         self.gather.as_ref().map_or(Ok(()), |gather| gather.gathering.check())
     }
 
-    /// Who spreads the light of `mesh`.
-    pub(crate) fn solver(&self, mesh: &Mesh) -> Solver {
-        let shooting = self.shooting.solver();
-        let method = match (self.method, Solver::for_mesh(mesh).method) {
-            (Some(Method::Shooting { overshoot, .. }), _) => {
-                return Shooting { overshoot, ..self.shooting.clone() }.solver();
+    /// The solver for `mesh`.
+    pub(crate) fn solver_for(&self, mesh: &Mesh) -> Solver {
+        match Solver::for_mesh(mesh).method {
+            method @ Method::Gmres { .. } if self.gmres_if_bright => {
+                Solver { method, ..self.solver }
             }
-            (Some(method), _) | (None, method @ Method::Gmres { .. }) => method,
-            (None, _) => return shooting,
-        };
-        Solver { method, ..shooting }
+            _ => self.solver,
+        }
     }
 
     /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
@@ -106,12 +103,12 @@ impl BakeSettings {
             rotations: NonZeroU32::MIN,
             near: 1.0,
             viewpoints: None,
-            shooting: Shooting {
+            solver: Solver {
                 unshot: e / 40.0,
-                tolerance: e.min(0.02 + 0.4 * e),
-                ..Shooting::default()
+                patch_tolerance: e.min(0.02 + 0.4 * e),
+                ..Solver::default()
             },
-            method: None,
+            gmres_if_bright: true,
             state: None,
             ambient: false,
             gather: Some(GatherSettings {

@@ -114,7 +114,7 @@ fn solve(
     rows: &mut dyn FormFactors,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, Error> {
-    let solver = effort.solver(mesh);
+    let solver = effort.solver_for(mesh);
     let Some(path) = &effort.state else { return solver.solve(mesh, rows, progress) };
     let mut solve = match path.exists() {
         true => solver.resume(mesh, rows, path)?,

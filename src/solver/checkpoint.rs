@@ -12,6 +12,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::flux_state::FluxState;
 use super::gmres::Gmres;
+use super::method::saved_identity;
 use super::patch_cut::{CutSnapshot, PatchCut};
 use super::relaxation::Relaxation;
 use super::row_cache::PatchHistory;
@@ -85,8 +86,11 @@ impl SolveSession<'_> {
     /// What [`SolveSession::save`] writes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let SolveSession { solver, state, rows, course, done, made_by, .. } = self;
-        let name =
-            Name { mesh: state.mesh.fingerprint(), method: method(solver), rows: made_by.clone() };
+        let name = Name {
+            mesh: state.mesh.fingerprint(),
+            method: saved_identity(solver),
+            rows: made_by.clone(),
+        };
         let trails: Vec<(NodeId, PatchHistory)> =
             rows.trails.iter().map(|(&p, &t)| (p, t)).collect();
         let doubtful = trails.iter().filter(|(_, trail)| trail.kept && trail.doubt > 0.0);
@@ -120,11 +124,6 @@ fn seal(mut bytes: Vec<u8>) -> Vec<u8> {
     let sum = xxh3_64(&bytes);
     bytes.extend(sum.to_le_bytes());
     bytes
-}
-
-/// What must be the same for a solve to go on, in words. StopReason rules may differ.
-fn method(solver: &Solver) -> String {
-    format!("{:?}", solver.method)
 }
 
 impl Solver {
@@ -179,7 +178,7 @@ impl Solver {
         };
         let hex = |mesh: u64| format!("{mesh:016x}");
         same("fingerprint of the mesh", &hex(name.mesh), &hex(mesh.fingerprint()))?;
-        same("method", &name.method, &method(self))?;
+        same("method", &name.method, &saved_identity(self))?;
         same("rows", &name.rows, &form_factors.fingerprint())?;
         let (saved, rest) = postcard::take_from_bytes::<Saved>(rest).map_err(damaged)?;
         if !rest.is_empty() {
@@ -251,8 +250,9 @@ impl Saved {
         }
         let unfit = || bad("method", "what it had in hand does not fit the mesh", REMEDY);
         let course = match (course, solver.method) {
-            (SavedMethodState::Shooting(cut), Method::Shooting { tolerance, level, .. }) => {
-                let shooters = PatchCut::from_cut(mesh, tolerance, level, cut);
+            (SavedMethodState::Shooting(cut), Method::Shooting { .. }) => {
+                let Solver { patch_tolerance, min_patch_level, .. } = solver;
+                let shooters = PatchCut::from_cut(mesh, patch_tolerance, min_patch_level, cut);
                 MethodState::Shooting(shooters.ok_or_else(unfit)?)
             }
             (SavedMethodState::Relaxation(relaxation), Method::Jacobi)

@@ -14,9 +14,6 @@ use crate::error::Error;
 use crate::form_factor::Row;
 use crate::scene::Rgb;
 
-/// Elements that a direct solve takes at most: its matrix has 24 bytes an entry, 400 MB in all.
-pub const MAX_DIRECT: usize = 4096;
-
 /// Pivot rows that are taken at once, as many as a cache holds beside the row that they are taken
 /// from.
 const PANEL: usize = 16;

@@ -83,11 +83,13 @@ impl Counters {
 }
 
 impl<'m> MethodState<'m> {
-    pub fn new(method: Method, mesh: &'m Mesh) -> MethodState<'m> {
-        match method {
-            Method::Shooting { tolerance, level, .. } => {
-                MethodState::Shooting(PatchCut::new(mesh, tolerance, level))
-            }
+    pub fn new(solver: &Solver, mesh: &'m Mesh) -> MethodState<'m> {
+        match solver.method {
+            Method::Shooting { .. } => MethodState::Shooting(PatchCut::new(
+                mesh,
+                solver.patch_tolerance,
+                solver.min_patch_level,
+            )),
             Method::Jacobi => MethodState::Relaxation(Relaxation::jacobi(mesh.element_count())),
             Method::GaussSeidel => MethodState::Relaxation(Relaxation::gauss_seidel()),
             Method::Gmres { restart } => MethodState::Gmres(Gmres::new(restart)),
@@ -97,6 +99,19 @@ impl<'m> MethodState<'m> {
 }
 
 impl<'m> SolveSession<'m> {
+    /// Nothing is shot yet.
+    pub(super) fn new(solver: Solver, mesh: &'m Mesh) -> Result<SolveSession<'m>, Error> {
+        Ok(SolveSession {
+            state: FluxState::new(mesh)?,
+            rows: RowCache::new(solver.row_memory),
+            course: MethodState::new(&solver, mesh),
+            done: Counters::default(),
+            stop: None,
+            made_by: String::new(),
+            solver,
+        })
+    }
+
     /// Goes on by one batch of rows, or as far as kept rows go; answers why it stops, if it does. A
     /// direct solve is one batch.
     ///
@@ -143,11 +158,11 @@ impl<'m> SolveSession<'m> {
         let doubt = rows.doubt(state.ledger.emitted) / 4.0;
         let unshot = (solver.unshot - doubt).max(solver.unshot / 2.0);
         let unshot = unshot.max(LEAST_UNSHOT);
-        let steps = solver.steps;
+        let steps = solver.max_steps;
         let mut batch = StepContext { state, rows, maker, done, progress, start, unshot, steps };
         self.stop = match course {
             MethodState::Shooting(shooters) => {
-                let overshoot = matches!(solver.method, Method::Shooting { overshoot: true, .. });
+                let overshoot = matches!(solver.method, Method::Shooting { overshoot: true });
                 shoot_batch(&mut batch, shooters, overshoot)?
             }
             MethodState::Relaxation(relaxation) => relaxation.advance(&mut batch)?,
@@ -211,8 +226,8 @@ impl<'m> SolveSession<'m> {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`](crate::ErrorKind::Setting) when `unshot` is not in [0, 1].
-    pub fn set_limits(&mut self, unshot: f64, steps: Option<u64>) -> Result<(), Error> {
-        let solver = Solver { unshot, steps, ..self.solver };
+    pub fn set_limits(&mut self, unshot: f64, max_steps: Option<u64>) -> Result<(), Error> {
+        let solver = Solver { unshot, max_steps, ..self.solver };
         solver.check()?;
         self.solver = solver;
         Ok(())

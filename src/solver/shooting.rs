@@ -1,92 +1,20 @@
 //! Progressive shooting (Cohen, Chen, Wallace, Greenberg 1988) in f64: the patch with most unshot
 //! flux first, which is Southwell's relaxation.
 
-use std::ops::ControlFlow;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::StopReason;
 use super::flux_state::FluxState;
 use super::patch_cut::{PatchCut, Shot};
 use super::session::StepContext;
-use super::{Method, Progress, Solution, Solver, StopReason};
 use crate::error::Error;
-use crate::form_factor::FormFactors;
-use crate::mesh::{Mesh, NodeId};
+use crate::mesh::NodeId;
 use crate::scene::Rgb;
-
-/// Settings of progressive shooting; [`Shooting::default`] is usable as it is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shooting {
-    /// StopReason when no channel has more than this share of its emitted flux unshot, in [0, 1].
-    pub unshot: f64,
-    /// StopReason after this many shots.
-    pub shots: Option<u64>,
-    /// Bytes that kept rows may take.
-    pub row_memory: usize,
-    /// How much of its light a patch may send wrong because it shoots from one place: the share of
-    /// the emitted light that it carries, under a square root, times the share of this that goes
-    /// wrong, as far as can be told from its size, from how near its receivers are and from how
-    /// uneven it is. Patches are as large as this lets them be, from clusters of many triangles down
-    /// to elements. 0 makes every patch as small as `level` allows. Elements of emitters shoot by
-    /// themselves where they are few. RowCache are taken to be right for near receivers: see
-    /// [`ProximityCorrection`](crate::ProximityCorrection).
-    pub tolerance: f64,
-    /// The smallest patches are this many quadtree levels above the elements: 4ᵏ elements, or a
-    /// triangle.
-    pub level: u32,
-    /// Whether patches shoot ahead of the light (Feda and Purgathofer 1992): beside what they have
-    /// unshot, what they would yet receive and reflect if all that is unshot fell evenly. Saves shots
-    /// where reflectance is high; what was shot too much is made up for by what comes in, or shot as
-    /// negative light. Until then the ledger has it as `overshot`.
-    pub overshoot: bool,
-}
-
-impl Default for Shooting {
-    fn default() -> Self {
-        Shooting {
-            unshot: 1e-3,
-            shots: None,
-            row_memory: 1 << 30,
-            tolerance: Shooting::TOLERANCE,
-            level: 0,
-            overshoot: false,
-        }
-    }
-}
 
 /// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order
 /// where ω < 2, since exchange areas are symmetric (Ostrowski 1954).
 const MOST_OVERSHOOT: f64 = 0.8;
-
-impl Shooting {
-    /// The tolerance, unless set.
-    pub const TOLERANCE: f64 = 4e-3;
-
-    /// Spreads the light that `mesh` emits, with rows from `form_factors`, brightest patch first.
-    ///
-    /// `progress` is told of every shot, and of every row that was made in vain, and may stop the
-    /// solver; what was reached is returned.
-    ///
-    /// # Errors
-    /// [`crate::ErrorKind::Setting`] when `unshot` is not in [0, 1] or `tolerance` not at least 0;
-    /// [`crate::ErrorKind::Scene`] when the emitted flux is not finite; [`crate::ErrorKind::FormFactor`] when a row
-    /// breaks its contract; whatever `form_factors` fails with.
-    pub fn solve(
-        &self,
-        mesh: &Mesh,
-        form_factors: &mut dyn FormFactors,
-        mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Solution, Error> {
-        self.solver().solve(mesh, form_factors, &mut progress)
-    }
-
-    /// The same as a [`Solver`].
-    pub fn solver(&self) -> Solver {
-        let &Shooting { unshot, shots, row_memory, tolerance, level, overshoot } = self;
-        let method = Method::Shooting { tolerance, level, overshoot };
-        Solver { method, unshot, steps: shots, row_memory }
-    }
-}
 
 /// Takes the next shots, if there is any to be taken.
 pub(super) fn shoot_batch(

@@ -1,0 +1,162 @@
+//! Settings of a solve, the rule that picks a method, and the solve itself.
+
+use std::ops::ControlFlow;
+
+use super::{Method, Progress, Solution, SolveSession};
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::FormFactors;
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+/// How light is spread, and when that stops. [`Solver::default`] shoots to 0.1 % unshot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// The method.
+    pub method: Method,
+    /// Stops when no channel has more than this share of its emitted flux unshot, in [0, 1].
+    /// Radiosity is off by no more than that brings: at most this × emitted flux / (1 − ρ) in all,
+    /// ρ the highest reflectance.
+    pub unshot: f64,
+    /// Stops after this many steps of the [`Method`]; for shooting, shots.
+    pub max_steps: Option<u64>,
+    /// Bytes that kept rows may take; those that do not fit are made again.
+    pub row_memory: usize,
+    /// For shooting: the highest estimated error of a patch that shoots along one row, seen from
+    /// one place: √s q, where s is the share of the emitted light that it carries and q the share
+    /// of this that goes wrong, estimated from its size, the distance of its receivers and how
+    /// uneven its light is. Patches are as large as this permits, from clusters of many triangles
+    /// down to elements. 0 makes every patch as small as `min_patch_level` allows. Elements of
+    /// emitters shoot by themselves where they are few. Rows are taken to be right for near
+    /// receivers: see [`ProximityCorrection`](crate::ProximityCorrection).
+    pub patch_tolerance: f64,
+    /// For shooting: the smallest patches are this many quadtree levels above the elements: 4ᵏ
+    /// elements, or a triangle.
+    pub min_patch_level: u32,
+}
+
+impl Default for Solver {
+    /// Shooting, without overshoot.
+    fn default() -> Solver {
+        Solver::new(Method::Shooting { overshoot: false })
+    }
+}
+
+impl Solver {
+    /// Elements that [`Method::Direct`] takes at most: its matrix has 24 bytes an entry, 400 MB in
+    /// all.
+    pub const DIRECT_MAX_ELEMENTS: usize = 4096;
+
+    /// Elements up to which [`Solver::for_mesh`] solves directly: a tenth of a second.
+    pub const AUTO_DIRECT_MAX_ELEMENTS: usize = 512;
+
+    /// Mean reflectance from which on [`Solver::for_mesh`] chooses GMRES where all rows fit in
+    /// memory: shooting would follow some 70 bounces for 0.1 % unshot, where GMRES takes some 10
+    /// products.
+    pub const AUTO_GMRES_MIN_REFLECTANCE: f64 = 0.9;
+
+    /// The same where rows must be made again for every product: 2 300 bounces.
+    pub const AUTO_GMRES_MIN_REFLECTANCE_UNCACHED: f64 = 0.997;
+
+    /// [`Solver::patch_tolerance`], unless set.
+    pub const DEFAULT_PATCH_TOLERANCE: f64 = 4e-3;
+
+    /// `method`, to 0.1 % unshot with a GiB of rows.
+    pub fn new(method: Method) -> Solver {
+        Solver {
+            method,
+            unshot: 1e-3,
+            max_steps: None,
+            row_memory: 1 << 30,
+            patch_tolerance: Solver::DEFAULT_PATCH_TOLERANCE,
+            min_patch_level: 0,
+        }
+    }
+
+    /// The method that suits `mesh`, by its size and by its mean reflectance (by area, the highest
+    /// channel), with [`Solver::new`]'s settings:
+    ///
+    /// 1. direct, for up to [`Solver::AUTO_DIRECT_MAX_ELEMENTS`] elements;
+    /// 2. else GMRES, from [`Solver::AUTO_GMRES_MIN_REFLECTANCE`] on if all rows fit in memory even
+    ///    when full (8 bytes for each pair of elements), or from
+    ///    [`Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED`] on if they do not;
+    /// 3. else shooting.
+    pub fn for_mesh(mesh: &Mesh) -> Solver {
+        let [shooting, _, _, _, gmres, direct] = Method::ALL.map(Solver::new);
+        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
+        let area: f64 = elements.clone().map(|n| mesh.area(n)).sum();
+        let reflects: Rgb = elements.map(|n| mesh.material(n).reflectance * mesh.area(n)).sum();
+        let reflectance = (reflects / area).max_element();
+        let count = mesh.element_count();
+        let all_fit = count.saturating_mul(count).saturating_mul(8) <= gmres.row_memory;
+        let bright = if all_fit {
+            Solver::AUTO_GMRES_MIN_REFLECTANCE
+        } else {
+            Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED
+        };
+        if count <= Solver::AUTO_DIRECT_MAX_ELEMENTS {
+            direct
+        } else if reflectance >= bright {
+            gmres
+        } else {
+            shooting
+        }
+    }
+
+    /// Spreads the light that `mesh` emits, with rows from `form_factors`.
+    ///
+    /// `progress` is called for every row that light is sent along, or that is made in vain, and
+    /// may stop the solver; what was reached is returned. Its ledger closes, whenever that is.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1], a setting of the method is out of
+    /// range or the mesh too large for it; [`ErrorKind::Scene`] when the emitted flux is not
+    /// finite; [`ErrorKind::FormFactor`] when a row breaks its contract; all errors of
+    /// `form_factors`.
+    pub fn solve(
+        &self,
+        mesh: &Mesh,
+        form_factors: &mut dyn FormFactors,
+        progress: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Solution, Error> {
+        let mut session = self.begin(mesh)?;
+        session.run(form_factors, progress)?;
+        session.into_solution()
+    }
+
+    /// A session over `mesh` in which nothing is shot yet.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1], a setting of the method is out of
+    /// range or the mesh too large for it; [`ErrorKind::Scene`] when the emitted flux is not
+    /// finite.
+    pub fn begin<'m>(&self, mesh: &'m Mesh) -> Result<SolveSession<'m>, Error> {
+        self.check()?;
+        let (count, max) = (mesh.element_count(), Solver::DIRECT_MAX_ELEMENTS);
+        if self.method == Method::Direct && count > max {
+            let remedy = format!("at most {max}: use another method, such as gmres");
+            let found = format!("{count} elements");
+            return Err(Error::new(ErrorKind::Setting, "direct solve", found, remedy));
+        }
+        SolveSession::new(*self, mesh)
+    }
+
+    /// Whether all settings are in range.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let wrong = |place: String, found: &str, remedy: &str| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        let Solver { method, unshot, patch_tolerance, .. } = *self;
+        if !(0.0..=1.0).contains(&unshot) {
+            return wrong(format!("unshot share {unshot}"), "out of range", "use 0 to 1");
+        }
+        match method {
+            Method::Shooting { .. } if patch_tolerance.is_nan() || patch_tolerance < 0.0 => {
+                wrong(format!("tolerance {patch_tolerance}"), "below 0", "use 0 or more")
+            }
+            Method::Gmres { restart: 0 } => {
+                wrong("restart 0".into(), "no product", "use 1 or more products a cycle")
+            }
+            _ => Ok(()),
+        }
+    }
+}
