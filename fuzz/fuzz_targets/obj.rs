@@ -1,9 +1,9 @@
 //! OBJ and MTL from anywhere: see `try_scene`.
 #![no_main]
 
-#[path = "../try_scene.rs"]
-mod try_scene;
+#[path = "../../tests/fuzz_corpus/scene.rs"]
+mod scene;
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| {
-    try_scene::try_scene(input);
+    scene::try_scene(input);
 });

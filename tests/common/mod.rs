@@ -2,7 +2,10 @@
 #![allow(dead_code)]
 
 pub mod closed_forms;
+pub mod files;
+pub mod framed;
 pub mod surface;
+pub mod truth;
 pub mod walls;
 
 use glam::DVec3;

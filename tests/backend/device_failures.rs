@@ -1,0 +1,388 @@
+//! What callers get from devices that fail: every failure is brought about, and answered by an error
+//! or by smaller batches; what was solved by then stays.
+
+use std::cell::RefCell;
+use std::num::NonZeroU32;
+use std::ops::ControlFlow;
+
+use crate::common::{cornell_box, cube, gpu};
+use radiosity::{
+    Accuracy, AdaptiveViewpoints, Backend, BakeProgress, BakeSettings, Entry, Error, ErrorKind,
+    Fallback, FormFactors, Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
+    Material, Mesh, Method, NodeId, ProximityCorrection, RadiosityField, RayGather, RayRows,
+    RefinementSettings, Rgb, Row, Solver, StopReason, ViewFactors,
+};
+use radiosity::{GatherPoint, IrradianceSample};
+
+/// The device as if it had no more than `limits`.
+fn within(limits: GpuLimits) -> Gpu {
+    Gpu::within(None, &limits).unwrap()
+}
+
+fn go<T>(_: &T) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// A glowing cube in some elements.
+fn furnace() -> Mesh {
+    let glow = Material { exitance: Rgb::ONE, ..Material::grey("glow", 0.5) };
+    Mesh::new(cube(&glow), 0.3).unwrap()
+}
+
+/// Asks on until its device is closed, after so many times.
+struct Doomed<T> {
+    inner: T,
+    gpu: Gpu,
+    left: u32,
+}
+
+impl<T> Doomed<T> {
+    fn count(&mut self) {
+        match self.left {
+            0 => self.gpu.close(),
+            _ => self.left -= 1,
+        }
+    }
+}
+
+impl FormFactors for Doomed<HemicubeRows> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
+        self.count();
+        self.inner.rows(mesh, patches, share)
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        self.inner.preferred_batch_len()
+    }
+}
+
+impl Gather for Doomed<HemicubeGather> {
+    fn gather(
+        &mut self,
+        sources: &RadiosityField,
+        places: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        self.count();
+        self.inner.gather(sources, places)
+    }
+}
+
+/// Hemicubes whose device is closed after so many batches.
+fn doomed(gpu: &Gpu, mesh: &Mesh, left: u32) -> Doomed<HemicubeRows> {
+    Doomed { inner: HemicubeRows::new(gpu, mesh, 64).unwrap(), gpu: gpu.clone(), left }
+}
+
+#[test]
+fn a_lost_device_is_an_error_wherever_it_is_used() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = furnace();
+    let mut rows = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
+    let mut gather = HemicubeGather::new(&gpu, &mesh, 64).unwrap();
+    let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
+    let place =
+        GatherPoint { position: [0.5; 3].into(), normal: [0.0, 0.0, 1.0].into(), near: 1e-3 };
+    gpu.close();
+    let errors = [
+        rows.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err(),
+        rows.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err(),
+        gather.gather(&light.unwrap().sources(), &[place]).unwrap_err(),
+        HemicubeRows::new(&gpu, &mesh, 64).unwrap_err(),
+        HemicubeGather::new(&gpu, &mesh, 64).unwrap_err(),
+        Backend::Gpu(gpu.clone()).rows(&mesh, 64, NonZeroU32::MIN).unwrap_err(),
+        BakeSettings::for_error(0.1, mesh.scene())
+            .bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), go)
+            .unwrap_err(),
+    ];
+    for e in errors {
+        assert_eq!(e.kind(), ErrorKind::Device);
+        let text = e.to_string();
+        assert!(text.contains(&gpu.adapter().name) && text.contains("lost: closed"), "{text}");
+    }
+    // Another one is not concerned.
+    assert!(HemicubeRows::new(&Gpu::new(None).unwrap(), &mesh, 64).is_ok());
+}
+
+#[test]
+fn a_solve_outlives_its_device() {
+    let Some(_) = gpu() else { return };
+    let mesh = furnace();
+    for method in [Method::ALL[0], Method::ALL[2], Method::ALL[4]] {
+        let solver = Solver::new(method);
+        let mut alone = HemicubeRows::new(&Gpu::new(None).unwrap(), &mesh, 64).unwrap();
+        let undisturbed = solver.solve(&mesh, &mut alone, go).unwrap();
+        let lost = Gpu::new(None).unwrap();
+        let e = solver.solve(&mesh, &mut doomed(&lost, &mesh, 2), go).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Device);
+        let (lost, errors) = (Gpu::new(None).unwrap(), RefCell::new(vec![]));
+        let mut relay = Fallback::new(doomed(&lost, &mesh, 2), |e| {
+            errors.borrow_mut().push(e);
+            HemicubeRows::new(&Gpu::new(None)?, &mesh, 64)
+        });
+        let solution = solver.solve(&mesh, &mut relay, go).unwrap();
+        assert_eq!(solution.stop, StopReason::Converged);
+        // Rows of the first device were used on, those of the second are the same: so is the light.
+        assert!(solution.radiosity == undisturbed.radiosity, "{method}");
+        assert_eq!(solution.rows_made, undisturbed.rows_made);
+        let drawn = [relay.first().inner.drawn(), relay.second().unwrap().drawn()];
+        assert_eq!(drawn.iter().sum::<u64>(), undisturbed.rows_made);
+        assert!(drawn.iter().all(|d| *d > 0), "{drawn:?}");
+        assert_eq!(errors.take().iter().map(|e| e.kind()).collect::<Vec<_>>(), [ErrorKind::Device]);
+    }
+}
+
+#[test]
+fn a_relay_may_give_up_and_minds_other_errors_not() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = furnace();
+    let mut relay = Fallback::new(doomed(&gpu, &mesh, 0), Err::<RayRows, _>);
+    let e = relay.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err();
+    assert_eq!(e.kind(), ErrorKind::Device);
+    // What the caller has wrong another device has wrong as well.
+    let other = Mesh::new(cube(&Material::grey("g", 0.5)), f64::INFINITY).unwrap();
+    let gather = RayGather::new(&other, 16).unwrap();
+    struct Wrong;
+    impl Gather for Wrong {
+        fn gather(
+            &mut self,
+            _: &RadiosityField,
+            _: &[GatherPoint],
+        ) -> Result<Vec<IrradianceSample>, Error> {
+            Err(Error::new(ErrorKind::Setting, "sources", "wrong", "be right"))
+        }
+    }
+    let mut spare = Some(gather);
+    let mut relay = Fallback::new(Wrong, |_| Ok(spare.take().unwrap()));
+    let light = GatheredMesh::from_elements(&other, &[Rgb::ONE; 12]).unwrap();
+    assert_eq!(relay.gather(&light.sources(), &[]).unwrap_err().kind(), ErrorKind::Setting);
+    assert!(relay.second().is_none());
+}
+
+#[test]
+fn gathering_outlives_its_device() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = furnace();
+    let light =
+        GatheredMesh::from_elements(&mesh, &vec![Rgb::splat(2.0); mesh.element_count()]).unwrap();
+    // Nothing bends in a furnace: split it whatever the light says, so that there are two batches.
+    let settings =
+        RefinementSettings { everywhere: 1, curve: f64::INFINITY, ..RefinementSettings::new(1e-3) };
+    let by = |gather: &mut dyn Gather| settings.gather(&light, &mesh, gather, go).unwrap();
+    let hemicubes = by(&mut HemicubeGather::new(&gpu, &mesh, 64).unwrap());
+    let rays = by(&mut RayGather::new(&mesh, 1024).unwrap());
+    let inner = HemicubeGather::new(&gpu, &mesh, 64).unwrap();
+    let doomed = Doomed { inner, gpu: gpu.clone(), left: 1 };
+    let mut relay = Fallback::new(doomed, |_| RayGather::new(&mesh, 1024));
+    let found = by(&mut relay);
+    assert!(relay.second().is_some() && found.stop == StopReason::Converged);
+    // What the device has gathered is there to the bit, and rays have gathered the rest.
+    let same = |one: &GatheredMesh| -> Vec<bool> {
+        let values = one.surface.radiosity.iter().zip(&found.surface.radiosity);
+        values.map(|(a, b)| a == b).collect()
+    };
+    let (first, second) = (same(&hemicubes), same(&rays));
+    assert!(first.iter().zip(&second).all(|(a, b)| *a != *b));
+    assert!(first.contains(&true) && second.contains(&true));
+}
+
+#[test]
+fn a_bake_outlives_its_device() {
+    let Some(_) = gpu() else { return };
+    let scene = cornell_box(f64::INFINITY).scene().clone();
+    // Closed while it shoots; the second is stopped when it hears of that.
+    for stop in [false, true] {
+        let gpu = Gpu::new(None).unwrap();
+        let (mut told, mut calls, mut after) = (vec![], 0, 0);
+        let baked = Accuracy { error: 0.1, adjust: &|_| {} }
+            .bake(scene.clone(), &Backend::Gpu(gpu.clone()), |stage| {
+                calls += 1;
+                after += u32::from(!told.is_empty());
+                if calls == 40 {
+                    gpu.close();
+                }
+                match stage {
+                    BakeProgress::Failed(error) => {
+                        told.push(error.clone());
+                        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    }
+                    _ => ControlFlow::Continue(()),
+                }
+            })
+            .unwrap();
+        let failure = baked.failure.expect("the device failed");
+        assert_eq!(failure.kind(), ErrorKind::Device);
+        assert_eq!(told.len(), 1, "it is told once");
+        assert_eq!(told[0].to_string(), failure.to_string());
+        assert!(baked.solution.ledger.imbalance() < 1e-9);
+        if stop {
+            assert_eq!(baked.solution.stop, StopReason::Cancelled);
+            // The judgement is told of at the end, and nothing else.
+            assert_eq!(after, 1);
+        } else {
+            assert_eq!(baked.solution.stop, StopReason::Converged);
+            assert!(baked.certificate.total < 0.1, "{}", baked.certificate.total);
+        }
+        // Both devices have made rows: the hemicubes are those before the 40th call.
+        let drawn: u64 = baked.hemicubes_by_resolution.iter().map(|h| h.1).sum();
+        assert!(drawn > 0 && drawn < baked.hemicubes, "{drawn} of {}", baked.hemicubes);
+    }
+}
+
+#[test]
+fn without_memory_batches_are_smaller_and_rows_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(100.0);
+    let patches: Vec<NodeId> = (0..40).map(|e| mesh.element(7 * e)).collect();
+    let all = HemicubeRows::new(&gpu, &mesh, 128).unwrap().rows(&mesh, &patches, 1.0).unwrap();
+    // A hemicube of 128 pixels is drawn on 128 × 384 × 4 bytes, which are copied once; the other
+    // resolutions come on top. A batch of 16 takes more than 16 times that, one alone less than 4.
+    let one: u64 = 2 * 128 * 384 * 4;
+    let mut fits = vec![];
+    for memory in (0..10).map(|k| (one / 16) << k) {
+        let gpu = within(GpuLimits { memory, ..GpuLimits::MOST });
+        match HemicubeRows::new(&gpu, &mesh, 128) {
+            Ok(mut rows) => {
+                assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{memory}");
+                fits.push(memory);
+                // All of it is given back: as much fits again.
+                drop(rows);
+                assert!(HemicubeRows::new(&gpu, &mesh, 128).is_ok());
+            }
+            Err(e) => {
+                assert_eq!((e.kind(), fits.len()), (ErrorKind::Memory, 0));
+                let text = e.to_string();
+                assert!(text.contains("bytes for") && text.contains(&memory.to_string()), "{text}");
+                // The device is as good as before: what needs little gets it.
+                let gpu = Gpu::clone(&gpu);
+                let small = Mesh::new(mesh.scene().clone(), f64::INFINITY);
+                assert!(memory < one || HemicubeRows::new(&gpu, &small.unwrap(), 16).is_ok());
+            }
+        }
+    }
+    assert!(fits[0] <= 4 * one && fits[0] > one / 16, "{} of {one}", fits[0]);
+}
+
+#[test]
+fn without_memory_places_gather_in_smaller_batches() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(100.0);
+    let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
+    let light = light.unwrap();
+    let place = |e: usize| {
+        let (node, normal) = (mesh.element(e), mesh.normal(mesh.element(e)));
+        GatherPoint { position: mesh.centroid(node) + 0.01 * normal, normal, near: 1e-3 }
+    };
+    let places: Vec<GatherPoint> = (0..40).map(|e| place(7 * e)).collect();
+    let gather = |gpu: &Gpu| HemicubeGather::new(gpu, &mesh, 64)?.gather(&light.sources(), &places);
+    let all = gather(&gpu).unwrap();
+    // An image of 64 × 192 pixels, and some lines of tiles, of 16 bytes; 64 of them in a batch.
+    let one: u64 = 64 * 192 * 16;
+    let mut fits = vec![];
+    // In steps of an eighth: somewhere there is room for all but the light that comes last.
+    for memory in (0..24).map(|k| (one as f64 * 1.5f64.powi(k) / 2.0) as u64) {
+        match gather(&within(GpuLimits { memory, ..GpuLimits::MOST })) {
+            Ok(found) => {
+                assert!(found == all, "{memory}");
+                fits.push(memory);
+            }
+            Err(e) => assert_eq!((e.kind(), fits.len()), (ErrorKind::Memory, 0), "{memory}: {e}"),
+        }
+    }
+    assert!(fits[0] > one / 2 && fits[0] < 32 * one, "{} of {one}", fits[0]);
+}
+
+#[test]
+fn what_a_lesser_device_cannot_do_is_told_with_what_it_can() {
+    let Some(_) = gpu() else { return };
+    let mesh = furnace();
+    let small = within(GpuLimits { texture: 256, ..GpuLimits::MOST });
+    // An item buffer is three times as high as wide: 3 · 84 = 252.
+    for e in [
+        HemicubeRows::new(&small, &mesh, 128).unwrap_err(),
+        HemicubeGather::new(&small, &mesh, 128).unwrap_err(),
+    ] {
+        let text = e.to_string();
+        assert!(e.kind() == ErrorKind::Setting && e.place() == "hemicube resolution 128", "{text}");
+        assert!(text.contains("this device allows resolutions up to "), "{text}");
+        let most = text.rsplit(' ').next().unwrap().parse().unwrap();
+        if text.contains("item buffer") {
+            assert_eq!(most, 84);
+            HemicubeRows::new(&small, &mesh, most).unwrap();
+        } else {
+            HemicubeGather::new(&small, &mesh, most).unwrap();
+        }
+    }
+    // Rows of 4 bytes an element in buffers of 32 KiB: some 8 000 elements.
+    let few = within(GpuLimits { buffer: 32 << 10, ..GpuLimits::MOST });
+    let large = cornell_box(30.0);
+    let e = HemicubeRows::new(&few, &large, 16).unwrap_err();
+    assert!(e.kind() == ErrorKind::Setting && e.place() == "mesh", "{e}");
+    assert!(e.to_string().contains(&format!("{}", (32 << 10) / 4 - 16)), "{e}");
+    // One layer is one hemicube at a time, and the same rows.
+    let patches: Vec<NodeId> = (0..20).map(|e| mesh.element(e)).collect();
+    let [one, many] = [1, 16].map(|layers| {
+        let gpu = within(GpuLimits { layers, ..GpuLimits::MOST });
+        HemicubeRows::new(&gpu, &mesh, 32).unwrap().rows(&mesh, &patches, 1.0).unwrap()
+    });
+    assert!(one == many);
+}
+
+/// Rows as they are given, of whatever patch.
+struct Given(Row, usize);
+
+impl FormFactors for Given {
+    fn rows(&mut self, _: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
+        Ok(vec![self.0.clone(); patches.len() - self.1.min(patches.len())])
+    }
+}
+
+#[test]
+fn rows_that_are_none_are_errors_whoever_uses_them() {
+    let mesh = furnace();
+    let row = |element: u32, share: u32, open: u32| {
+        let entries = vec![Entry { element, share }];
+        Row { entries, escaped: open, backface: 0 }
+    };
+    let total = Row::TOTAL;
+    // An element that does not exist; sums too small, too large and beyond 32 bits; a row missing.
+    let bad = [
+        (row(1 << 30, total, 0), 0),
+        (row(1, 5, 0), 0),
+        (row(1, total, 1), 0),
+        (row(1, total, total), 0),
+        (row(1, total, 0), 1),
+    ];
+    let patch = [mesh.root(0)];
+    for (row, missing) in bad {
+        let given = || Given(row.clone(), missing);
+        let near = || ProximityCorrection::new(given(), &mesh, 1e9);
+        let errors = [
+            Solver::new(Method::ALL[0]).solve(&mesh, &mut given(), go).unwrap_err(),
+            near().rows(&mesh, &patch, 1.0).unwrap_err(),
+            AdaptiveViewpoints::new(near(), 0.0, 9).rows(&mesh, &patch, 1.0).unwrap_err(),
+            ViewFactors::sampled(&mesh, &mut given(), |_, _| ControlFlow::Continue(()))
+                .unwrap_err(),
+        ];
+        for e in errors {
+            assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");
+        }
+    }
+}
+
+#[test]
+fn what_takes_long_is_asked_for_in_small_batches() {
+    // Progress is told between batches: the work in one is bounded whatever the settings.
+    let mesh = furnace();
+    let rays = |count| RayRows::new(&mesh, count).unwrap();
+    assert_eq!([1 << 10, 1 << 18, 1 << 20].map(|n| rays(n).preferred_batch_len()), [16, 4, 1]);
+    let parts = |levels| {
+        AdaptiveViewpoints::new(ProximityCorrection::new(rays(64), &mesh, 1.0), 0.1, levels)
+            .preferred_batch_len()
+    };
+    assert_eq!([0, 1, u32::MAX].map(parts), [16, 1, 1]);
+    let Some(gpu) = gpu() else { return };
+    let turned = |n: u32| {
+        let hemicubes = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
+        hemicubes.with_rotations(NonZeroU32::new(n).unwrap()).preferred_batch_len()
+    };
+    assert_eq!([1, 4, 16, 100].map(turned), [16, 4, 1, 1]);
+}

@@ -1,0 +1,447 @@
+//! Gathering with hemicubes: against closed forms, against rays, and against itself.
+
+use std::f64::consts::PI;
+
+use crate::common::{cornell_box, cube, gpu, quads};
+use glam::DVec3;
+use radiosity::form_factor::closed_form::point_to_polygon;
+use radiosity::{
+    ErrorKind, Gather, GatherPoint, Gpu, HemicubeGather, IrradianceSample, Material, Mesh,
+    RadiosityField, RayGather, Rgb, Scene, Triangle,
+};
+
+/// Settled light by its value at every point.
+struct Light {
+    mesh: Mesh,
+    corners: Vec<[u32; 3]>,
+    reflected: Vec<Rgb>,
+}
+
+impl Light {
+    /// `value` of element and point, W/m².
+    fn new(mesh: Mesh, value: impl Fn(usize, DVec3) -> Rgb) -> Light {
+        let (mut corners, mut reflected) = (vec![], vec![]);
+        for e in 0..mesh.element_count() {
+            let (node, first) = (mesh.element(e), reflected.len() as u32);
+            corners.push([first, first + 1, first + 2]);
+            reflected.extend(mesh.corners(node).map(|p| value(e, p)));
+        }
+        Light { mesh, corners, reflected }
+    }
+
+    fn sources(&self) -> RadiosityField<'_> {
+        RadiosityField { mesh: &self.mesh, corners: &self.corners, reflected: &self.reflected }
+    }
+
+    fn gather(&self, gpu: &Gpu, n: u32, places: &[GatherPoint]) -> Vec<IrradianceSample> {
+        let mut gather = HemicubeGather::new(gpu, &self.mesh, n).unwrap();
+        gather.gather(&self.sources(), places).unwrap()
+    }
+
+    /// Places just over the middle of elements, `count` of them all over the scene.
+    fn places(&self, count: usize, above: f64) -> Vec<GatherPoint> {
+        let place = |k: usize| {
+            let node = self.mesh.element(k * 7919 % self.mesh.element_count());
+            let normal = self.mesh.normal(node);
+            let position = self.mesh.centroid(node) + normal * above;
+            GatherPoint { position, normal, near: above }
+        };
+        (0..count).map(place).collect()
+    }
+}
+
+/// Bound on the error of a form factor seen by a hemicube of resolution `n`, when its outline is
+/// `half_faces` long in units of half a face's width and has so many corners: a line of l pixels
+/// crosses at most √2 l + 2, each wrong by at most half the largest weight, 4/(π n²).
+fn outline_bound(n: u32, half_faces: f64, corners: f64) -> f64 {
+    let crossed = 2f64.sqrt() * half_faces * f64::from(n) / 2.0 + 2.0 * corners;
+    crossed * 2.0 / (PI * f64::from(n).powi(2))
+}
+
+/// A quadrilateral, its front where its corners run counter-clockwise.
+type Quad = [[f64; 3]; 4];
+
+/// One that lies in the plane at height `z` and faces down.
+fn down([x0, x1]: [f64; 2], [y0, y1]: [f64; 2], z: f64) -> Quad {
+    [[x0, y0, z], [x0, y1, z], [x1, y1, z], [x1, y0, z]]
+}
+
+fn lamp() -> Material {
+    Material { exitance: Rgb::new(1.0, 2.0, 3.0), ..Material::grey("lamp", 0.0) }
+}
+
+fn grey() -> Material {
+    Material::grey("grey", 0.5)
+}
+
+/// A scene in which nothing reflects light.
+fn dark(quad_list: &[(Quad, Material)]) -> Light {
+    Light::new(Mesh::new(quads(quad_list), f64::INFINITY).unwrap(), |_, _| Rgb::ZERO)
+}
+
+/// A place that looks along `normal`.
+fn place(position: [f64; 3], normal: [f64; 3]) -> GatherPoint {
+    let (position, normal) = (DVec3::from_array(position), DVec3::from_array(normal));
+    GatherPoint { position, normal: normal.normalize(), near: 1e-5 }
+}
+
+fn factor(place: &GatherPoint, corners: &[[f64; 3]]) -> f64 {
+    let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
+    point_to_polygon(place.position, place.normal, &corners)
+}
+
+#[test]
+fn hemicubes_agree_with_rays() {
+    let Some(gpu) = gpu() else { return };
+    // Unequal depths: every third element split, and every fifth of what comes of it. Values jump
+    // from element to element, so that a wrong one is seen.
+    let mesh = cornell_box(60.0);
+    let third: Vec<usize> = (0..mesh.element_count()).step_by(3).collect();
+    let mesh = mesh.split(&third).unwrap();
+    let fifth: Vec<usize> = (0..mesh.element_count()).step_by(5).collect();
+    let light = Light::new(mesh.split(&fifth).unwrap(), |e, p| {
+        Rgb::new(1.0 + p.x / 600.0, 1.0 + p.y / 600.0, 1.0 + (e % 7) as f64 / 7.0)
+    });
+    let places = light.places(64, 0.01);
+    let got = light.gather(&gpu, 128, &places);
+    let mut rays = RayGather::new(&light.mesh, 1 << 15).unwrap();
+    let want = rays.gather(&light.sources(), &places).unwrap();
+    for ((place, got), want) in places.iter().zip(&got).zip(&want) {
+        let indirect = |g: &IrradianceSample| g.irradiance - g.direct;
+        // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half of
+        // the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump there,
+        // 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
+        let error = (indirect(got) - indirect(want)).abs().max_element();
+        assert!(error < 6.0 * 1.8e-3, "{place:?}: {error}");
+        // Hit or miss of outlines, 3 half faces long or 300 pixels: 6 · √(300/12) · 3e-5 = 9e-4; a
+        // fifth of 2¹⁵ rays might hit either way: 6 · √(0.2 · 0.8 / 2¹⁵) = 1.3e-2 for each bare
+        // share, a tenth of it as the rays are stratified.
+        let error = (got.direct - want.direct).abs().max_element();
+        assert!(error <= 0.01 * want.irradiance.max_element(), "{place:?}: {error}");
+        assert!((got.escaped - want.escaped).abs() < 2e-3, "{place:?}");
+        assert!((got.backface - want.backface).abs() < 2e-3, "{place:?}");
+        assert!((got.inverse_distance / want.inverse_distance - 1.0).abs() < 5e-3, "{place:?}");
+    }
+}
+
+#[test]
+fn a_furnace_is_as_bright_as_its_walls() {
+    let Some(gpu) = gpu() else { return };
+    // One material and shared corners: the walls are one light, which surrounds every place.
+    let cube = cube(&Material::grey("furnace", 0.5));
+    let mut material = cube.materials()[0].clone();
+    material.exitance = Rgb::ONE;
+    let one = |t: &Triangle| Triangle { material: 0, ..*t };
+    let triangles = cube.triangles().iter().map(one).collect();
+    let groups = cube.groups().to_vec();
+    let cube = Scene::new(cube.positions().to_vec(), triangles, groups, vec![material]).unwrap();
+    let light = Light::new(Mesh::new(cube, 0.2).unwrap(), |_, _| Rgb::ONE);
+    for g in light.gather(&gpu, 64, &light.places(50, 1e-4)) {
+        assert!((g.irradiance - 2.0).abs().max_element() < 2e-5, "{g:?}");
+        assert_eq!((g.escaped, g.backface), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn what_comes_straight_from_a_light_is_its_closed_form() {
+    let Some(gpu) = gpu() else { return };
+    // A square overhead under a ceiling, one edge on the horizon's far side, one cut by it.
+    let overhead = down([-0.5, 0.5], [-0.5, 0.5], 2.0);
+    let ceiling = down([-9.0, 9.0], [-9.0, 9.0], 2.001);
+    let wall = [[4.0, -0.5, -0.5], [4.0, -0.5, 0.5], [4.0, 0.5, 0.5], [4.0, 0.5, -0.5]];
+    let light = dark(&[(overhead, lamp()), (ceiling, grey()), (wall, lamp())]);
+    let places = [
+        place([0.0; 3], [0.0, 0.0, 1.0]),
+        place([0.3, 0.2, 1.0], [0.2, 0.1, 1.0]),
+        // The wall's lower half is below the horizon.
+        place([2.5, 0.1, 0.0], [0.0, 0.0, 1.0]),
+        // Grazing: the overhead square is 4 degrees above the horizon, seen at 0.2 over 3 from it.
+        place([-2.9, 0.0, 1.8], [0.0, 0.0, 1.0]),
+        place([0.0, -3.0, 0.0], [0.0, -1.0, 0.1]),
+        // Far off: a square of 1/100.
+        place([-90.0, 3.0, -50.0], [1.0, 0.0, 0.5]),
+    ];
+    for (place, got) in places.iter().zip(light.gather(&gpu, 64, &places)) {
+        let factors = [&overhead, &wall].map(|q| factor(place, q));
+        // What could give less than 1e-3 of it all is left to the hemicube.
+        let least = 1e-3 * factors.iter().sum::<f64>();
+        let want = lamp().exitance * factors.iter().filter(|&&f| f > least).sum::<f64>();
+        // Every pixel that would show the light does: the closed form as it is.
+        let error = (got.direct - want).abs().max_element();
+        assert!(error < 1e-6, "{place:?}: {got:?} {want}");
+        let left = lamp().exitance * factors.iter().filter(|&&f| f <= least).sum::<f64>();
+        let error = (got.irradiance - got.direct - left).abs().max_element();
+        assert!(error < 3.0 * outline_bound(64, 0.1, 4.0), "{place:?}: {got:?} {left}");
+        assert!(left != Rgb::ZERO || got.direct == got.irradiance);
+    }
+}
+
+#[test]
+fn a_half_hidden_light_gives_what_is_left() {
+    let Some(gpu) = gpu() else { return };
+    // Shadows with an edge parallel to the light's, and at angles to it; places at and off its axis.
+    let square = down([-0.5, 0.5], [-0.5, 0.5], 2.0);
+    let mut worst = [0f64; 3];
+    for k in 0..60usize {
+        let (at, angle) = (f64::from(k as u32 % 20) * 0.045 - 0.43, f64::from(k as u32 / 20) * 0.4);
+        // Half way up, the blocker's edge at half the distance that it hides the light from.
+        let (along, across) =
+            (DVec3::new(-angle.sin(), angle.cos(), 0.0), DVec3::new(angle.cos(), angle.sin(), 0.0));
+        let edge = across * at / 2.0 + DVec3::Z;
+        let blocker = [
+            edge - along * 9.0,
+            edge + along * 9.0,
+            edge + along * 9.0 + across * 9.0,
+            edge - along * 9.0 + across * 9.0,
+        ];
+        let light = dark(&[(square, lamp()), (blocker.map(|p| p.to_array()), grey())]);
+        let place = place([0.0; 3], [0.1, 0.2, 1.0]);
+        let got = light.gather(&gpu, 64, &[place])[0];
+        // The part of the square on the light side of the line at `at` across.
+        let mut left = vec![];
+        for k in 0..4 {
+            let (a, b) = (DVec3::from_array(square[k]), DVec3::from_array(square[(k + 1) % 4]));
+            let (ha, hb) = (a.dot(across) - at, b.dot(across) - at);
+            left.extend((ha < 0.0).then_some(a.to_array()));
+            left.extend((ha * hb < 0.0).then(|| a.lerp(b, ha / (ha - hb)).to_array()));
+        }
+        let (want, whole) = (factor(&place, &left), factor(&place, &square));
+        let error = (got.direct.x - want) / whole;
+        worst[k / 20] = error.abs().max(worst[k / 20]);
+        // The shadow's edge crosses some 28 of the tile's columns, the light covers some 700 of its
+        // pixels. A column is off by half a pixel at most. Parallel to the light's edge, the shadow's
+        // climbs a line in four or five columns that even out but for one: 7 halves. At the other
+        // angles its slopes are near 3/4 and 3/5, and the midpoints of as many columns miss by an
+        // eighth of a pixel each and one by a half where the pattern shifts: 28/8 + 7/2.
+        let pixels = if angle == 0.0 { 3.5 } else { 7.0 };
+        assert!(error.abs() < pixels / 700.0, "{k}: {error}");
+    }
+    println!("worst errors {worst:.4?} of the light, by angle");
+}
+
+#[test]
+fn lights_of_many_triangles() {
+    let Some(gpu) = gpu() else { return };
+    // A bulb: an octahedron cut into 512 triangles, on a sphere of radius 0.2.
+    let mut bulb = vec![];
+    for octant in 0..8 {
+        let sign = |bit: i32| if octant >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let [x, y, z] = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+        let outward = sign(0) * sign(1) * sign(2) > 0.0;
+        let mut parts = vec![if outward { [x, y, z] } else { [x, z, y] }];
+        for _ in 0..3 {
+            let halves = |[a, b, c]: [DVec3; 3]| {
+                let [d, e, f] = [a + b, b + c, c + a].map(DVec3::normalize);
+                [[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+            };
+            parts = parts.into_iter().flat_map(halves).collect();
+        }
+        bulb.extend(parts.into_iter().map(|t| t.map(|p| p * 0.2 + DVec3::Z)));
+    }
+    // A trough, open downwards, that shines on its inside: not convex, yet nothing of it hides any.
+    let peak = [[0.0, -0.5, 2.0], [0.0, 0.5, 2.0]];
+    let [left, right] = [-0.5, 0.5].map(|x| [[x, -0.5, 1.5], [x, 0.5, 1.5]]);
+    let trough = [
+        [left[0], left[1], peak[1]],
+        [left[0], peak[1], peak[0]],
+        [peak[0], peak[1], right[1]],
+        [peak[0], right[1], right[0]],
+    ]
+    .map(|t| t.map(DVec3::from_array));
+    for (corners, convex) in [(&bulb[..], true), (&trough[..], false)] {
+        let triangles = (0..corners.len() as u32)
+            .map(|t| Triangle { corners: [3 * t, 3 * t + 1, 3 * t + 2], ..Default::default() });
+        let positions = corners.iter().copied().flatten().collect();
+        let scene = Scene::new(positions, triangles.collect(), vec!["g".into()], vec![lamp()]);
+        let light = Light::new(Mesh::new(scene.unwrap(), f64::INFINITY).unwrap(), |_, _| Rgb::ZERO);
+        for place in
+            [place([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]), place([0.3, 0.0, 0.3], [-0.5, 0.2, 1.0])]
+        {
+            let got = light.gather(&gpu, 64, &[place])[0];
+            let want: f64 =
+                corners.iter().map(|t| point_to_polygon(place.position, place.normal, t)).sum();
+            let error = got.direct.x / want - 1.0;
+            // Not convex: pixels' own form factors. Some 700 show it, four sides of some 30 pixels are
+            // crossed, each wrong by half a pixel and as often too little as too much: 6 σ are
+            // 6·√(120/12) = 19 pixels, and midpoints are off by (2/32)²/24·8 = 1.3e-3.
+            let bound = if convex { 1e-6 } else { 19.0 / 700.0 + 1.3e-3 };
+            println!("convex {convex}: {error:.1e}");
+            assert!(error.abs() < bound, "convex {convex}: {error}");
+        }
+    }
+}
+
+#[test]
+fn more_lights_than_are_looked_at_apart() {
+    let Some(gpu) = gpu() else { return };
+    let lamps: Vec<Quad> = (0..12)
+        .map(|k| (f64::from(k % 4) - 1.6, f64::from(k / 4) - 1.2))
+        .map(|(x, y)| down([x, x + 0.3], [y, y + 0.3], 1.5))
+        .collect();
+    let light = dark(&lamps.iter().map(|&q| (q, lamp())).collect::<Vec<_>>());
+    let place = place([0.0; 3], [0.0, 0.0, 1.0]);
+    let got = light.gather(&gpu, 256, &[place])[0];
+    let mut factors: Vec<f64> = lamps.iter().map(|q| factor(&place, q)).collect();
+    factors.sort_by(|a, b| b.total_cmp(a));
+    let apart: f64 = factors[..8].iter().sum();
+    assert!((got.direct.x - apart).abs() < 1e-6, "{got:?} {apart}");
+    // Four squares of sides 0.3/1.5 half faces are left to the pixels.
+    let bound = outline_bound(256, 4.0 * 4.0 * 0.2, 16.0);
+    let all: f64 = factors.iter().sum();
+    assert!((got.irradiance.x - all).abs() < bound, "{got:?} {all} {bound}");
+    assert!(got.irradiance.x > got.direct.x);
+}
+
+#[test]
+fn close_to_a_large_light_its_pixels_count() {
+    let Some(gpu) = gpu() else { return };
+    let sheet = down([-1.0, 1.0], [-1.0, 1.0], 1.0);
+    let light = dark(&[(sheet, lamp())]);
+    let places =
+        [place([0.1, 0.2, 0.999], [0.0, 0.0, 1.0]), place([0.99, 0.2, 0.999], [0.4, 0.0, 1.0])];
+    for (place, got) in places.iter().zip(light.gather(&gpu, 128, &places)) {
+        assert_eq!(got.direct, Rgb::ZERO);
+        // The outline runs along the horizon's 8 half faces, or straight across the hemicube.
+        let (want, bound) = (factor(place, &sheet), outline_bound(128, 8.0, 8.0));
+        assert!((got.irradiance.x - want).abs() < bound, "{got:?} {want}");
+        assert!(((1.0 - got.escaped) - want).abs() < bound);
+    }
+}
+
+#[test]
+fn linear_light_is_reproduced_between_corners() {
+    let Some(gpu) = gpu() else { return };
+    // A floor of sides 4 under a place at height 1, cut unevenly.
+    let floor = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
+    let value = |p: DVec3| Rgb::new(3.0 + p.x, 3.0 + p.y, 2.0 - p.x - 0.5 * p.y);
+    let (steps, place) = (100, place([0.3, -0.2, 1.0], [0.1, 0.2, -1.0]));
+    let mut want = Rgb::ZERO;
+    for (i, j) in (0..steps * steps).map(|k| (k % steps, k / steps)) {
+        let at = |k: i32| -2.0 + 4.0 * f64::from(k) / f64::from(steps);
+        let (x0, x1, y0, y1) = (at(i), at(i + 1), at(j), at(j + 1));
+        let cell = [[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]];
+        want += value(DVec3::new(x0 + x1, y0 + y1, 0.0) / 2.0) * factor(&place, &cell);
+    }
+    for size in [f64::INFINITY, 2.9, 0.3] {
+        let mesh = Mesh::new(quads(&[(floor, grey())]), size).unwrap();
+        let uneven: Vec<usize> = (0..mesh.element_count()).step_by(3).collect();
+        let light = Light::new(mesh.split(&uneven).unwrap(), |_, p| value(p));
+        let got = light.gather(&gpu, 256, &[place])[0];
+        // Pixels on the outline (8 half faces on the top face or lower) are wrong by half the
+        // radiosity of up to 5; cells and pixels are taken at their middles: 0.04² of 4/24 each.
+        let bound = 5.0 * outline_bound(256, 8.0, 8.0) / 10.0 + 3e-4;
+        let error = (got.irradiance - want).abs().max_element();
+        println!("size {size}: {error:.1e}, bound {bound:.1e}");
+        assert!(error < bound, "{got:?} {want}");
+        assert_eq!(got.direct, Rgb::ZERO);
+    }
+}
+
+#[test]
+fn the_same_bits_however_they_are_batched() {
+    let Some(gpu) = gpu() else { return };
+    let light = Light::new(cornell_box(100.0), |t, p| p / 600.0 + 0.1 * (t % 3) as f64);
+    let places = light.places(70, 0.01);
+    let mut gather = HemicubeGather::new(&gpu, &light.mesh, 64).unwrap();
+    let together = gather.gather(&light.sources(), &places).unwrap();
+    for (place, want) in places.iter().zip(&together) {
+        assert_eq!(&gather.gather(&light.sources(), &[*place]).unwrap()[0], want);
+    }
+    assert_eq!(gather.drawn(), 140);
+    assert!(light.gather(&gpu, 64, &places) == together);
+    assert_eq!(gather.gather(&light.sources(), &[]).unwrap(), []);
+}
+
+#[test]
+fn what_is_open_what_shows_its_back_and_how_near_it_is() {
+    let Some(gpu) = gpu() else { return };
+    let place = place([0.0; 3], [0.0, 0.0, 1.0]);
+    let wide = |z: f64| down([-1e3 * z, 1e3 * z], [-1e3 * z, 1e3 * z], z);
+    for (back, z) in [(false, 2.0), (true, 0.5)] {
+        let mut plane = wide(z);
+        if back {
+            plane.reverse();
+        }
+        let got = dark(&[(plane, grey())]).gather(&gpu, 64, &[place])[0];
+        // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Pixels on the
+        // lowest lines of 64 look out at 1/64, above the plane's end at 1e-3. Midpoints of pixels:
+        // relative (2/64)²/24 · 12 = 5e-4.
+        assert_eq!(got.escaped, 0.0);
+        assert!((got.backface - f64::from(u8::from(back))).abs() < 1e-5, "{got:?}");
+        assert!((got.inverse_distance * 1.5 * z - 1.0).abs() < 5e-4, "{got:?}");
+    }
+    // Half the sky: what is not on one side of a wall.
+    let wall = [[0.0, -1e3, -1e3], [0.0, 1e3, -1e3], [0.0, 1e3, 1e3], [0.0, -1e3, 1e3]];
+    let shifted = GatherPoint { position: DVec3::new(0.01, 0.0, 0.0), ..place };
+    let got = dark(&[(wall, grey())]).gather(&gpu, 64, &[shifted])[0];
+    // The top of the wall is 1e-5 off the zenith; 4 half faces of outline.
+    assert!((got.escaped - 0.5).abs() < outline_bound(64, 4.0, 2.0), "{got:?}");
+    assert!((got.escaped + got.backface - 1.0).abs() < 1e-5 || got.backface == 0.0);
+}
+
+#[test]
+fn what_does_not_fit_is_said() {
+    let Some(gpu) = gpu() else { return };
+    let light = Light::new(cornell_box(200.0), |_, _| Rgb::ONE);
+    for n in [0, 7, 100_000] {
+        let e = HemicubeGather::new(&gpu, &light.mesh, n).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Setting);
+        assert!(e.to_string().contains(&n.to_string()), "{e}");
+    }
+    let mut gather = HemicubeGather::new(&gpu, &light.mesh, 64).unwrap();
+    let other = dark(&[(down([0.0, 1.0], [0.0, 1.0], 1.0), lamp())]);
+    let good = light.sources();
+    let short = RadiosityField { corners: &light.corners[1..], ..good };
+    let empty = RadiosityField { reflected: &[], ..good };
+    for bad in [other.sources(), short, empty] {
+        assert_eq!(
+            gather.gather(&bad, &light.places(1, 0.01)).unwrap_err().kind(),
+            ErrorKind::Setting
+        );
+    }
+    // A finer mesh of the same scene and other values are fine, call by call.
+    for (size, value) in [(100.0, 0.5), (50.0, 2.0)] {
+        let finer = Light::new(cornell_box(size), |_, _| Rgb::splat(value));
+        let got = gather.gather(&finer.sources(), &light.places(1, 0.01)).unwrap()[0];
+        let indirect = (got.irradiance - got.direct) / (1.0 - got.escaped - got.backface);
+        assert!((indirect / value - 1.0).abs().max_element() < 1e-5, "{got:?}");
+    }
+}
+
+/// Some places see a small bright spot, which few rays find or miss by chance.
+#[test]
+fn rays_that_disagree_get_more() {
+    let spot = [[-0.3, 0.0, 1.4], [0.3, 0.0, 1.4], [0.3, 0.0, 2.0], [-0.3, 0.0, 2.0]];
+    let corners = spot.map(DVec3::from_array);
+    let scene = quads(&[(spot, Material::grey("spot", 0.5))]);
+    let light = Light::new(Mesh::new(scene, 1.0).unwrap(), |_, _| Rgb::ONE);
+    let place = |k: usize| {
+        let (x, y) = (0.01 * k as f64 - 0.5, -1.5 + 0.003 * k as f64);
+        GatherPoint { position: DVec3::new(x, y, 0.0), normal: DVec3::Z, near: 1e-6 }
+    };
+    let places: Vec<GatherPoint> = (0..100).map(place).collect();
+    let off = |gather: RayGather| {
+        let mut gather = gather;
+        let found = gather.gather(&light.sources(), &places).unwrap();
+        let off = found.iter().zip(&places).map(|(g, p)| {
+            let truth = point_to_polygon(p.position, p.normal, &corners);
+            (g.irradiance.x / truth - 1.0).powi(2)
+        });
+        (off.sum::<f64>() / 100.0).sqrt()
+    };
+    let few = || RayGather::new(&light.mesh, 1024).unwrap();
+    let (plain, more) = (off(few()), off(few().with_noise(0.02, 0.0)));
+    let all = off(RayGather::new(&light.mesh, 1 << 14).unwrap());
+    println!("off by {plain:.4}, {more:.4} where they disagree, {all:.4} with 16 times as many");
+    // Some 8 of 256 rays find it: 1/8 off, or less as they are stratified. Four times as many are off
+    // by less than half of that; 16 times by a quarter of that again.
+    assert!(plain > 0.04 && more < plain / 2.0 && all < plain / 4.0);
+    // Where they agree, nothing changes: with light from everywhere, bit for bit.
+    let even =
+        Light::new(Mesh::new(cube(&Material::grey("even", 0.5)), 0.5).unwrap(), |_, _| Rgb::ONE);
+    let places = even.places(20, 1e-6);
+    let few = || RayGather::new(&even.mesh, 64).unwrap();
+    let [one, two] = [few(), few().with_noise(0.02, 0.0)]
+        .map(|mut g| g.gather(&even.sources(), &places).unwrap());
+    assert_eq!(one, two);
+}

@@ -1,0 +1,303 @@
+//! Rows from hemicubes: against closed forms, against rays, and against themselves.
+
+use std::f64::consts::PI;
+use std::num::NonZeroU32;
+
+use crate::common::{cornell_box, cube, gpu, quads};
+use glam::DVec3;
+use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
+use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Material, Mesh, NodeId, RayRows, Row};
+
+/// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
+fn largest_pixel(n: u32) -> f64 {
+    4.0 / (PI * f64::from(n).powi(2))
+}
+
+/// Bound on the error of a form factor to a polygon seen within the top face (or one side face),
+/// when its outline there is `perimeter` long in units of half the face's width.
+///
+/// A pixel is counted by its centre. Wrong are only the pixels that the outline crosses, each by
+/// at most half its weight (a straight line leaves the side of the centre at least half the pixel).
+/// A line of `l` pixels crosses at most √2 l + 2 of them.
+fn outline_bound(n: u32, perimeter: f64, corners: f64) -> f64 {
+    let pixels = 2f64.sqrt() * perimeter * f64::from(n) / 2.0 + 2.0 * corners;
+    0.5 * largest_pixel(n) * pixels
+}
+
+fn rows(gpu: &Gpu, mesh: &Mesh, n: u32, patches: &[NodeId]) -> Vec<Row> {
+    let rows = HemicubeRows::new(gpu, mesh, n).unwrap().rows(mesh, patches, 1.0).unwrap();
+    rows.iter().zip(patches).for_each(|(row, &p)| row.check(mesh, p).unwrap());
+    rows
+}
+
+/// Form factor to all elements of one group.
+fn to_group(mesh: &Mesh, row: &Row, group: u32) -> f64 {
+    let of = |e: u32| mesh.scene().triangles()[mesh.triangle(mesh.element(e as usize))].group;
+    let seen = row.entries.iter().filter(|e| of(e.element) == group);
+    seen.map(|e| Row::form_factor(e.share)).sum()
+}
+
+const GREY: fn() -> Material = || Material::grey("grey", 0.5);
+
+#[test]
+fn a_square_seen_from_a_point_on_its_axis() {
+    let Some(gpu) = gpu() else { return };
+    // A speck at the origin looks at a square of side 0.5 at distance 1 (Howell, B-3, four times).
+    let speck = [[-1e-3, -1e-3, 0.], [1e-3, -1e-3, 0.], [0., 2e-3, 0.], [-1e-3, 0., 0.]];
+    let square = [[-0.25, -0.25, 1.], [-0.25, 0.25, 1.], [0.25, 0.25, 1.], [0.25, -0.25, 1.]];
+    let mesh = Mesh::new(quads(&[(speck, GREY()), (square, GREY())]), f64::INFINITY).unwrap();
+    let r = (1.0f64 + 0.25 * 0.25).sqrt();
+    let exact = 4.0 / PI * (0.25 / r) * (0.25 / r).atan();
+    let corners = square.map(DVec3::from_array);
+    assert!((point_to_polygon(DVec3::ZERO, DVec3::Z, &corners) - exact).abs() < 1e-14);
+    for n in [16, 32, 64, 128, 256, 512, 1024] {
+        let row = &rows(&gpu, &mesh, n, &[mesh.element(0)])[0];
+        let got = to_group(&mesh, row, 1);
+        // The centroid of the speck's first triangle is 7e-4 off the axis: a shift of the order
+        // of its square; the outline is 4 sides of 0.5.
+        let bound = outline_bound(n, 2.0, 4.0) + 1e-6;
+        println!("n {n:4}: error {:+.2e}, bound {bound:.1e}", got - exact);
+        assert!((got - exact).abs() <= bound, "n {n}: {got} {exact} {bound}");
+        assert_eq!(row.backface, 0);
+    }
+}
+
+/// Area-averaged factor between two unit squares from rows at every element; its error has two
+/// causes, each with its own bound: pixels, against the closed form from the same points, and the
+/// points, against the closed form from the whole area.
+fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, perimeter: f64) {
+    let Some(gpu) = gpu() else { return };
+    let first = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    let (p, q) = (first.map(DVec3::from_array), second.map(DVec3::from_array));
+    assert!((polygon_to_polygon(&p, &q) - exact).abs() < 5e-9, "{}", polygon_to_polygon(&p, &q));
+    let mesh = Mesh::new(quads(&[(first, GREY()), (second, GREY())]), 0.1).unwrap();
+    let patches: Vec<NodeId> = [0, 1]
+        .into_iter()
+        .flat_map(|t| mesh.elements_of(mesh.root(t)))
+        .map(|e| mesh.element(e))
+        .collect();
+    let point = |&n: &NodeId| point_to_polygon(mesh.centroid(n), mesh.normal(n), &q) * mesh.area(n);
+    let at_points: f64 = patches.iter().map(point).sum();
+    assert!((at_points - exact).abs() <= quadrature, "{at_points} {exact}");
+    for n in [16, 64, 256, 1024] {
+        let rows = rows(&gpu, &mesh, n, &patches);
+        let got: f64 =
+            rows.iter().zip(&patches).map(|(r, &n)| to_group(&mesh, r, 1) * mesh.area(n)).sum();
+        let bound = outline_bound(n, perimeter, 12.0);
+        println!(
+            "n {n:4}: pixels {:+.2e} within {bound:.1e}, points {:+.2e}",
+            got - at_points,
+            at_points - exact
+        );
+        assert!((got - at_points).abs() <= bound, "n {n}: {got} {at_points} {bound}");
+        assert!((got - exact).abs() <= bound + quadrature);
+    }
+}
+
+#[test]
+fn parallel_unit_squares() {
+    // Centroid rule: for a triangle of longest edge h, |error| ≤ h²/24·max|∇²F| or less; ∇²F of
+    // the point factor is below 4 here, h = 0.0884: 1.3e-3. The outline on the hemicube is at most
+    // the square's, 4 sides of 1 at distance 1, in units of half a face: 4 times 1, wherever the
+    // point is; folded over the edge of the top face it gets no longer.
+    let above = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
+    between_unit_squares(above, 0.199_824_895_698_387_46, 1.3e-3, 4.0);
+}
+
+#[test]
+fn perpendicular_unit_squares_that_share_an_edge() {
+    // Near the shared edge the point factor runs up to 1/2 like a function of (distance to edge)/
+    // (length), so the centroid rule misses up to a share of the edge row's own area times its
+    // factor's variation: 0.0625 · 1/2 · 1/4. The outline spans at most two faces: 8 half-faces.
+    let wall = [[1., 0., 0.], [1., 0., 1.], [1., 1., 1.], [1., 1., 0.]];
+    between_unit_squares(wall, 0.200_043_776_075_403_16, 7.9e-3, 8.0);
+}
+
+#[test]
+fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = Mesh::new(cube(&GREY()), 0.3).unwrap();
+    let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
+    for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
+        // Pixels look along directions of at least 1/64 above the horizon: no gap at the edges.
+        assert_eq!((row.escaped, row.backface), (0, 0));
+        assert_eq!(row.closure(), 1.0);
+        let own = mesh.scene().triangles()[mesh.triangle(p)].group;
+        assert_eq!(to_group(&mesh, row, own), 0.0, "a flat wall does not see itself");
+    }
+}
+
+#[test]
+fn what_is_out_of_view_is_all_that_is_left_out() {
+    let Some(gpu) = gpu() else { return };
+    // A closed cube of 1 536 triangles, of which each face of a hemicube draws only a part: one
+    // triangle left out in error would be a hole.
+    let cube = cube(&GREY());
+    let mut tiles = vec![];
+    for wall in (0..cube.triangles().len()).step_by(2) {
+        let [a, b, c] = cube.corners(wall);
+        let at = |u: u32, v: u32| a + (b - a) * f64::from(u) / 16. + (c - b) * f64::from(v) / 16.;
+        for (u, v) in (0..256).map(|k| (k % 16, k / 16)) {
+            let corners = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)];
+            tiles.push((corners.map(|p| p.to_array()), GREY()));
+        }
+    }
+    let mesh = Mesh::new(quads(&tiles), f64::INFINITY).unwrap();
+    let patches: Vec<NodeId> =
+        (0..mesh.element_count()).step_by(31).map(|e| mesh.element(e)).collect();
+    for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
+        assert_eq!((row.escaped, row.backface), (0, 0), "from {}", mesh.centroid(p));
+    }
+}
+
+#[test]
+fn backs_are_told_from_fronts_and_block() {
+    let Some(gpu) = gpu() else { return };
+    let floor = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    // A screen that shows its back to the floor, close over it, and hides the lid.
+    let screen = [[-9., -9., 0.1], [9., -9., 0.1], [9., 9., 0.1], [-9., 9., 0.1]];
+    let lid = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
+    let mesh = Mesh::new(quads(&[(floor, GREY()), (screen, GREY()), (lid, GREY())]), 0.5).unwrap();
+    let patches: Vec<NodeId> = mesh.elements_of(mesh.root(0)).map(|e| mesh.element(e)).collect();
+    for row in rows(&gpu, &mesh, 64, &patches) {
+        assert_eq!(row.entries, []);
+        // At least 8 to each side at height 0.1: all but 0.5·(1 − 8/√(64.01))·4 ≈ 3e-4 is covered.
+        assert!(Row::form_factor(row.backface) > 1.0 - 4e-4, "{}", Row::form_factor(row.backface));
+    }
+}
+
+/// GPU and CPU rows of the same patches differ by no more than both their sampling errors.
+fn agree(size: f64, n: u32, rays: u32, count: usize) {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(size);
+    let all = mesh.element_count();
+    let patches: Vec<NodeId> = (0..count).map(|k| mesh.element(k * 7919 % all)).collect();
+    let gpu_rows = rows(&gpu, &mesh, n, &patches);
+    let cpu_rows = RayRows::new(&mesh, rays).unwrap().rows(&mesh, &patches, 1.0).unwrap();
+    let (pixel, mut worst) = (largest_pixel(n), 0.0f64);
+    for (a, b) in gpu_rows.iter().zip(&cpu_rows) {
+        let dense = |row: &Row| {
+            let mut shares = vec![0; all];
+            row.entries.iter().for_each(|e| shares[e.element as usize] = e.share);
+            shares.extend([row.escaped, row.backface]);
+            shares.into_iter().map(Row::form_factor).collect::<Vec<f64>>()
+        };
+        for (e, (f, g)) in dense(a).into_iter().zip(dense(b)).enumerate() {
+            let seen = f.max(g);
+            // Rays: a count of independent hits, variance F(1 − F)/rays. Pixels: those on the
+            // outline, each uniform within half its weight either way, variance pixel²/12. A
+            // region of p pixels has an outline of at most 7√p pixels crossed if it is compact
+            // (a right triangle's is 6.8√p); foreshortened elements are longer: twice that.
+            let crossed = 14.0 * (seen / pixel).sqrt() + 6.0;
+            let variance = seen * (1.0 - seen) / f64::from(rays) + crossed * pixel * pixel / 12.0;
+            // Six standard errors, since there are 10⁵ entries, and what Poisson counts of a few
+            // rays add to a Gaussian tail.
+            let bound = 6.0 * variance.sqrt() + 8.0 / f64::from(rays);
+            worst = worst.max((f - g).abs() / bound);
+            assert!((f - g).abs() <= bound, "entry {e}: GPU {f}, CPU {g}, bound {bound}");
+        }
+    }
+    println!("worst difference {worst:.2} of its bound");
+}
+
+#[test]
+fn hemicubes_agree_with_rays_element_by_element() {
+    agree(60.0, 256, 1 << 16, 24);
+}
+
+#[test]
+fn hemicubes_agree_with_rays_triangle_by_triangle() {
+    agree(f64::INFINITY, 512, 1 << 18, 32);
+}
+
+#[test]
+fn rows_are_the_same_bits_however_they_are_batched() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(100.0);
+    let patches: Vec<NodeId> =
+        (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
+    let mut maker = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
+    let together = maker.rows(&mesh, &patches, 1.0).unwrap();
+    for (row, &p) in together.iter().zip(&patches) {
+        assert!(&maker.rows(&mesh, &[p], 1.0).unwrap()[0] == row, "{p:?}");
+    }
+    assert_eq!(maker.drawn(), 140);
+    assert!(
+        HemicubeRows::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &patches, 1.0).unwrap() == together
+    );
+    assert_eq!(maker.rows(&mesh, &[], 1.0).unwrap(), []);
+}
+
+#[test]
+fn a_far_scene_gives_the_same_rows() {
+    let Some(gpu) = gpu() else { return };
+    // Moved by a thousand of its sizes, in steps that 64-bit coordinates hold exactly: the device
+    // works about a local origin and sees the very same numbers.
+    let near = cornell_box(200.0);
+    let moved: Vec<DVec3> =
+        near.scene().positions().iter().map(|&p| p + DVec3::splat(f64::from(1 << 19))).collect();
+    let s = near.scene();
+    let (triangles, groups, materials) =
+        (s.triangles().to_vec(), s.groups().to_vec(), s.materials().to_vec());
+    let far = radiosity::Scene::new(moved, triangles, groups, materials).unwrap();
+    let far = Mesh::new(far, 200.0).unwrap();
+    let patches: Vec<NodeId> = (0..40).map(|e| near.element(e * 5)).collect();
+    let (a, b) = (rows(&gpu, &near, 64, &patches), rows(&gpu, &far, 64, &patches));
+    for (a, b) in a.iter().zip(&b) {
+        let total = |row: &Row| row.entries.iter().map(|e| u64::from(e.share)).sum::<u64>();
+        // Positions round at 2^19 by 2^-34: a pixel on a border may flip, no more than a few.
+        let pixels = 8.0 * largest_pixel(64);
+        assert!((total(a) as f64 - total(b) as f64).abs() <= pixels * f64::from(Row::TOTAL));
+    }
+}
+
+#[test]
+fn what_a_device_cannot_do_is_said() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(200.0);
+    for n in [0, 7, 100_000] {
+        let e = HemicubeRows::new(&gpu, &mesh, n).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Setting);
+        assert!(e.to_string().contains(&n.to_string()), "{e}");
+    }
+    let e = Gpu::new(Some("no such adapter")).unwrap_err();
+    assert_eq!(e.kind(), ErrorKind::Device);
+    assert!(e.to_string().contains(&gpu.adapter().name), "lists what there is: {e}");
+}
+
+#[test]
+fn turned_hemicubes_average_pixel_errors_away() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = Mesh::new(cube(&GREY()), 0.1).unwrap();
+    // Elements of the walls, some 20 pixels each.
+    let patches: Vec<NodeId> = (0..20).map(|k| mesh.element(k * 150 + 7)).collect();
+    let make = |k: u32| {
+        let k = NonZeroU32::new(k).unwrap();
+        let mut maker = HemicubeRows::new(&gpu, &mesh, 128).unwrap().with_rotations(k);
+        let rows = maker.rows(&mesh, &patches, 1.0).unwrap();
+        rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
+        assert_eq!(maker.drawn(), u64::from(k.get()) * patches.len() as u64);
+        rows
+    };
+    let rms = |rows: &[Row]| {
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (row, &patch) in rows.iter().zip(&patches) {
+            let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
+            for e in &row.entries {
+                let corners = mesh.corners(mesh.element(e.element as usize));
+                let exact = point_to_polygon(eye, normal, &corners);
+                squares += (Row::form_factor(e.share) - exact).powi(2);
+                count += 1.0;
+            }
+        }
+        f64::sqrt(squares / count)
+    };
+    assert!(make(1) == rows(&gpu, &mesh, 128, &patches), "one rotation is none");
+    let (one, four) = (make(1), make(4));
+    assert!(four == make(4), "the same bits again");
+    let ratio = rms(&four) / rms(&one);
+    println!("error {:.2e}, with four rotations {ratio:.3} of it", rms(&one));
+    // Independent errors would leave 1/2; the RMS of some 50 000 entries is known to well below a
+    // tenth of itself.
+    assert!(ratio < 0.6, "{ratio}");
+}

@@ -1,0 +1,3 @@
+mod device_failures;
+mod gpu_gather;
+mod gpu_rows;

@@ -1,0 +1,2 @@
+mod cornell_box;
+mod target;

@@ -1,0 +1,209 @@
+//! One dial, and what it says of itself. No GPU needed: rays see, and truth is path-traced or has a
+//! closed form.
+
+use crate::common::truth;
+use crate::common::{cornell_box, cube, quads};
+use radiosity::{
+    Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, ErrorKind, Material,
+    RefinementSettings, Rgb, Scene, Solver, StopReason,
+};
+use std::ops::ControlFlow;
+
+const TRUTH: &str = include_str!("../data/cornell_box.truth.json");
+
+fn go(_: &BakeProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn cornell() -> Scene {
+    cornell_box(f64::INFINITY).scene().clone()
+}
+
+fn dial(scene: Scene, error: f64) -> BakeResult {
+    Accuracy { error, adjust: &|_| {} }.bake(scene, &Backend::Cpu, go).unwrap()
+}
+
+/// A closed room in which all is known: B = 1/(1 − ρ) everywhere.
+fn furnace(reflectance: f64) -> Scene {
+    cube(&Material { exitance: Rgb::ONE, ..Material::grey("glow", reflectance) })
+}
+
+#[test]
+fn an_accuracy_is_reached_and_the_certificate_says_so() {
+    for error in [0.1, 0.05, 0.02] {
+        let baked = dial(cornell(), error);
+        let (surface, said) = (&baked.light.surface, baked.certificate);
+        let points = truth::points(TRUTH).unwrap();
+        let found = points.iter().map(|p| truth::at(surface, p.position, p.normal).unwrap());
+        let off: Vec<_> =
+            points.iter().zip(found).map(|(p, (b, e))| (p, b.distance(p.radiosity), e)).collect();
+        let area = off.iter().filter(|o| o.0.kind == "area");
+        let shares: Vec<f64> = area.map(|(p, off, _)| off / p.radiosity.length()).collect();
+        let rms = (shares.iter().map(|e| e * e).sum::<f64>() / shares.len() as f64).sqrt();
+        let within = off.iter().filter(|(_, off, told)| *off <= 2.0 * told).count();
+        println!(
+            "asked {error}, off by {rms:.4}, told {:.4}, {within} of {} within two estimates",
+            said.total,
+            points.len()
+        );
+        // What the dial is for: no worse than asked, and the estimate between half of it and thrice.
+        assert!(rms <= error && said.total <= error);
+        assert!(said.total > 0.5 * rms && said.total < 3.0 * rms);
+        // 95 % would be what two standard errors of a normal distribution hold; 198 points of a
+        // share of 95 % scatter by 1.5 %, twice.
+        assert!(within as f64 >= 0.92 * points.len() as f64);
+        // The squares of the parts are that of the whole, rounded a few times each.
+        let parts = [said.mesh, said.sampling, said.settling, said.unshot];
+        let sum: f64 = parts.iter().map(|p| p * p).sum();
+        assert!((sum.sqrt() - said.total).abs() < 1e-12, "{said:?}");
+        assert_eq!(surface.error.len(), surface.positions.len());
+        assert!(surface.error.iter().all(|e| e.is_finite() && *e >= 0.0));
+    }
+}
+
+#[test]
+fn a_furnace_is_exact_and_known_to_be() {
+    let baked = dial(furnace(0.5), 0.02);
+    // Most of what is left is what was not shot, e/40 = 5e-4 of what is emitted, of which half returns,
+    // and what few looks into corners miss.
+    let all = &baked.light.surface.radiosity;
+    let rms = all.iter().map(|b| (b.x / 2.0 - 1.0).powi(2)).sum::<f64>() / all.len() as f64;
+    println!("off by {}, {:?}", rms.sqrt(), baked.certificate);
+    assert!(rms.sqrt() < 5e-3, "{}", rms.sqrt());
+    assert!(baked.certificate.total < 5e-3, "{:?}", baked.certificate);
+}
+
+/// Light that is wrong by a known share, and what is said of it: shooting stopped early.
+#[test]
+fn light_that_was_not_shot_is_told_of() {
+    for reflectance in [0.5, 0.8] {
+        for unshot in [0.3, 0.1, 0.03] {
+            let mut effort = BakeSettings::for_error(0.02, &furnace(reflectance));
+            effort.solver = Solver { unshot, patch_tolerance: 0.0, ..Solver::default() };
+            (effort.gather, effort.element_size) = (None, 0.5);
+            let baked = effort.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
+            let (even, left) = (1.0 / (1.0 - reflectance), baked.solution.ledger.unshot_share());
+            let mean = baked.solution.radiosity.iter().map(|b| b.x).sum::<f64>()
+                / baked.solution.radiosity.len() as f64;
+            // All elements are equal here: what is missing is ρ/(1 − ρ) of what was not shot.
+            let missing = 1.0 - mean / even;
+            assert!((missing - left * reflectance).abs() < 1e-9, "{missing} {left}");
+            // A share of what is there, not of what there would be.
+            let share = missing / (1.0 - missing);
+            let bound = baked.certificate.unshot_bound;
+            assert!((bound / share - 1.0).abs() < 1e-6, "exact here: {bound} {share}");
+            let said = baked.certificate.total;
+            println!("{reflectance} {unshot}: missing {missing:.4}, told {:?}", baked.certificate);
+            assert!(said > 0.5 * missing && said < 3.0 * missing);
+        }
+    }
+}
+
+#[test]
+fn what_is_set_by_hand_stays() {
+    let adjust = |effort: &mut BakeSettings| {
+        effort.hemicube = 48;
+        if let Some(gather) = &mut effort.gather {
+            (gather.rays, gather.noise) = (77, 0.05);
+            gather.gathering = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
+        }
+    };
+    let baked =
+        Accuracy { error: 0.01, adjust: &adjust }.bake(cornell(), &Backend::Cpu, go).unwrap();
+    let mut want = BakeSettings::for_error(0.01, &cornell());
+    adjust(&mut want);
+    assert_eq!(baked.effort, want);
+    assert!(baked.certificate.total > 0.01, "and it says that it fell short");
+}
+
+#[test]
+fn two_runs_give_the_same_bits() {
+    let [one, two] = [0, 1].map(|_| dial(cornell(), 0.1));
+    assert!(one.light.surface.radiosity == two.light.surface.radiosity);
+    assert!(one.light.surface.error == two.light.surface.error);
+    assert_eq!(one.certificate, two.certificate);
+    assert_eq!(one.effort, two.effort);
+}
+
+#[test]
+fn a_time_is_kept_and_more_of_it_gains() {
+    let bake = |seconds: f64| {
+        Budget { seconds, adjust: &|_| {} }.bake(cornell(), &Backend::Cpu, go).unwrap()
+    };
+    // No time at all: what was reached, which is little, comes back at once.
+    let none = bake(1e-9);
+    assert_eq!(none.solution.stop, StopReason::Cancelled);
+    assert_eq!(none.light.surface.error.len(), none.light.surface.positions.len());
+    // Nothing is said of the clock here: any machine has done the first accuracy by then, or stops.
+    let some = bake(4.0);
+    assert!(some.certificate.total < none.certificate.total);
+}
+
+#[test]
+fn it_can_be_stopped_at_every_stage() {
+    for at in 0..3 {
+        let mut judged = 0;
+        let baked = Accuracy { error: 0.05, adjust: &|_| {} }
+            .bake(cornell(), &Backend::Cpu, |stage| {
+                let stop = match stage {
+                    BakeProgress::Shooting(_) => at == 0,
+                    BakeProgress::RefinementSettings(p) => at == 1 && p.level > 0,
+                    BakeProgress::ErrorEstimator(_) => {
+                        judged += 1;
+                        at == 2
+                    }
+                    BakeProgress::Judging { places, of } => {
+                        assert!(0 < *places && places <= of);
+                        false
+                    }
+                    BakeProgress::Failed(error) => panic!("{error}"),
+                };
+                if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .unwrap();
+        assert_eq!(judged, 1, "what was reached is judged, once");
+        match at {
+            0 => assert_eq!(baked.solution.stop, StopReason::Cancelled),
+            1 => assert_eq!(baked.light.stop, StopReason::Cancelled),
+            _ => assert_eq!(baked.light.stop, StopReason::Converged),
+        }
+        assert_eq!(baked.light.surface.error.len(), baked.light.surface.positions.len());
+    }
+}
+
+#[test]
+fn dark_and_black_scenes_are_exact() {
+    let up = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    let lamp = Material { exitance: Rgb::ONE, ..Material::grey("lamp", 0.0) };
+    for material in [Material::grey("dark", 0.5), Material::grey("black", 0.0), lamp] {
+        let baked = dial(quads(&[(up, material.clone())]), 0.01);
+        assert_eq!(baked.certificate.total, 0.0, "{:?}", baked.certificate);
+        // Means over elements are rounded.
+        let off = |b: &Rgb| b.distance(material.exitance);
+        assert!(baked.light.surface.radiosity.iter().all(|b| off(b) < 1e-14));
+        assert!(baked.light.surface.error.iter().all(|e| *e == 0.0));
+    }
+}
+
+#[test]
+fn errors_and_times_out_of_range_are_refused() {
+    for error in [0.0, -0.1, 1.0, 7.0, f64::NAN, f64::INFINITY] {
+        let dial = Accuracy { error, adjust: &|_| {} };
+        let e = dial.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Setting);
+        assert!(e.to_string().contains("error"), "{e}");
+    }
+    for seconds in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let budget = Budget { seconds, adjust: &|_| {} };
+        let e = budget.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Setting);
+    }
+    let bad = |effort: &mut BakeSettings| {
+        if let Some(gather) = &mut effort.gather {
+            gather.gathering.tolerance = 0.0;
+        }
+    };
+    let e =
+        Accuracy { error: 0.1, adjust: &bad }.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+    assert_eq!(e.kind(), ErrorKind::Setting);
+}

@@ -1,0 +1,3 @@
+mod proximity;
+mod resolution_policy;
+mod viewpoints;

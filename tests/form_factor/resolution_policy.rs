@@ -1,0 +1,150 @@
+//! Effort follows the flux at stake: coarse rows for patches that shoot little.
+
+use crate::common::{cornell_box, gpu, quads};
+use radiosity::{
+    AdaptiveViewpoints, Error, FormFactors, HemicubeRows, Material, Mesh, NodeId,
+    ProximityCorrection, RayRows, Rgb, Row, Solution, Solver,
+};
+use std::ops::ControlFlow;
+
+/// Shares of the emitted flux for which rows are made at full resolution, half and a quarter: a
+/// halving is enough for 2^2.5 = 5.7 times less light.
+const FULL: f64 = 0.1;
+const SHARES: [f64; 3] = [FULL, FULL / 6.0, FULL / 33.0];
+
+fn some(mesh: &Mesh) -> Vec<NodeId> {
+    (0..20).map(|k| mesh.element(k * 97 % mesh.element_count())).collect()
+}
+
+#[test]
+fn rows_for_little_light_are_those_of_smaller_hemicubes() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(100.0);
+    let patches = some(&mesh);
+    let make = |n: u32| HemicubeRows::new(&gpu, &mesh, n).unwrap().with_full_share(FULL);
+    for (full, resolutions) in [(128, [128, 64, 32]), (36, [36, 18, 16]), (8, [8, 8, 8])] {
+        let mut maker = make(full);
+        // Back and forth, so that one resolution leaves nothing behind for another.
+        for k in [0, 1, 2, 1, 0, 2] {
+            let rows = maker.rows(&mesh, &patches, SHARES[k]).unwrap();
+            rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
+            let alone = make(resolutions[k]).rows(&mesh, &patches, 1.0).unwrap();
+            assert!(rows == alone, "{full}, halved {k} times: as of {}", resolutions[k]);
+        }
+        assert_eq!(maker.drawn(), 6 * patches.len() as u64);
+    }
+    let mut maker = make(128);
+    maker.rows(&mesh, &patches[..5], SHARES[1]).unwrap();
+    maker.rows(&mesh, &patches[..2], SHARES[2]).unwrap();
+    assert_eq!(maker.drawn_by_resolution(), [(128, 0), (64, 5), (32, 2)]);
+    let mut even = maker.with_full_share(0.0);
+    even.rows(&mesh, &patches[..3], 1e-9).unwrap();
+    assert_eq!(even.drawn_by_resolution(), [(128, 3), (64, 5), (32, 2)]);
+    assert_eq!(make(16).drawn_by_resolution(), [(16, 0)], "nothing smaller");
+}
+
+#[test]
+fn rows_for_little_light_have_fewer_rays() {
+    let mesh = cornell_box(200.0);
+    let patches = some(&mesh);
+    let make = |n: u32| RayRows::new(&mesh, n).unwrap().with_full_share(FULL);
+    for (full, counts) in [(8192, [8192, 2048, 512]), (600, [600, 256, 256]), (10, [10, 10, 10])] {
+        let mut maker = make(full);
+        for k in [0, 1, 2] {
+            let rows = maker.rows(&mesh, &patches, SHARES[k]).unwrap();
+            rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
+            assert!(rows == make(counts[k]).rows(&mesh, &patches, 1.0).unwrap(), "{full} {k}");
+            assert!(rows.iter().all(|row| row.entries.len() as u32 <= counts[k]), "{full} {k}");
+        }
+        let all = make(full).rows(&mesh, &patches, 1.0).unwrap();
+        assert!(maker.with_full_share(0.0).rows(&mesh, &patches, 1e-9).unwrap() == all);
+    }
+}
+
+/// Sends all light away and notes how much was said to be at stake, and for how many patches.
+#[derive(Default)]
+struct Told(Vec<(f64, usize)>);
+
+impl FormFactors for Told {
+    fn rows(&mut self, _: &Mesh, patches: &[NodeId], share: f64) -> Result<Vec<Row>, Error> {
+        self.0.push((share, patches.len()));
+        Ok(vec![Row { escaped: Row::TOTAL, ..Default::default() }; patches.len()])
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        3
+    }
+}
+
+/// A lamp of two triangles that shine red, one of two that shine half as much in red and alone in
+/// green, one that is dim; each triangle an element.
+fn lamps() -> Mesh {
+    let square = |x: f64| [[x, 0., 0.], [x + 1., 0., 0.], [x + 1., 1., 0.], [x, 1., 0.]];
+    let lamp = |exitance| Material { exitance, ..Material::grey("lamp", 0.0) };
+    let (red, both) = (Rgb::new(4.0, 0.0, 0.0), Rgb::new(2.0, 1.0, 0.0));
+    let dim = Rgb::new(0.4, 0.0, 0.0);
+    let scene =
+        quads(&[(square(0.), lamp(red)), (square(2.), lamp(both)), (square(4.), lamp(dim))]);
+    Mesh::new(scene, 2.0).unwrap()
+}
+
+#[test]
+fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
+    let mesh = lamps();
+    let mut told = Told::default();
+    Solver { unshot: 0.0, ..Default::default() }
+        .solve(&mesh, &mut told, |_| ControlFlow::Continue(()))
+        .unwrap();
+    // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch is
+    // three patches, or fewer where light falls to a quarter.
+    let want = [(0.5, 3), (4.0 / 12.8, 1), (0.4 / 12.8, 2)];
+    assert_eq!(told.0.len(), 3, "{:?}", told.0);
+    for (told, want) in told.0.iter().zip(want) {
+        assert!((told.0 - want.0).abs() < 1e-12 && told.1 == want.1, "{told:?} {want:?}");
+    }
+}
+
+#[test]
+fn repairs_pass_on_what_is_at_stake() {
+    let mesh = cornell_box(200.0);
+    let near = ProximityCorrection::new(Told::default(), &mesh, 1.0);
+    let mut rows = AdaptiveViewpoints::new(near, 0.0, u32::MAX);
+    let patch = mesh.root(0);
+    assert!(mesh.children(patch).is_some());
+    rows.rows(&mesh, &[patch], 0.125).unwrap();
+    let told = &rows.inner().inner().0;
+    assert!(!told.is_empty() && told.iter().all(|&(share, _)| share == 0.125), "{told:?}");
+}
+
+/// A solution whose energy is accounted for and whose bits are those of a second run, and its rows.
+fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, ProximityCorrection<M>) {
+    let solve = || {
+        let mut rows = ProximityCorrection::new(make(), mesh, 1.0);
+        let solution =
+            Solver::default().solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
+        (solution, rows)
+    };
+    let ((one, rows), (again, _)) = (solve(), solve());
+    assert!(one.radiosity == again.radiosity && one.ledger == again.ledger);
+    assert!(one.ledger.imbalance() <= 1e-9, "{}", one.ledger.imbalance());
+    (one, rows)
+}
+
+#[test]
+fn rows_of_several_counts_of_rays_keep_the_energy_and_the_bits() {
+    let mesh = cornell_box(100.0);
+    let rays = || RayRows::new(&mesh, 4096).unwrap();
+    let (some, all) = (solve(&mesh, rays).0, solve(&mesh, || rays().with_full_share(0.0)).0);
+    assert!(some.radiosity != all.radiosity);
+}
+
+#[test]
+fn rows_of_several_resolutions_keep_the_energy_and_the_bits() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = cornell_box(60.0);
+    let (solution, rows) = solve(&mesh, || HemicubeRows::new(&gpu, &mesh, 64).unwrap());
+    let drawn = rows.inner().drawn_by_resolution();
+    println!("{drawn:?}");
+    assert!(drawn.iter().map(|d| d.0).eq([64, 32, 16]) && drawn.iter().all(|d| d.1 > 0));
+    assert_eq!(rows.inner().drawn(), solution.rows_made);
+}

@@ -1,0 +1,93 @@
+//! Faces wound inside out are said in a warning, with the name of their group; others are not.
+
+use crate::common::{cube, quads};
+use glam::DVec3;
+use radiosity::{Material, Scene, Triangle, load_obj};
+
+/// Corners of the triangles of a box, seen from inside or from outside.
+fn block(low: DVec3, high: DVec3, inside: bool) -> Vec<[DVec3; 3]> {
+    let unit = cube(&Material::grey("m", 0.5));
+    let put = |p: DVec3| low + (high - low) * p;
+    let corners = (0..12).map(|t| unit.corners(t).map(put));
+    corners.map(|[a, b, c]| if inside { [a, b, c] } else { [a, c, b] }).collect()
+}
+
+fn room() -> (&'static str, Vec<[DVec3; 3]>) {
+    ("room", block(DVec3::ZERO, DVec3::ONE, true))
+}
+
+/// The groups that the warning names, which there is at most one of.
+fn named(groups: &[(&str, Vec<[DVec3; 3]>)]) -> String {
+    let corners: Vec<[DVec3; 3]> = groups.iter().flat_map(|g| g.1.clone()).collect();
+    let of = (0u32..).zip(groups).flat_map(|(k, g)| g.1.iter().map(move |_| k));
+    let triangle = |(t, group)| Triangle {
+        corners: [0, 1, 2].map(|k| 3 * t + k),
+        group,
+        ..Default::default()
+    };
+    let mut scene = Scene::new(
+        corners.concat(),
+        (0u32..).zip(of).map(triangle).collect(),
+        groups.iter().map(|g| g.0.into()).collect(),
+        vec![Material::grey("m", 0.5)],
+    )
+    .unwrap();
+    scene.check_winding();
+    assert!(scene.warnings().len() < 2);
+    let warning = scene.warnings().first().map_or("", |w| w);
+    warning.chars().skip_while(|&c| c != '\'').take_while(|&c| c != ';').collect()
+}
+
+#[test]
+fn groups_wound_inside_out_are_named() {
+    let (low, high) = (DVec3::splat(0.3), DVec3::splat(0.6));
+    assert_eq!(named(&[room(), ("block", block(low, high, true))]), "'block'");
+    // One side of twelve triangles.
+    for side in 0..6 {
+        let mut one = block(low, high, false);
+        one[2 * side].swap(1, 2);
+        one[2 * side + 1].swap(1, 2);
+        assert_eq!(named(&[room(), ("block", one)]), "'block'", "{side}");
+    }
+    // All of the room but what stands in it.
+    let outside_in = ("room", block(DVec3::ZERO, DVec3::ONE, false));
+    let blocks = ("block", block(low, high, false));
+    assert_eq!(named(&[outside_in, blocks.clone()]), "'room'");
+    // A wall of it.
+    let mut walls = room().1;
+    let mut wall = walls.split_off(10);
+    wall.iter_mut().for_each(|corners| corners.swap(1, 2));
+    assert_eq!(named(&[("walls", walls), ("wall", wall), blocks]), "'wall'");
+    // Both in one group.
+    let all = [room().1, block(low, high, true)].concat();
+    assert_eq!(named(&[("all", all)]), "'all'");
+    // A screen with one face, seen from both sides.
+    let screen = block(DVec3::new(0.5, 0.2, 0.2), DVec3::new(0.9, 0.8, 0.8), true);
+    assert_eq!(named(&[room(), ("screen", screen[..2].to_vec())]), "'screen'");
+}
+
+#[test]
+fn groups_that_are_right_are_not() {
+    let block = |low: [f64; 3], high: [f64; 3]| block(low.into(), high.into(), false);
+    assert_eq!(named(&[room()]), "");
+    assert_eq!(named(&[("block", block([0.; 3], [1.; 3]))]), "");
+    // What stands on the floor hides a part of it, which sees nothing but backs.
+    assert_eq!(named(&[room(), ("cube", block([0.2, 0.2, 0.], [0.6, 0.6, 0.4]))]), "");
+    assert_eq!(named(&[room(), ("plate", block([0.1, 0.1, 0.], [0.9, 0.9, 0.01]))]), "");
+    // One in the other, and out of the room.
+    let pillars =
+        [block([0.4, 0.4, -0.5], [0.6, 0.6, 1.5]), block([0.2, 0.45, 0.], [0.8, 0.55, 0.5])];
+    assert_eq!(named(&[room(), ("pillars", pillars.concat())]), "");
+    let mut scene =
+        load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")).unwrap();
+    scene.check_winding();
+    assert_eq!(scene.warnings(), [""; 0]);
+}
+
+#[test]
+fn a_face_that_nobody_sees_says_nothing() {
+    let plate = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    let mut scene = quads(&[(plate, Material::grey("m", 0.5))]);
+    scene.check_winding();
+    assert_eq!(scene.warnings(), [""; 0]);
+}

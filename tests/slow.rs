@@ -1,0 +1,8 @@
+//! Tests that take minutes: `cargo test --release --test slow`.
+
+mod common;
+
+mod slow {
+    mod extremes;
+    mod properties;
+}

@@ -1,0 +1,7 @@
+mod checkpoint;
+mod incremental;
+mod many_triangles;
+mod methods;
+mod odd_geometry;
+mod patch_cut;
+mod shooting;
