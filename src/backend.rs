@@ -9,11 +9,12 @@ use std::time::Instant;
 
 use crate::backend::cpu::gather::RayGather;
 use crate::backend::cpu::rows::RayRows;
-use crate::backend::gpu::{Gpu, HemicubeGather, HemicubeRows};
+use crate::backend::gpu::{Gpu, HemicubeGather, HemicubeRows, StageSeconds};
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
 use crate::gather::Gather;
 use crate::mesh::{Mesh, NodeId};
+use crate::progress::Timings;
 
 /// What makes rows and gathers light.
 #[derive(Clone, Debug)]
@@ -133,13 +134,13 @@ impl BackendRows {
     }
 
     /// Seconds of drawing, reducing and reading back; rays are all drawing.
-    pub fn stages(&self) -> (f64, f64, f64) {
+    pub fn timings(&self) -> Timings {
         match &self.rows {
             Rows::Gpu(hemicubes) => {
-                let s = hemicubes.seconds();
-                (s.draw, s.reduce, s.readback)
+                let StageSeconds { draw, reduce, readback } = hemicubes.seconds();
+                Timings { draw, reduce, readback, ..Timings::default() }
             }
-            Rows::Cpu(_) => (self.seconds, 0.0, 0.0),
+            Rows::Cpu(_) => Timings { draw: self.seconds, ..Timings::default() },
         }
     }
 

@@ -77,8 +77,8 @@ pub use backend::fallback::Fallback;
 pub use backend::gpu::{AdapterInfo, Gpu, GpuLimits, HemicubeGather, HemicubeRows, StageSeconds};
 pub use backend::{Backend, BackendRows};
 pub use bake::{
-    Accuracy, BakeProgress, BakeResult, BakeSettings, Budget, ErrorEstimate, GatherSettings,
-    Timings,
+    BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate, GatherSettings,
+    SolveSettings,
 };
 pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
@@ -91,6 +91,7 @@ pub use io::{
     write_png, write_view_factor_list, write_view_factors,
 };
 pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
+pub use progress::Timings;
 pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
 pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver, StopReason};
 pub use vertex::VertexMesh;

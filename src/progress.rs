@@ -1,4 +1,4 @@
-//! How much to do between two calls of progress.
+//! How much to do between two calls of a progress callback, and where the time went.
 
 use std::time::{Duration, Instant};
 
@@ -27,6 +27,53 @@ impl BatchSizer {
         };
         done
     }
+}
+
+/// Seconds of wall time by stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Timings {
+    /// Cutting the scene into elements, and getting the device ready.
+    pub mesh: f64,
+    /// Rows: rendering item buffers, or casting rays.
+    pub draw: f64,
+    /// Rows: adding up pixel weights.
+    pub reduce: f64,
+    /// Rows: copying them from the device.
+    pub readback: f64,
+    /// Shooting along rows, corrections of rows included.
+    pub solve: f64,
+    /// Elements to vertices, gathering and splitting included.
+    pub vertices: f64,
+    /// Estimating the error.
+    pub estimate: f64,
+}
+
+impl Timings {
+    /// The sum of all stages.
+    pub fn total(&self) -> f64 {
+        let rows = self.draw + self.reduce + self.readback;
+        self.mesh + rows + self.solve + self.vertices + self.estimate
+    }
+}
+
+impl std::ops::AddAssign for Timings {
+    fn add_assign(&mut self, other: Timings) {
+        self.mesh += other.mesh;
+        self.draw += other.draw;
+        self.reduce += other.reduce;
+        self.readback += other.readback;
+        self.solve += other.solve;
+        self.vertices += other.vertices;
+        self.estimate += other.estimate;
+    }
+}
+
+/// Seconds since `start`, which becomes now.
+pub(crate) fn lap(start: &mut Instant) -> f64 {
+    let seconds = start.elapsed().as_secs_f64();
+    *start = Instant::now();
+    seconds
 }
 
 #[cfg(test)]

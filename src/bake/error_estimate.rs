@@ -15,6 +15,7 @@ use crate::vertex::gathering::GatheredMesh;
 /// An estimate of the error of vertex radiosity: root mean square over the area, as a share of the
 /// radiosity. The squares of the parts add up to that of the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorEstimate {
     /// All of it.
     pub total: f64,
@@ -25,13 +26,16 @@ pub struct ErrorEstimate {
     /// Radiosity is linear over the faces.
     pub mesh: f64,
     /// What was gathered is not settled: it would change if it shone itself.
-    pub settling: f64,
+    pub truncation: f64,
     /// An exact bound: no more than this share of all radiosity times area is missing because it was
     /// not shot, in the worst channel.
     pub unshot_bound: f64,
     /// Random places that were looked at.
-    pub places: usize,
+    pub samples: usize,
 }
+
+/// Places that the estimate looks at, at least.
+pub(super) const LEAST_PLACES: usize = 192;
 
 /// What there is to be judged.
 pub(crate) struct ErrorEstimator<'a> {
@@ -170,9 +174,9 @@ impl ErrorEstimator<'_> {
             unshot: (unshot * share).sqrt(),
             sampling: (sampling * share).sqrt(),
             mesh: (mesh * share).sqrt(),
-            settling: (settling * share).sqrt(),
+            truncation: (settling * share).sqrt(),
             unshot_bound,
-            places: samples.len(),
+            samples: samples.len(),
         };
         let even = sampling + settling + unshot;
         Ok((certificate, self.at_vertices(calibration, even.sqrt())))

@@ -1,104 +1,95 @@
 //! A device with the CPU behind it: what a bake has solved stays, whatever the device does.
+//!
+//! Rows and gathers come from the device until it fails; from the next batch on rays on the CPU make
+//! them. The failure is kept here until the bake asks for it, which is at its next report.
 
-use std::cell::RefCell;
-use std::ops::ControlFlow;
-use std::rc::Rc;
+use std::cell::{Cell, OnceCell};
 
-use super::{BakeProgress, ProgressCallback};
 use crate::backend::fallback::Fallback;
 use crate::backend::{Backend, BackendRows};
-use crate::bake::settings::BakeSettings;
+use crate::bake::settings::SolveSettings;
 use crate::error::{Error, ErrorKind};
 use crate::gather::Gather;
 use crate::mesh::Mesh;
 
-/// A device in use. When it fails rays on the CPU go on.
-pub(crate) struct ResilientBackend<'d> {
-    device: &'d Backend,
-    failure: Rc<RefCell<Failure>>,
+/// Rows of a device, and then of the CPU.
+pub(super) type ResilientRows<'a> = Fallback<'a, BackendRows>;
+
+/// A device in use, which rays on the CPU replace when it fails.
+pub(super) struct ResilientBackend<'a> {
+    backend: &'a Backend,
+    /// The first failure.
+    failure: OnceCell<Error>,
+    /// Whether [`ResilientBackend::new_failure`] has given it.
+    reported: Cell<bool>,
 }
 
-#[derive(Default)]
-struct Failure {
-    first: Option<Error>,
-    untold: Option<Error>,
-}
-
-impl<'d> ResilientBackend<'d> {
-    /// Nothing has failed yet.
-    pub fn new(device: &'d Backend) -> ResilientBackend<'d> {
-        ResilientBackend { device, failure: Rc::default() }
+impl<'a> ResilientBackend<'a> {
+    /// `backend`, which has not failed yet.
+    pub fn new(backend: &'a Backend) -> ResilientBackend<'a> {
+        ResilientBackend { backend, failure: OnceCell::new(), reported: Cell::new(false) }
     }
 
-    /// What the device failed of, if it did.
+    /// Why the device failed, if it did.
     pub fn failure(&self) -> Option<Error> {
-        self.failure.borrow().first.clone()
+        self.failure.get().cloned()
     }
 
-    /// Tells of a failure once, then of `stage`.
-    pub fn tell(&self, stage: &BakeProgress, progress: ProgressCallback) -> ControlFlow<()> {
-        let untold = self.failure.borrow_mut().untold.take();
-        if let Some(error) = untold {
-            progress(&BakeProgress::Failed(error))?;
-        }
-        progress(stage)
+    /// The failure of the device, once: at the first call after it.
+    pub fn new_failure(&self) -> Option<Error> {
+        let failure = self.failure.get().filter(|_| !self.reported.get())?;
+        self.reported.set(true);
+        Some(failure.clone())
     }
 
-    /// Whoever makes rows as `effort` says. What keeps the device from starting is an error, since
+    /// Keeps the first failure; what fails after that is a consequence.
+    fn record(&self, error: Error) {
+        let _ = self.failure.set(error);
+    }
+
+    /// A source of rows as `settings` ask for. What keeps the device from starting is an error, since
     /// nothing is lost then.
     pub fn rows<'m>(
-        &self,
+        &'m self,
         mesh: &'m Mesh,
-        effort: &'m BakeSettings,
-    ) -> Result<BackendFallback<'m>, Error> {
-        let rows = |device: &Backend| {
-            let rows = device.rows(mesh, effort.hemicube, effort.rotations)?;
-            Ok(match effort.full_share {
+        settings: &'m SolveSettings,
+    ) -> Result<ResilientRows<'m>, Error> {
+        let rows = |backend: &Backend| {
+            let rows = backend.rows(mesh, settings.hemicube_resolution, settings.rotations)?;
+            Ok(match settings.full_resolution_share {
                 Some(share) => rows.with_full_share(share),
                 None => rows,
             })
         };
-        let failure = self.failure.clone();
-        Ok(Fallback::new(rows(self.device)?, move |error| {
-            note(&failure, error);
+        Ok(Fallback::new(rows(self.backend)?, move |error| {
+            self.record(error);
             rows(&Backend::Cpu)
         }))
     }
 
-    /// Whoever gathers: see [`Backend::gather_evenly`]. A device that cannot has failed too: light was
-    /// shot by now.
+    /// A gatherer: see [`Backend::gather_evenly`]. A device that cannot start one has failed too:
+    /// light was shot by now.
     pub fn gather(
         &self,
         mesh: &Mesh,
         rays: u32,
         noise: f64,
         dim: f64,
-    ) -> Result<Box<dyn Gather>, Error> {
-        let failure = self.failure.clone();
-        match self.device.gather_evenly(mesh, rays, noise, dim) {
-            Ok(first) if self.device.gathers_by_hemicubes() => {
+    ) -> Result<Box<dyn Gather + '_>, Error> {
+        match self.backend.gather_evenly(mesh, rays, noise, dim) {
+            Ok(first) if self.backend.gathers_by_hemicubes() => {
                 let mesh = mesh.clone();
                 Ok(Box::new(Fallback::new(first, move |error| {
-                    note(&failure, error);
+                    self.record(error);
                     Backend::Cpu.gather_evenly(&mesh, rays, noise, dim)
                 })))
             }
             Err(e) if e.is_device_error() || e.kind() == ErrorKind::Setting => {
                 let gather = Backend::Cpu.gather_evenly(mesh, rays, noise, dim)?;
-                note(&failure, e);
+                self.record(e);
                 Ok(gather)
             }
-            done => done,
+            result => result.map(|gather| gather as Box<dyn Gather>),
         }
-    }
-}
-
-/// Rows of a device, and then of the CPU.
-pub(crate) type BackendFallback<'m> = Fallback<'m, BackendRows>;
-
-fn note(failure: &RefCell<Failure>, error: Error) {
-    let mut failure = failure.borrow_mut();
-    if failure.first.is_none() {
-        *failure = Failure { first: Some(error.clone()), untold: Some(error) };
     }
 }

@@ -1,12 +1,14 @@
 //! The second half of a bake: vertices gather, are judged, and gather again where that is needed.
 
-use super::shooting_phase::ShootingPhase;
-use super::{BakeProgress, Goal, LEAST_PLACES, ProgressCallback, lap};
-use crate::bake::error_estimate::{ErrorEstimate, ErrorEstimator};
+use crate::bake::error_estimate::{ErrorEstimate, ErrorEstimator, LEAST_PLACES};
 use crate::bake::fallback::ResilientBackend;
+use crate::bake::pipeline::ErrorTarget;
+use crate::bake::progress::{BakeProgress, ProgressCallback, report};
 use crate::bake::settings::BakeSettings;
+use crate::bake::shooting_phase::ShootingPhase;
 use crate::error::Error;
 use crate::gather::Gather;
+use crate::progress::lap;
 use crate::solver::StopReason;
 use crate::vertex::adaptive::AdaptiveGather;
 use crate::vertex::gathering::{GatherProgress, GatheredMesh, RefinementSettings};
@@ -16,33 +18,33 @@ use std::ops::ControlFlow;
 pub(super) struct GatherPhase<'a> {
     pub effort: BakeSettings,
     pub state: AdaptiveGather<'a>,
-    pub looks: Box<dyn Gather>,
+    pub looks: Box<dyn Gather + 'a>,
     pub device: &'a ResilientBackend<'a>,
     pub shot: ShootingPhase,
 }
 
-impl GatherPhase<'_> {
+impl<'a> GatherPhase<'a> {
     /// Gathers as the effort says, and on until the goal is reached or nothing is left to be done.
     pub fn until(
         mut self,
-        goal: &Goal,
+        goal: Option<ErrorTarget>,
         progress: ProgressCallback,
     ) -> Result<(GatheredMesh, ErrorEstimate, ShootingPhase, BakeSettings), Error> {
-        if let Goal::Error(wanted, adjust) = goal {
-            self.look(*wanted, adjust)?;
+        if let Some(ErrorTarget { error: wanted, overrides: adjust }) = goal {
+            self.look(wanted, adjust)?;
         }
         let device = self.device;
-        let mut tell = |stage: BakeProgress| device.tell(&stage, progress);
+        let mut tell = |stage: BakeProgress| report(device, &stage, progress);
         let gather = self.effort.gather.as_ref().expect("vertices gather");
-        let mut rough = match gather.gathering.sweeps {
+        let mut rough = match gather.refinement.sweeps {
             0 | 1 => None,
             _ => Some(self.looks(ROUGH)?),
         };
-        let mut stop = gather.gathering.settle(
+        let mut stop = gather.refinement.settle(
             &mut self.state,
             &mut *self.looks,
             rough.as_mut().map(|r| &mut **r as &mut dyn Gather),
-            &mut |p| tell(BakeProgress::RefinementSettings(*p)),
+            &mut |p| tell(BakeProgress::Gathering(*p)),
         )?;
         for round in 0.. {
             let (mut light, rest) = self.state.curved(self.gathering())?;
@@ -52,16 +54,16 @@ impl GatherPhase<'_> {
             let judged = ErrorEstimator { light: &light, sources, rest: &rest, ledger, sweeps };
             let count = (light.gathers as usize / GATHERS_A_PLACE).clamp(LEAST_PLACES, MOST_PLACES);
             let mut cancelled = stop == StopReason::Cancelled;
-            let (certificate, error) = judged.judge(count, &mut *self.looks, &mut |places| {
+            let (certificate, error) = judged.judge(count, &mut *self.looks, &mut |samples| {
                 cancelled =
-                    cancelled || tell(BakeProgress::Judging { places, of: count }).is_break();
+                    cancelled || tell(BakeProgress::Estimating { samples, of: count }).is_break();
                 if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;
             light.surface.error = error;
             light.stop = stop;
-            self.shot.seconds.certificate += lap(&mut self.shot.since);
-            let go = tell(BakeProgress::ErrorEstimator(certificate));
-            let Goal::Error(wanted, adjust) = goal else {
+            self.shot.seconds.estimate += lap(&mut self.shot.since);
+            let go = tell(BakeProgress::Estimated(certificate));
+            let Some(ErrorTarget { error: wanted, overrides: adjust }) = goal else {
                 return Ok((light, certificate, self.shot, self.effort));
             };
             let done = certificate.total <= SURE * wanted
@@ -69,12 +71,12 @@ impl GatherPhase<'_> {
                 || go.is_break()
                 || cancelled
                 || round == ROUNDS;
-            let again = if done { None } else { self.improve(&certificate, *wanted, adjust)? };
+            let again = if done { None } else { self.improve(&certificate, wanted, adjust)? };
             let Some(again) = again else {
                 return Ok((light, certificate, self.shot, self.effort));
             };
             let gathering = self.gathering().clone();
-            let mut tell = |p: &GatherProgress| tell(BakeProgress::RefinementSettings(*p));
+            let mut tell = |p: &GatherProgress| tell(BakeProgress::Gathering(*p));
             stop = match again {
                 NextStep::All => self.state.sweep(&gathering, &mut *self.looks, &mut tell)?,
                 NextStep::Split => self.state.refine(&gathering, &mut *self.looks, &mut tell)?,
@@ -107,7 +109,7 @@ impl GatherPhase<'_> {
         if let Some(gather) = &mut effort.gather {
             let more = (sampling / most).powf(1.0 / NOISE);
             let rays = (f64::from(gather.rays) * more).clamp(LEAST_RAYS, MOST_RAYS);
-            (gather.rays, gather.noise) = (rays.ceil() as u32, OUTLIER * most);
+            (gather.rays, gather.noise_tolerance) = (rays.ceil() as u32, OUTLIER * most);
             adjust(&mut effort);
         }
         self.effort = effort;
@@ -116,14 +118,14 @@ impl GatherPhase<'_> {
     }
 
     /// Whoever gathers as the effort says, with a part of the looks.
-    fn looks(&self, fewer: u32) -> Result<Box<dyn Gather>, Error> {
+    fn looks(&self, fewer: u32) -> Result<Box<dyn Gather + 'a>, Error> {
         let gather = self.effort.gather.as_ref().expect("vertices gather");
-        let (rays, noise) = (gather.rays.div_ceil(fewer), gather.noise * f64::from(fewer));
+        let (rays, noise) = (gather.rays.div_ceil(fewer), gather.noise_tolerance * f64::from(fewer));
         self.device.gather(&self.shot.mesh, rays, noise, self.state.dim())
     }
 
     fn gathering(&self) -> &RefinementSettings {
-        &self.effort.gather.as_ref().expect("vertices gather").gathering
+        &self.effort.gather.as_ref().expect("vertices gather").refinement
     }
 
     /// Sets more effort against the parts of the error that are most of it, if there is any to be set.
@@ -133,35 +135,35 @@ impl GatherPhase<'_> {
         wanted: f64,
         adjust: &dyn Fn(&mut BakeSettings),
     ) -> Result<Option<NextStep>, Error> {
-        let ErrorEstimate { sampling, mesh, settling, unshot, .. } = *certificate;
+        let ErrorEstimate { sampling, mesh, truncation: settling, unshot, .. } = *certificate;
         let mut effort = self.effort.clone();
         let Some(gather) = &mut effort.gather else { return Ok(None) };
         let most = highest([sampling, mesh, settling], unshot, AIM * SURE * wanted);
         if settling > most {
-            gather.gathering.sweeps += 1;
+            gather.refinement.sweeps += 1;
         }
         if sampling > most {
             let more = (sampling / most).powf(1.0 / NOISE).clamp(1.25, 8.0);
             gather.rays = (f64::from(gather.rays) * more) as u32;
-            gather.noise *= (most / sampling).clamp(0.25, 0.8);
+            gather.noise_tolerance *= (most / sampling).clamp(0.25, 0.8);
         }
         if mesh > most {
             let finer = (most / mesh).clamp(0.6, 0.8);
-            gather.gathering.tolerance *= finer;
-            gather.gathering.smallest *= finer;
-            gather.gathering.curve *= finer;
+            gather.refinement.tolerance *= finer;
+            gather.refinement.smallest *= finer;
+            gather.refinement.curve *= finer;
         }
         adjust(&mut effort);
         if effort == self.effort {
             return Ok(None);
         }
         let (Some(old), Some(new)) = (&self.effort.gather, &effort.gather) else { return Ok(None) };
-        let again = if (new.rays, new.noise) != (old.rays, old.noise) {
-            if new.gathering.sweeps != old.gathering.sweeps {
+        let again = if (new.rays, new.noise_tolerance) != (old.rays, old.noise_tolerance) {
+            if new.refinement.sweeps != old.refinement.sweeps {
                 self.state.shine();
             }
             NextStep::All
-        } else if new.gathering.sweeps != old.gathering.sweeps {
+        } else if new.refinement.sweeps != old.refinement.sweeps {
             NextStep::Settle
         } else {
             NextStep::Split

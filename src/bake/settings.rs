@@ -1,4 +1,4 @@
-//! What a bake spends: all its settings, and which of them an accuracy asks for.
+//! All settings of a bake, and which of them an error asks for.
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -9,65 +9,81 @@ use crate::scene::Scene;
 use crate::solver::{Method, Solver};
 use crate::vertex::gathering::RefinementSettings;
 
-/// All settings of a bake. [`BakeSettings::for_error`] chooses them; each can be changed by hand.
+/// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`] or
+/// [`BakeSettings::gathering`], and change what is to be different:
+///
+/// ```
+/// # fn settings(scene: &radiosity::Scene) {
+/// let mut settings = radiosity::BakeSettings::for_error(0.02, scene);
+/// settings.solve.hemicube_resolution = 128;
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct BakeSettings {
+    /// How light is spread on the elements of a first mesh.
+    pub solve: SolveSettings,
+    /// How the vertices of a second mesh gather that light; with none, the vertices of the first get
+    /// the mean of the elements around them.
+    pub gather: Option<GatherSettings>,
+}
+
+/// Settings of the first phase of a bake: mesh, rows of form factors, solver.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SolveSettings {
     /// Longest edge of the elements that light is shot on, scene unit.
     pub element_size: f64,
-    /// Levels that those elements are split which other surfaces touch.
-    pub contacts: u32,
-    /// Pixels along an edge of the top face of the hemicubes that shoot much, even; a half or a quarter
-    /// of them for dim patches.
-    pub hemicube: u32,
-    /// The share of the emitted light from which on a patch shoots much; with none, the device's own.
-    pub full_share: Option<f64>,
-    /// HemicubeRows a viewpoint, each turned further.
+    /// Quadtree levels by which elements are split that other surfaces touch.
+    pub contact_levels: u32,
+    /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a half
+    /// or a quarter of them for dimmer ones. Where rays are cast, the square root of their number.
+    pub hemicube_resolution: u32,
+    /// A patch that shoots at least this share of the emitted light gets the full resolution; 0 for
+    /// all patches; with none, the backend's own.
+    pub full_resolution_share: Option<f64>,
+    /// Hemicubes a viewpoint, averaged, each turned further about the normal.
     pub rotations: NonZeroU32,
-    /// Receivers within this many patch diameters get closed forms; below 0 none.
-    pub near: f64,
-    /// Patches whose parts disagree by more than this share of light are seen from finer parts; with
-    /// none, each only from its centroid.
-    pub viewpoints: Option<f64>,
+    /// Receivers within this many patch diameters get closed-form factors
+    /// ([`crate::ProximityCorrection`]); below 0 none.
+    pub near_reach: f64,
+    /// Patches of whose light more than this share lands on other elements when it is sent from their
+    /// parts are seen from those ([`crate::AdaptiveViewpoints`]); with none, each from its centroid
+    /// alone.
+    pub viewpoint_tolerance: Option<f64>,
     /// How light is spread, how far, and from how large patches.
     pub solver: Solver,
     /// Whether GMRES takes the place of `solver.method` in scenes for which [`Solver::for_mesh`]
     /// chooses it.
     pub gmres_if_bright: bool,
     /// A file that the state of the solve is written to, every few batches and at its end; if it is
-    /// there, the solve goes on from it: see [`Solver::resume`]. The last batches at most are lost
-    /// when a bake is killed: as many as take ten times what writing takes.
-    pub state: Option<PathBuf>,
-    /// Whether the light not yet shot is added, spread evenly.
+    /// there, the solve goes on from it: see [`Solver::resume`]. A bake that is killed loses the last
+    /// batches at most: writing takes about a tenth of the time.
+    pub checkpoint: Option<PathBuf>,
+    /// Whether the light not yet shot is added, spread evenly (the ambient term of Cohen et al. 1988).
     pub ambient: bool,
-    /// How vertices gather; with none, they get what the elements around them have.
-    pub gather: Option<GatherSettings>,
 }
 
-/// Settings of vertices that gather.
+/// Settings of the second phase of a bake: vertices that gather.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct GatherSettings {
     /// Longest edge of the elements whose corners gather first, scene unit.
     pub element_size: f64,
-    /// Levels that those elements are split which other surfaces touch.
-    pub contacts: u32,
-    /// Looks that a vertex takes: rays, or pixels of a hemicube that are worth as much.
+    /// Quadtree levels by which those elements are split that other surfaces touch.
+    pub contact_levels: u32,
+    /// Rays a vertex, or as many pixels of a hemicube as are worth that.
     pub rays: u32,
-    /// RayScene find on the CPU that half of them are off by more than this share of the irradiance: then
-    /// there are more, up to 16 times as many. Infinity for never.
-    pub noise: f64,
+    /// Rays cast on the CPU are doubled, up to 16 times as many, while the estimated error of the
+    /// irradiance is above this share of it; infinity for never.
+    pub noise_tolerance: f64,
     /// Where elements are split, and how often all vertices gather.
-    pub gathering: RefinementSettings,
+    pub refinement: RefinementSettings,
 }
 
-impl BakeSettings {
-    /// Whether a bake would take these settings of gathering: worth asking before a long solve. What
-    /// comes before that is checked where it is used.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        self.gather.as_ref().map_or(Ok(()), |gather| gather.gathering.check())
-    }
-
+impl SolveSettings {
     /// The solver for `mesh`.
-    pub(crate) fn solver_for(&self, mesh: &Mesh) -> Solver {
+    pub(super) fn solver_for(&self, mesh: &Mesh) -> Solver {
         match Solver::for_mesh(mesh).method {
             method @ Method::Gmres { .. } if self.gmres_if_bright => {
                 Solver { method, ..self.solver }
@@ -75,12 +91,42 @@ impl BakeSettings {
             _ => self.solver,
         }
     }
+}
+
+impl BakeSettings {
+    /// Whether a bake would take these settings of gathering: worth asking before a long solve. What
+    /// comes before that is checked where it is used.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        self.gather.as_ref().map_or(Ok(()), |gather| gather.refinement.check())
+    }
+
+    /// Settings for previews: elements of a 32nd of the scene's diagonal, 1e-4 unshot, and no vertex
+    /// gathers.
+    pub fn elements_only(scene: &Scene) -> BakeSettings {
+        let mut settings = BakeSettings::for_error(0.02, scene);
+        settings.solve.element_size = scene_diagonal(scene) / 32.0;
+        settings.solve.contact_levels = 3;
+        settings.solve.hemicube_resolution = 128;
+        settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
+        settings.gather = None;
+        settings
+    }
+
+    /// Settings for vertices that gather where no error is asked for: those of an error of 0.8 %, with
+    /// elements half as large where light bends most, so that contact shadows are sharp, and 1500 rays.
+    pub fn gathering(scene: &Scene) -> BakeSettings {
+        let mut settings = BakeSettings::for_error(0.008, scene);
+        if let Some(gather) = &mut settings.gather {
+            gather.refinement.smallest /= 2.0;
+            gather.rays = 1500;
+        }
+        settings
+    }
 
     /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
     /// root mean square over the area of `scene`.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
-        let (low, high) = scene.bounds();
-        let diagonal = (high - low).length();
+        let diagonal = scene_diagonal(scene);
         let e = error.clamp(1e-4, 0.3);
         let hemicube = match e {
             e if e > 0.03 => 32,
@@ -95,29 +141,36 @@ impl BakeSettings {
             sweeps: if e > 0.03 { 1 } else { 2 },
             ..RefinementSettings::new(0.1 * diagonal * e.powf(0.85))
         };
-        BakeSettings {
+        let solve = SolveSettings {
             element_size: diagonal * (0.105 * e.powf(0.4)).max(0.6 * e),
-            contacts,
-            hemicube,
-            full_share: None,
+            contact_levels: contacts,
+            hemicube_resolution: hemicube,
+            full_resolution_share: None,
             rotations: NonZeroU32::MIN,
-            near: 1.0,
-            viewpoints: None,
+            near_reach: 1.0,
+            viewpoint_tolerance: None,
             solver: Solver {
                 unshot: e / 40.0,
                 patch_tolerance: e.min(0.02 + 0.4 * e),
                 ..Solver::default()
             },
             gmres_if_bright: true,
-            state: None,
+            checkpoint: None,
             ambient: false,
-            gather: Some(GatherSettings {
-                element_size: 0.3 * diagonal * e.powf(0.3),
-                contacts: if e > 0.07 { 1 } else { contacts },
-                rays: (20.0 / e).ceil() as u32,
-                noise: e,
-                gathering,
-            }),
-        }
+        };
+        let gather = GatherSettings {
+            element_size: 0.3 * diagonal * e.powf(0.3),
+            contact_levels: if e > 0.07 { 1 } else { contacts },
+            rays: (20.0 / e).ceil() as u32,
+            noise_tolerance: e,
+            refinement: gathering,
+        };
+        BakeSettings { solve, gather: Some(gather) }
     }
+}
+
+/// Diagonal of the bounding box, scene unit.
+fn scene_diagonal(scene: &Scene) -> f64 {
+    let (low, high) = scene.bounds();
+    (high - low).length()
 }

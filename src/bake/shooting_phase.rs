@@ -4,15 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{BakeProgress, LEAST_PLACES, ProgressCallback, Timings, lap};
-use crate::bake::error_estimate::{ErrorEstimate, ErrorEstimator};
-use crate::bake::fallback::{BackendFallback, ResilientBackend};
-use crate::bake::settings::BakeSettings;
+use crate::bake::error_estimate::{ErrorEstimate, ErrorEstimator, LEAST_PLACES};
+use crate::bake::fallback::{ResilientBackend, ResilientRows};
+use crate::bake::progress::{BakeProgress, ProgressCallback, report};
+use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::form_factor::viewpoints::AdaptiveViewpoints;
 use crate::mesh::Mesh;
+use crate::progress::{Timings, lap};
 use crate::scene::Scene;
 use crate::solver::{Progress, Solution, StopReason};
 use crate::vertex::gathering::GatheredMesh;
@@ -30,36 +31,35 @@ pub(super) struct ShootingPhase {
 
 impl ShootingPhase {
     pub fn new(
-        effort: &BakeSettings,
+        settings: &BakeSettings,
         scene: &Arc<Scene>,
         device: &ResilientBackend,
         progress: ProgressCallback,
     ) -> Result<ShootingPhase, Error> {
         let mut since = Instant::now();
-        effort.check()?;
-        let mesh =
-            Mesh::new(scene.clone(), effort.element_size)?.split_at_contacts(effort.contacts);
-        let rows = device.rows(&mesh, effort)?;
-        let near = ProximityCorrection::new(rows, &mesh, effort.near);
-        let levels = if effort.viewpoints.is_some() { u32::MAX } else { 0 };
-        let mut rows = AdaptiveViewpoints::new(near, effort.viewpoints.unwrap_or(1.0), levels);
+        settings.check()?;
+        let settings = &settings.solve;
+        let mesh = Mesh::new(scene.clone(), settings.element_size)?
+            .split_at_contacts(settings.contact_levels);
+        let rows = device.rows(&mesh, settings)?;
+        let near = ProximityCorrection::new(rows, &mesh, settings.near_reach);
+        let levels = if settings.viewpoint_tolerance.is_some() { u32::MAX } else { 0 };
+        let tolerance = settings.viewpoint_tolerance.unwrap_or(1.0);
+        let mut rows = AdaptiveViewpoints::new(near, tolerance, levels);
         let mut seconds = Timings { mesh: lap(&mut since), ..Default::default() };
-        let mut tell = |p: &Progress| device.tell(&BakeProgress::Shooting(*p), progress);
-        let mut solution = solve(effort, &mesh, &mut rows, &mut tell)?;
-        if effort.ambient {
+        let mut tell = |p: &Progress| report(device, &BakeProgress::Shooting(*p), progress);
+        let mut solution = solve(settings, &mesh, &mut rows, &mut tell)?;
+        if settings.ambient {
             solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
         }
-        let relay: &BackendFallback = rows.inner().inner();
+        let relay: &ResilientRows = rows.inner().inner();
         let mut in_rows = 0.0;
         for maker in [relay.first()].into_iter().chain(relay.second()) {
-            let (draw, reduce, readback) = maker.stages();
-            seconds.draw += draw;
-            seconds.reduce += reduce;
-            seconds.readback += readback;
+            seconds += maker.timings();
             in_rows += maker.seconds();
         }
         seconds.solve = lap(&mut since) - in_rows;
-        let rotations = u64::from(effort.rotations.get());
+        let rotations = u64::from(settings.rotations.get());
         let hemicubes = (solution.rows_made + rows.extra()) * rotations;
         let near_moved = rows.inner().moved();
         let hemicubes_by_resolution = relay.first().drawn_by_resolution();
@@ -95,27 +95,27 @@ impl ShootingPhase {
             ErrorEstimator { light: &light, sources: &light, rest: &rest, ledger, sweeps: 0 };
         let of = LEAST_PLACES;
         let mut cancelled = self.solution.stop == StopReason::Cancelled;
-        let (certificate, error) = judged.judge(of, &mut *looks, &mut |places| {
+        let (certificate, error) = judged.judge(of, &mut *looks, &mut |samples| {
             cancelled = cancelled
-                || device.tell(&BakeProgress::Judging { places, of }, progress).is_break();
+                || report(device, &BakeProgress::Estimating { samples, of }, progress).is_break();
             if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         light.surface.error = error;
-        self.seconds.certificate = lap(&mut self.since);
-        let _ = device.tell(&BakeProgress::ErrorEstimator(certificate), progress);
+        self.seconds.estimate = lap(&mut self.since);
+        let _ = report(device, &BakeProgress::Estimated(certificate), progress);
         Ok((light, certificate, self, effort.clone()))
     }
 }
 
 /// Spreads the light of `mesh`; from a saved state on if there is one, and saves it.
 fn solve(
-    effort: &BakeSettings,
+    settings: &SolveSettings,
     mesh: &Mesh,
     rows: &mut dyn FormFactors,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, Error> {
-    let solver = effort.solver_for(mesh);
-    let Some(path) = &effort.state else { return solver.solve(mesh, rows, progress) };
+    let solver = settings.solver_for(mesh);
+    let Some(path) = &settings.checkpoint else { return solver.solve(mesh, rows, progress) };
     let mut solve = match path.exists() {
         true => solver.resume(mesh, rows, path)?,
         false => solver.begin(mesh)?,

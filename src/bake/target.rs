@@ -1,123 +1,180 @@
-//! One dial: an accuracy, or a time, and everything else follows.
+//! What is asked of a bake: an error, or a time. All settings follow from it.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
+use crate::bake::pipeline::{self, ErrorTarget};
+use crate::bake::progress::{BakeProgress, ProgressCallback};
+use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
-use crate::bake::{BakeProgress, BakeResult, Goal};
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
 
-/// An accuracy to be reached.
-pub struct Accuracy<'a> {
-    /// Root mean square error of vertex radiosity over the area, as a share of it, in (0, 1).
-    pub error: f64,
-    /// What is to be set by hand, after everything else was chosen.
-    pub adjust: &'a dyn Fn(&mut BakeSettings),
+/// What is asked of a bake.
+///
+/// ```no_run
+/// # use std::ops::ControlFlow;
+/// # use radiosity::{Backend, BakeTarget, load_obj};
+/// # fn main() -> Result<(), radiosity::Error> {
+/// let scene = load_obj("scenes/cornell_box.obj")?;
+/// let baked = BakeTarget::Error(0.02).bake(scene, &Backend::Cpu, |_| ControlFlow::Continue(()))?;
+/// println!("{:.1} % off, by estimate", 100.0 * baked.estimate.total);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BakeTarget {
+    /// Root mean square error of vertex radiosity over the area, as a share of it, in (0, 1). The bake
+    /// ends when the estimated error is well below, or where it will not fall any further: see
+    /// [`BakeResult::estimate`].
+    Error(f64),
+    /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long the
+    /// one before took, for as long as another fits in. What is not done in time is stopped, and the
+    /// last that was done is returned; if none was, what was reached.
+    Time(Duration),
 }
 
-impl Accuracy<'_> {
-    /// Bakes `scene` until the estimated error is well below the one asked for; or, where it will not
-    /// fall any further, as far as it goes: see [`BakeResult::certificate`]. `progress` may stop it at any
-    /// time: what was reached is returned.
+/// The first error to be tried within a time, which takes little.
+const FIRST: f64 = 0.2;
+
+/// An error that is so many times smaller takes that many times, to this power, as long.
+const COST: f64 = 1.5;
+
+/// Share of the time left that the next error is chosen for: what it will take is a guess.
+const PRUDENCE: f64 = 0.5;
+
+/// Less than this much smaller is not worth a start from nothing.
+const WORTHWHILE: f64 = 1.3;
+
+impl BakeTarget {
+    /// The target [`BakeTarget::Time`], in seconds of wall time.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] for an error outside (0, 1) or an adjusted setting out of range;
-    /// [`ErrorKind::Device`] and [`ErrorKind::Memory`] when the device cannot even start. One that
-    /// fails later is in [`BakeResult::failure`].
+    /// [`ErrorKind::Setting`] for a time that is not above 0 or not finite.
+    pub fn seconds(seconds: f64) -> Result<BakeTarget, Error> {
+        let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero());
+        match time {
+            Some(time) => Ok(BakeTarget::Time(time)),
+            None => Err(not_a_time(seconds)),
+        }
+    }
+
+    /// Bakes `scene` until the target is met. `progress` may stop it at any time: what was reached is
+    /// returned.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for an error outside (0, 1) or a time of 0; [`ErrorKind::Device`] and
+    /// [`ErrorKind::Memory`] when the device cannot even start. One that fails later is in
+    /// [`BakeResult::device_failure`].
     pub fn bake(
-        &self,
+        self,
         scene: impl Into<Arc<Scene>>,
-        device: &Backend,
+        backend: &Backend,
+        progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
+    ) -> Result<BakeResult, Error> {
+        self.bake_with(scene, backend, |_| {}, progress)
+    }
+
+    /// As [`BakeTarget::bake`], with some settings made by hand.
+    ///
+    /// `overrides` is called with all settings whenever the bake has chosen some: once at the start of
+    /// a bake to an error, with those of [`BakeSettings::for_error`]; once when the number of rays was
+    /// chosen by what a few of them find; and after every estimate above the target, with those of the
+    /// next round. Within a time, that is repeated for each error that is tried. It may change any
+    /// setting, and must set the same ones to the same values at every call: what it sets stays, and
+    /// the bake changes the others. Settings of the solve count at the first call only, since light is
+    /// shot once; [`BakeSettings::gather`] may be taken away at the first call and not later; within a
+    /// time [`checkpoint`](crate::bake::SolveSettings::checkpoint) has no effect, since it would be
+    /// that of many solves.
+    ///
+    /// # Errors
+    /// Those of [`BakeTarget::bake`], and [`ErrorKind::Setting`] for a setting out of range.
+    pub fn bake_with(
+        self,
+        scene: impl Into<Arc<Scene>>,
+        backend: &Backend,
+        overrides: impl Fn(&mut BakeSettings),
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
-        if !(self.error > 0.0 && self.error < 1.0) {
-            let place = format!("error {}", self.error);
-            let remedy = "ask for a share above 0 and below 1, such as 0.02";
-            return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
+        let scene = &scene.into();
+        match self {
+            BakeTarget::Error(error) => {
+                let target = ErrorTarget { error, overrides: &overrides };
+                bake_to_error(target, scene, backend, &mut progress)
+            }
+            BakeTarget::Time(time) => {
+                bake_in_time(time, scene, backend, &overrides, &mut progress)
+            }
         }
-        let scene = scene.into();
-        let mut effort = BakeSettings::for_error(self.error, &scene);
-        (self.adjust)(&mut effort);
-        effort.bake_until(&scene, device, &Goal::Error(self.error, self.adjust), &mut progress)
     }
 }
 
-/// A time to be used well.
-pub struct Budget<'a> {
-    /// Seconds of wall time.
-    pub seconds: f64,
-    /// What is to be set by hand, after everything else was chosen.
-    pub adjust: &'a dyn Fn(&mut BakeSettings),
+fn not_a_time(seconds: f64) -> Error {
+    let place = format!("{seconds} seconds");
+    Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
 }
 
-/// The first accuracy to be tried, which takes little.
-const FIRST: f64 = 0.2;
+fn bake_to_error(
+    target: ErrorTarget,
+    scene: &Arc<Scene>,
+    backend: &Backend,
+    progress: ProgressCallback,
+) -> Result<BakeResult, Error> {
+    if !(target.error > 0.0 && target.error < 1.0) {
+        let place = format!("error {}", target.error);
+        let remedy = "ask for a share above 0 and below 1, such as 0.02";
+        return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
+    }
+    let mut settings = BakeSettings::for_error(target.error, scene);
+    (target.overrides)(&mut settings);
+    pipeline::run(&settings, scene, backend, Some(target), progress)
+}
 
-/// An accuracy that is so many times finer takes that many times, to this power, as long.
-const COST: f64 = 1.5;
-
-/// Share of the time left that the next accuracy is chosen for: what it will take is a guess.
-const PRUDENCE: f64 = 0.5;
-
-/// Less than this much finer is not worth a start from nothing.
-const WORTHWHILE: f64 = 1.3;
-
-impl Budget<'_> {
-    /// Bakes `scene` to one accuracy after the other, each chosen by how long the one before took,
-    /// for as long as another fits in. What did not get done in time is stopped, and the last that
-    /// did is returned; if none did, what was reached. No state is saved ([`BakeSettings::state`]): it would
-    /// be that of many solves.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Setting`] for a time that is not above 0; else those of [`Accuracy::bake`].
-    pub fn bake(
-        &self,
-        scene: impl Into<Arc<Scene>>,
-        device: &Backend,
-        mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
-    ) -> Result<BakeResult, Error> {
-        let limit = Duration::try_from_secs_f64(self.seconds).ok().filter(|d| !d.is_zero());
-        let Some(limit) = limit else {
-            let place = format!("{} seconds", self.seconds);
-            let remedy = "give a time above 0";
-            return Err(Error::new(ErrorKind::Setting, place, "not a time to work in", remedy));
-        };
-        let (start, scene) = (Instant::now(), scene.into());
-        let (mut best, mut error) = (None, FIRST);
-        let adjust = |effort: &mut BakeSettings| {
-            (self.adjust)(effort);
-            effort.state = None;
-        };
-        loop {
-            let (begun, mut late, mut stopped) = (Instant::now(), false, false);
-            let baked = Accuracy { error, adjust: &adjust }.bake(scene.clone(), device, |p| {
-                stopped |= progress(p).is_break();
-                late |= start.elapsed() >= limit;
-                if stopped || late { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
-            let baked = match (baked, best) {
-                (Err(error), Some(best)) if error.is_device_error() => {
-                    return Ok(BakeResult { failure: Some(error), ..best });
-                }
-                (baked, last) => {
-                    best = last;
-                    baked?
-                }
-            };
-            if stopped || late {
-                return Ok(best.unwrap_or(baked));
+fn bake_in_time(
+    limit: Duration,
+    scene: &Arc<Scene>,
+    backend: &Backend,
+    overrides: &dyn Fn(&mut BakeSettings),
+    progress: ProgressCallback,
+) -> Result<BakeResult, Error> {
+    if limit.is_zero() {
+        return Err(not_a_time(0.0));
+    }
+    let start = Instant::now();
+    let without_checkpoint = |settings: &mut BakeSettings| {
+        overrides(settings);
+        settings.solve.checkpoint = None;
+    };
+    let mut best: Option<BakeResult> = None;
+    let mut error = FIRST;
+    loop {
+        let attempt_start = Instant::now();
+        let mut stopped = false;
+        let target = ErrorTarget { error, overrides: &without_checkpoint };
+        let attempt = bake_to_error(target, scene, backend, &mut |stage| {
+            stopped |= progress(stage).is_break() || start.elapsed() >= limit;
+            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        let baked = match (attempt, best.take()) {
+            (Err(error), Some(best)) if error.is_device_error() => {
+                return Ok(BakeResult { device_failure: Some(error), ..best });
             }
-            best = Some(baked);
-            let left = limit.saturating_sub(start.elapsed()).as_secs_f64();
-            let finer = (PRUDENCE * left / begun.elapsed().as_secs_f64()).powf(1.0 / COST);
-            if finer < WORTHWHILE {
-                break;
+            (attempt, Some(best)) if stopped => {
+                attempt?;
+                return Ok(best);
             }
-            error /= finer;
+            (attempt, _) => attempt?,
+        };
+        let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
+        let affordable = PRUDENCE * remaining / attempt_start.elapsed().as_secs_f64();
+        let improvement = affordable.powf(1.0 / COST);
+        if stopped || improvement < WORTHWHILE {
+            return Ok(baked);
         }
-        Ok(best.expect("one is done"))
+        best = Some(baked);
+        error /= improvement;
     }
 }

@@ -121,8 +121,8 @@ impl Report {
                 "overshot": channels(overshot),
             },
             "error": {
-                "total": c.total, "mesh": c.mesh, "sampling": c.sampling, "settling": c.settling,
-                "unshot": c.unshot, "unshot_bound": c.unshot_bound, "places": c.places,
+                "total": c.total, "mesh": c.mesh, "sampling": c.sampling, "settling": c.truncation,
+                "unshot": c.unshot, "unshot_bound": c.unshot_bound, "places": c.samples,
             },
             "seconds": {
                 "load": s.load, "open": s.open, "mesh": s.mesh, "draw": s.draw, "reduce": s.reduce,

@@ -1,0 +1,37 @@
+//! What comes out of a bake.
+
+use crate::bake::error_estimate::ErrorEstimate;
+use crate::bake::settings::BakeSettings;
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::progress::Timings;
+use crate::solver::Solution;
+use crate::vertex::gathering::GatheredMesh;
+
+/// What comes out of a bake.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct BakeResult {
+    /// The mesh that light was shot on.
+    pub mesh: Mesh,
+    /// Radiosity of the elements of [`BakeResult::mesh`].
+    pub solution: Solution,
+    /// Radiosity at vertices, each with its estimated error, on a mesh of its own.
+    pub light: GatheredMesh,
+    /// Estimated error of [`BakeResult::light`].
+    pub estimate: ErrorEstimate,
+    /// The settings that were used in the end.
+    pub settings: BakeSettings,
+    /// Hemicubes drawn, or rows of rays cast: those of all rotations and viewpoints.
+    pub hemicubes: u64,
+    /// Hemicubes drawn at each resolution (pixels along an edge of the top face); empty where rays
+    /// were cast.
+    pub hemicubes_by_resolution: Vec<(u32, u64)>,
+    /// Mean share of a row that the correction of near receivers moved:
+    /// [`crate::ProximityCorrection`].
+    pub mean_near_correction: f64,
+    /// Why the graphics device failed, if it did; from then on rays were cast on the CPU.
+    pub device_failure: Option<Error>,
+    /// Wall time by stage.
+    pub timings: Timings,
+}
