@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
-use radiosity::{Accuracy, Backend, Material, Rgb, Scene, Triangle, load_obj};
+use radiosity::{Backend, BakeTarget, Material, Rgb, Scene, Triangle, load_obj};
 
 /// A box of walls: seen from inside, or from outside. `material` says what each of the six is of.
 fn block(
@@ -80,8 +80,7 @@ fn dial(c: &mut Criterion) {
     ] {
         for error in [0.05, 0.02, 0.01] {
             let bake = || {
-                let accuracy = Accuracy { error, adjust: &|_| {} };
-                accuracy
+                BakeTarget::Error(error)
                     .bake(scene.clone(), &device, |_| ControlFlow::Continue(()))
                     .expect("a solution")
             };
@@ -92,7 +91,7 @@ fn dial(c: &mut Criterion) {
                 if let Some(baked) = last.filter(|_| !std::mem::replace(&mut told, true)) {
                     eprintln!(
                         "{name}, asked {error}: told {:.4}, {} vertices, {} hemicubes, {} gathers",
-                        baked.certificate.total,
+                        baked.estimate.total,
                         baked.light.surface.positions.len(),
                         baked.hemicubes,
                         baked.light.gathers

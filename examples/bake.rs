@@ -109,7 +109,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("error") => bake.goal = Goal::Error(args.value()?.parse()?),
             Long("time") => bake.goal = Goal::Seconds(args.value()?.parse()?),
             Long("gather") => match args.value()?.string()?.as_str() {
-                "none" => set(&mut bake, |effort| effort.gather = None),
+                "none" => set(&mut bake, |settings| settings.gather = None),
                 "needed" => gather = Some(0),
                 "all" => gather = Some(1),
                 other => return Err(format!("'{other}' is not one of none, needed, all").into()),
@@ -117,64 +117,64 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             Long("row-memory") => {
                 let megabytes: usize = args.value()?.parse()?;
                 let bytes = megabytes.saturating_mul(1 << 20);
-                set(&mut bake, move |effort| effort.solver.row_memory = bytes);
+                set(&mut bake, move |settings| settings.solve.solver.row_memory = bytes);
             }
             Long("solver") => {
                 let method: Method = args.value()?.parse()?;
-                set(&mut bake, move |effort| {
-                    effort.solver.method = method;
-                    effort.gmres_if_bright = false;
+                set(&mut bake, move |settings| {
+                    settings.solve.solver.method = method;
+                    settings.solve.gmres_if_bright = false;
                 });
             }
             Long("state") => {
                 let path = PathBuf::from(args.value()?);
                 state = true;
-                set(&mut bake, move |effort| effort.state = Some(path.clone()));
+                set(&mut bake, move |settings| settings.solve.checkpoint = Some(path.clone()));
             }
-            Long("ambient") => set(&mut bake, |effort| effort.ambient = true),
+            Long("ambient") => set(&mut bake, |settings| settings.solve.ambient = true),
             Long("element-size") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.element_size = value);
+                set(&mut bake, move |settings| settings.solve.element_size = value);
             }
             Long("contacts") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.contacts = value);
+                set(&mut bake, move |settings| settings.solve.contact_levels = value);
             }
             Long("hemicube") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.hemicube = value);
+                set(&mut bake, move |settings| settings.solve.hemicube_resolution = value);
             }
             Long("full-share") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.full_share = Some(value));
+                set(&mut bake, move |settings| settings.solve.full_resolution_share = Some(value));
             }
             Long("near") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.near = value);
+                set(&mut bake, move |settings| settings.solve.near_reach = value);
             }
             Long("viewpoints") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.viewpoints = Some(value));
+                set(&mut bake, move |settings| settings.solve.viewpoint_tolerance = Some(value));
             }
             Long("rotations") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.rotations = value);
+                set(&mut bake, move |settings| settings.solve.rotations = value);
             }
             Long("unshot") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.solver.unshot = value);
+                set(&mut bake, move |settings| settings.solve.solver.unshot = value);
             }
             Long("shots") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.solver.max_steps = Some(value));
+                set(&mut bake, move |settings| settings.solve.solver.max_steps = Some(value));
             }
             Long("patch-tolerance") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.solver.patch_tolerance = value);
+                set(&mut bake, move |settings| settings.solve.solver.patch_tolerance = value);
             }
             Long("patch-level") => {
                 let value = args.value()?.parse()?;
-                set(&mut bake, move |effort| effort.solver.min_patch_level = value);
+                set(&mut bake, move |settings| settings.solve.solver.min_patch_level = value);
             }
             Long("gather-size") => {
                 let value = args.value()?.parse()?;
@@ -182,7 +182,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             }
             Long("gather-contacts") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.contacts = value);
+                set_gather(&mut bake, move |gather| gather.contact_levels = value);
             }
             Long("rays") => {
                 let value = args.value()?.parse()?;
@@ -190,27 +190,27 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
             }
             Long("noise") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.noise = value);
+                set_gather(&mut bake, move |gather| gather.noise_tolerance = value);
             }
             Long("bend") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.gathering.tolerance = value);
+                set_gather(&mut bake, move |gather| gather.refinement.tolerance = value);
             }
             Long("smallest") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.gathering.smallest = value);
+                set_gather(&mut bake, move |gather| gather.refinement.smallest = value);
             }
             Long("curve") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.gathering.curve = value);
+                set_gather(&mut bake, move |gather| gather.refinement.curve = value);
             }
             Long("max-elements") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.gathering.elements = value);
+                set_gather(&mut bake, move |gather| gather.refinement.elements = value);
             }
             Long("sweeps") => {
                 let value = args.value()?.parse()?;
-                set_gather(&mut bake, move |gather| gather.gathering.sweeps = value);
+                set_gather(&mut bake, move |gather| gather.refinement.sweeps = value);
             }
             Long("camera") => {
                 let [a, b, c, d, e, f, vertical_fov] = args.value()?.parse_with(numbers)?;
@@ -233,7 +233,7 @@ fn parse(mut args: lexopt::Parser) -> Result<Option<Bake>, lexopt::Error> {
         if let Goal::Plain { gather } = &mut bake.goal {
             *gather = true;
         }
-        set_gather(&mut bake, move |gather| gather.gathering.everywhere = everywhere);
+        set_gather(&mut bake, move |gather| gather.refinement.everywhere = everywhere);
     }
     bake.scene = scene.ok_or("no scene given")?.into();
     bake.out = out.map_or_else(|| bake.scene.with_extension(""), Into::into);
@@ -246,7 +246,7 @@ fn set(bake: &mut Bake, change: impl Fn(&mut BakeSettings) + 'static) {
 
 /// What vertices that do not gather do not need is left alone.
 fn set_gather(bake: &mut Bake, change: impl Fn(&mut GatherSettings) + 'static) {
-    set(bake, move |effort| effort.gather.iter_mut().for_each(&change));
+    set(bake, move |settings| settings.gather.iter_mut().for_each(&change));
 }
 
 /// Exactly `N` numbers with commas between.

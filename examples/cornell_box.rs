@@ -12,7 +12,7 @@ fn main() -> Result<(), radiosity::Error> {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     let bake = support::Bake {
         out: "cornell_box".into(),
-        changes: vec![Box::new(|effort| effort.element_size = 30.0)],
+        changes: vec![Box::new(|settings| settings.solve.element_size = 30.0)],
         camera: Some(Camera {
             eye: DVec3::new(278.0, 273.0, -800.0),
             target: DVec3::new(278.0, 273.0, 0.0),

@@ -8,10 +8,9 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::{
-    Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, Camera, Error,
-    ErrorEstimate, ErrorKind, GatherProgress, GatherSettings, Progress, RadianceImage,
-    RefinementSettings, Report, Scene, Seconds, Solver, VertexMesh, load_obj, write_exr, write_ply,
-    write_png,
+    Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorEstimate,
+    ErrorKind, GatherProgress, GatherSettings, Progress, RadianceImage, RefinementSettings, Report,
+    Scene, Seconds, VertexMesh, load_obj, write_exr, write_ply, write_png,
 };
 use serde_json::{Value, json};
 
@@ -63,9 +62,6 @@ impl Choice {
         }
     }
 }
-
-/// The accuracy whose settings vertices gather with where none is asked for.
-const PLAIN: f64 = 0.008;
 
 /// Lines of sight along a pixel's side.
 const SAMPLES: u32 = 4;
@@ -119,12 +115,12 @@ impl Bake {
             write_exr(self.out.with_added_extension("exr"), &image)?;
             write_png(self.out.with_added_extension("png"), &image)?;
         }
-        let s = baked.seconds;
+        let s = baked.timings;
         let report = Report {
             scene: self.scene.display().to_string(),
             adapter: device.adapter(),
             goal: self.goal.to_json(),
-            settings: settings(&baked.effort),
+            settings: settings(&baked.settings),
             triangles,
             shot_elements: baked.mesh.element_count(),
             elements: baked.light.mesh.element_count(),
@@ -134,14 +130,14 @@ impl Bake {
             hemicubes_by_resolution: baked.hemicubes_by_resolution,
             gathers: baked.light.gathers,
             gather_change: baked.light.change,
-            gather_stop: match baked.effort.gather {
+            gather_stop: match baked.settings.gather {
                 Some(_) => baked.light.stop.to_string(),
                 None => "none".into(),
             },
-            near_moved: baked.near_moved,
+            near_moved: baked.mean_near_correction,
             stop: baked.solution.stop.to_string(),
             ledger: baked.solution.ledger,
-            certificate: baked.certificate,
+            certificate: baked.estimate,
             seconds: Seconds {
                 load,
                 open,
@@ -151,7 +147,7 @@ impl Bake {
                 readback: s.readback,
                 solve: s.solve,
                 vertices: s.vertices,
-                certificate: s.certificate,
+                certificate: s.estimate,
                 write: writing.elapsed().as_secs_f64(),
                 total: start.elapsed().as_secs_f64(),
             },
@@ -167,15 +163,25 @@ impl Bake {
             show(&bar, stage);
             ControlFlow::Continue(())
         };
-        let adjust =
-            |effort: &mut BakeSettings| self.changes.iter().for_each(|change| change(effort));
+        let overrides = |settings: &mut BakeSettings| {
+            for change in &self.changes {
+                change(settings);
+            }
+        };
         let baked = match self.goal {
-            Goal::Error(error) => Accuracy { error, adjust: &adjust }.bake(scene, device, told),
-            Goal::Seconds(seconds) => Budget { seconds, adjust: &adjust }.bake(scene, device, told),
+            Goal::Error(error) => {
+                BakeTarget::Error(error).bake_with(scene, device, overrides, told)
+            }
+            Goal::Seconds(seconds) => {
+                BakeTarget::seconds(seconds)?.bake_with(scene, device, overrides, told)
+            }
             Goal::Plain { gather } => {
-                let mut effort = if gather { gathering(&scene) } else { plain(&scene) };
-                adjust(&mut effort);
-                effort.bake(scene, device, told)
+                let mut settings = match gather {
+                    true => BakeSettings::gathering(&scene),
+                    false => BakeSettings::elements_only(&scene),
+                };
+                overrides(&mut settings);
+                settings.bake(scene, device, told)
             }
         };
         bar.finish_and_clear();
@@ -189,7 +195,7 @@ impl Bake {
         baked: &BakeResult,
         device: &Backend,
     ) -> Result<RadianceImage, Error> {
-        let rays = baked.effort.gather.as_ref().map_or(2048, |gather| gather.rays);
+        let rays = baked.settings.gather.as_ref().map_or(2048, |gather| gather.rays);
         let mut gather = device.gather(&baked.light.mesh, rays)?;
         let ((width, height), bar) = (self.image, bar());
         let image = camera.gathered_image(
@@ -219,41 +225,12 @@ impl Goal {
     }
 }
 
-/// Elements alone: for previews.
-pub fn plain(scene: &Scene) -> BakeSettings {
-    BakeSettings {
-        element_size: default_element_size(scene),
-        contacts: 3,
-        hemicube: 128,
-        solver: Solver { unshot: 1e-4, ..Solver::default() },
-        gather: None,
-        ..BakeSettings::for_error(0.02, scene)
-    }
-}
-
-/// Vertices that gather, with small elements at contacts: what is asked for there is not an error over
-/// the area.
-pub fn gathering(scene: &Scene) -> BakeSettings {
-    let mut effort = BakeSettings::for_error(PLAIN, scene);
-    if let Some(gather) = &mut effort.gather {
-        gather.gathering.smallest /= 2.0;
-        gather.rays = 1500;
-    }
-    effort
-}
-
-/// A 32nd of the diagonal of the scene's bounding box.
-pub fn default_element_size(scene: &Scene) -> f64 {
-    let (low, high) = scene.bounds();
-    (high - low).length() / 32.0
-}
-
 fn comments(baked: &BakeResult) -> Vec<String> {
     let mut comments = vec![];
-    if baked.effort.ambient {
+    if baked.settings.solve.ambient {
         comments.push("ambient term of the unshot light added to the elements".into());
     }
-    let ErrorEstimate { total, places, .. } = baked.certificate;
+    let ErrorEstimate { total, samples: places, .. } = baked.estimate;
     comments.push(format!(
         "estimated error {:.3} % of radiosity, RMS over area, at {places} places; vertices have \
          their own",
@@ -262,34 +239,36 @@ fn comments(baked: &BakeResult) -> Vec<String> {
     comments
 }
 
-fn settings(effort: &BakeSettings) -> Vec<(String, Value)> {
-    let BakeSettings { solver, gather, .. } = effort;
+fn settings(settings: &BakeSettings) -> Vec<(String, Value)> {
+    let solve = &settings.solve;
+    let solver = &solve.solver;
     let mut all = vec![
-        ("element_size", json!(effort.element_size)),
-        ("contacts", json!(effort.contacts)),
-        ("hemicube", json!(effort.hemicube)),
-        ("full_share", json!(effort.full_share)),
-        ("near", json!(effort.near)),
-        ("viewpoints", json!(effort.viewpoints)),
-        ("rotations", json!(effort.rotations.get())),
-        ("solver", json!((!effort.gmres_if_bright).then(|| solver.method.to_string()))),
+        ("element_size", json!(solve.element_size)),
+        ("contacts", json!(solve.contact_levels)),
+        ("hemicube", json!(solve.hemicube_resolution)),
+        ("full_share", json!(solve.full_resolution_share)),
+        ("near", json!(solve.near_reach)),
+        ("viewpoints", json!(solve.viewpoint_tolerance)),
+        ("rotations", json!(solve.rotations.get())),
+        ("solver", json!((!solve.gmres_if_bright).then(|| solver.method.to_string()))),
         ("unshot", json!(solver.unshot)),
         ("shots", json!(solver.max_steps)),
         ("row_memory", json!(solver.row_memory)),
         ("patch_tolerance", json!(solver.patch_tolerance)),
         ("patch_level", json!(solver.min_patch_level)),
-        ("ambient", json!(effort.ambient)),
-        ("gather", json!(if gather.is_some() { "needed" } else { "none" })),
+        ("ambient", json!(solve.ambient)),
+        ("gather", json!(if settings.gather.is_some() { "needed" } else { "none" })),
     ];
-    if let Some(GatherSettings { element_size, contacts, rays, noise, gathering }) = gather {
+    if let Some(gather) = &settings.gather {
+        let GatherSettings { element_size, contact_levels, rays, noise_tolerance, .. } = gather;
         let RefinementSettings { tolerance, smallest, curve, elements, everywhere, sweeps } =
-            gathering;
+            &gather.refinement;
         all.extend([
             ("gather_size", json!(element_size)),
-            ("gather_contacts", json!(contacts)),
+            ("gather_contacts", json!(contact_levels)),
             ("rays", json!(rays)),
             // JSON has no infinity: null where there are never more rays.
-            ("noise", json!(noise)),
+            ("noise", json!(noise_tolerance)),
             ("bend", json!(tolerance)),
             ("smallest", json!(smallest)),
             // JSON has no infinity: null where nothing is split for its curve.
@@ -300,6 +279,11 @@ fn settings(effort: &BakeSettings) -> Vec<(String, Value)> {
         ]);
     }
     all.into_iter().map(|(name, value)| (name.into(), value)).collect()
+}
+
+/// A 32nd of the diagonal of the scene's bounding box.
+pub fn default_element_size(scene: &Scene) -> f64 {
+    BakeSettings::elements_only(scene).solve.element_size
 }
 
 /// Refuses an output that could not be written before any work is done for it.
@@ -333,13 +317,7 @@ fn show(bar: &ProgressBar, stage: &BakeProgress) {
                 elapsed.as_secs_f64()
             ));
         }
-        BakeProgress::RefinementSettings(GatherProgress {
-            sweep,
-            level,
-            elements,
-            gathered,
-            of,
-        }) => {
+        BakeProgress::Gathering(GatherProgress { sweep, level, elements, gathered, of }) => {
             bar.set_position((1000 * gathered / of.max(&1)) as u64);
             bar.set_message(format!(
                 "gathering, sweep {}, split {level} times, {gathered} of {of} vertices, \
@@ -347,14 +325,17 @@ fn show(bar: &ProgressBar, stage: &BakeProgress) {
                 sweep + 1
             ));
         }
-        BakeProgress::Judging { places, of } => {
-            bar.set_position((1000 * places / of.max(&1)) as u64);
-            bar.set_message(format!("judging, {places} of {of} places"));
+        BakeProgress::Estimating { samples, of } => {
+            bar.set_position((1000 * samples / of.max(&1)) as u64);
+            bar.set_message(format!("estimating the error, {samples} of {of} points"));
         }
-        BakeProgress::ErrorEstimator(certificate) => {
-            bar.println(format!("estimated error {:.2} %", 100.0 * certificate.total));
+        BakeProgress::Estimated(estimate) => {
+            bar.println(format!("estimated error {:.2} %", 100.0 * estimate.total));
         }
-        BakeProgress::Failed(error) => bar.println(format!("rays on the CPU go on: {error}")),
+        BakeProgress::DeviceFailed(error) => {
+            bar.println(format!("rays on the CPU go on: {error}"));
+        }
+        _ => {}
     }
 }
 
@@ -391,11 +372,11 @@ pub fn table(report: &Report) -> String {
             share(ledger.unshot)
         ),
         format!(
-            "error      about {:.2} %: mesh {:.2}, sampling {:.2}, settling {:.2}, unshot {:.2}",
+            "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, unshot {:.2}",
             100.0 * c.total,
             100.0 * c.mesh,
             100.0 * c.sampling,
-            100.0 * c.settling,
+            100.0 * c.truncation,
             100.0 * c.unshot
         ),
         format!(

@@ -77,9 +77,10 @@ impl Grid {
             "resolution",
             "",
             steps,
-            |e| e.hemicube.to_string(),
+            |e| e.solve.hemicube_resolution.to_string(),
             |e, f| {
-                e.hemicube = 2 * (f * f64::from(e.hemicube) / 2.0).round().max(1.0) as u32;
+                e.solve.hemicube_resolution =
+                    2 * (f * f64::from(e.solve.hemicube_resolution) / 2.0).round().max(1.0) as u32;
                 if let Some(gather) = &mut e.gather {
                     gather.rays = (f * f * f64::from(gather.rays)).ceil().max(16.0) as u32;
                 }
@@ -89,50 +90,51 @@ impl Grid {
 
         let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5] };
         let sizes = self.vary(base, "element size", "", steps, size, |e, f| {
-            e.element_size *= f;
+            e.solve.element_size *= f;
             if let Some(gather) = &mut e.gather {
                 gather.element_size *= f;
-                gather.gathering.smallest *= f;
+                gather.refinement.smallest *= f;
             }
         });
         self.panel("Element size", "edge of those that shoot; others with it", [sizes]);
 
         let steps: &[f64] = if quick { &[16.0, 4.0, 1.0] } else { &[64.0, 16.0, 4.0, 1.0, 0.25] };
-        let label = |e: &BakeSettings| percent(e.solver.unshot);
-        let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.solver.unshot *= f);
+        let label = |e: &BakeSettings| percent(e.solve.solver.unshot);
+        let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.solve.solver.unshot *= f);
         self.panel("Unshot share", "of the light, at which shooting stops", [unshot]);
 
         let steps: &[f64] = if quick { &[1.0, 2.0] } else { &[1.0, 2.0, 4.0] };
-        let label = |e: &BakeSettings| e.rotations.to_string();
+        let label = |e: &BakeSettings| e.solve.rotations.to_string();
         let rotations = self.vary(base, "rotations", "", steps, label, |e, f| {
-            e.rotations = NonZeroU32::new(f as u32).expect("not zero");
+            e.solve.rotations = NonZeroU32::new(f as u32).expect("not zero");
         });
         self.panel("Rotations", "hemicubes a viewpoint, averaged", [rotations]);
 
-        let label = |e: &BakeSettings| match e.near {
+        let label = |e: &BakeSettings| match e.solve.near_reach {
             reach if reach < 0.0 => "none".into(),
             reach => reach.to_string(),
         };
-        let near = self.vary(base, "near field", "", &[-1.0, 1.0, 3.0], label, |e, f| e.near = f);
+        let near = self
+            .vary(base, "near field", "", &[-1.0, 1.0, 3.0], label, |e, f| e.solve.near_reach = f);
         self.panel("Near field", "closed forms within so many patch diameters", [near]);
 
         let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.0, 0.5, 0.25] };
         let none = self.vary(base, "no gather", "none, element size", steps, size, |e, f| {
-            e.element_size *= f;
+            e.solve.element_size *= f;
             e.gather = None;
         });
         let label =
-            |e: &BakeSettings| e.gather.as_ref().map_or(0, |g| g.gathering.sweeps).to_string();
+            |e: &BakeSettings| e.gather.as_ref().map_or(0, |g| g.refinement.sweeps).to_string();
         let sweeps = self.vary(base, "sweeps", "sweeps", &[1.0, 2.0, 3.0], label, |e, f| {
-            e.gather.iter_mut().for_each(|g| g.gathering.sweeps = f as u32);
+            e.gather.iter_mut().for_each(|g| g.refinement.sweeps = f as u32);
         });
         let label =
-            |e: &BakeSettings| percent(e.gather.as_ref().map_or(0.0, |g| g.gathering.tolerance));
+            |e: &BakeSettings| percent(e.gather.as_ref().map_or(0.0, |g| g.refinement.tolerance));
         let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5, 0.25] };
         let bend = self.vary(base, "bend", "bend", steps, label, |e, f| {
             if let Some(gather) = &mut e.gather {
-                gather.gathering.tolerance = (f * gather.gathering.tolerance).min(1.0);
-                gather.gathering.curve *= f;
+                gather.refinement.tolerance = (f * gather.refinement.tolerance).min(1.0);
+                gather.refinement.curve *= f;
             }
         });
         self.panel("Gather", "none; how often; how much a side may bend", [none, sweeps, bend]);
@@ -149,21 +151,21 @@ impl Grid {
         change: impl Fn(&mut BakeSettings, f64),
     ) -> Series {
         let run = |&value: &f64| {
-            let mut effort = base.clone();
-            change(&mut effort, value);
-            let label = label(&effort);
-            (label.clone(), self.add(knob, label, effort))
+            let mut settings = base.clone();
+            change(&mut settings, value);
+            let label = label(&settings);
+            (label.clone(), self.add(knob, label, settings))
         };
         Series { name, runs: values.iter().map(run).collect() }
     }
 
     /// A run of these settings, the one there is if they are not new.
-    fn add(&mut self, knob: &'static str, value: String, effort: BakeSettings) -> usize {
-        let same = |run: &Run| matches!(&run.ask, Ask::Settings(other) if **other == effort);
+    fn add(&mut self, knob: &'static str, value: String, settings: BakeSettings) -> usize {
+        let same = |run: &Run| matches!(&run.ask, Ask::Settings(other) if **other == settings);
         if let Some(there) = self.runs.iter().position(same) {
             return there;
         }
-        self.runs.push(Run { knob, value, ask: Ask::Settings(Box::new(effort)) });
+        self.runs.push(Run { knob, value, ask: Ask::Settings(Box::new(settings)) });
         self.runs.len() - 1
     }
 
@@ -177,8 +179,8 @@ impl Grid {
     }
 }
 
-fn size(effort: &BakeSettings) -> String {
-    short(effort.element_size)
+fn size(settings: &BakeSettings) -> String {
+    short(settings.solve.element_size)
 }
 
 pub fn percent(share: f64) -> String {

@@ -23,7 +23,7 @@ use std::time::Instant;
 use grid::{Ask, Grid, Run};
 use lexopt::prelude::*;
 use measure::{Judge, Measured, Places};
-use radiosity::{Accuracy, Backend, BakeResult, BakeSettings, Error, ErrorKind, Scene, load_obj};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene, load_obj};
 use support::Choice;
 
 const USAGE: &str = "\
@@ -132,9 +132,9 @@ impl Options {
             None => {
                 let finest = grid.finest / 3.0;
                 eprintln!("for reference: settings meant for {}", grid::percent(finest));
-                let mut effort = BakeSettings::for_error(finest, &scene);
-                effort.gather.iter_mut().for_each(|gather| gather.gathering.sweeps += 1);
-                let baked = bake(&Ask::Settings(Box::new(effort)), &scene, &device)?;
+                let mut settings = BakeSettings::for_error(finest, &scene);
+                settings.gather.iter_mut().for_each(|gather| gather.refinement.sweeps += 1);
+                let baked = bake(&Ask::Settings(Box::new(settings)), &scene, &device)?;
                 Judge::Finest(Places::on(&baked.light, &device)?)
             }
         };
@@ -207,10 +207,11 @@ const ROUNDS: u32 = 3;
 
 fn bake(ask: &Ask, scene: &Arc<Scene>, device: &Backend) -> Result<BakeResult, Error> {
     match ask {
-        Ask::Settings(effort) => effort.bake(scene.clone(), device, |_| ControlFlow::Continue(())),
+        Ask::Settings(settings) => {
+            settings.bake(scene.clone(), device, |_| ControlFlow::Continue(()))
+        }
         Ask::Dial(error) => {
-            Accuracy { error: *error, adjust: &|_| {} }
-                .bake(scene.clone(), device, |_| ControlFlow::Continue(()))
+            BakeTarget::Error(*error).bake(scene.clone(), device, |_| ControlFlow::Continue(()))
         }
     }
 }
@@ -244,10 +245,10 @@ impl Found {
              gathers,on_front\n",
         );
         for (k, (run, m)) in self.grid.runs.iter().zip(&self.measured).enumerate() {
-            let e = &m.effort;
+            let e = &m.settings;
             let gather = e.gather.as_ref().map_or("none,,,,,,,".to_string(), |g| {
-                let s = &g.gathering;
-                let (size, contacts, rays) = (g.element_size, g.contacts, g.rays);
+                let s = &g.refinement;
+                let (size, contacts, rays) = (g.element_size, g.contact_levels, g.rays);
                 let (bend, curve) = (s.tolerance, s.curve);
                 let (smallest, sweeps) = (s.smallest, s.sweeps);
                 format!("needed,{size:.6},{contacts},{rays},{bend},{curve},{smallest:.6},{sweeps}")
@@ -258,13 +259,13 @@ impl Found {
                 "{},{},{:.6},{},{},{},{},{},{},{gather},{:.4},{:.6},{all},{},{:.6},{},{},{},{},{},{}",
                 run.knob,
                 run.value,
-                e.element_size,
-                e.contacts,
-                e.hemicube,
-                e.rotations,
-                e.near,
-                e.solver.unshot,
-                e.solver.patch_tolerance,
+                e.solve.element_size,
+                e.solve.contact_levels,
+                e.solve.hemicube_resolution,
+                e.solve.rotations,
+                e.solve.near_reach,
+                e.solve.solver.unshot,
+                e.solve.solver.patch_tolerance,
                 m.seconds,
                 m.errors.area,
                 self.judge.name(),

@@ -20,7 +20,7 @@ pub struct Measured {
     pub hemicubes: u64,
     pub gathers: u64,
     /// The settings used in the end.
-    pub effort: BakeSettings,
+    pub settings: BakeSettings,
 }
 
 /// Root mean squares of relative errors.
@@ -38,21 +38,20 @@ impl Measured {
         Ok(Measured {
             seconds: seconds(baked),
             errors: judge.errors(surface)?,
-            estimate: baked.certificate.total,
+            estimate: baked.estimate.total,
             vertices: surface.positions.len(),
             shot_elements: baked.mesh.element_count(),
             elements: baked.light.mesh.element_count(),
             hemicubes: baked.hemicubes,
             gathers: baked.light.gathers,
-            effort: baked.effort.clone(),
+            settings: baked.settings.clone(),
         })
     }
 }
 
 /// All stages of a bake.
 pub fn seconds(baked: &BakeResult) -> f64 {
-    let s = baked.seconds;
-    s.mesh + s.draw + s.reduce + s.readback + s.solve + s.vertices + s.certificate
+    baked.timings.total()
 }
 
 /// What errors are against.

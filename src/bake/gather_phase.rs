@@ -120,7 +120,8 @@ impl<'a> GatherPhase<'a> {
     /// Whoever gathers as the effort says, with a part of the looks.
     fn looks(&self, fewer: u32) -> Result<Box<dyn Gather + 'a>, Error> {
         let gather = self.effort.gather.as_ref().expect("vertices gather");
-        let (rays, noise) = (gather.rays.div_ceil(fewer), gather.noise_tolerance * f64::from(fewer));
+        let (rays, noise) =
+            (gather.rays.div_ceil(fewer), gather.noise_tolerance * f64::from(fewer));
         self.device.gather(&self.shot.mesh, rays, noise, self.state.dim())
     }
 

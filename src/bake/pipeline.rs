@@ -61,8 +61,7 @@ pub(super) fn run(
             let mesh = Mesh::new(scene.clone(), gather.element_size)?;
             let mesh = mesh.split_at_contacts(gather.contact_levels);
             let state = AdaptiveGather::new(mesh.clone(), &light);
-            let looks =
-                backend.gather(&mesh, gather.rays, gather.noise_tolerance, state.dim())?;
+            let looks = backend.gather(&mesh, gather.rays, gather.noise_tolerance, state.dim())?;
             GatherPhase { effort: settings.clone(), state, looks, device: backend, shot }
                 .until(target, progress)?
         }

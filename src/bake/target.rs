@@ -105,9 +105,7 @@ impl BakeTarget {
                 let target = ErrorTarget { error, overrides: &overrides };
                 bake_to_error(target, scene, backend, &mut progress)
             }
-            BakeTarget::Time(time) => {
-                bake_in_time(time, scene, backend, &overrides, &mut progress)
-            }
+            BakeTarget::Time(time) => bake_in_time(time, scene, backend, &overrides, &mut progress),
         }
     }
 }

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 use crate::common::{cornell_box, cube, gpu};
 use radiosity::{
-    Accuracy, AdaptiveViewpoints, Backend, BakeProgress, BakeSettings, Entry, Error, ErrorKind,
+    AdaptiveViewpoints, Backend, BakeProgress, BakeSettings, BakeTarget, Entry, Error, ErrorKind,
     Fallback, FormFactors, Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
     Material, Mesh, Method, NodeId, ProximityCorrection, RadiosityField, RayGather, RayRows,
     RefinementSettings, Rgb, Row, Solver, StopReason, ViewFactors,
@@ -192,7 +192,7 @@ fn a_bake_outlives_its_device() {
     for stop in [false, true] {
         let gpu = Gpu::new(None).unwrap();
         let (mut told, mut calls, mut after) = (vec![], 0, 0);
-        let baked = Accuracy { error: 0.1, adjust: &|_| {} }
+        let baked = BakeTarget::Error(0.1)
             .bake(scene.clone(), &Backend::Gpu(gpu.clone()), |stage| {
                 calls += 1;
                 after += u32::from(!told.is_empty());
@@ -200,7 +200,7 @@ fn a_bake_outlives_its_device() {
                     gpu.close();
                 }
                 match stage {
-                    BakeProgress::Failed(error) => {
+                    BakeProgress::DeviceFailed(error) => {
                         told.push(error.clone());
                         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                     }
@@ -208,7 +208,7 @@ fn a_bake_outlives_its_device() {
                 }
             })
             .unwrap();
-        let failure = baked.failure.expect("the device failed");
+        let failure = baked.device_failure.expect("the device failed");
         assert_eq!(failure.kind(), ErrorKind::Device);
         assert_eq!(told.len(), 1, "it is told once");
         assert_eq!(told[0].to_string(), failure.to_string());
@@ -219,7 +219,7 @@ fn a_bake_outlives_its_device() {
             assert_eq!(after, 1);
         } else {
             assert_eq!(baked.solution.stop, StopReason::Converged);
-            assert!(baked.certificate.total < 0.1, "{}", baked.certificate.total);
+            assert!(baked.estimate.total < 0.1, "{}", baked.estimate.total);
         }
         // Both devices have made rows: the hemicubes are those before the 40th call.
         let drawn: u64 = baked.hemicubes_by_resolution.iter().map(|h| h.1).sum();

@@ -4,10 +4,11 @@
 use crate::common::truth;
 use crate::common::{cornell_box, cube, quads};
 use radiosity::{
-    Accuracy, Backend, BakeProgress, BakeResult, BakeSettings, Budget, ErrorKind, Material,
+    Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material,
     RefinementSettings, Rgb, Scene, Solver, StopReason,
 };
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 const TRUTH: &str = include_str!("../data/cornell_box.truth.json");
 
@@ -20,7 +21,7 @@ fn cornell() -> Scene {
 }
 
 fn dial(scene: Scene, error: f64) -> BakeResult {
-    Accuracy { error, adjust: &|_| {} }.bake(scene, &Backend::Cpu, go).unwrap()
+    BakeTarget::Error(error).bake(scene, &Backend::Cpu, go).unwrap()
 }
 
 /// A closed room in which all is known: B = 1/(1 − ρ) everywhere.
@@ -32,7 +33,7 @@ fn furnace(reflectance: f64) -> Scene {
 fn an_accuracy_is_reached_and_the_certificate_says_so() {
     for error in [0.1, 0.05, 0.02] {
         let baked = dial(cornell(), error);
-        let (surface, said) = (&baked.light.surface, baked.certificate);
+        let (surface, said) = (&baked.light.surface, baked.estimate);
         let points = truth::points(TRUTH).unwrap();
         let found = points.iter().map(|p| truth::at(surface, p.position, p.normal).unwrap());
         let off: Vec<_> =
@@ -53,7 +54,7 @@ fn an_accuracy_is_reached_and_the_certificate_says_so() {
         // share of 95 % scatter by 1.5 %, twice.
         assert!(within as f64 >= 0.92 * points.len() as f64);
         // The squares of the parts are that of the whole, rounded a few times each.
-        let parts = [said.mesh, said.sampling, said.settling, said.unshot];
+        let parts = [said.mesh, said.sampling, said.truncation, said.unshot];
         let sum: f64 = parts.iter().map(|p| p * p).sum();
         assert!((sum.sqrt() - said.total).abs() < 1e-12, "{said:?}");
         assert_eq!(surface.error.len(), surface.positions.len());
@@ -68,9 +69,9 @@ fn a_furnace_is_exact_and_known_to_be() {
     // and what few looks into corners miss.
     let all = &baked.light.surface.radiosity;
     let rms = all.iter().map(|b| (b.x / 2.0 - 1.0).powi(2)).sum::<f64>() / all.len() as f64;
-    println!("off by {}, {:?}", rms.sqrt(), baked.certificate);
+    println!("off by {}, {:?}", rms.sqrt(), baked.estimate);
     assert!(rms.sqrt() < 5e-3, "{}", rms.sqrt());
-    assert!(baked.certificate.total < 5e-3, "{:?}", baked.certificate);
+    assert!(baked.estimate.total < 5e-3, "{:?}", baked.estimate);
 }
 
 /// Light that is wrong by a known share, and what is said of it: shooting stopped early.
@@ -78,10 +79,11 @@ fn a_furnace_is_exact_and_known_to_be() {
 fn light_that_was_not_shot_is_told_of() {
     for reflectance in [0.5, 0.8] {
         for unshot in [0.3, 0.1, 0.03] {
-            let mut effort = BakeSettings::for_error(0.02, &furnace(reflectance));
-            effort.solver = Solver { unshot, patch_tolerance: 0.0, ..Solver::default() };
-            (effort.gather, effort.element_size) = (None, 0.5);
-            let baked = effort.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
+            let mut settings = BakeSettings::for_error(0.02, &furnace(reflectance));
+            settings.solve.solver = Solver { unshot, patch_tolerance: 0.0, ..Solver::default() };
+            settings.solve.element_size = 0.5;
+            settings.gather = None;
+            let baked = settings.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
             let (even, left) = (1.0 / (1.0 - reflectance), baked.solution.ledger.unshot_share());
             let mean = baked.solution.radiosity.iter().map(|b| b.x).sum::<f64>()
                 / baked.solution.radiosity.len() as f64;
@@ -90,10 +92,10 @@ fn light_that_was_not_shot_is_told_of() {
             assert!((missing - left * reflectance).abs() < 1e-9, "{missing} {left}");
             // A share of what is there, not of what there would be.
             let share = missing / (1.0 - missing);
-            let bound = baked.certificate.unshot_bound;
+            let bound = baked.estimate.unshot_bound;
             assert!((bound / share - 1.0).abs() < 1e-6, "exact here: {bound} {share}");
-            let said = baked.certificate.total;
-            println!("{reflectance} {unshot}: missing {missing:.4}, told {:?}", baked.certificate);
+            let said = baked.estimate.total;
+            println!("{reflectance} {unshot}: missing {missing:.4}, told {:?}", baked.estimate);
             assert!(said > 0.5 * missing && said < 3.0 * missing);
         }
     }
@@ -101,19 +103,18 @@ fn light_that_was_not_shot_is_told_of() {
 
 #[test]
 fn what_is_set_by_hand_stays() {
-    let adjust = |effort: &mut BakeSettings| {
-        effort.hemicube = 48;
-        if let Some(gather) = &mut effort.gather {
-            (gather.rays, gather.noise) = (77, 0.05);
-            gather.gathering = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
+    let adjust = |settings: &mut BakeSettings| {
+        settings.solve.hemicube_resolution = 48;
+        if let Some(gather) = &mut settings.gather {
+            (gather.rays, gather.noise_tolerance) = (77, 0.05);
+            gather.refinement = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
         }
     };
-    let baked =
-        Accuracy { error: 0.01, adjust: &adjust }.bake(cornell(), &Backend::Cpu, go).unwrap();
+    let baked = BakeTarget::Error(0.01).bake_with(cornell(), &Backend::Cpu, adjust, go).unwrap();
     let mut want = BakeSettings::for_error(0.01, &cornell());
     adjust(&mut want);
-    assert_eq!(baked.effort, want);
-    assert!(baked.certificate.total > 0.01, "and it says that it fell short");
+    assert_eq!(baked.settings, want);
+    assert!(baked.estimate.total > 0.01, "and it says that it fell short");
 }
 
 #[test]
@@ -121,14 +122,14 @@ fn two_runs_give_the_same_bits() {
     let [one, two] = [0, 1].map(|_| dial(cornell(), 0.1));
     assert!(one.light.surface.radiosity == two.light.surface.radiosity);
     assert!(one.light.surface.error == two.light.surface.error);
-    assert_eq!(one.certificate, two.certificate);
-    assert_eq!(one.effort, two.effort);
+    assert_eq!(one.estimate, two.estimate);
+    assert_eq!(one.settings, two.settings);
 }
 
 #[test]
 fn a_time_is_kept_and_more_of_it_gains() {
     let bake = |seconds: f64| {
-        Budget { seconds, adjust: &|_| {} }.bake(cornell(), &Backend::Cpu, go).unwrap()
+        BakeTarget::seconds(seconds).unwrap().bake(cornell(), &Backend::Cpu, go).unwrap()
     };
     // No time at all: what was reached, which is little, comes back at once.
     let none = bake(1e-9);
@@ -136,27 +137,28 @@ fn a_time_is_kept_and_more_of_it_gains() {
     assert_eq!(none.light.surface.error.len(), none.light.surface.positions.len());
     // Nothing is said of the clock here: any machine has done the first accuracy by then, or stops.
     let some = bake(4.0);
-    assert!(some.certificate.total < none.certificate.total);
+    assert!(some.estimate.total < none.estimate.total);
 }
 
 #[test]
 fn it_can_be_stopped_at_every_stage() {
     for at in 0..3 {
         let mut judged = 0;
-        let baked = Accuracy { error: 0.05, adjust: &|_| {} }
+        let baked = BakeTarget::Error(0.05)
             .bake(cornell(), &Backend::Cpu, |stage| {
                 let stop = match stage {
                     BakeProgress::Shooting(_) => at == 0,
-                    BakeProgress::RefinementSettings(p) => at == 1 && p.level > 0,
-                    BakeProgress::ErrorEstimator(_) => {
+                    BakeProgress::Gathering(p) => at == 1 && p.level > 0,
+                    BakeProgress::Estimated(_) => {
                         judged += 1;
                         at == 2
                     }
-                    BakeProgress::Judging { places, of } => {
-                        assert!(0 < *places && places <= of);
+                    BakeProgress::Estimating { samples, of } => {
+                        assert!(0 < *samples && samples <= of);
                         false
                     }
-                    BakeProgress::Failed(error) => panic!("{error}"),
+                    BakeProgress::DeviceFailed(error) => panic!("{error}"),
+                    _ => false,
                 };
                 if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
@@ -177,7 +179,7 @@ fn dark_and_black_scenes_are_exact() {
     let lamp = Material { exitance: Rgb::ONE, ..Material::grey("lamp", 0.0) };
     for material in [Material::grey("dark", 0.5), Material::grey("black", 0.0), lamp] {
         let baked = dial(quads(&[(up, material.clone())]), 0.01);
-        assert_eq!(baked.certificate.total, 0.0, "{:?}", baked.certificate);
+        assert_eq!(baked.estimate.total, 0.0, "{:?}", baked.estimate);
         // Means over elements are rounded.
         let off = |b: &Rgb| b.distance(material.exitance);
         assert!(baked.light.surface.radiosity.iter().all(|b| off(b) < 1e-14));
@@ -188,22 +190,22 @@ fn dark_and_black_scenes_are_exact() {
 #[test]
 fn errors_and_times_out_of_range_are_refused() {
     for error in [0.0, -0.1, 1.0, 7.0, f64::NAN, f64::INFINITY] {
-        let dial = Accuracy { error, adjust: &|_| {} };
-        let e = dial.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+        let e = BakeTarget::Error(error).bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains("error"), "{e}");
     }
     for seconds in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let budget = Budget { seconds, adjust: &|_| {} };
-        let e = budget.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+        let e = BakeTarget::seconds(seconds).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
     }
-    let bad = |effort: &mut BakeSettings| {
-        if let Some(gather) = &mut effort.gather {
-            gather.gathering.tolerance = 0.0;
+    let no_time = BakeTarget::Time(Duration::ZERO);
+    let e = no_time.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+    assert_eq!(e.kind(), ErrorKind::Setting);
+    let bad = |settings: &mut BakeSettings| {
+        if let Some(gather) = &mut settings.gather {
+            gather.refinement.tolerance = 0.0;
         }
     };
-    let e =
-        Accuracy { error: 0.1, adjust: &bad }.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+    let e = BakeTarget::Error(0.1).bake_with(furnace(0.5), &Backend::Cpu, bad, go).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Setting);
 }

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::{
-    Accuracy, AdaptiveViewpoints, Backend, Error, Gather, GatherPoint, GatheredMesh,
+    AdaptiveViewpoints, Backend, BakeTarget, Error, Gather, GatherPoint, GatheredMesh,
     HemicubeGather, Mesh, Method, ProximityCorrection, RayGather, RefinementSettings, Rgb, Scene,
     Solution, Solver, VertexMesh, ViewFactors, write_ply,
 };
@@ -296,8 +296,7 @@ fn bake(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let light = |frame: Frame, e: f64, sweep: &mut Sweep| -> Result<Vec<f64>, Error> {
         let scene = files::through_obj(&scenes::room(frame, e, 0.1 * e), folder.path())?;
-        let dial = Accuracy { error: 0.1, adjust: &|_| {} };
-        let baked = dial.bake(scene, ask.device, go)?;
+        let baked = BakeTarget::Error(0.1).bake(scene, ask.device, go)?;
         sweep.solved(&baked.solution);
         let ply = folder.path().join("scene.ply");
         write_ply(&ply, &baked.light.surface)?;
