@@ -74,8 +74,7 @@ fn run() -> Result<(), Failure> {
     let shift = DVec3::from_slice(shift.get(..3).ok_or("DX,DY,DZ are three numbers")?);
     let factor: f64 = factor.parse()?;
     let scene = load_obj(path)?;
-    let (low, high) = scene.bounds();
-    let size = if element_size.is_nan() { (high - low).length() / 40.0 } else { element_size };
+    let size = if element_size.is_nan() { scene.bounds().diagonal() / 40.0 } else { element_size };
 
     let mut materials = scene.materials().to_vec();
     let lamp = materials.iter_mut().find(|m| m.name == *material).ok_or("no such material")?;

@@ -6,6 +6,7 @@ pub(crate) mod resolution_policy;
 pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
+use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
 
 /// Where light that leaves one patch goes: the row F_i· of the form-factor matrix, sparse.
@@ -59,18 +60,16 @@ impl Row {
     /// rounding; rounded by their running sum, so that the shares sum to [`Row::TOTAL`]. Entries
     /// that round to nothing go.
     pub(crate) fn set_factors(&mut self, factors: &[f64]) {
-        let (mut sum, mut given) = (0.0, 0);
+        let (mut sum, mut shares) = (0.0, Apportion::default());
         let slots = self.entries.iter_mut().map(|e| &mut e.share);
         for (slot, factor) in slots.chain([&mut self.escaped, &mut self.backface]).zip(factors) {
             sum += factor;
-            let upto = (sum * f64::from(Row::TOTAL)).round() as u32;
-            *slot = upto - given;
-            given = upto;
+            *slot = shares.part_up_to((sum * f64::from(Row::TOTAL)).round() as u32);
         }
         // The largest slot can take what rounding of the sum has left.
         let slots = self.entries.iter_mut().map(|e| &mut e.share);
         let largest = slots.chain([&mut self.escaped, &mut self.backface]).max_by_key(|s| **s);
-        largest.into_iter().for_each(|s| *s += Row::TOTAL - given);
+        largest.into_iter().for_each(|s| *s += shares.remainder(Row::TOTAL));
         self.entries.retain(|e| e.share > 0);
     }
 
@@ -81,13 +80,10 @@ impl Row {
         let mut seen: Vec<Entry> = rows.iter().flat_map(|r| r.entries.iter().copied()).collect();
         // Runs in order already: a stable sort merges them.
         seen.sort_by_key(|e| e.element);
-        let (mut sum, mut given) = (0, 0);
+        let (mut sum, mut means) = (0, Apportion::default());
         let mut part = |shares: &mut dyn Iterator<Item = u32>| {
             sum += shares.map(u64::from).sum::<u64>();
-            let upto = (sum / count) as u32;
-            let share = upto - given;
-            given = upto;
-            share
+            means.part_up_to((sum / count) as u32)
         };
         let runs = seen.chunk_by(|a, b| a.element == b.element);
         let mean = |run: &[Entry]| Entry {

@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
+use crate::geometry::rounding::Apportion;
 
 /// Smallest and largest resolution of a hemicube's top face, in pixels along an edge.
 pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 2..=4096;
@@ -151,19 +152,16 @@ pub(crate) fn weights(n: u32) -> Result<Vec<u32>, Error> {
 /// Integers in proportion to `shares` with the given sum: differences of the rounded running sum.
 fn rounded(shares: &[f64], sum: u32) -> Vec<u32> {
     let scale = f64::from(sum) / shares.iter().sum::<f64>();
-    let (mut running, mut given) = (0.0, 0u32);
+    let (mut running, mut parts) = (0.0, Apportion::default());
     let mut units: Vec<u32> = shares
         .iter()
         .map(|share| {
             running += share;
-            let upto = ((running * scale).round() as u32).min(sum);
-            let unit = upto - given;
-            given = upto;
-            unit
+            parts.part_up_to(((running * scale).round() as u32).min(sum))
         })
         .collect();
     if let Some(last) = units.last_mut() {
-        *last += sum - given;
+        *last += parts.remainder(sum);
     }
     units
 }

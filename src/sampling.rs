@@ -1,5 +1,15 @@
-//! Sample sets and hashes that know nothing of light.
+//! Sample points, directions and hashes that know nothing of light.
+//!
+//! | module | gives |
+//! |---|---|
+//! | [`hash`] | pseudo-random bits from an index |
+//! | [`low_discrepancy`] | evenly spread points of the unit interval and square |
+//! | [`hemisphere`] | cosine-weighted directions |
+//! | [`rotation`] | how far to rotate them from point to point |
+//! | [`surface`] | points in proportion to area |
 
 pub(crate) mod hash;
 pub(crate) mod hemisphere;
+pub(crate) mod low_discrepancy;
 pub(crate) mod rotation;
+pub(crate) mod surface;

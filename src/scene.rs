@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
+pub use crate::geometry::aabb::Aabb;
 
 /// One value per colour channel (r, g, b), linear; the unit is said where it is used.
 pub type Rgb = DVec3;
@@ -179,11 +180,9 @@ impl Scene {
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Lowest and highest corner of the axis-aligned box around all triangles.
-    pub fn bounds(&self) -> (DVec3, DVec3) {
-        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let corners = (0..self.triangles.len()).flat_map(|t| self.corners(t));
-        corners.fold(nothing, |(low, high), p| (low.min(p), high.max(p)))
+    /// The axis-aligned box around all triangles.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::from_points((0..self.triangles.len()).flat_map(|t| self.corners(t)))
     }
 
     /// The step between 64-bit coordinates where the scene is, its own unit: what is said to be in one

@@ -17,11 +17,12 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use self::convex_polygons::{ConvexPolygon, Merge, pieces};
-use self::cubature::{mix, total};
+use self::cubature::total;
 use self::exchange::{PairVisibility, link};
 use self::point_visibility::PointVisibility;
 use self::shaft::Tree;
 use crate::error::{Error, ErrorKind};
+use crate::sampling::hash::split_mix64;
 use crate::scene::Scene;
 
 pub use self::checks::{ErrorStats, MatrixChecks};
@@ -128,8 +129,7 @@ impl ViewFactors {
             let remedy = format!("the scene has {groups} groups");
             return setting("two-sided group", group.to_string(), remedy);
         }
-        let (low, high) = scene.bounds();
-        let unit = (high - low).max_element().log2().floor().exp2();
+        let unit = scene.bounds().longest_side().log2().floor().exp2();
         let engine = Assembler::new(scene, unit, error, two_sided);
         let mut sums = Sums::new(groups);
         let count = engine.fronts.len();
@@ -237,7 +237,8 @@ impl Assembler {
         let mut whole = Estimate::default();
         let mut partial = Vec::new();
         for (to, t) in receivers {
-            match link(from, to, &self.blockers, eye, mix(mix(s as u64) ^ t as u64)) {
+            let seed = split_mix64(split_mix64(s as u64) ^ t as u64);
+            match link(from, to, &self.blockers, eye, seed) {
                 PairVisibility::Nothing => {}
                 PairVisibility::Whole(flux) => {
                     whole.value += flux.value;

@@ -6,7 +6,9 @@ use std::ops::ControlFlow;
 use crate::error::Error;
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::progress::BatchSizer;
+use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::rotation::CellRotation;
+use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Rgb;
 use crate::solver::Ledger;
 use crate::vertex::gather_points::{SurfaceOffset, is_covered};
@@ -88,11 +90,10 @@ impl ErrorEstimator<'_> {
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(ErrorEstimate, Vec<f64>), Error> {
         let samples = self.samples(count);
-        let (low, high) = self.light.mesh.scene().bounds();
-        let gap = GAP * (high - low).length();
+        let gap = GAP * self.light.mesh.scene().bounds().diagonal();
         let own = std::ptr::eq(self.light, self.sources);
         let mut looks: Vec<Option<[IrradianceSample; 3]>> = vec![None; samples.len()];
-        let order = scattered(samples.len());
+        let order = golden_ratio_order(samples.len());
         let (mut left, mut pace) = (&order[..], BatchSizer::new(FEW));
         while !left.is_empty() {
             pace.next(&mut left, |now| {
@@ -209,39 +210,27 @@ impl ErrorEstimator<'_> {
             let [a, b, c] = corners(f);
             (b - a).cross(c - a).length() / 2.0
         };
-        let whole: f64 = surface.faces.iter().map(area).sum();
-        let (above, turns) = (SurfaceOffset::new(mesh.scene()), CellRotation::new(mesh.scene()));
-        let (mut below, mut samples) = (0.0, Vec::with_capacity(count));
-        for (face, &element) in surface.faces.iter().zip(&surface.elements) {
-            below += area(face);
-            while samples.len() < count {
-                let k = samples.len() as f64;
-                if (k + 0.5) / count as f64 * whole >= below {
-                    break;
-                }
-                // The additive recurrence of the plastic number (Roberts 2018), folded into the triangle.
-                let (u, v) = (
-                    (0.5 + k * 0.754_877_666_246_693).fract(),
-                    (0.5 + k * 0.569_840_290_998_053_2).fract(),
-                );
-                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-                let mix = |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
-                let element = element as usize;
-                let node = mesh.element(element);
-                let (material, size) = (mesh.material(node), mesh.area(node).sqrt());
-                let place = above.place(mix(corners(face)), mesh.normal(node), size);
-                samples.push(Sample {
-                    element,
-                    reflectance: material.reflectance,
-                    place,
-                    said: mix(face.map(|v| surface.radiosity[v as usize])),
-                    emitted: material.exitance,
-                    size,
-                    turn: turns.of(&place),
-                });
+        let above = SurfaceOffset::new(mesh.scene());
+        let rotations = CellRotation::new(&mesh.scene().bounds());
+        let sample = |point: SurfacePoint| {
+            let face = &surface.faces[point.triangle];
+            let [u, v] = point.barycentric;
+            let mix = |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
+            let element = surface.elements[point.triangle] as usize;
+            let node = mesh.element(element);
+            let (material, size) = (mesh.material(node), mesh.area(node).sqrt());
+            let place = above.place(mix(corners(face)), mesh.normal(node), size);
+            Sample {
+                element,
+                reflectance: material.reflectance,
+                place,
+                said: mix(face.map(|v| surface.radiosity[v as usize])),
+                emitted: material.exitance,
+                size,
+                turn: rotations.at(place.position, place.near),
             }
-        }
-        samples
+        };
+        AreaSampler::new(surface.faces.iter().map(area)).spread(count, 0.5).map(sample).collect()
     }
 
     /// Mean reflectance over the area: the largest of the channels.
@@ -308,49 +297,11 @@ impl ErrorEstimator<'_> {
 /// waits for it.
 const FEW: usize = 16;
 
-/// The numbers below `count`, each once, the first of them spread over all as evenly as any.
-fn scattered(count: usize) -> Vec<usize> {
-    let divides = |mut a: usize, mut b: usize| {
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a != 1
-    };
-    // Steps near the golden section spread best (Knuth 1973, 6.4).
-    let mut step = (count as f64 * 0.618_033_988_749_895) as usize;
-    while divides(step, count) && step < count {
-        step += 1;
-    }
-    (0..count).map(|k| k * step % count).collect()
-}
-
 impl Sample {
     fn aside(&self) -> GatherPoint {
         let p = self.place;
         let (x, _) = p.normal.any_orthonormal_pair();
         let step = 1e-3 * self.size * (0.5 + self.turn);
         GatherPoint { position: p.position + x * step, ..p }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_are_taken_once_each_and_everywhere() {
-        for count in [0, 1, 2, 3, 10, 192, 1000, 1024] {
-            let order = scattered(count);
-            let mut sorted = order.clone();
-            sorted.sort_unstable();
-            assert_eq!(sorted, (0..count).collect::<Vec<_>>());
-            let mut first: Vec<usize> = order.into_iter().take(FEW).collect();
-            first.push(count);
-            first.sort_unstable();
-            // By the three-gap theorem no gap is larger than the sum of the two others, which at the
-            // golden section is below 2.7 times the mean; steps are rounded.
-            let gap = first.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
-            assert!(gap as f64 <= 3.0 * count as f64 / FEW as f64 + 1.0, "{count}: {gap}");
-        }
     }
 }

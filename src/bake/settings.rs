@@ -104,7 +104,7 @@ impl BakeSettings {
     /// gathers.
     pub fn elements_only(scene: &Scene) -> BakeSettings {
         let mut settings = BakeSettings::for_error(0.02, scene);
-        settings.solve.element_size = scene_diagonal(scene) / 32.0;
+        settings.solve.element_size = scene.bounds().diagonal() / 32.0;
         settings.solve.contact_levels = 3;
         settings.solve.hemicube_resolution = 128;
         settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
@@ -126,7 +126,7 @@ impl BakeSettings {
     /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
     /// root mean square over the area of `scene`.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
-        let diagonal = scene_diagonal(scene);
+        let diagonal = scene.bounds().diagonal();
         let e = error.clamp(1e-4, 0.3);
         let hemicube = match e {
             e if e > 0.03 => 32,
@@ -167,10 +167,4 @@ impl BakeSettings {
         };
         BakeSettings { solve, gather: Some(gather) }
     }
-}
-
-/// Diagonal of the bounding box, scene unit.
-fn scene_diagonal(scene: &Scene) -> f64 {
-    let (low, high) = scene.bounds();
-    (high - low).length()
 }

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use super::GatherPoint;
 use crate::form_factor::closed_form::point_to_polygon;
+use crate::geometry::weld::position_key;
+use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene};
 
 /// Emitting triangles of one material that hang together by corners.
@@ -12,8 +14,8 @@ use crate::scene::{Rgb, Scene};
 pub(crate) struct Light {
     /// Its triangles, ascending.
     pub triangles: Vec<u32>,
-    /// Area of each and all before it, in the scene's unit squared.
-    pub ends: Vec<f64>,
+    /// Chooses among them in proportion to area.
+    pub surface: AreaSampler,
     /// Exitance of all of them, W/m² per channel.
     pub exitance: Rgb,
     /// Whether no part of it can hide another: all of it lies behind each of its triangles' planes.
@@ -50,7 +52,7 @@ impl Lights {
         let mut at: HashMap<([u64; 3], u32), Vec<usize>> = HashMap::new();
         let keys = |t: usize| {
             let material = scene.triangles()[t].material;
-            scene.corners(t).map(|p| ((p + 0.0).to_array().map(f64::to_bits), material))
+            scene.corners(t).map(|p| (position_key(p), material))
         };
         for t in (0..count).filter(emits) {
             keys(t).into_iter().for_each(|k| at.entry(k).or_default().push(t));
@@ -75,13 +77,8 @@ impl Lights {
             triangles.sort_unstable();
             let convex = is_convex(&scene, &triangles);
             let exitance = scene.material(start).exitance;
-            let mut whole = 0.0;
-            let end = |&t: &u32| {
-                whole += scene.area(t as usize);
-                whole
-            };
-            let ends = triangles.iter().map(end).collect();
-            lights.push(Light { triangles, ends, exitance, convex });
+            let surface = AreaSampler::new(triangles.iter().map(|&t| scene.area(t as usize)));
+            lights.push(Light { triangles, surface, exitance, convex });
         }
         Lights { scene, lights, of_triangle }
     }

@@ -4,10 +4,9 @@ use std::fmt;
 use std::io::Write;
 use std::path::Path;
 
-use glam::DVec3;
-
 use super::write_file;
 use crate::error::Error;
+use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::vertex::VertexMesh;
 
@@ -85,11 +84,9 @@ enum Width {
 impl Width {
     /// Floats, where their steps are below a millionth of the mesh's size.
     fn of_positions(surface: &VertexMesh) -> Width {
-        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let all = surface.positions.iter();
-        let (low, high) = all.fold(nothing, |(l, h), &p| (l.min(p), h.max(p)));
-        let largest = low.abs().max(high.abs()).max_element();
-        Width::of(largest, largest <= 16.0 * (high - low).max_element())
+        let bounds = Aabb::from_points(surface.positions.iter().copied());
+        let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
+        Width::of(largest, largest <= 16.0 * bounds.longest_side())
     }
 
     /// Floats, where they hold the largest value and what is a hundred million times dimmer.

@@ -2,11 +2,9 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
-/// From the least coordinates to the largest.
-pub(super) type Bounds = [DVec3; 2];
+use crate::geometry::aabb::Aabb;
 
 /// A box that overlaps with more others than this is in a crowd: thousands of faces in one place.
 const CROWD: usize = 256;
@@ -14,7 +12,7 @@ const CROWD: usize = 256;
 /// For each box, the others that it overlaps with, in no order that means anything. Two in crowds
 /// are told of each other if there are at most [`CROWD`] such boxes, or if one of them is among the
 /// first so many by `rank`: time and memory go with the number of boxes, not with its square.
-pub(super) fn overlaps(boxes: &[Bounds], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
+pub(super) fn overlaps(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
     let tree = Tree::new(boxes);
     let others = |k: usize| {
         let mut others = vec![];
@@ -42,7 +40,7 @@ pub(super) fn overlaps(boxes: &[Bounds], rank: impl Fn(usize) -> f64) -> Vec<Vec
             continue;
         }
         for c in first.iter().map(|&c| c as usize) {
-            if c != k && overlap(&boxes[k], &boxes[c]) {
+            if c != k && boxes[k].overlaps(&boxes[c]) {
                 out[k].push(c as u32);
                 if !is_first[k] {
                     out[c].push(k as u32);
@@ -53,29 +51,21 @@ pub(super) fn overlaps(boxes: &[Bounds], rank: impl Fn(usize) -> f64) -> Vec<Vec
     out
 }
 
-/// Whether they have a point in common.
-pub(super) fn overlap(a: &Bounds, b: &Bounds) -> bool {
-    !(a[0].cmpgt(b[1]) | b[0].cmpgt(a[1])).any()
-}
-
 /// Boxes by halves along the longest axis of their middles. The parts of node k are nodes 2k + 1
 /// and 2k + 2.
 struct Tree<'a> {
-    boxes: &'a [Bounds],
+    boxes: &'a [Aabb],
     order: Vec<u32>,
-    bounds: Vec<Bounds>,
+    bounds: Vec<Aabb>,
 }
 
 /// Boxes in a leaf, at most.
 const LEAF: usize = 4;
 
-/// Around nothing.
-const NOTHING: Bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-
 impl Tree<'_> {
-    fn new(boxes: &[Bounds]) -> Tree<'_> {
+    fn new(boxes: &[Aabb]) -> Tree<'_> {
         let order = (0..boxes.len() as u32).collect();
-        let bounds = vec![NOTHING; 2 * boxes.len().next_power_of_two()];
+        let bounds = vec![Aabb::EMPTY; 2 * boxes.len().next_power_of_two()];
         let mut tree = Tree { boxes, order, bounds };
         tree.build(0, 0..boxes.len());
         tree
@@ -83,14 +73,13 @@ impl Tree<'_> {
 
     fn build(&mut self, node: usize, range: Range<usize>) {
         let part = &mut self.order[range.clone()];
-        let around = |[l, h]: Bounds, [low, high]: Bounds| [l.min(low), h.max(high)];
-        self.bounds[node] = part.iter().map(|&k| self.boxes[k as usize]).fold(NOTHING, around);
+        let boxes = part.iter().map(|&k| self.boxes[k as usize]);
+        self.bounds[node] = boxes.fold(Aabb::EMPTY, Aabb::union);
         if range.len() <= LEAF {
             return;
         }
-        let middle = |k: u32| (self.boxes[k as usize][0] + self.boxes[k as usize][1]) / 2.0;
-        let middles = part.iter().map(|&k| [middle(k); 2]).fold(NOTHING, around);
-        let axis = (middles[1] - middles[0]).max_position();
+        let middle = |k: u32| self.boxes[k as usize].centre();
+        let axis = Aabb::from_points(part.iter().map(|&k| middle(k))).longest_axis();
         let half = part.len() / 2;
         part.select_nth_unstable_by(half, |&a, &b| middle(a)[axis].total_cmp(&middle(b)[axis]));
         let half = range.start + half;
@@ -99,10 +88,10 @@ impl Tree<'_> {
     }
 
     /// Calls `visit` with every box that overlaps with `with`, until it says no.
-    fn visit(&self, with: Bounds, visit: &mut impl FnMut(u32) -> bool) {
+    fn visit(&self, with: Aabb, visit: &mut impl FnMut(u32) -> bool) {
         let mut open = vec![(0, 0..self.order.len())];
         while let Some((node, range)) = open.pop() {
-            if !overlap(&self.bounds[node], &with) {
+            if !self.bounds[node].overlaps(&with) {
                 continue;
             }
             if range.len() > LEAF {
@@ -112,7 +101,7 @@ impl Tree<'_> {
                 continue;
             }
             let mut here =
-                self.order[range].iter().filter(|&&k| overlap(&self.boxes[k as usize], &with));
+                self.order[range].iter().filter(|&&k| self.boxes[k as usize].overlaps(&with));
             if !here.all(|&k| visit(k)) {
                 return;
             }
@@ -122,31 +111,30 @@ impl Tree<'_> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
+    use crate::sampling::hash::{split_mix64_nth, unit_interval};
+
+    const UNIT: Aabb = Aabb { low: DVec3::ZERO, high: DVec3::ONE };
 
     /// Cubes in a unit cube, at random.
-    fn cubes(count: u32, size: f64) -> Vec<Bounds> {
-        // Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators".
-        let random = |k: u32| {
-            let x = (u64::from(k) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            (x >> 32) as f64 / 2f64.powi(32)
-        };
+    fn cubes(count: u32, size: f64) -> Vec<Aabb> {
+        let random = |k: u32| unit_interval(split_mix64_nth(k.into()));
         let low = |k: u32| DVec3::new(random(3 * k), random(3 * k + 1), random(3 * k + 2));
-        (0..count).map(|k| [low(k), low(k) + size]).collect()
+        (0..count).map(|k| Aabb { low: low(k), high: low(k) + size }).collect()
     }
 
-    fn sorted(boxes: &[Bounds]) -> Vec<Vec<u32>> {
+    fn sorted(boxes: &[Aabb]) -> Vec<Vec<u32>> {
         let mut all = overlaps(boxes, |k| -(k as f64));
         all.iter_mut().for_each(|others| others.sort_unstable());
         all
     }
 
     /// Every box against every other.
-    fn plainly(boxes: &[Bounds]) -> Vec<Vec<u32>> {
+    fn plainly(boxes: &[Aabb]) -> Vec<Vec<u32>> {
         let others = |k: usize| {
-            let touches = |&m: &usize| m != k && overlap(&boxes[m], &boxes[k]);
+            let touches = |&m: &usize| m != k && boxes[m].overlaps(&boxes[k]);
             (0..boxes.len()).filter(touches).map(|m| m as u32).collect()
         };
         (0..boxes.len()).map(others).collect()
@@ -164,7 +152,7 @@ mod tests {
     fn what_many_stand_on_hears_of_all_of_them() {
         // Some floors, each below all the cubes, are in crowds; the cubes are not.
         let mut boxes = cubes(3000, 0.02);
-        boxes.extend([[DVec3::ZERO, DVec3::ONE]; 3]);
+        boxes.extend([UNIT; 3]);
         let all = sorted(&boxes);
         assert!(all == plainly(&boxes));
         assert!(all[3000].len() > 10 * CROWD);
@@ -173,7 +161,7 @@ mod tests {
     #[test]
     fn a_crowd_takes_no_square() {
         const N: usize = 20_000;
-        let all = sorted(&[[DVec3::ZERO, DVec3::ONE]; N]);
+        let all = sorted(&[UNIT; N]);
         // Each hears of the first 256, which hear of each.
         let expected = |k: usize| if k < CROWD { N - 1 } else { CROWD };
         assert!((0..N).all(|k| all[k].len() == expected(k)));

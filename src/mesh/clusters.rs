@@ -13,7 +13,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 use glam::DVec3;
 
 use super::SurfaceTopology;
-use crate::geometry::rounding::rank;
+use crate::geometry::rounding::tie_stable_key;
 use crate::scene::Scene;
 
 /// No triangle's normal is further than this from its cluster's axis, degrees.
@@ -152,7 +152,7 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
     // In units of the fourth power of length: the extent, and as much again for a spread of normals
     // of one (1 − flat² is their variance).
     let cost = merged.spread + merged.area * merged.area * (1.0 - flat * flat).max(0.0);
-    (merged.angle <= SPREAD_DEGREES.to_radians()).then(|| Reverse((rank(cost), a, b)))
+    (merged.angle <= SPREAD_DEGREES.to_radians()).then(|| Reverse((tie_stable_key(cost), a, b)))
 }
 
 /// For each triangle those across a side where the surface goes on without a sharp fold.

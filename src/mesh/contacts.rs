@@ -2,10 +2,11 @@
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
-use super::box_overlap::{Bounds, overlap, overlaps};
+use super::box_overlap::overlaps;
 use super::{Cell, MAX_DEPTH, Mesh, SurfaceTopology};
-use crate::sampling::hash::Set;
+use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 /// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
@@ -56,7 +57,7 @@ impl Mesh {
             self.part(t, Cell::ROOT, &lines, levels, &mut out);
             out
         };
-        let parted: Set<(usize, Cell)> =
+        let parted: FxHashSet<(usize, Cell)> =
             (0..slack.len()).into_par_iter().flat_map_iter(parted).collect();
         let deeper = |t: usize, cell: Cell| {
             cell.level < self.level_at(t, cell) || parted.contains(&(t, cell))
@@ -128,16 +129,9 @@ fn parts(line: &ContactSegment, cell: Cell, margin: f64) -> bool {
 }
 
 /// The box around each triangle, grown by its `slack`.
-fn boxes(scene: &Scene, slack: &[f64]) -> Vec<Bounds> {
-    let grown = |(t, &slack): (usize, &f64)| {
-        let [low, high] = around(&scene.corners(t));
-        [low - slack, high + slack]
-    };
+fn boxes(scene: &Scene, slack: &[f64]) -> Vec<Aabb> {
+    let grown = |(t, &slack): (usize, &f64)| Aabb::from_points(scene.corners(t)).expanded(slack);
     slack.iter().enumerate().map(grown).collect()
-}
-
-fn around(&[a, b, c]: &[DVec3; 3]) -> Bounds {
-    [a.min(b).min(c), a.max(b).max(c)]
 }
 
 /// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
@@ -183,7 +177,7 @@ impl Plane {
         &self,
         corners: &[DVec3; 3],
         rim: &[bool; 3],
-        within: &Bounds,
+        within: &Aabb,
         lines: &mut Vec<ContactSegment>,
     ) {
         let slack = self.slack;
@@ -191,7 +185,7 @@ impl Plane {
         if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
             return;
         }
-        if !overlap(&around(corners), within) {
+        if !Aabb::from_points(*corners).overlaps(within) {
             return;
         }
         let flat = |p: DVec3| self.flat(p);

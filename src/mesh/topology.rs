@@ -1,10 +1,9 @@
 //! Which corners and sides of scene triangles belong to one smooth surface.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
-use glam::DVec3;
-
-use crate::sampling::hash::Map;
+use crate::geometry::union_find::UnionFind;
+use crate::geometry::weld::Weld;
 use crate::scene::{Scene, Triangle};
 
 /// Neighbours of one smoothing group meet in a crease if their normals differ by more than this
@@ -56,9 +55,11 @@ impl SurfaceTopology {
     /// What goes on smoothly where two neighbours' normals may differ by as many degrees as `most`
     /// says.
     fn up_to(scene: &Scene, most: impl Fn(&Triangle, &Triangle) -> f64) -> SurfaceTopology {
-        let welded = weld(scene);
         let count = scene.triangles().len();
-        let mut by_ends: Map<(u32, u32), Vec<(usize, usize)>> = Map::default();
+        let mut weld = Weld::default();
+        let welded: Vec<[u32; 3]> =
+            (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
+        let mut by_ends: FxHashMap<(u32, u32), Vec<(usize, usize)>> = FxHashMap::default();
         let ends = |t: usize, k: usize| (welded[t][k], welded[t][(k + 1) % 3]);
         for t in 0..count {
             for k in 0..3 {
@@ -116,42 +117,10 @@ impl SurfaceTopology {
     }
 }
 
-/// Per triangle corner, one number for each distinct position.
-fn weld(scene: &Scene) -> Vec<[u32; 3]> {
-    let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut number = |p: DVec3| {
-        // Adding zero makes -0 equal to 0, bit for bit.
-        let bits = (p + DVec3::ZERO).to_array().map(f64::to_bits);
-        let next = seen.len() as u32;
-        *seen.entry(bits).or_insert(next)
-    };
-    (0..scene.triangles().len()).map(|t| scene.corners(t).map(&mut number)).collect()
-}
-
-/// Disjoint sets; the lowest member stands for its set, whatever the order of joining.
-struct UnionFind(Vec<usize>);
-
-impl UnionFind {
-    fn new(count: usize) -> UnionFind {
-        UnionFind((0..count).collect())
-    }
-
-    fn find(&mut self, mut k: usize) -> usize {
-        while self.0[k] != k {
-            self.0[k] = self.0[self.0[k]];
-            k = self.0[k];
-        }
-        k
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.0[a.max(b)] = a.min(b);
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::scene::Material;
 

@@ -1,69 +1,70 @@
-//! Maps by numbers of our own making.
+//! Bit mixers: pseudo-random bits from an index, the same on every run and machine.
+//!
+//! A mixer is a bijection of integers that flips each output bit with probability ½ when any one
+//! input bit flips, so that hashes of consecutive patch ids, cells or seeds look independent.
+//!
+//! | function | bits | used for |
+//! |---|---|---|
+//! | [`split_mix64`] | 64 | rotations per cell, of hemicubes, and seeds of cubature cells |
+//! | [`low_bias32`] | 32 | rotations of ray-cast rows |
 
-use std::collections::{HashMap, HashSet};
-use std::hash::{BuildHasherDefault, Hasher};
+/// Step of the state of SplitMix64: 2⁶⁴ over the golden ratio, rounded to an odd number.
+const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Keys are numbers that the crate gave out: a file cannot choose those that meet, so that the
-/// standard hash, which is safe from that and slower, is not needed.
-pub(crate) type Map<K, V> = HashMap<K, V, BuildHasherDefault<Mix>>;
+/// The output of SplitMix64 from `state` (Steele, Lea and Flood 2014, "Fast splittable pseudorandom
+/// number generators", with the variant 13 mixer of D. Stafford).
+pub(crate) fn split_mix64(state: u64) -> u64 {
+    let z = state.wrapping_add(GOLDEN_GAMMA);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
 
-/// See [`Map`].
-pub(crate) type Set<K> = HashSet<K, BuildHasherDefault<Mix>>;
+/// Output number `index`, from 0, of the SplitMix64 generator that starts at state 0.
+pub(crate) fn split_mix64_nth(index: u64) -> u64 {
+    split_mix64(index.wrapping_mul(GOLDEN_GAMMA))
+}
 
-/// Mixes numbers by the two halves of a product.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Mix(u64);
+/// Mixes 32 bits (C. Wellons 2018, "Prospecting for hash functions": lowbias32).
+pub(crate) fn low_bias32(mut x: u32) -> u32 {
+    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
 
-impl Hasher for Mix {
-    fn write_u64(&mut self, number: u64) {
-        // Odd, with its bits spread evenly: 2⁶⁴ over the golden ratio.
-        let product = u128::from(self.0 ^ number ^ 0x2545_f491_4f6c_dd1d) * 0x9e37_79b9_7f4a_7c15;
-        self.0 = product as u64 ^ (product >> 64) as u64;
-    }
-
-    fn write_u32(&mut self, number: u32) {
-        self.write_u64(number.into());
-    }
-
-    fn write_usize(&mut self, number: usize) {
-        self.write_u64(number as u64);
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&b| self.write_u64(b.into()));
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
+/// The number in [0, 1) that the upper 53 bits stand for: all that an f64 holds.
+pub(crate) fn unit_interval(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1u64 << 53) as f64
 }
 
 #[cfg(test)]
 mod tests {
-    use std::hash::Hash;
-
     use super::*;
 
     #[test]
-    fn neighbouring_keys_spread() {
-        // A map takes the low bits for a place and the high seven to tell keys apart there. Of n
-        // keys on n places a random hash leaves n/e free, with a variance of n (1/e − 2/e²): 0.097 n.
-        const N: u32 = 1 << 16;
-        let expected = f64::from(N) * (-1f64).exp();
-        let six_sigma = 6.0 * (0.097 * f64::from(N)).sqrt();
-        for (step, across) in [(1, 256), (64, 256), (4096, 16), (1, 1)] {
-            let hashes = (0..N).map(|k| {
-                let mut hasher = Mix::default();
-                (2u32, step * (k / across), step * (k % across)).hash(&mut hasher);
-                hasher.finish()
-            });
-            let hashes: Vec<u64> = hashes.collect();
-            for shift in [0, 64 - 16] {
-                let mut taken = vec![false; N as usize];
-                hashes.iter().for_each(|h| taken[(h >> shift) as usize % N as usize] = true);
-                let free = taken.iter().filter(|t| !**t).count() as f64;
-                assert!((free - expected).abs() < six_sigma, "{step} {across} {shift}: {free}");
+    fn split_mix64_gives_the_published_sequence() {
+        // The first outputs from seed 0 of S. Vigna's splitmix64.c.
+        let expected = [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f];
+        assert_eq!([0, 1, 2].map(split_mix64_nth), expected);
+        assert_eq!(split_mix64(0), expected[0]);
+    }
+
+    #[test]
+    fn one_input_bit_flips_half_of_the_output() {
+        // 256 · 64 · 64 fair bits: six standard errors of their mean are 0.003.
+        let (mut flipped, mut trials) = (0u32, 0u32);
+        for k in 0..256u64 {
+            for bit in 0..64 {
+                flipped += (split_mix64(k) ^ split_mix64(k ^ 1 << bit)).count_ones();
+                trials += 64;
             }
         }
+        assert!((f64::from(flipped) / f64::from(trials) - 0.5).abs() < 0.003);
+    }
+
+    #[test]
+    fn unit_interval_excludes_one() {
+        assert_eq!(unit_interval(0), 0.0);
+        assert_eq!(unit_interval(u64::MAX), 1.0 - f64::EPSILON / 2.0);
     }
 }

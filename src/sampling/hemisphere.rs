@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
+use crate::sampling::low_discrepancy::{radical_inverse, sobol_02_point};
 
 /// Directions spread over a hemisphere in proportion to the cosine, so that each stands for the same
 /// form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley's points.
@@ -37,7 +38,7 @@ impl HemisphereSamples {
     /// As many rays, of which the first half, quarter and so on are fans of their own if `count` is a
     /// power of two, and what they lack of the whole is too.
     pub fn progressive(count: u32) -> HemisphereSamples {
-        HemisphereSamples::of(count.clamp(1, MOST), nested)
+        HemisphereSamples::of(count.clamp(1, MOST), sobol_02_point)
     }
 
     fn of(count: u32, point: impl Fn(u32) -> [f64; 2]) -> HemisphereSamples {
@@ -68,22 +69,6 @@ impl HemisphereSamples {
         let directions = &self.directions[range.start as usize..range.end as usize];
         directions.iter().map(move |d| x * d[0] + y * d[1] + normal * d[2])
     }
-}
-
-/// Point `k` of a (0, 2)-sequence in base 2 (Sobol 1967): any 2ᵐ in a row from a multiple of that on are
-/// spread as evenly as Hammersley's. In the middle of its cell of 2⁻³².
-pub(crate) fn nested(k: u32) -> [f64; 2] {
-    let (mut left, mut column, mut bits) = (k, 1u32 << 31, 0);
-    while left > 0 {
-        bits ^= if left & 1 == 1 { column } else { 0 };
-        (left, column) = (left >> 1, column ^ (column >> 1));
-    }
-    [k.reverse_bits(), bits].map(|b| (f64::from(b) + 0.5) / 2f64.powi(32))
-}
-
-/// The second coordinate of Hammersley's points, in [0, 1).
-fn radical_inverse(k: u32) -> f64 {
-    f64::from(k.reverse_bits()) / 2f64.powi(32)
 }
 
 #[cfg(test)]

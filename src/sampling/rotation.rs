@@ -1,47 +1,93 @@
-//! How far the fans and hemicubes of places are turned about their normals.
+//! How far sets of directions are rotated about the normal, from point to point.
+//!
+//! The same set at every point would repeat its errors as a pattern across a surface. A
+//! Cranley–Patterson rotation (R. Cranley and T. N. L. Patterson 1976) shifts the azimuth of all
+//! directions by a pseudo-random offset. It is hashed from the cubic cell that the point lies in,
+//! so that runs repeat, and the few points of one cell share their pattern.
+//!
+//! ```text
+//! cell edge = 8 to 16 × the point's near distance, doubling in steps
+//! ┌────┬────┬────┐
+//! │0.71│0.03│0.48│  offset of each cell, in turns
+//! ├────┼────┼────┤
+//! │0.22│0.95│0.37│
+//! └────┴────┴────┘
+//! ```
 
 use glam::DVec3;
 
-use crate::gather::GatherPoint;
-use crate::scene::Scene;
+use crate::geometry::aabb::Aabb;
+use crate::sampling::hash::{split_mix64, unit_interval};
 
-/// CellRotation over one scene.
+/// Cranley–Patterson rotations of the azimuth, one per cell of a box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CellRotation {
     low: DVec3,
-    /// Longest side of the box around the scene, its own unit.
+    /// Longest side of the box, scene unit.
     size: f64,
 }
 
-/// Where cells double, in powers of two: nothing in particular, so that no round number is there.
-const DOUBLING: f64 = 0.377;
+/// Phase of the cell sizes, which double: a power of two. Chosen by hand so that near distances
+/// that are round shares of the scene's size do not lie where the cell size changes.
+const DOUBLING_PHASE: f64 = 0.377;
 
-/// Smallest cells, in powers of two of the scene's size: for places that see what is next to them.
-const SMALLEST: f64 = -40.0;
+/// Smallest cell, as a power of two of the scene's size. Cell numbers stay below 2⁴⁰ then, which
+/// 64-bit floats tell apart.
+const SMALLEST_CELL_LOG2: f64 = -40.0;
 
 impl CellRotation {
-    /// For places in `scene`.
-    pub fn new(scene: &Scene) -> CellRotation {
-        let (low, high) = scene.bounds();
-        CellRotation { low, size: (high - low).max_element() }
+    /// For points within `bounds`.
+    pub fn new(bounds: &Aabb) -> CellRotation {
+        CellRotation { low: bounds.low, size: bounds.longest_side() }
     }
 
-    /// A turn in [0, 1) that differs from place to place: a hash of the cell that it is in, 8 to 16
-    /// times as large as the distance from which on it sees. However large the scene is and wherever
-    /// it stands, a place has the same turn; rounding is too small to carry one to another cell, but
-    /// for a few in a hundred thousand, a million sizes from the origin.
-    pub fn of(&self, place: &GatherPoint) -> f64 {
-        let near = (place.near / self.size).log2() + DOUBLING;
-        let cells = (-(near.floor() + 3.0).max(SMALLEST)).exp2() / self.size;
-        let mix = |h: u64, x: i64| {
-            // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-            let mut z = (h ^ x as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            z ^ (z >> 31)
-        };
-        let cell = ((place.position - self.low) * cells).round().as_i64vec3();
-        let bits = cell.to_array().into_iter().fold(0, mix);
-        (bits >> 11) as f64 / (1u64 << 53) as f64
+    /// The offset in [0, 1), in turns, at `position` for a point that sees nothing nearer than
+    /// `near` (both scene unit).
+    ///
+    /// Constant per cubic cell with an edge of 8 to 16 × `near`. Scale and translation of the scene
+    /// do not change it, up to rounding: a million scene sizes from the origin, rounding carries a
+    /// few points in a hundred thousand to another cell.
+    pub fn at(&self, position: DVec3, near: f64) -> f64 {
+        let size_log2 = (near / self.size).log2() + DOUBLING_PHASE;
+        let cells_per_unit =
+            (-(size_log2.floor() + 3.0).max(SMALLEST_CELL_LOG2)).exp2() / self.size;
+        let cell = ((position - self.low) * cells_per_unit).round().as_i64vec3();
+        let mix = |hash: u64, x: i64| split_mix64(hash ^ x as u64);
+        unit_interval(cell.to_array().into_iter().fold(0, mix))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_box(scale: f64, shift: DVec3) -> CellRotation {
+        CellRotation::new(&Aabb { low: shift, high: shift + scale })
+    }
+
+    #[test]
+    fn rotation_is_the_same_for_a_scaled_and_shifted_scene() {
+        let shift = DVec3::new(64.0, -32.0, 16.0);
+        for k in 0..100 {
+            let p = DVec3::new(0.37, 0.011, 0.93) * f64::from(k) / 100.0;
+            let plain = unit_box(1.0, DVec3::ZERO).at(p, 1e-3);
+            assert!((0.0..1.0).contains(&plain));
+            // Powers of two, and sums without rounding at this size but for the last bits.
+            assert_eq!(unit_box(8.0, DVec3::ZERO).at(p * 8.0, 8e-3), plain);
+            assert_eq!(unit_box(1.0, shift).at(p + shift, 1e-3), plain);
+        }
+    }
+
+    #[test]
+    fn rotation_is_constant_within_a_cell_and_spread_across_cells() {
+        let rotation = unit_box(1.0, DVec3::ZERO);
+        let at = |k: i32| rotation.at(DVec3::X * f64::from(k) / 1000.0, 1e-3);
+        // 1000 points over cells with an edge of 8 to 16 thousandths: 63 to 126 values.
+        let mut values: Vec<f64> = (0..1000).map(at).collect();
+        values.dedup();
+        assert!((62..=127).contains(&values.len()), "{}", values.len());
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        // Three standard errors of a mean of 62 values that are even in [0, 1).
+        assert!((mean - 0.5).abs() < 3.0 / (12.0f64 * 62.0).sqrt(), "{mean}");
     }
 }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use glam::{BVec3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::flux_state::{Flux, FluxState};
@@ -23,6 +23,7 @@ use super::{Progress, StopReason};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::closed_form::point_to_polygon;
 use crate::form_factor::{FormFactors, Row};
+use crate::geometry::aabb::Aabb;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -252,7 +253,7 @@ struct GeometryDelta {
     /// Whether each triangle has.
     triangles: Vec<bool>,
     /// About those of each group, where they were and where they are.
-    groups: Vec<[Bounds; 2]>,
+    groups: Vec<[Aabb; 2]>,
     /// What hides them.
     rays: Option<RayScene>,
 }
@@ -268,11 +269,11 @@ impl GeometryDelta {
         let count = before.triangles().len();
         let triangles: Vec<bool> =
             (0..count).map(|t| before.corners(t) != after.corners(t)).collect();
-        let mut groups = vec![[Bounds::NONE; 2]; before.groups().len()];
+        let mut groups = vec![[Aabb::EMPTY; 2]; before.groups().len()];
         for t in (0..count).filter(|&t| triangles[t]) {
             let [was, is] = &mut groups[before.triangles()[t].group as usize];
-            before.corners(t).into_iter().for_each(|p| was.add(p));
-            after.corners(t).into_iter().for_each(|p| is.add(p));
+            before.corners(t).into_iter().for_each(|p| was.include(p));
+            after.corners(t).into_iter().for_each(|p| is.include(p));
         }
         groups.retain(|[was, _]| was.low.is_finite());
         let rays = (!groups.is_empty()).then(|| RayScene::of_scene(after));
@@ -285,14 +286,15 @@ impl GeometryDelta {
             return 1.0;
         }
         let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
-        let seen = |k: usize| self.groups.iter().map(|g| g[k].seen(eye, normal)).sum::<f64>();
+        let seen =
+            |k: usize| self.groups.iter().map(|g| form_factor_to(&g[k], eye, normal)).sum::<f64>();
         let was = row.map_or(1.0, |row| {
             let hit = |e: u32| self.triangles[mesh.triangle(mesh.element(e as usize))];
             let hits = row.entries.iter().filter(|entry| hit(entry.element));
             hits.map(|entry| Row::form_factor(entry.share)).sum::<f64>()
                 + Row::form_factor(row.backface)
         });
-        let is = |bounds: &[Bounds; 2]| match bounds[1].seen(eye, normal) {
+        let is = |bounds: &[Aabb; 2]| match form_factor_to(&bounds[1], eye, normal) {
             0.0 => 0.0,
             share => share * self.open(eye, bounds[1]),
         };
@@ -301,9 +303,9 @@ impl GeometryDelta {
     }
 
     /// How much of `bounds` is open to `eye`, by a few places in it, never 0.
-    fn open(&self, eye: DVec3, bounds: Bounds) -> f64 {
+    fn open(&self, eye: DVec3, bounds: Aabb) -> f64 {
         let Some(rays) = &self.rays else { return 1.0 };
-        let middle = bounds.low + (bounds.high - bounds.low) / 2.0;
+        let middle = bounds.centre();
         let corners = bounds.corners().map(|corner| middle + (corner - middle) / 2.0);
         let places = || corners.iter().chain([&middle]);
         let hides = |hit: &Hit| !self.triangles[hit.triangle];
@@ -315,39 +317,13 @@ impl GeometryDelta {
 /// RayScene begin this far on their way.
 const GRAZE: f64 = 1e-6;
 
-/// A box along the axes.
-#[derive(Clone, Copy)]
-struct Bounds {
-    low: DVec3,
-    high: DVec3,
+/// The form factor to `bounds` from a point with that `normal`, as if nothing were in between.
+fn form_factor_to(bounds: &Aabb, eye: DVec3, normal: DVec3) -> f64 {
+    if bounds.contains(eye) {
+        return 1.0;
+    }
+    let corners = bounds.corners();
+    let to_face = |face: &[usize; 4]| point_to_polygon(eye, normal, &face.map(|k| corners[k]));
+    // The sides that face away have none.
+    Aabb::FACES.iter().map(to_face).sum::<f64>().min(1.0)
 }
-
-impl Bounds {
-    const NONE: Bounds = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
-
-    fn add(&mut self, p: DVec3) {
-        (self.low, self.high) = (self.low.min(p), self.high.max(p));
-    }
-
-    /// Corner k is high in x, y and z where k has the bits 1, 2 and 4.
-    fn corners(self) -> [DVec3; 8] {
-        let Bounds { low, high } = self;
-        [0, 1, 2, 3, 4, 5, 6, 7]
-            .map(|k| DVec3::select(BVec3::new(k & 1 != 0, k & 2 != 0, k & 4 != 0), high, low))
-    }
-
-    /// The form factor to this from a point with that `normal`.
-    fn seen(self, eye: DVec3, normal: DVec3) -> f64 {
-        if eye.cmpge(self.low).all() && eye.cmple(self.high).all() {
-            return 1.0;
-        }
-        let corners = self.corners();
-        let seen = |face: &[usize; 4]| point_to_polygon(eye, normal, &face.map(|k| corners[k]));
-        // The sides that face away have none.
-        FACES.iter().map(seen).sum::<f64>().min(1.0)
-    }
-}
-
-/// Sides of a box, seen from outside.
-const FACES: [[usize; 4]; 6] =
-    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::flux_state::Flux;
 use crate::form_factor::Row;
-use crate::geometry::rounding::rank;
+use crate::geometry::rounding::tie_stable_key;
 use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
 
@@ -184,13 +184,13 @@ impl<'m> PatchCut<'m> {
         // Of equals the first in the cut.
         let entry = |s: &ShootingPatch, k: usize| {
             let share = flux.unshot_share(&s.elements);
-            (share > 0.0).then(|| (s.fresh, rank(share), Reverse(k)))
+            (share > 0.0).then(|| (s.fresh, tie_stable_key(share), Reverse(k)))
         };
         let mut bright: BinaryHeap<_> =
             self.cut.iter().zip(0..).filter_map(|(s, k)| entry(s, k)).collect();
         let (mut wanted, mut shots, mut floor) = (rows.max(1), Vec::<Shot>::new(), None);
         while let Some((fresh, share, Reverse(k))) = bright.pop() {
-            let least = || rank(flux.unshot_share(&self.cut[k].elements) * BATCH_FALL);
+            let least = || tie_stable_key(flux.unshot_share(&self.cut[k].elements) * BATCH_FALL);
             let (first, least) = *floor.get_or_insert_with(|| (fresh, least()));
             if fresh != first || share < least || shots.len() as u64 >= most {
                 break;
@@ -335,7 +335,7 @@ impl<'m> PatchCut<'m> {
         let middle = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / whole;
         let off = |e: &usize| self.centroids[*e].distance_squared(middle);
         let sees = |e: &usize| !self.blind.contains(&mesh.element(*e));
-        let nearest = elements().filter(lit).filter(sees).min_by_key(|e| rank(off(e)));
+        let nearest = elements().filter(lit).filter(sees).min_by_key(|e| tie_stable_key(off(e)));
         mesh.element(nearest.unwrap_or(shooter.elements[0].start))
     }
 

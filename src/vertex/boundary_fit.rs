@@ -3,11 +3,11 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::corner_singularity;
 use super::keys::ElementLoops;
 use crate::mesh::Mesh;
-use crate::sampling::hash::Map;
 use crate::scene::Rgb;
 
 /// Elements that a plane is fitted to, at least: three would let it swing freely.
@@ -112,7 +112,7 @@ fn ring(rims: &ElementLoops, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> 
 
 /// Vertices on a side that only one element has, ascending.
 fn boundary(rims: &ElementLoops) -> Vec<usize> {
-    let mut sides: Map<(u32, u32), u32> = Map::default();
+    let mut sides: FxHashMap<(u32, u32), u32> = FxHashMap::default();
     for (_, rim) in rims.iter() {
         for (k, &a) in rim.iter().enumerate() {
             let b = rim[(k + 1) % rim.len()];

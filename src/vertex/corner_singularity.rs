@@ -73,9 +73,9 @@ pub(super) fn mend(
 
 /// For each of `ends` the others at its place, if they are not too many.
 fn meeting(mesh: &Mesh, ends: &[BoundaryVertex]) -> Vec<Vec<usize>> {
-    let (low, high) = mesh.scene().bounds();
-    let unit = (high - low).max_element() * SAME_PLACE;
-    let place = |end: &BoundaryVertex| ((end.position - low) / unit).round().as_i64vec3();
+    let bounds = mesh.scene().bounds();
+    let unit = bounds.longest_side() * SAME_PLACE;
+    let place = |end: &BoundaryVertex| ((end.position - bounds.low) / unit).round().as_i64vec3();
     let mut places: HashMap<_, Vec<usize>> = HashMap::new();
     ends.iter().zip(0..).for_each(|(end, k)| places.entry(place(end)).or_default().push(k));
     let others = |k: usize| {

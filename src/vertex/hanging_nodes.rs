@@ -2,10 +2,10 @@
 //! share, so that the mesh is watertight wherever the scene is.
 
 use glam::DVec3;
+use rustc_hash::FxHashSet;
 
 use super::keys::{ElementLoops, VertexKey, Vertices};
 use crate::mesh::{Mesh, SurfaceTopology};
-use crate::sampling::hash::Set;
 
 /// The vertices that creases ask for beside those of the smooth surfaces.
 pub(super) struct HangingNodes {
@@ -29,7 +29,7 @@ impl HangingNodes {
             VertexKey::Side { id, step } => Some((edge(id), step)),
             _ => None,
         };
-        let places: Set<(u32, u32)> = vertices.keys.iter().filter_map(on_edge).collect();
+        let places: FxHashSet<(u32, u32)> = vertices.keys.iter().filter_map(on_edge).collect();
         let (mut rims, mut seams) = (ElementLoops::default(), vec![]);
         for e in 0..mesh.element_count() {
             let mut add = |key: VertexKey, position: &dyn Fn() -> DVec3, between: [u32; 2]| {

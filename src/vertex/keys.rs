@@ -1,9 +1,9 @@
 //! Which vertices a mesh has: places on lattices that are the same place, on one smooth surface.
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
 use crate::mesh::{Cell, MAX_DEPTH, Mesh, Side, SurfaceTopology};
-use crate::sampling::hash::Map;
 use crate::scene::Scene;
 
 /// Steps along a triangle's side on the lattice that all depths share.
@@ -31,7 +31,7 @@ pub(super) struct Vertices {
     pub corners: Vec<[u32; 3]>,
     /// All around each element.
     pub rims: ElementLoops,
-    numbers: Map<VertexKey, u32>,
+    numbers: FxHashMap<VertexKey, u32>,
 }
 
 /// The vertices around each element: its corners, and what finer neighbours put between them.

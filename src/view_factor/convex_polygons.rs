@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::DVec3;
 
 use crate::form_factor::closed_form::area_vector;
+use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 
 /// Corners off a common plane by less than this, in units of the scene's size, are in it: above the
@@ -245,20 +246,11 @@ impl Outlines {
 /// Per triangle its corners as numbers of distinct positions, and these positions, from the middle
 /// of the scene and over `unit`.
 fn weld(scene: &Scene, unit: f64) -> (Vec<Vec<u32>>, Vec<DVec3>) {
-    let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut corners: Vec<DVec3> = Vec::new();
-    let (low, high) = scene.bounds();
-    let centre = low + (high - low) / 2.0;
-    let mut number = |p: DVec3| {
-        // Adding zero makes -0 equal to 0, bit for bit.
-        let bits = (p + DVec3::ZERO).to_array().map(f64::to_bits);
-        *seen.entry(bits).or_insert_with(|| {
-            corners.push((p - centre) / unit);
-            corners.len() as u32 - 1
-        })
-    };
+    let mut weld = Weld::default();
     let loops = (0..scene.triangles().len())
-        .map(|t| scene.corners(t).into_iter().map(&mut number).collect())
+        .map(|t| scene.corners(t).into_iter().map(|p| weld.number(p)).collect())
         .collect();
+    let centre = scene.bounds().centre();
+    let corners = weld.positions.into_iter().map(|p| (p - centre) / unit).collect();
     (loops, corners)
 }

@@ -10,6 +10,7 @@ use super::exchange::unblocked;
 use super::point_visibility::PointVisibility;
 use super::shaft::{Blocker, Shaft, covers};
 use super::visual_events::{EventPlane, most_even};
+use crate::sampling::hash::{split_mix64, unit_interval};
 
 /// Most cells that a sum is cut into; what error is left then is told.
 const MOST_CELLS: usize = 40_000;
@@ -156,7 +157,7 @@ impl Cell {
             Some((_, crease)) => crease.cut(&self.corners),
             None => self.halves().to_vec(),
         };
-        let seeds = (1..).map(|k| mix(self.seed ^ k));
+        let seeds = (1..).map(|k| split_mix64(self.seed ^ k));
         let mut parts: Vec<Cell> = triangles
             .into_iter()
             .zip(seeds)
@@ -178,18 +179,10 @@ impl Cell {
         let longest = sides.iter().max_by(|x, y| square(x).total_cmp(&square(y)));
         let &(p, q, r) = longest.unwrap_or(&sides[0]);
         // Off the middle by up to a tenth, so that errors along a line of cells are independent.
-        let share = 0.4 + 0.2 * (self.seed >> 11) as f64 / (1_u64 << 53) as f64;
+        let share = 0.4 + 0.2 * unit_interval(self.seed);
         let middle = p.lerp(q, share);
         [[p, middle, r], [middle, q, r]]
     }
-}
-
-/// A well-mixed number (S. Vigna's splitmix64).
-pub(super) fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// A cell waiting to be cut, the worst first; ties go by number, so that the order is certain.

@@ -4,12 +4,13 @@ use glam::DVec3;
 
 use super::Estimate;
 use super::convex_polygons::ConvexPolygon;
-use super::cubature::{Cell, OccludedPair, mix};
+use super::cubature::{Cell, OccludedPair};
 use super::far_field::{FAR_ERROR, far_exchange};
 use super::point_visibility::PointVisibility;
 use super::shaft::{CONTACT, Shaft, Tree, covers, distinct};
 use super::visual_events::{creases, fan, parts_between, standing_on};
 use crate::form_factor::closed_form::{clip, polygon_area, polygon_to_polygon};
+use crate::sampling::hash::split_mix64;
 
 /// What the closed form errs by at most, as a share of the flux from the smaller piece into the
 /// whole hemisphere (see [`polygon_to_polygon`]).
@@ -81,7 +82,7 @@ pub(super) fn link(
     };
     let parts = parts_between(domain.0, &domain.2);
     for (corners, k) in parts.iter().flat_map(|part| fan(part)).zip(0..) {
-        let cell = Cell::new(&partial, corners, &between, mix(seed.wrapping_add(k)), eye);
+        let cell = Cell::new(&partial, corners, &between, split_mix64(seed.wrapping_add(k)), eye);
         partial.cells.push(cell);
     }
     PairVisibility::OccludedPair(Box::new(partial))

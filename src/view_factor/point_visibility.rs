@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::shaft::{Blocker, Bounds};
+use super::shaft::Blocker;
 use crate::form_factor::closed_form::lambert;
+use crate::geometry::aabb::Aabb;
 
 /// Corners off a plane through the eye by less than this share of the reach are in it.
 const CONTACT: f64 = 1e-13;
@@ -16,7 +17,7 @@ const MARGIN: f64 = 1e-9;
 /// A convex part of what is seen: its corners, as a range of all, and the box around them.
 struct Part {
     corners: Range<usize>,
-    bounds: Bounds,
+    bounds: Aabb,
 }
 
 /// An eye on a surface, and room to work in.
@@ -82,7 +83,7 @@ impl PointVisibility {
         if self.corners.len() < start + 3 {
             return self.corners.truncate(start);
         }
-        let bounds = Bounds::around(&self.corners[start..]);
+        let bounds = Aabb::from_points(self.corners[start..].iter().copied());
         self.parts.push(Part { corners: start..self.corners.len(), bounds });
     }
 
@@ -106,10 +107,10 @@ impl PointVisibility {
     }
 
     /// Cuts the cone, and so all that is in `shadow`, off all parts.
-    fn cut(&mut self, shadow: &Bounds, contact: f64) {
+    fn cut(&mut self, shadow: &Aabb, contact: f64) {
         // From the last: what takes the place of a part that is gone has been dealt with.
         for k in (0..self.parts.len()).rev() {
-            if !self.parts[k].bounds.meets(shadow) {
+            if !self.parts[k].bounds.overlaps(shadow) {
                 continue;
             }
             let part = &self.corners[self.parts[k].corners.clone()];
@@ -140,17 +141,17 @@ impl PointVisibility {
 
 /// A box around what `blocker` hides, from `point`, of a plane at `depth` before it that faces
 /// `facing`; everything where a part of the blocker is beside the point or behind it.
-fn shadow(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Bounds {
-    let mut bounds = Bounds::NOTHING;
+fn shadow(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
     for corner in &blocker.corners {
         let v = corner - point;
         let down = -facing.dot(v);
         if down <= MARGIN * depth {
-            return Bounds::EVERYTHING;
+            return Aabb::EVERYTHING;
         }
         bounds.include(v * (depth / down));
     }
-    bounds.grown(margin)
+    bounds.expanded(margin)
 }
 
 /// Splits a convex polygon by the plane through the origin with unit normal `n`.

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::convex_polygons::ConvexPolygon;
 use crate::form_factor::closed_form::{clip, polygon_area};
+use crate::geometry::aabb::Aabb;
 
 /// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
 /// and above what pieces may be off their own planes ([`super::convex_polygons::PLANAR`]).
@@ -24,36 +25,6 @@ const ONE: f64 = 1e-9;
 /// Pieces in one leaf of the tree.
 const LEAF: usize = 4;
 
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    low: DVec3,
-    high: DVec3,
-}
-
-impl Bounds {
-    pub const NOTHING: Bounds = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
-    pub const EVERYTHING: Bounds = Bounds { low: DVec3::NEG_INFINITY, high: DVec3::INFINITY };
-
-    pub fn around<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Bounds {
-        let mut bounds = Bounds::NOTHING;
-        points.into_iter().for_each(|&p| bounds.include(p));
-        bounds
-    }
-
-    pub fn include(&mut self, point: DVec3) {
-        (self.low, self.high) = (self.low.min(point), self.high.max(point));
-    }
-
-    pub fn grown(self, margin: f64) -> Bounds {
-        Bounds { low: self.low - margin, high: self.high + margin }
-    }
-
-    pub fn meets(&self, other: &Bounds) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
-    }
-}
-
 /// The plane of all points with n·p = offset; its upper side is where n, a unit vector, points.
 #[derive(Clone, Copy, Debug)]
 struct Plane {
@@ -71,7 +42,7 @@ impl Plane {
     }
 
     /// Largest height in a box.
-    fn highest(&self, bounds: &Bounds) -> f64 {
+    fn highest(&self, bounds: &Aabb) -> f64 {
         let up = self.normal.cmpge(DVec3::ZERO);
         self.height(DVec3::select(up, bounds.high, bounds.low))
     }
@@ -80,14 +51,14 @@ impl Plane {
 /// The convex hull of two polygons that are all before one another: every segment between them.
 pub(super) struct Shaft {
     planes: Vec<Plane>,
-    bounds: Bounds,
+    bounds: Aabb,
 }
 
 impl Shaft {
     /// Of the hull's faces, the two polygons themselves and the one beside each of their edges,
     /// which leans on a corner of the other polygon. These are all.
     pub fn new(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Shaft {
-        let bounds = Bounds::around(a.iter().chain(b));
+        let bounds = Aabb::from_points(a.iter().chain(b).copied());
         let mut planes = Vec::with_capacity(a.len() + b.len() + 2);
         planes.extend(a.first().map(|&p| Plane::through(p, a_normal)));
         planes.extend(b.first().map(|&p| Plane::through(p, b_normal)));
@@ -118,8 +89,9 @@ impl Shaft {
         (polygon_area(&kept) > SLIVER * size).then_some(kept)
     }
 
-    fn meets(&self, bounds: &Bounds) -> bool {
-        self.bounds.meets(bounds) && self.planes.iter().all(|plane| plane.highest(bounds) > CONTACT)
+    fn meets(&self, bounds: &Aabb) -> bool {
+        self.bounds.overlaps(bounds)
+            && self.planes.iter().all(|plane| plane.highest(bounds) > CONTACT)
     }
 }
 
@@ -233,7 +205,7 @@ pub(super) struct Tree {
 }
 
 struct Node {
-    bounds: Bounds,
+    bounds: Aabb,
     kind: Kind,
 }
 
@@ -256,14 +228,13 @@ impl Tree {
     /// Halves a range of pieces at the median along the longest side of their box.
     fn build(&mut self, start: usize, end: usize) -> usize {
         let pieces = &mut self.pieces[start..end];
-        let bounds = Bounds::around(pieces.iter().flat_map(|piece| &piece.corners));
+        let bounds = Aabb::from_points(pieces.iter().flat_map(|piece| &piece.corners).copied());
         let kind = if pieces.len() <= LEAF {
             Kind::Leaf(start, end)
         } else {
-            let size = bounds.high - bounds.low;
-            let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);
+            let axis = bounds.longest_axis();
             let key = |piece: &ConvexPolygon| {
-                let b = Bounds::around(&piece.corners);
+                let b = Aabb::from_points(piece.corners.iter().copied());
                 (b.low + b.high)[axis]
             };
             pieces.sort_by(|p, q| key(p).total_cmp(&key(q)));
@@ -281,7 +252,7 @@ impl Tree {
         for piece in &self.pieces {
             let back = piece.reversed();
             let mut parts = vec![back.corners.clone()];
-            for front in fronts.nearby(&Bounds::around(&piece.corners)) {
+            for front in fronts.nearby(&Aabb::from_points(piece.corners.iter().copied())) {
                 if lies_on(front, &back) {
                     parts = parts.iter().flat_map(|part| minus(part, front)).collect();
                 }
@@ -293,12 +264,12 @@ impl Tree {
     }
 
     /// The pieces in boxes of the tree that meet `bounds`, and perhaps some more.
-    fn nearby(&self, bounds: &Bounds) -> impl Iterator<Item = &ConvexPolygon> {
+    fn nearby(&self, bounds: &Aabb) -> impl Iterator<Item = &ConvexPolygon> {
         let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
         let mut ranges = Vec::new();
         while let Some(node) = open.pop() {
             match self.nodes[node].kind {
-                _ if !self.nodes[node].bounds.meets(bounds) => {}
+                _ if !self.nodes[node].bounds.overlaps(bounds) => {}
                 Kind::Inner(a, b) => open.extend([b, a]),
                 Kind::Leaf(start, end) => ranges.push(start..end),
             }

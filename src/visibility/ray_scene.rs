@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use glam::{DVec3, Vec3, Vec3A};
-use obvhs::aabb::Aabb;
+use obvhs::aabb::Aabb as Aabb32;
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 
+use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 use super::wide_bvh::hierarchy;
@@ -51,18 +52,16 @@ impl RayScene {
     /// For triangles by their corners.
     pub fn new(corners: impl Iterator<Item = [DVec3; 3]>) -> RayScene {
         let corners: Vec<[DVec3; 3]> = corners.collect();
-        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let all = corners.iter().flatten();
-        let (low, high) = all.fold(nothing, |(l, h), &p| (l.min(p), h.max(p)));
-        let origin = low + (high - low) / 2.0;
-        let scale = SPAN / (high - low).max_element().max(f64::MIN_POSITIVE);
+        let bounds = Aabb::from_points(corners.iter().flatten().copied());
+        let origin = bounds.centre();
+        let scale = SPAN / bounds.longest_side().max(f64::MIN_POSITIVE);
         let local = |p: DVec3| Vec3A::from(((p - origin) * scale).as_vec3());
-        let boxes: Vec<Aabb> = corners
+        let boxes: Vec<Aabb32> = corners
             .iter()
             .map(|c| {
                 let [a, b, c] = c.map(local);
                 let margin = Vec3A::splat(MARGIN);
-                Aabb { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
+                Aabb32 { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
             })
             .collect();
         let bvh = hierarchy(&boxes);

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::error::quoted;
 use crate::sampling::hemisphere::HemisphereSamples;
+use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -77,26 +78,16 @@ fn looks(scene: &Scene) -> Vec<Tally> {
     let count = scene.triangles().len();
     let rays = RayScene::of_scene(scene);
     let fan = HemisphereSamples::progressive(RAYS);
-    let mut area = 0.0;
-    let upto: Vec<f64> = (0..count)
-        .map(|t| {
-            area += scene.area(t);
-            area
-        })
-        .collect();
-    let look = |k: usize| -> Vec<Option<Hit>> {
-        let at = (k as f64 + 0.5) / PLACES as f64 * area;
-        let t = upto.partition_point(|&sum| sum <= at).min(count - 1);
-        // Roberts's sequence in the unit square, folded along its diagonal.
-        let [u, v] =
-            [0.754_877_666_246_692_8, 0.569_840_290_998_053_3].map(|x| (k as f64 * x).fract());
-        let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+    let surface = AreaSampler::new((0..count).map(|t| scene.area(t)));
+    let points: Vec<SurfacePoint> = surface.spread(PLACES, 0.0).collect();
+    let look = |point: SurfacePoint| -> Vec<Option<Hit>> {
+        let (t, [u, v]) = (point.triangle, point.barycentric);
         let [a, b, c] = scene.corners(t);
         let (eye, start) = (a + (b - a) * u + (c - a) * v, START * scene.area(t).sqrt());
         let directions = fan.directions(scene.normal(t), v);
         directions.map(|d| rays.closest_hit(eye, d, start, Some(t))).collect()
     };
-    let found: Vec<_> = (0..PLACES).into_par_iter().map(look).collect();
+    let found: Vec<_> = points.into_par_iter().map(look).collect();
     let mut tallies = vec![Tally::default(); count];
     for hits in found {
         let backs = hits.iter().flatten().filter(|hit| !hit.front).count();

@@ -59,8 +59,7 @@ fn check_scene(scene: &Scene, bytes: usize) {
 
 /// A few shots of rays from elements of some size, and their light at the vertices.
 fn settle(scene: &Scene) {
-    let (low, high) = scene.bounds();
-    let mesh = match Mesh::new(scene.clone(), (high - low).length() / 4.0) {
+    let mesh = match Mesh::new(scene.clone(), scene.bounds().diagonal() / 4.0) {
         Ok(mesh) => mesh,
         Err(_) => return,
     };

@@ -10,7 +10,8 @@ use crate::gather::light_projection::LightProjection;
 use crate::gather::lights::{Light, Lights, NO_LIGHT};
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
-use crate::sampling::hemisphere::{self, HemisphereSamples, nested};
+use crate::sampling::hemisphere::{self, HemisphereSamples};
+use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -55,7 +56,7 @@ impl RayGather {
         let least = 1 << f64::from(count).log2().round().max(1.0) as u32;
         let (rays, lights) = (RayScene::of_scene(mesh.scene()), Lights::new(mesh.shared_scene()));
         let (fan, noise, dim) = (HemisphereSamples::progressive(least), f64::INFINITY, 0.0);
-        let turns = CellRotation::new(mesh.scene());
+        let turns = CellRotation::new(&mesh.scene().bounds());
         Ok(RayGather { rays, lights, turns, fan, least, most: least, noise, dim })
     }
 
@@ -104,7 +105,7 @@ impl RayGather {
         apart: &[(u32, f64)],
         range: Range<u32>,
     ) -> RaySums {
-        let turn = self.turns.of(place);
+        let turn = self.turns.at(place.position, place.near);
         let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
         let mut seen = RaySums::default();
         let out = &mut seen.around;
@@ -164,17 +165,14 @@ impl RayGather {
         range: Range<u32>,
         turn: f64,
     ) -> Visible {
-        let Light { triangles, ends, .. } = &self.lights.lights[light as usize];
-        let whole = ends[ends.len() - 1];
+        let Light { triangles, surface, .. } = &self.lights.lights[light as usize];
+        let area = surface.total_area();
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
         for i in range {
-            let [x, y] = nested(i);
-            let at = x * whole;
-            let k = ends.partition_point(|&end| end < at).min(triangles.len() - 1);
-            let below = if k == 0 { 0.0 } else { ends[k - 1] };
+            let [x, y] = sobol_02_point(i);
+            let (k, across) = surface.locate(x);
             let triangle = triangles[k] as usize;
             let [a, b, c] = scene.corners(triangle);
-            let across = ((at - below) / (ends[k] - below)).clamp(0.0, 1.0);
             // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
             let (root, v) = (across.sqrt(), (y + turn).fract());
             let point = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
@@ -185,7 +183,7 @@ impl RayGather {
                 continue;
             }
             let r2 = to.length_squared();
-            let factor = whole * facing * above / (PI * r2 * r2);
+            let factor = area * facing * above / (PI * r2 * r2);
             out.all += factor;
             // What is met first may be another part of the light, which is as good.
             let near = place.near / r2.sqrt();

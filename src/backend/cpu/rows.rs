@@ -4,7 +4,9 @@ use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
+use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
+use crate::sampling::hash::low_bias32;
 use crate::sampling::hemisphere::HemisphereSamples;
 use crate::visibility::ray_scene::RayScene;
 
@@ -50,7 +52,7 @@ impl RayRows {
     fn row(&self, mesh: &Mesh, patch: NodeId, fan: &HemisphereSamples, count: u32) -> Row {
         let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
         let start = START * mesh.area(patch).sqrt();
-        let turn = f64::from(shuffle(patch.0)) / 2f64.powi(32);
+        let turn = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
         let see = |direction| match self.rays.closest_hit(eye, direction, start, Some(own)) {
             None => OPEN,
             Some(hit) if !hit.front => BACK,
@@ -61,10 +63,10 @@ impl RayRows {
         // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
         let upto = |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(count)) as u32;
         let mut row = Row::default();
-        let mut first = 0;
+        let (mut shares, mut counted) = (Apportion::default(), 0);
         for run in seen.chunk_by(|a, b| a == b) {
-            let share = upto(first + run.len()) - upto(first);
-            first += run.len();
+            counted += run.len();
+            let share = shares.part_up_to(upto(counted));
             match run[0] {
                 OPEN => row.escaped = share,
                 BACK => row.backface = share,
@@ -104,10 +106,3 @@ const BACK: u32 = u32::MAX - 1;
 
 /// RayScene start this far from the patch, in units of the square root of its area.
 const START: f64 = 1e-6;
-
-/// A 32-bit mixer (Wellons 2018, "lowbias32").
-fn shuffle(mut x: u32) -> u32 {
-    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
-    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::geometry::aabb::Aabb;
 use crate::hemicube::Face;
 use crate::scene::Scene;
 
@@ -40,15 +41,14 @@ impl DrawList {
         let mut order: Vec<u32> = (0..middles.len() as u32).collect();
         let mut runs = vec![];
         halve(&mut order, 0, &middles, &mut runs);
-        let (low, high) = scene.bounds();
         // The device rounds to 32 bits: boxes grow by a few steps of its coordinates.
-        let margin = (high - low).max_element() * 8.0 * f64::from(f32::EPSILON);
+        let margin = scene.bounds().longest_side() * 8.0 * f64::from(f32::EPSILON);
         let around = |places: Range<u32>| {
-            let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             let triangles = order[places.start as usize..places.end as usize].iter();
             let corners = triangles.flat_map(|&t| scene.corners(t as usize));
-            let (low, high) = corners.fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
-            Chunk { places, centre: (low + high) / 2.0, half: (high - low) / 2.0 + margin }
+            let bounds = Aabb::from_points(corners);
+            let centre = bounds.low.midpoint(bounds.high);
+            Chunk { places, centre, half: bounds.size() / 2.0 + margin }
         };
         let chunks = runs.into_iter().map(around).collect();
         let mut places = vec![0; order.len()];
@@ -83,11 +83,7 @@ fn halve(order: &mut [u32], start: u32, middles: &[DVec3], runs: &mut Vec<Range<
         runs.push(start..start + order.len() as u32);
         return;
     }
-    let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) =
-        order.iter().map(|&t| middles[t as usize]).fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
-    let axis = (high - low).to_array();
-    let axis = (0..3).max_by(|&a, &b| axis[a].total_cmp(&axis[b])).unwrap_or(0);
+    let axis = Aabb::from_points(order.iter().map(|&t| middles[t as usize])).longest_axis();
     let along = |t: &u32| middles[*t as usize][axis];
     // Ties by index: the same order on every run.
     order.sort_unstable_by(|a, b| along(a).total_cmp(&along(b)).then(a.cmp(b)));

@@ -87,7 +87,7 @@ impl HemicubeGather {
         let lights = Lights::new(mesh.shared_scene());
         let slots = lights.lights.len().min(APART) as u32;
         let batch = batch(gpu, scene, resolution, slots)?;
-        let (local, turns) = (SplitFloat::new(scene), CellRotation::new(scene));
+        let (local, turns) = (SplitFloat::new(scene), CellRotation::new(&scene.bounds()));
         let bright = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
         let bright = if bright > 0.0 { bright.log2().floor().exp2() } else { 1.0 };
         let chunks = DrawList::new(scene);
@@ -131,7 +131,7 @@ impl HemicubeGather {
             fits.extend(view);
             view.is_some()
         });
-        let frame = Frame::new(place.normal, self.turns.of(place) * FRAC_PI_2);
+        let frame = Frame::new(place.normal, self.turns.at(place.position, place.near) * FRAC_PI_2);
         let mut lights = [NO_LIGHT; APART];
         lights.iter_mut().zip(&apart).for_each(|(l, a)| *l = a.0);
         let [eye, eye_low] = self.local.parts(place.position);

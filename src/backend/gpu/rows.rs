@@ -20,6 +20,7 @@ use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::{Mesh, NodeId};
+use crate::sampling::hash::{split_mix64_nth, unit_interval};
 
 /// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
 ///
@@ -266,12 +267,7 @@ const NEAR: f64 = 1e-4;
 /// Turn of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours do
 /// not repeat one another's pixel pattern and every run turns alike.
 fn rotation(patch: NodeId) -> f64 {
-    // The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-    let mut z = (u64::from(patch.0) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
-    unit * FRAC_PI_2
+    unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
 }
 
 /// The row of `patch` from what the device says; or what is wrong with that.

@@ -16,8 +16,8 @@ pub struct SplitFloat {
 
 impl SplitFloat {
     pub fn new(scene: &Scene) -> SplitFloat {
-        let (low, high) = scene.bounds();
-        SplitFloat { origin: low + (high - low) / 2.0, unit: (high - low).max_element() }
+        let bounds = scene.bounds();
+        SplitFloat { origin: bounds.centre(), unit: bounds.longest_side() }
     }
 
     /// The two parts of `p`: what 32 bits hold of it, and of the rest. What lies near an eye is told

@@ -1,0 +1,141 @@
+//! Axis-aligned boxes: the one box type of the crate.
+//!
+//! ```text
+//!        6────────7  high          Corner k lies on the high side of the
+//!       ╱│       ╱│                x, y and z axis where k has the bits
+//!      2────────3 │                1, 2 and 4.
+//!      │ 4──────│─5     y  z
+//!      │╱       │╱      │ ╱        A box contains its boundary. The empty
+//! low  0────────1       └── x      box has low = ∞ and high = −∞.
+//! ```
+
+use glam::{BVec3, DVec3};
+
+/// An axis-aligned box from its lowest to its highest coordinates, both within it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lowest coordinates, scene unit.
+    pub low: DVec3,
+    /// Highest coordinates, scene unit.
+    pub high: DVec3,
+}
+
+impl Aabb {
+    /// Contains no point; the neutral element of [`Aabb::union`].
+    pub const EMPTY: Aabb = Aabb { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+
+    /// Contains every point.
+    pub const EVERYTHING: Aabb = Aabb { low: DVec3::NEG_INFINITY, high: DVec3::INFINITY };
+
+    /// The six sides by the corners that [`Aabb::corners`] numbers, counter-clockwise from outside.
+    pub const FACES: [[usize; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
+    /// The smallest box around `points`; [`Aabb::EMPTY`] around none.
+    pub fn from_points(points: impl IntoIterator<Item = DVec3>) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        for point in points {
+            bounds.include(point);
+        }
+        bounds
+    }
+
+    /// Grows the box until it contains `point`.
+    pub fn include(&mut self, point: DVec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Aabb) -> Aabb {
+        Aabb { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// The box with every side moved outwards by `margin`, scene unit.
+    pub fn expanded(self, margin: f64) -> Aabb {
+        Aabb { low: self.low - margin, high: self.high + margin }
+    }
+
+    /// Whether `point` is within the box or on its boundary.
+    pub fn contains(&self, point: DVec3) -> bool {
+        point.cmpge(self.low).all() && point.cmple(self.high).all()
+    }
+
+    /// Whether the two boxes have a point in common, if only on their boundaries.
+    pub fn overlaps(&self, other: &Aabb) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+
+    /// Lengths of the sides along x, y and z, scene unit.
+    pub fn size(&self) -> DVec3 {
+        self.high - self.low
+    }
+
+    /// Length of the longest side, scene unit.
+    pub fn longest_side(&self) -> f64 {
+        self.size().max_element()
+    }
+
+    /// Length of the diagonal, scene unit.
+    pub fn diagonal(&self) -> f64 {
+        self.size().length()
+    }
+
+    /// The axis (0 to 2) of the longest side; the last of equals.
+    pub fn longest_axis(&self) -> usize {
+        let size = self.size();
+        (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0)
+    }
+
+    /// The point in the middle. Written so that finite coordinates do not overflow.
+    pub fn centre(&self) -> DVec3 {
+        self.low + self.size() / 2.0
+    }
+
+    /// The eight corners, in the order of the module's drawing.
+    pub fn corners(&self) -> [DVec3; 8] {
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|k| {
+            let on_high_side = BVec3::new(k & 1 != 0, k & 2 != 0, k & 4 != 0);
+            DVec3::select(on_high_side, self.high, self.low)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contains_its_points_and_no_others() {
+        let points = [DVec3::new(1.0, -2.0, 3.0), DVec3::new(-1.0, 5.0, 3.5), DVec3::ZERO];
+        let bounds = Aabb::from_points(points);
+        assert_eq!((bounds.low, bounds.high), (DVec3::new(-1., -2., 0.), DVec3::new(1., 5., 3.5)));
+        assert!(points.iter().all(|&p| bounds.contains(p)));
+        assert!(!bounds.contains(DVec3::new(1.1, 0.0, 0.0)));
+        assert!(!Aabb::EMPTY.contains(DVec3::ZERO) && Aabb::EVERYTHING.contains(DVec3::ZERO));
+        assert_eq!(Aabb::EMPTY.union(bounds), bounds);
+        assert_eq!((bounds.longest_axis(), bounds.longest_side()), (1, 7.0));
+        assert_eq!(bounds.centre(), DVec3::new(0.0, 1.5, 1.75));
+    }
+
+    #[test]
+    fn overlaps_where_sides_touch() {
+        let unit = Aabb { low: DVec3::ZERO, high: DVec3::ONE };
+        let moved =
+            |by: f64| Aabb { low: unit.low + DVec3::X * by, high: unit.high + DVec3::X * by };
+        assert!(unit.overlaps(&moved(1.0)) && unit.overlaps(&moved(-1.0)));
+        assert!(!unit.overlaps(&moved(1.5)) && unit.overlaps(&moved(1.5).expanded(0.5)));
+        assert!(!unit.overlaps(&Aabb::EMPTY) && unit.overlaps(&Aabb::EVERYTHING));
+    }
+
+    #[test]
+    fn faces_are_seen_from_outside() {
+        let bounds = Aabb { low: DVec3::new(-1.0, 2.0, 0.5), high: DVec3::new(3.0, 4.0, 1.0) };
+        let corners = bounds.corners();
+        for [a, b, c, d] in Aabb::FACES.map(|face| face.map(|k| corners[k])) {
+            let normal = (b - a).cross(c - a);
+            assert!(normal.dot(a - bounds.centre()) > 0.0);
+            assert_eq!(normal.dot(d - a), 0.0);
+        }
+    }
+}
