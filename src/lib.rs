@@ -90,10 +90,11 @@ pub use io::{
     Report, Seconds, ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply,
     write_png, write_view_factor_list, write_view_factors,
 };
-pub use mesh::{COPLANAR_DEGREES, CREASE_DEGREES, MAX_DEPTH, MAX_ELEMENTS, Mesh, NodeId};
+pub use mesh::{Mesh, NodeId};
+pub use progress::StopReason;
 pub use progress::Timings;
-pub use scene::{DEFAULT_REFLECTANCE, Material, Rgb, Scene, Triangle};
-pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver, StopReason};
+pub use scene::{Material, Rgb, Scene, Triangle};
+pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver};
 pub use vertex::VertexMesh;
 pub use vertex::gathering::{GatherProgress, GatheredMesh, RefinementSettings};
 pub use view_factor::{

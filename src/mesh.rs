@@ -19,21 +19,14 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Rgb, Scene};
 pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
-pub use topology::{COPLANAR_DEGREES, CREASE_DEGREES};
 pub(crate) use topology::{Side, SurfaceTopology};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct NodeId(pub(crate) u32);
-
-/// Levels of subdivision that a triangle can have at most: 4¹² elements.
-pub const MAX_DEPTH: u32 = 12;
-
-/// Elements that a mesh can have at most.
-pub const MAX_ELEMENTS: usize = 1 << 26;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -63,12 +56,30 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Levels of subdivision that a triangle can have at most: 4¹² elements.
+    pub const MAX_DEPTH: u32 = 12;
+
+    /// Elements that a mesh can have at most: element numbers, and all that is kept per element,
+    /// stay within 32 bits and some gigabytes.
+    pub const MAX_ELEMENTS: usize = 1 << 26;
+
+    /// Neighbouring triangles of one smoothing group meet in a crease if their normals differ by
+    /// more than this many degrees: radiosity jumps there, whatever shading is wanted. The same
+    /// holds for neighbours of which no smoothing group is known. Chosen by hand; no measurement
+    /// was kept.
+    pub const CREASE_DEGREES: f64 = 40.0;
+
+    /// All other neighbouring triangles, in two smoothing groups or in none, meet in a crease if
+    /// their normals differ by more than this many degrees: triangles of a polygon that is flat but
+    /// for the rounding of its coordinates in a file do not.
+    pub const COPLANAR_DEGREES: f64 = 1.0;
+
     /// Splits every triangle of `scene` until no element edge is longer than `element_size` (in
     /// the scene's length unit; infinity splits nothing).
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `element_size` is not above zero, or when it asks for more than
-    /// [`MAX_DEPTH`] splits of a triangle or [`MAX_ELEMENTS`] elements.
+    /// [`Mesh::MAX_DEPTH`] splits of a triangle or [`Mesh::MAX_ELEMENTS`] elements.
     pub fn new(scene: impl Into<Arc<Scene>>, element_size: f64) -> Result<Mesh, Error> {
         let scene = scene.into();
         let place = || format!("element size {element_size}");
@@ -91,14 +102,16 @@ impl Mesh {
             .collect();
         let wanted: f64 = depths.iter().map(|&d| 4f64.powi(d as i32)).sum();
         let deepest = depths.iter().copied().max().unwrap_or(0);
-        if deepest > MAX_DEPTH || wanted > MAX_ELEMENTS as f64 {
+        if deepest > Mesh::MAX_DEPTH || wanted > Mesh::MAX_ELEMENTS as f64 {
             let size = triangles.map(longest).fold(0.0, f64::max) / 64.0;
             return Err(Error::new(
                 ErrorKind::Setting,
                 place(),
                 format!("asks for {wanted:.3e} elements and {deepest} splits of a triangle"),
                 format!(
-                    "at most {MAX_ELEMENTS} and {MAX_DEPTH}; {size:.3} would split 6 times at most"
+                    "at most {} and {}; {size:.3} would split 6 times at most",
+                    Mesh::MAX_ELEMENTS,
+                    Mesh::MAX_DEPTH
                 ),
             ));
         }
@@ -130,14 +143,16 @@ impl Mesh {
     /// The same scene with each of `elements` split into four more.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when one of them is [`MAX_DEPTH`] levels deep, or when there would be
-    /// more than [`MAX_ELEMENTS`].
+    /// [`ErrorKind::Setting`] when one of them is [`Mesh::MAX_DEPTH`] levels deep, or when there would be
+    /// more than [`Mesh::MAX_ELEMENTS`].
     pub fn split(&self, elements: &[usize]) -> Result<Mesh, Error> {
         let wanted = self.element_count() + 3 * elements.len();
-        let deep = |&&e: &&usize| self.cell(self.element(e)).level >= MAX_DEPTH;
-        if wanted > MAX_ELEMENTS || elements.iter().any(|e| deep(&e)) {
-            let found = format!("{wanted} elements, or one with {MAX_DEPTH} levels above it");
-            let remedy = format!("at most {MAX_ELEMENTS} elements and {MAX_DEPTH} splits");
+        let deep = |&&e: &&usize| self.cell(self.element(e)).level >= Mesh::MAX_DEPTH;
+        if wanted > Mesh::MAX_ELEMENTS || elements.iter().any(|e| deep(&e)) {
+            let found =
+                format!("{wanted} elements, or one with {} levels above it", Mesh::MAX_DEPTH);
+            let remedy =
+                format!("at most {} elements and {} splits", Mesh::MAX_ELEMENTS, Mesh::MAX_DEPTH);
             return Err(Error::new(ErrorKind::Setting, "mesh to be split", found, remedy));
         }
         let inner = |n: &&Node| n.children != LEAF;
@@ -278,6 +293,17 @@ impl Mesh {
     pub fn area(&self, node: NodeId) -> f64 {
         let n = self.node(node);
         self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
+    }
+
+    /// Area of all elements, length unit squared.
+    pub(crate) fn total_area(&self) -> f64 {
+        self.elements.iter().map(|&node| self.area(node)).sum()
+    }
+
+    /// Mean reflectance by area, per channel.
+    pub(crate) fn mean_reflectance(&self) -> Rgb {
+        let reflecting = |&node: &NodeId| self.material(node).reflectance * self.area(node);
+        self.elements.iter().map(reflecting).sum::<Rgb>() / self.total_area()
     }
 
     /// Unit normal of `node`, on its front.

@@ -1,6 +1,34 @@
 //! How much to do between two calls of a progress callback, and where the time went.
 
+use std::fmt;
 use std::time::{Duration, Instant};
+
+/// Why a solve or a gather stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// What is left is as small as was asked for: the unshot share, or the error.
+    Converged,
+    /// The number of shots asked for is done.
+    Shots,
+    /// The number of steps asked for is done: bounces, sweeps or products.
+    Steps,
+    /// There are as many elements as there may be.
+    Elements,
+    /// The progress callback said so; the solution is what was reached.
+    Cancelled,
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            StopReason::Converged => "converged",
+            StopReason::Shots => "shots",
+            StopReason::Steps => "steps",
+            StopReason::Elements => "elements",
+            StopReason::Cancelled => "cancelled",
+        })
+    }
+}
 
 /// As much at once as takes about this long: progress is told several times a second.
 const PACE: Duration = Duration::from_millis(250);

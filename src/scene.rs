@@ -10,9 +10,6 @@ pub use crate::geometry::aabb::Aabb;
 /// One value per colour channel (r, g, b), linear; the unit is said where it is used.
 pub type Rgb = DVec3;
 
-/// Reflectance of faces that name no material.
-pub const DEFAULT_REFLECTANCE: f64 = 0.5;
-
 /// How the front of a face reflects and emits. Backs only block light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
@@ -33,7 +30,7 @@ pub struct Triangle {
     pub group: u32,
     /// Index into the materials.
     pub material: u32,
-    /// Smoothing group: says with angles where a surface has creases ([`crate::CREASE_DEGREES`]).
+    /// Smoothing group: says with angles where a surface has creases ([`crate::Mesh::CREASE_DEGREES`]).
     /// `Some(0)` is in none; `None` means that nothing is known.
     pub smoothing: Option<u32>,
 }
@@ -250,6 +247,9 @@ impl Scene {
 }
 
 impl Material {
+    /// Reflectance ρ, in every channel, of faces that name no material.
+    pub const DEFAULT_REFLECTANCE: f64 = 0.5;
+
     /// A surface that reflects `reflectance` in every channel and emits nothing.
     pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
         Material { name: name.into(), reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO }

@@ -14,10 +14,10 @@ mod session;
 mod settings;
 mod shooting;
 
-use std::fmt;
 use std::time::Duration;
 
 use crate::error::{Error, ErrorKind};
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 pub use ledger::Ledger;
 pub use method::Method;
@@ -42,33 +42,6 @@ pub struct Solution {
     pub rows_made: u64,
     /// Why the solver stopped.
     pub stop: StopReason,
-}
-
-/// Why a solver stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopReason {
-    /// The unshot share is as low as was asked for.
-    Converged,
-    /// The number of shots asked for is done.
-    Shots,
-    /// The number of steps asked for is done: bounces, sweeps or products.
-    Steps,
-    /// There are as many elements as there may be.
-    Elements,
-    /// The progress callback said so; the solution is what was reached.
-    Cancelled,
-}
-
-impl fmt::Display for StopReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            StopReason::Converged => "converged",
-            StopReason::Shots => "shots",
-            StopReason::Steps => "steps",
-            StopReason::Elements => "elements",
-            StopReason::Cancelled => "cancelled",
-        })
-    }
 }
 
 /// How far a solver is, told after every shot or row.

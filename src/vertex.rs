@@ -21,8 +21,8 @@ use keys::Vertices;
 /// there.
 ///
 /// A smooth surface is a set of triangles of one group and one material that meet in no crease:
-/// at angles up to [`crate::CREASE_DEGREES`] in one smoothing group, else up to
-/// [`crate::COPLANAR_DEGREES`]. Where neighbouring elements differ in size, the larger one is
+/// at angles up to [`Mesh::CREASE_DEGREES`] in one smoothing group, else up to
+/// [`Mesh::COPLANAR_DEGREES`]. Where neighbouring elements differ in size, the larger one is
 /// fanned around its centroid over the vertices on its sides, across creases too: no cracks, no
 /// T-vertices, and where the scene is watertight so is the mesh, position by position.
 #[derive(Clone, Debug, Default)]
@@ -215,14 +215,15 @@ mod tests {
 
     #[test]
     fn a_fold_is_shared_below_the_crease_angle_and_cut_above() {
-        for (degrees, vertices) in [(CREASE_DEGREES - 1.0, 4), (CREASE_DEGREES + 1.0, 6)] {
+        for (degrees, vertices) in
+            [(Mesh::CREASE_DEGREES - 1.0, 4), (Mesh::CREASE_DEGREES + 1.0, 6)]
+        {
             let a = f64::to_radians(degrees);
             let points = [[0., 0., 0.], [0., 1., 0.], [-1., 0., 0.], [a.cos(), 0., a.sin()]];
             let m = mesh(&points, &[([0, 1, 2], 0, 0), ([1, 0, 3], 0, 0)], 9.0);
             assert_eq!(VertexMesh::new(&m, &[Rgb::ONE; 2]).positions.len(), vertices);
         }
     }
-    use crate::mesh::CREASE_DEGREES;
 
     #[test]
     fn unequal_neighbours_leave_no_crack() {

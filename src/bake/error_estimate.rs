@@ -13,6 +13,7 @@ use crate::scene::Rgb;
 use crate::solver::Ledger;
 use crate::vertex::gather_points::{SurfaceOffset, is_covered};
 use crate::vertex::gathering::GatheredMesh;
+use crate::visibility::buried;
 
 /// An estimate of the error of vertex radiosity: root mean square over the area, as a share of the
 /// radiosity. The squares of the parts add up to that of the whole.
@@ -56,9 +57,6 @@ pub(crate) struct ErrorEstimator<'a> {
 /// A place that is dim or behind something, and sees what is nearer than this share of the scene's
 /// diagonal, lies in a gap that nobody looks into. It is not judged.
 const GAP: f64 = 0.1;
-
-/// Behind something are places that see more than this share of backs.
-const BEHIND: f64 = 0.5;
 
 /// Errors have heavier tails than a normal distribution of the same spread: so much wider are those
 /// of vertices given, that one in twenty is off by more than twice as much.
@@ -128,7 +126,7 @@ impl ErrorEstimator<'_> {
             let [a, b, c] = looks[k].map(|g| s.emitted + s.reflectance * g.irradiance);
             let found = looks[k][0];
             let truth = (a + b) / 2.0;
-            let hidden = truth.length() < dim || found.backface > BEHIND;
+            let hidden = truth.length() < dim || found.backface > buried::HIDDEN_SAMPLE;
             if hidden && found.inverse_distance * gap > 1.0 {
                 continue;
             }
@@ -154,7 +152,7 @@ impl ErrorEstimator<'_> {
         let mesh = all - sampling;
         let drift: Vec<DVec3> = if own { off.iter().map(|&d| -d).collect() } else { settling };
         let bias = drift.iter().sum::<DVec3>() / used;
-        let reflectance = self.mean_reflectance();
+        let reflectance = self.light.mesh.mean_reflectance().max_element();
         let tail = bias.length() / (1.0 - reflectance);
         let settling = if own {
             (tail * reflectance).powi(2)
@@ -231,18 +229,6 @@ impl ErrorEstimator<'_> {
             }
         };
         AreaSampler::new(surface.faces.iter().map(area)).spread(count, 0.5).map(sample).collect()
-    }
-
-    /// Mean reflectance over the area: the largest of the channels.
-    fn mean_reflectance(&self) -> f64 {
-        let mesh = &self.light.mesh;
-        let (mut sum, mut area) = (Rgb::ZERO, 0.0);
-        for e in 0..mesh.element_count() {
-            let node = mesh.element(e);
-            sum += mesh.material(node).reflectance * mesh.area(node);
-            area += mesh.area(node);
-        }
-        (sum / area).max_element()
     }
 
     /// Root mean square of the ambient term over the radiosity, or `dim` where that is more, and the

@@ -12,8 +12,8 @@ use crate::bake::settings::BakeSettings;
 use crate::bake::shooting_phase::ShootingPhase;
 use crate::error::Error;
 use crate::mesh::Mesh;
+use crate::progress::StopReason;
 use crate::scene::Scene;
-use crate::solver::StopReason;
 use crate::vertex::adaptive::AdaptiveGather;
 use crate::vertex::gathering::GatheredMesh;
 

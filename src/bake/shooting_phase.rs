@@ -13,9 +13,10 @@ use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::form_factor::viewpoints::AdaptiveViewpoints;
 use crate::mesh::Mesh;
+use crate::progress::StopReason;
 use crate::progress::{Timings, lap};
 use crate::scene::Scene;
-use crate::solver::{Progress, Solution, StopReason};
+use crate::solver::{Progress, Solution};
 use crate::vertex::gathering::GatheredMesh;
 
 /// Light that was shot.

@@ -11,7 +11,7 @@ use super::mtl::Library;
 use super::polygon::{MOST_CORNERS_TO_CLIP, triangulate};
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted};
-use crate::scene::{DEFAULT_REFLECTANCE, Material, Scene, Triangle};
+use crate::scene::{Material, Scene, Triangle};
 
 /// Group of the faces that come before any `o` or `g` line.
 const DEFAULT_GROUP: &str = "default";
@@ -26,13 +26,13 @@ const DEFAULT_GROUP: &str = "default";
 ///
 /// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
 /// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced Visualizer 3.0,
-/// "Grouping"). In one group surfaces have creases at angles above [`crate::CREASE_DEGREES`], else
-/// above [`crate::COPLANAR_DEGREES`]. Faces before the first `s`, and after one that says nothing
+/// "Grouping"). In one group surfaces have creases at angles above [`crate::Mesh::CREASE_DEGREES`], else
+/// above [`crate::Mesh::COPLANAR_DEGREES`]. Faces before the first `s`, and after one that says nothing
 /// (`s` or `s on`, as some programs write), are as if in a group of their own.
 ///
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
-/// material reflect [`DEFAULT_REFLECTANCE`].
+/// material reflect [`Material::DEFAULT_REFLECTANCE`].
 ///
 /// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below:
 /// absolute names and `..` are refused, so that a scene cannot have other files of the machine (or
@@ -263,7 +263,7 @@ impl Scan {
         warnings.extend(about);
         let default = materials.len() as u32;
         if self.faces.iter().any(|f| f.material.is_none()) {
-            materials.push(Material::grey("(default)", DEFAULT_REFLECTANCE));
+            materials.push(Material::grey("(default)", Material::DEFAULT_REFLECTANCE));
         }
         let triangles = self.triangles(path, default)?;
         let scene = Scene::new(self.positions, triangles, self.groups, materials);
@@ -307,13 +307,14 @@ impl Scan {
     /// What was replaced by a default or passed over in the OBJ file.
     fn warnings(&self) -> Vec<String> {
         let mut warnings = vec![];
+        let default = Material::DEFAULT_REFLECTANCE;
         match (self.faces.iter().filter(|f| f.material.is_none()).count(), self.faces.len()) {
             (0, _) => {}
             (bare, all) if bare == all => warnings.push(format!(
-                "no face names a material: all {all} reflect {DEFAULT_REFLECTANCE} and emit nothing"
+                "no face names a material: all {all} reflect {default} and emit nothing"
             )),
             (bare, _) => warnings.push(format!(
-                "{bare} faces before the first `usemtl` reflect {DEFAULT_REFLECTANCE} and emit nothing"
+                "{bare} faces before the first `usemtl` reflect {default} and emit nothing"
             )),
         }
         if self.without_group > 0 {

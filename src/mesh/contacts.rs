@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::box_overlap::overlaps;
-use super::{Cell, MAX_DEPTH, Mesh, SurfaceTopology};
+use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
@@ -16,8 +16,8 @@ const TOUCH: f64 = 0.15;
 const INSIDE: f64 = 0.02;
 
 /// Of a cell's size: lines that part some element in the cell come this far into it, since elements
-/// are at most [`MAX_DEPTH`] levels smaller.
-const LEAST: f64 = INSIDE / (1u32 << MAX_DEPTH) as f64;
+/// are at most [`Mesh::MAX_DEPTH`] levels smaller.
+const LEAST: f64 = INSIDE / (1u32 << Mesh::MAX_DEPTH) as f64;
 
 /// Cosine of the angle between triangles in one plane, at least: 1e-5 radians.
 const FLAT: f64 = 1.0 - 5e-11;
@@ -37,7 +37,7 @@ impl Mesh {
     /// (the discontinuities of order zero of Heckbert, "Discontinuity meshing for radiosity", 1992).
     ///
     /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
-    /// would go beyond [`MAX_DEPTH`] are left out.
+    /// would go beyond [`Mesh::MAX_DEPTH`] are left out.
     ///
     /// Where more than 256 triangles have more than 256 others about them each, only the largest 256
     /// touch the rest of these: thousands of faces in one place are not worth the time.
@@ -82,7 +82,7 @@ impl Mesh {
         let base = self.level_at(t, cell);
         if cell.level >= base {
             let reach = self.reach(t, cell.level);
-            let split = cell.level < (base + levels).min(MAX_DEPTH)
+            let split = cell.level < (base + levels).min(Mesh::MAX_DEPTH)
                 && lines.iter().any(|l| l.gap <= reach && parts(l, cell, INSIDE));
             if !split {
                 return;

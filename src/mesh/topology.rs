@@ -4,17 +4,8 @@ use rustc_hash::FxHashMap;
 
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
+use crate::mesh::Mesh;
 use crate::scene::{Scene, Triangle};
-
-/// Neighbours of one smoothing group meet in a crease if their normals differ by more than this
-/// many degrees: radiosity jumps there, whatever shading is wanted. The same holds for neighbours
-/// of which no smoothing group is known.
-pub const CREASE_DEGREES: f64 = 40.0;
-
-/// All other neighbours, in two smoothing groups or in none, meet in a crease if their normals
-/// differ by more than this many degrees: triangles of a polygon that is flat but for rounding do
-/// not.
-pub const COPLANAR_DEGREES: f64 = 1.0;
 
 /// Identities shared across a smooth surface: one object or group, one material, no crease.
 #[derive(Clone)]
@@ -43,13 +34,13 @@ impl SurfaceTopology {
         let together =
             |a: &Triangle, b: &Triangle| a.smoothing == b.smoothing && a.smoothing != Some(0);
         SurfaceTopology::up_to(scene, |a, b| {
-            if together(a, b) { CREASE_DEGREES } else { COPLANAR_DEGREES }
+            if together(a, b) { Mesh::CREASE_DEGREES } else { Mesh::COPLANAR_DEGREES }
         })
     }
 
     /// What would go on smoothly if nothing were known of smoothing groups.
     pub fn by_angle(scene: &Scene) -> SurfaceTopology {
-        SurfaceTopology::up_to(scene, |_, _| CREASE_DEGREES)
+        SurfaceTopology::up_to(scene, |_, _| Mesh::CREASE_DEGREES)
     }
 
     /// What goes on smoothly where two neighbours' normals may differ by as many degrees as `most`
@@ -142,11 +133,11 @@ mod tests {
     fn smoothing_groups_part_what_is_not_flat_and_join_what_is_not_sharp() {
         for (degrees, same, others) in [
             (0.0, true, true),
-            (COPLANAR_DEGREES - 0.1, true, true),
-            (COPLANAR_DEGREES + 0.1, true, false),
+            (Mesh::COPLANAR_DEGREES - 0.1, true, true),
+            (Mesh::COPLANAR_DEGREES + 0.1, true, false),
             (20.0, true, false),
-            (CREASE_DEGREES - 0.1, true, false),
-            (CREASE_DEGREES + 0.1, false, false),
+            (Mesh::CREASE_DEGREES - 0.1, true, false),
+            (Mesh::CREASE_DEGREES + 0.1, false, false),
             (60.0, false, false),
         ] {
             for (pairs, joined) in [(&SAME[..], same), (&NOT_THE_SAME[..], others)] {

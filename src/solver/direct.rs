@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::StopReason;
 use super::session::StepContext;
 use crate::error::Error;
 use crate::form_factor::Row;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// Pivot rows that are taken at once, as many as a cache holds beside the row that they are taken

@@ -11,12 +11,12 @@
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
-use super::StopReason;
 use super::flux_state::{FluxState, Transfer, send};
 use super::ledger::largest_share;
 use super::row_cache::RowCache;
 use super::session::StepContext;
 use crate::error::Error;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// Cycles of products, each a step, until done.

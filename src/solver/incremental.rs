@@ -15,18 +15,19 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::Progress;
 use super::flux_state::{Flux, FluxState};
 use super::ledger::largest_share;
-use super::patch_cut::BLIND;
 use super::session::{MethodState, SolveSession};
-use super::{Progress, StopReason};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::closed_form::point_to_polygon;
 use crate::form_factor::{FormFactors, Row};
 use crate::geometry::aabb::Aabb;
 use crate::mesh::{Mesh, NodeId};
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::visibility::{buried, offset};
 
 impl<'m> SolveSession<'m> {
     /// Goes over to `mesh`, in which materials have changed: exitances, reflectances, or both. Nothing
@@ -166,8 +167,8 @@ impl<'m> SolveSession<'m> {
             let sent = rows.trails[&patch].sent;
             state.pass_on(-sent, &old);
             rows.forget(patch);
-            let blinded =
-                Row::form_factor(new.backface) > BLIND && Row::form_factor(old.backface) <= BLIND;
+            let blinded = Row::form_factor(new.backface) > buried::VIEWPOINT
+                && Row::form_factor(old.backface) <= buried::VIEWPOINT;
             let shooter = match course {
                 MethodState::Shooting(shooters) if blinded => shooters.blinded(patch),
                 _ => None,
@@ -309,13 +310,10 @@ impl GeometryDelta {
         let corners = bounds.corners().map(|corner| middle + (corner - middle) / 2.0);
         let places = || corners.iter().chain([&middle]);
         let hides = |hit: &Hit| !self.triangles[hit.triangle];
-        let open = |p: &&DVec3| !rays.occluded(eye, **p - eye, GRAZE..1.0, hides);
+        let open = |p: &&DVec3| !rays.occluded(eye, **p - eye, offset::SEGMENT_START..1.0, hides);
         (places().filter(open).count() + 1) as f64 / (places().count() + 1) as f64
     }
 }
-
-/// RayScene begin this far on their way.
-const GRAZE: f64 = 1e-6;
 
 /// The form factor to `bounds` from a point with that `normal`, as if nothing were in between.
 fn form_factor_to(bounds: &Aabb, eye: DVec3, normal: DVec3) -> f64 {

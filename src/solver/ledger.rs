@@ -55,14 +55,8 @@ impl Ledger {
 
     /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell evenly.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
-        let (mut area, mut reflects) = (0.0, Rgb::ZERO);
-        for e in 0..mesh.element_count() {
-            let node = mesh.element(e);
-            area += mesh.area(node);
-            reflects += mesh.material(node).reflectance * mesh.area(node);
-        }
-        let lost = (Rgb::ONE - reflects / area).max(Rgb::splat(f64::EPSILON));
-        (self.unshot - self.overshot) / area / lost
+        let lost = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
+        (self.unshot - self.overshot) / mesh.total_area() / lost
     }
 
     /// Share of the emitted flux that is unshot or overshot: the worst channel. 0 when nothing is

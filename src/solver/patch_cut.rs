@@ -20,6 +20,7 @@ use crate::form_factor::Row;
 use crate::geometry::rounding::tie_stable_key;
 use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
+use crate::visibility::buried;
 
 /// The shooters. Together they cover every element once, and they only ever get smaller.
 #[derive(Clone)]
@@ -234,7 +235,10 @@ impl<'m> PatchCut<'m> {
         let shooter = &mut self.cut[shot.shooter];
         shooter.near = near;
         let alone = all(&shooter.elements).nth(1).is_none();
-        if Row::form_factor(row.backface) > BLIND && shooter.rejected < ATTEMPTS && !alone {
+        if Row::form_factor(row.backface) > buried::VIEWPOINT
+            && shooter.rejected < ATTEMPTS
+            && !alone
+        {
             shooter.rejected += 1;
             shooter.patch = None;
             self.blind.insert(shot.patch);
@@ -385,9 +389,7 @@ const FEW: usize = 1024;
 /// A batch ends where the flux is below this share of its brightest patch.
 const BATCH_FALL: f64 = 0.25;
 
-/// Who sees more than this share of backs stands in or under something, and nobody shoots from there
-/// if another place can be found in so many attempts.
-pub(super) const BLIND: f64 = 0.5;
+/// Viewpoints of a patch that are tried until one does not see too many backs.
 const ATTEMPTS: u32 = 4;
 
 /// An element is lit from this share of its shooter's mean radiosity.

@@ -8,10 +8,10 @@
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
-use super::StopReason;
 use super::flux_state::FluxState;
 use super::session::StepContext;
 use crate::error::Error;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// Sweeps until done; a step is a sweep. After k sweeps of Jacobi what leaves is e + Me + … + Mᵏe.

@@ -12,10 +12,11 @@ use super::patch_cut::PatchCut;
 use super::relaxation::Relaxation;
 use super::row_cache::RowCache;
 use super::shooting::shoot_batch;
-use super::{Ledger, Method, Progress, Solution, Solver, StopReason};
+use super::{Ledger, Method, Progress, Solution, Solver};
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::{Mesh, NodeId};
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// A solve that goes on by batches of rows: [`Solver::begin`] makes it.

@@ -6,7 +6,6 @@ use super::{Method, Progress, Solution, SolveSession};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
-use crate::scene::Rgb;
 
 /// How light is spread, and when that stops. [`Solver::default`] shoots to 0.1 % unshot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,10 +81,7 @@ impl Solver {
     /// 3. else shooting.
     pub fn for_mesh(mesh: &Mesh) -> Solver {
         let [shooting, _, _, _, gmres, direct] = Method::ALL.map(Solver::new);
-        let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let area: f64 = elements.clone().map(|n| mesh.area(n)).sum();
-        let reflects: Rgb = elements.map(|n| mesh.material(n).reflectance * mesh.area(n)).sum();
-        let reflectance = (reflects / area).max_element();
+        let reflectance = mesh.mean_reflectance().max_element();
         let count = mesh.element_count();
         let all_fit = count.saturating_mul(count).saturating_mul(8) <= gmres.row_memory;
         let bright = if all_fit {

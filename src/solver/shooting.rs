@@ -4,12 +4,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::StopReason;
 use super::flux_state::FluxState;
 use super::patch_cut::{PatchCut, Shot};
 use super::session::StepContext;
 use crate::error::Error;
 use crate::mesh::NodeId;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order

@@ -13,10 +13,10 @@ use super::hanging_nodes::HangingNodes;
 use super::keys::Vertices;
 use crate::error::Error;
 use crate::gather::{Gather, GatherPoint};
-use crate::mesh::{MAX_DEPTH, Mesh, SurfaceTopology};
+use crate::mesh::{Mesh, SurfaceTopology};
 use crate::progress::BatchSizer;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
-use crate::solver::StopReason;
 
 #[derive(Clone)]
 pub(crate) struct AdaptiveGather<'a> {
@@ -264,7 +264,8 @@ impl<'a> AdaptiveGather<'a> {
     /// Whether element `e` can be split at all.
     pub(super) fn splits(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
-        self.mesh.cell(node).level < MAX_DEPTH && self.mesh.material(node).reflectance != Rgb::ZERO
+        self.mesh.cell(node).level < Mesh::MAX_DEPTH
+            && self.mesh.material(node).reflectance != Rgb::ZERO
     }
 
     /// Radiosity that is as good as none, W/m².

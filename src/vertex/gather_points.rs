@@ -6,6 +6,7 @@ use super::keys::Vertices;
 use crate::gather::{GatherPoint, IrradianceSample};
 use crate::mesh::Mesh;
 use crate::scene::{Rgb, Scene};
+use crate::visibility::{buried, offset};
 
 /// The elements around every vertex, and what they say of it.
 pub(super) struct VertexGatherPoints<'a> {
@@ -30,21 +31,8 @@ pub(crate) struct SurfaceOffset {
 /// meet, whose two sides see different things.
 const INWARDS: f64 = 0.02;
 
-/// How far above its surface a place is, in units of the smallest element's size.
-const LIFT: f64 = 1e-4;
-
-/// And in steps of the scene's coordinates, at least: a quarter of the way is out of all doubt, and so
-/// are four times the 2⁻⁴⁸ of the scene's size that a device tells apart.
-const GRAINS: f64 = 1024.0;
-
 /// Elements around a vertex that it tries to stand in, at most.
 const ATTEMPTS: usize = 6;
-
-/// A place that sees more than this share of backs is under something, if that is near or dark.
-const UNDER: f64 = 0.9;
-
-/// A place that sees more than this share of backs is inside: seams let a ray or two through.
-const INSIDE: f64 = 0.995;
 
 impl<'a> VertexGatherPoints<'a> {
     pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> VertexGatherPoints<'a> {
@@ -106,14 +94,18 @@ impl<'a> VertexGatherPoints<'a> {
 
 impl SurfaceOffset {
     pub fn new(scene: &Scene) -> SurfaceOffset {
-        SurfaceOffset { least: GRAINS * scene.coordinate_ulp() }
+        SurfaceOffset { least: offset::MIN_LIFT_ULPS * scene.coordinate_ulp() }
     }
 
     /// The place above `position`, where elements are of `size`: the square root of their area, scene
     /// unit.
     pub fn place(&self, position: DVec3, normal: DVec3, size: f64) -> GatherPoint {
-        let lift = (LIFT * size).max(self.least);
-        GatherPoint { position: position + normal * lift, normal, near: lift / 4.0 }
+        let lift = (offset::SURFACE_LIFT * size).max(self.least);
+        GatherPoint {
+            position: position + normal * lift,
+            normal,
+            near: lift * offset::NEAR_OF_LIFT,
+        }
     }
 }
 
@@ -121,5 +113,6 @@ impl SurfaceOffset {
 /// everywhere, nearer than the elements are large (the square root of their area is `size`), or
 /// nothing else at all.
 pub(crate) fn is_covered(found: &IrradianceSample, size: f64) -> bool {
-    found.backface > UNDER && (found.inverse_distance * size > 1.0 || found.backface > INSIDE)
+    found.backface > buried::BURIED
+        && (found.inverse_distance * size > 1.0 || found.backface > buried::INSIDE)
 }

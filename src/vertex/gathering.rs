@@ -6,8 +6,8 @@ use super::adaptive::AdaptiveGather;
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, RadiosityField};
 use crate::mesh::Mesh;
+use crate::progress::StopReason;
 use crate::scene::Rgb;
-use crate::solver::StopReason;
 use std::ops::ControlFlow;
 
 /// Settings of gathering at vertices.

@@ -3,11 +3,11 @@
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use crate::mesh::{Cell, MAX_DEPTH, Mesh, Side, SurfaceTopology};
+use crate::mesh::{Cell, Mesh, Side, SurfaceTopology};
 use crate::scene::Scene;
 
 /// Steps along a triangle's side on the lattice that all depths share.
-const FINEST: u32 = 1 << MAX_DEPTH;
+const FINEST: u32 = 1 << Mesh::MAX_DEPTH;
 
 /// What makes a vertex: the same key, the same vertex, in all meshes of one scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -7,6 +7,7 @@ use crate::sampling::hemisphere::HemisphereSamples;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::visibility::{buried, offset};
 
 /// Places on the fronts of faces that look around, evenly over the area, and rays of each.
 const PLACES: usize = 2048;
@@ -14,12 +15,6 @@ const RAYS: u32 = 32;
 
 /// Looks at a face or a group from which on there is something to be said of it.
 const FEWEST: u32 = 16;
-
-/// A place where more than this share of the rays meet backs is shut in.
-const SHUT: f64 = 0.75;
-
-/// RayScene start this far from their place, in units of the square root of its triangle's area.
-const START: f64 = 1e-6;
 
 impl Scene {
     /// Adds a warning that names the groups with faces that seem to be wound inside out: those that
@@ -83,7 +78,8 @@ fn looks(scene: &Scene) -> Vec<Tally> {
     let look = |point: SurfacePoint| -> Vec<Option<Hit>> {
         let (t, [u, v]) = (point.triangle, point.barycentric);
         let [a, b, c] = scene.corners(t);
-        let (eye, start) = (a + (b - a) * u + (c - a) * v, START * scene.area(t).sqrt());
+        let (eye, start) =
+            (a + (b - a) * u + (c - a) * v, offset::RAY_START * scene.area(t).sqrt());
         let directions = fan.directions(scene.normal(t), v);
         directions.map(|d| rays.closest_hit(eye, d, start, Some(t))).collect()
     };
@@ -91,7 +87,7 @@ fn looks(scene: &Scene) -> Vec<Tally> {
     let mut tallies = vec![Tally::default(); count];
     for hits in found {
         let backs = hits.iter().flatten().filter(|hit| !hit.front).count();
-        let shut = backs as f64 > SHUT * f64::from(RAYS);
+        let shut = backs as f64 > buried::ENCLOSED * f64::from(RAYS);
         for hit in hits.iter().flatten() {
             let tally = &mut tallies[hit.triangle];
             match (hit.front, shut) {

@@ -6,8 +6,8 @@ use crate::common::surface::assert_whole;
 use crate::common::{cube, quads};
 use glam::DVec3;
 use radiosity::{
-    ErrorKind, MAX_DEPTH, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason,
-    Triangle, VertexMesh,
+    ErrorKind, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason, Triangle,
+    VertexMesh,
 };
 use std::ops::ControlFlow;
 
@@ -101,10 +101,10 @@ fn what_is_split_takes_the_place_of_one_and_no_split_goes_too_deep() {
     assert_eq!(corners(&mesh, 8), corners(&split, 14));
     assert_eq!(mesh.split(&[]).unwrap().element_count(), mesh.element_count());
     let mut deep = Mesh::new(cube(&grey()), 9.0).unwrap();
-    for _ in 0..MAX_DEPTH {
+    for _ in 0..Mesh::MAX_DEPTH {
         deep = deep.split(&[0]).unwrap();
     }
-    assert_eq!((level(&deep, 0), level(&deep, 4)), (MAX_DEPTH, MAX_DEPTH - 1));
+    assert_eq!((level(&deep, 0), level(&deep, 4)), (Mesh::MAX_DEPTH, Mesh::MAX_DEPTH - 1));
     assert_eq!(deep.split(&[0]).unwrap_err().kind(), ErrorKind::Setting);
     assert!(deep.split(&[4]).is_ok());
 }

@@ -14,6 +14,7 @@ use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
 use crate::scene::Scene;
+use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
@@ -188,7 +189,8 @@ impl RayGather {
             // What is met first may be another part of the light, which is as good.
             let near = place.near / r2.sqrt();
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
-            let blocked = self.rays.occluded(place.position, to, near..1.0 - 1e-9, other);
+            let blocked =
+                self.rays.occluded(place.position, to, near..1.0 - offset::SEGMENT_END, other);
             out.seen += if blocked { 0.0 } else { factor };
         }
         out

@@ -8,6 +8,7 @@ use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
 use crate::sampling::hash::low_bias32;
 use crate::sampling::hemisphere::HemisphereSamples;
+use crate::visibility::offset;
 use crate::visibility::ray_scene::RayScene;
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid.
@@ -51,7 +52,7 @@ impl RayRows {
 
     fn row(&self, mesh: &Mesh, patch: NodeId, fan: &HemisphereSamples, count: u32) -> Row {
         let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
-        let start = START * mesh.area(patch).sqrt();
+        let start = offset::RAY_START * mesh.area(patch).sqrt();
         let turn = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
         let see = |direction| match self.rays.closest_hit(eye, direction, start, Some(own)) {
             None => OPEN,
@@ -103,6 +104,3 @@ impl FormFactors for RayRows {
 
 const OPEN: u32 = u32::MAX;
 const BACK: u32 = u32::MAX - 1;
-
-/// RayScene start this far from the patch, in units of the square root of its area.
-const START: f64 = 1e-6;

@@ -21,6 +21,7 @@ use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::{Mesh, NodeId};
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
+use crate::visibility::offset;
 
 /// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
 ///
@@ -173,7 +174,7 @@ impl HemicubeRows {
     /// The faces of the hemicube over `patch`, turned by `angle` (radians).
     fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), angle);
-        let near = self.local.length(mesh.area(patch).sqrt() * NEAR);
+        let near = self.local.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
         let centre = mesh.centroid(patch);
         let [eye, eye_low] = self.local.parts(centre);
         let own_triangle = self.chunks.places[mesh.triangle(patch)];
@@ -260,9 +261,6 @@ impl FormFactors for HemicubeRows {
         format!("{rotations} hemicubes of {resolution}, all from {full_share}")
     }
 }
-
-/// Near plane, in units of the square root of the patch's area.
-const NEAR: f64 = 1e-4;
 
 /// Turn of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours do
 /// not repeat one another's pixel pattern and every run turns alike.

@@ -1,0 +1,40 @@
+//! Offsets that keep rays and views from meeting the surface that they start from.
+//!
+//! A computed point lies off its surface by rounding, and neighbours of one plane lie off each
+//! other's planes. A ray therefore skips its first stretch, or its origin is lifted off the
+//! surface. Too small, and surfaces shade themselves; too large, and contact is lost.
+//!
+//! | constant | value | unit | used by | what bounds it |
+//! |---|---|---|---|---|
+//! | [`RAY_START`] | 1e-6 | √area of the patch or triangle | rays from points on surfaces | above the 64-bit rounding of scenes up to 1e9 patch sizes from the origin |
+//! | [`SEGMENT_START`] | 1e-6 | length of the segment | occlusion between two points, from its start | as above; no patch size is at hand |
+//! | [`SEGMENT_END`] | 1e-9 | length of the segment | occlusion between two points, at its end | the target itself must not count; rounding is 1e-15 |
+//! | [`NEAR_PLANE`] | 1e-4 | √area of the patch | hemicubes on a GPU | 32-bit coordinates; the patch's own triangle is skipped anyway |
+//! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element there | gather points, which skip no triangle | far below an element, far above what devices confuse |
+//! | [`MIN_LIFT_ULPS`] | 1024 | steps of the scene's coordinates | gather points of tiny elements | a quarter of it is 4 × the 2⁻⁴⁸ of a device's split floats |
+//! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather | rounding stays below the rest |
+//!
+//! The shares were chosen by hand within these bounds; no measurement was kept.
+
+/// Rays from a point on a surface start this far off, in units of the square root of the area of
+/// its patch or triangle.
+pub(crate) const RAY_START: f64 = 1e-6;
+
+/// Tests of occlusion between two points leave out this share of the way at the start.
+pub(crate) const SEGMENT_START: f64 = 1e-6;
+
+/// Tests of occlusion between two points leave out this share of the way at the end.
+pub(crate) const SEGMENT_END: f64 = 1e-9;
+
+/// Near plane of a hemicube, in units of the square root of its patch's area.
+pub(crate) const NEAR_PLANE: f64 = 1e-4;
+
+/// Height of a gather point above its surface, in units of the square root of the area of the
+/// smallest element there.
+pub(crate) const SURFACE_LIFT: f64 = 1e-4;
+
+/// Least height of a gather point, in steps between 64-bit coordinates of the scene.
+pub(crate) const MIN_LIFT_ULPS: f64 = 1024.0;
+
+/// A gather point sees nothing nearer than this share of its height.
+pub(crate) const NEAR_OF_LIFT: f64 = 0.25;
