@@ -1,3 +1,2 @@
-mod device_failures;
-mod gpu_gather;
-mod gpu_rows;
+mod cpu_gather;
+mod gpu;

@@ -1,2 +1,2 @@
-mod cornell_box;
+pub mod cornell_box;
 mod target;

@@ -2,7 +2,7 @@
 //! closed form.
 
 use crate::common::truth;
-use crate::common::{cornell_box, cube, quads};
+use crate::common::{cornell_box, cube, keep_going, quads};
 use radiosity::{
     Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material,
     RefinementSettings, Rgb, Scene, Solver, StopReason,
@@ -12,16 +12,12 @@ use std::time::Duration;
 
 const TRUTH: &str = include_str!("../data/cornell_box.truth.json");
 
-fn go(_: &BakeProgress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 fn cornell() -> Scene {
     cornell_box(f64::INFINITY).scene().clone()
 }
 
 fn dial(scene: Scene, error: f64) -> BakeResult {
-    BakeTarget::Error(error).bake(scene, &Backend::Cpu, go).unwrap()
+    BakeTarget::Error(error).bake(scene, &Backend::Cpu, keep_going).unwrap()
 }
 
 /// A closed room in which all is known: B = 1/(1 − ρ) everywhere.
@@ -83,7 +79,7 @@ fn light_that_was_not_shot_is_told_of() {
             settings.solve.solver = Solver { unshot, patch_tolerance: 0.0, ..Solver::default() };
             settings.solve.element_size = 0.5;
             settings.gather = None;
-            let baked = settings.bake(furnace(reflectance), &Backend::Cpu, go).unwrap();
+            let baked = settings.bake(furnace(reflectance), &Backend::Cpu, keep_going).unwrap();
             let (even, left) = (1.0 / (1.0 - reflectance), baked.solution.ledger.unshot_share());
             let mean = baked.solution.radiosity.iter().map(|b| b.x).sum::<f64>()
                 / baked.solution.radiosity.len() as f64;
@@ -110,7 +106,8 @@ fn what_is_set_by_hand_stays() {
             gather.refinement = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
         }
     };
-    let baked = BakeTarget::Error(0.01).bake_with(cornell(), &Backend::Cpu, adjust, go).unwrap();
+    let baked =
+        BakeTarget::Error(0.01).bake_with(cornell(), &Backend::Cpu, adjust, keep_going).unwrap();
     let mut want = BakeSettings::for_error(0.01, &cornell());
     adjust(&mut want);
     assert_eq!(baked.settings, want);
@@ -129,7 +126,7 @@ fn two_runs_give_the_same_bits() {
 #[test]
 fn a_time_is_kept_and_more_of_it_gains() {
     let bake = |seconds: f64| {
-        BakeTarget::seconds(seconds).unwrap().bake(cornell(), &Backend::Cpu, go).unwrap()
+        BakeTarget::seconds(seconds).unwrap().bake(cornell(), &Backend::Cpu, keep_going).unwrap()
     };
     // No time at all: what was reached, which is little, comes back at once.
     let none = bake(1e-9);
@@ -190,7 +187,7 @@ fn dark_and_black_scenes_are_exact() {
 #[test]
 fn errors_and_times_out_of_range_are_refused() {
     for error in [0.0, -0.1, 1.0, 7.0, f64::NAN, f64::INFINITY] {
-        let e = BakeTarget::Error(error).bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+        let e = BakeTarget::Error(error).bake(furnace(0.5), &Backend::Cpu, keep_going).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains("error"), "{e}");
     }
@@ -206,6 +203,7 @@ fn errors_and_times_out_of_range_are_refused() {
             gather.refinement.tolerance = 0.0;
         }
     };
-    let e = BakeTarget::Error(0.1).bake_with(furnace(0.5), &Backend::Cpu, bad, go).unwrap_err();
+    let e =
+        BakeTarget::Error(0.1).bake_with(furnace(0.5), &Backend::Cpu, bad, keep_going).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Setting);
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::common::quads;
+use crate::common::{keep_counting, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
@@ -40,8 +40,7 @@ const CAMERA: Camera = Camera {
 const SIZE: (u32, u32) = (48, 32);
 
 fn draw(light: &GatheredMesh, gather: &mut dyn Gather, samples: u32) -> RadianceImage {
-    let go = |_, _| ControlFlow::Continue(());
-    let image = CAMERA.gathered_image(light, gather, SIZE.0, SIZE.1, samples, go);
+    let image = CAMERA.gathered_image(light, gather, SIZE.0, SIZE.1, samples, keep_counting);
     image.unwrap().expect("nobody stopped it")
 }
 
@@ -189,8 +188,7 @@ fn bad_settings_are_refused() {
         (CAMERA, 8, 257),
         (Camera { target: CAMERA.eye, ..CAMERA }, 8, 1),
     ] {
-        let go = |_, _| ControlFlow::Continue(());
-        let image = camera.gathered_image(&light, &mut even, width, 8, samples, go);
+        let image = camera.gathered_image(&light, &mut even, width, 8, samples, keep_counting);
         assert_eq!(image.unwrap_err().kind(), ErrorKind::Setting);
     }
     assert_eq!(even.places, 0);

@@ -3,8 +3,7 @@
 use glam::{DQuat, DVec3};
 use radiosity::{Material, Rgb, Scene, Triangle};
 
-use crate::common::quads;
-use crate::common::walls::walls;
+use super::scenes::{block, quads, walls};
 
 /// Where a scene stands and how large it is. It stands askew, so that no wall is along an axis.
 #[derive(Clone, Copy, Debug)]
@@ -79,9 +78,8 @@ pub fn room(frame: Frame, first: f64, second: f64) -> Scene {
     all.push((lamp, grey(0.5, first)));
     let bracket = [[0.05, 0.7, 0.6], [0.05, 0.8, 0.6], [0.05, 0.8, 0.7], [0.05, 0.7, 0.7]];
     all.push((bracket, grey(0.2, second)));
-    // Turned inside out.
-    let sides = walls([0.2, 0.3, 0.01], [0.5, 0.6, 0.4]);
-    all.extend(sides.map(|[a, b, c, d]| ([d, c, b, a], grey(0.6, 0.0))));
+    let sides = block([0.2, 0.3, 0.01], [0.5, 0.6, 0.4]);
+    all.extend(sides.map(|side| (side, grey(0.6, 0.0))));
     frame.quads(&all)
 }
 

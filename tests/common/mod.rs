@@ -1,48 +1,32 @@
-//! What the integration tests share: scenes with known answers, and the device.
-#![allow(dead_code)]
+//! What the tests share: scenes with known answers, sources of rows, and the graphics device.
+#![allow(dead_code, unused_imports)] // each test program uses a part of it
 
 pub mod closed_forms;
+pub mod fakes;
 pub mod files;
 pub mod framed;
+pub mod scenes;
 pub mod surface;
 pub mod truth;
-pub mod walls;
 
-use glam::DVec3;
-use radiosity::{Gpu, Material, Mesh, Scene, Triangle};
+use std::ops::ControlFlow;
 
-/// The graphics device. Without one the test fails, unless RADIOSITY_NO_GPU is set: then it is
-/// skipped, and says so.
-pub fn gpu() -> Option<Gpu> {
-    if std::env::var_os("RADIOSITY_NO_GPU").is_some() {
-        eprintln!("skipped: RADIOSITY_NO_GPU is set");
-        return None;
-    }
-    Some(Gpu::new(None).expect("a graphics adapter; set RADIOSITY_NO_GPU to do without"))
+use radiosity::Gpu;
+
+pub use scenes::{cornell_box, cube, quads};
+
+/// The graphics device. Tests that need one fail where there is none, and are ignored where
+/// RADIOSITY_NO_GPU is set (see `build.rs`).
+pub fn gpu() -> Gpu {
+    Gpu::new(None).expect("a graphics adapter; RADIOSITY_NO_GPU=1 ignores tests that need one")
 }
 
-/// A scene of quadrilaterals, each a group of its own: corners counter-clockwise from the front.
-pub fn quads(quads: &[([[f64; 3]; 4], Material)]) -> Scene {
-    let (mut positions, mut triangles) = (vec![], vec![]);
-    for (k, (corners, _)) in (0u32..).zip(quads) {
-        positions.extend(corners.map(DVec3::from_array));
-        for corners in [[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]] {
-            triangles.push(Triangle { corners, group: k, material: k, smoothing: None });
-        }
-    }
-    let names = (0..quads.len()).map(|k| format!("q{k}")).collect();
-    let materials = quads.iter().map(|q| q.1.clone()).collect();
-    Scene::new(positions, triangles, names, materials).expect("a good scene")
+/// A progress callback that never stops the work.
+pub fn keep_going<T>(_: &T) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
-/// Unit cube seen from inside, walls x0, x1, y0, y1, z0, z1.
-pub fn cube(material: &Material) -> Scene {
-    let walls = walls::walls([0.0; 3], [1.0; 3]);
-    quads(&walls.map(|w| (w, material.clone())))
-}
-
-/// The Cornell box that ships with the crate, in elements of at most `size` millimetres.
-pub fn cornell_box(size: f64) -> Mesh {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    Mesh::new(radiosity::load_obj(path).expect("the scene loads"), size).expect("a good size")
+/// The same for callbacks that hear how much is done, of how much.
+pub fn keep_counting<N>(_: N, _: N) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }

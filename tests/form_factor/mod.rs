@@ -1,3 +1,5 @@
+mod batches;
 mod proximity;
-mod resolution_policy;
+pub mod resolution_policy;
+mod row_check;
 mod viewpoints;

@@ -1,52 +1,25 @@
 //! Effort follows the flux at stake: coarse rows for patches that shoot little.
 
-use crate::common::{cornell_box, gpu, quads};
+use crate::common::{cornell_box, keep_going, quads};
 use radiosity::{
-    AdaptiveViewpoints, Error, FormFactors, HemicubeRows, Material, Mesh, NodeId,
-    ProximityCorrection, RayRows, Rgb, Row, Solution, Solver,
+    AdaptiveViewpoints, Error, FormFactors, Material, Mesh, NodeId, ProximityCorrection, RayRows,
+    Rgb, Row, Solution, Solver,
 };
-use std::ops::ControlFlow;
 
 /// Shares of the emitted flux for which rows are made at full resolution, half and a quarter: a
 /// halving is enough for 2^2.5 = 5.7 times less light.
-const FULL: f64 = 0.1;
-const SHARES: [f64; 3] = [FULL, FULL / 6.0, FULL / 33.0];
+pub const FULL: f64 = 0.1;
 
-fn some(mesh: &Mesh) -> Vec<NodeId> {
+pub const SHARES: [f64; 3] = [FULL, FULL / 6.0, FULL / 33.0];
+
+pub fn some_elements(mesh: &Mesh) -> Vec<NodeId> {
     (0..20).map(|k| mesh.element(k * 97 % mesh.element_count())).collect()
-}
-
-#[test]
-fn rows_for_little_light_are_those_of_smaller_hemicubes() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = cornell_box(100.0);
-    let patches = some(&mesh);
-    let make = |n: u32| HemicubeRows::new(&gpu, &mesh, n).unwrap().with_full_share(FULL);
-    for (full, resolutions) in [(128, [128, 64, 32]), (36, [36, 18, 16]), (8, [8, 8, 8])] {
-        let mut maker = make(full);
-        // Back and forth, so that one resolution leaves nothing behind for another.
-        for k in [0, 1, 2, 1, 0, 2] {
-            let rows = maker.rows(&mesh, &patches, SHARES[k]).unwrap();
-            rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
-            let alone = make(resolutions[k]).rows(&mesh, &patches, 1.0).unwrap();
-            assert!(rows == alone, "{full}, halved {k} times: as of {}", resolutions[k]);
-        }
-        assert_eq!(maker.drawn(), 6 * patches.len() as u64);
-    }
-    let mut maker = make(128);
-    maker.rows(&mesh, &patches[..5], SHARES[1]).unwrap();
-    maker.rows(&mesh, &patches[..2], SHARES[2]).unwrap();
-    assert_eq!(maker.drawn_by_resolution(), [(128, 0), (64, 5), (32, 2)]);
-    let mut even = maker.with_full_share(0.0);
-    even.rows(&mesh, &patches[..3], 1e-9).unwrap();
-    assert_eq!(even.drawn_by_resolution(), [(128, 3), (64, 5), (32, 2)]);
-    assert_eq!(make(16).drawn_by_resolution(), [(16, 0)], "nothing smaller");
 }
 
 #[test]
 fn rows_for_little_light_have_fewer_rays() {
     let mesh = cornell_box(200.0);
-    let patches = some(&mesh);
+    let patches = some_elements(&mesh);
     let make = |n: u32| RayRows::new(&mesh, n).unwrap().with_full_share(FULL);
     for (full, counts) in [(8192, [8192, 2048, 512]), (600, [600, 256, 256]), (10, [10, 10, 10])] {
         let mut maker = make(full);
@@ -92,9 +65,7 @@ fn lamps() -> Mesh {
 fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
     let mesh = lamps();
     let mut told = Told::default();
-    Solver { unshot: 0.0, ..Default::default() }
-        .solve(&mesh, &mut told, |_| ControlFlow::Continue(()))
-        .unwrap();
+    Solver { unshot: 0.0, ..Default::default() }.solve(&mesh, &mut told, keep_going).unwrap();
     // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch is
     // three patches, or fewer where light falls to a quarter.
     let want = [(0.5, 3), (4.0 / 12.8, 1), (0.4 / 12.8, 2)];
@@ -117,11 +88,13 @@ fn repairs_pass_on_what_is_at_stake() {
 }
 
 /// A solution whose energy is accounted for and whose bits are those of a second run, and its rows.
-fn solve<M: FormFactors>(mesh: &Mesh, make: impl Fn() -> M) -> (Solution, ProximityCorrection<M>) {
+pub fn solve<M: FormFactors>(
+    mesh: &Mesh,
+    make: impl Fn() -> M,
+) -> (Solution, ProximityCorrection<M>) {
     let solve = || {
         let mut rows = ProximityCorrection::new(make(), mesh, 1.0);
-        let solution =
-            Solver::default().solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
+        let solution = Solver::default().solve(mesh, &mut rows, keep_going).unwrap();
         (solution, rows)
     };
     let ((one, rows), (again, _)) = (solve(), solve());
@@ -136,15 +109,4 @@ fn rows_of_several_counts_of_rays_keep_the_energy_and_the_bits() {
     let rays = || RayRows::new(&mesh, 4096).unwrap();
     let (some, all) = (solve(&mesh, rays).0, solve(&mesh, || rays().with_full_share(0.0)).0);
     assert!(some.radiosity != all.radiosity);
-}
-
-#[test]
-fn rows_of_several_resolutions_keep_the_energy_and_the_bits() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = cornell_box(60.0);
-    let (solution, rows) = solve(&mesh, || HemicubeRows::new(&gpu, &mesh, 64).unwrap());
-    let drawn = rows.inner().drawn_by_resolution();
-    println!("{drawn:?}");
-    assert!(drawn.iter().map(|d| d.0).eq([64, 32, 16]) && drawn.iter().all(|d| d.1 > 0));
-    assert_eq!(rows.inner().drawn(), solution.rows_made);
 }

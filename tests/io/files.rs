@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use crate::common::{cube, quads};
+use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::{
     Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Report, Rgb, Solver, VertexMesh,
@@ -95,9 +95,8 @@ fn a_camera_sees_what_stands_before_it() {
     let left = [[-1., -1., 0.], [0., -1., 0.], [0., 1., 0.], [-1., 1., 0.]];
     let right = [[0., -1., 0.], [1., -1., 0.], [1., 1., 0.], [0., 1., 0.]];
     let mesh = Mesh::new(quads(&[(left, glow), (right, Material::grey("d", 0.0))]), 9.0).unwrap();
-    let solution = Solver::default()
-        .solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), |_| ControlFlow::Continue(()))
-        .unwrap();
+    let solution =
+        Solver::default().solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), keep_going).unwrap();
     let surface = VertexMesh::new(&mesh, &solution.radiosity);
     let camera = Camera { eye: DVec3::new(0., 0., 2.), target: DVec3::ZERO, vertical_fov: 90.0 };
     // 8 pixels span 4 at distance 2: half a unit each. Radiance of the glow is 1.

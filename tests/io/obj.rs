@@ -1,8 +1,8 @@
 //! OBJ and MTL files, good and bad: what is taken, what is refused, and what the message names.
 
+use crate::common::keep_going;
 use std::f64::consts::PI;
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use radiosity::{
@@ -510,7 +510,7 @@ fn a_fold_of_two_smoothing_groups_is_a_crease() {
             &GatheredMesh::from_elements(&mesh, &light).unwrap(),
             &mesh,
             &mut rays,
-            |_| ControlFlow::Continue(()),
+            keep_going,
         );
         for surface in [VertexMesh::new(&mesh, &light), fine.unwrap().surface] {
             assert_eq!(surface.positions.len(), vertices, "{first}, {second}");

@@ -2,18 +2,14 @@
 //! term, which knows their areas. No GPU needed.
 
 use crate::common::closed_forms::exact;
+use crate::common::scenes::{grey, standing_block};
 use crate::common::surface::assert_whole;
-use crate::common::{cube, quads};
+use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::{
     ErrorKind, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason, Triangle,
     VertexMesh,
 };
-use std::ops::ControlFlow;
-
-fn grey() -> Material {
-    Material::grey("grey", 0.5)
-}
 
 /// Splits a pseudo-random quarter of the elements, `times` times.
 fn split_at_random(mut mesh: Mesh, times: u32) -> Mesh {
@@ -115,7 +111,7 @@ fn unequal_depths_shoot_as_well_as_equal_ones() {
     let uneven = |mesh: &Mesh| {
         let settings = Solver { unshot: 1e-6, ..Default::default() };
         let mut rows = RayRows::new(mesh, 1024).unwrap();
-        let s = settings.solve(mesh, &mut rows, |_| ControlFlow::Continue(())).unwrap();
+        let s = settings.solve(mesh, &mut rows, keep_going).unwrap();
         assert!(s.ledger.imbalance() <= 1e-9, "{}", s.ledger.imbalance());
         let mean = |elements: &mut dyn Iterator<Item = usize>| {
             let area = |e: usize| mesh.area(mesh.element(e));
@@ -146,13 +142,6 @@ fn ring(x0: f64, x1: f64, z: f64) -> [[f64; 3]; 4] {
     [[x0, x0, z], [x1, x0, z], [x1, x1, z], [x0, x1, z]]
 }
 
-/// The walls and the lid of a box over `ring`, fronts outwards.
-fn block(x0: f64, x1: f64, z: f64) -> Vec<[[f64; 3]; 4]> {
-    let (low, high) = (ring(x0, x1, 0.0), ring(x0, x1, z));
-    let wall = |k: usize| [low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]];
-    [0, 1, 2, 3].map(wall).into_iter().chain([high]).collect()
-}
-
 /// Points along a square's sides, `keep` away from its corners.
 fn along(ring: [[f64; 3]; 4], keep: f64) -> Vec<DVec3> {
     let corners = ring.map(DVec3::from_array);
@@ -173,7 +162,8 @@ fn floor_under(p: DVec3) -> usize {
 fn elements_are_split_where_a_box_stands_and_nowhere_else() {
     // Between the lattice lines of all levels here, multiples of 1/8.
     let (x0, x1) = (-0.71, 0.79);
-    let walls: Vec<_> = [FLOOR].into_iter().chain(block(x0, x1, 1.0)).collect();
+    let walls: Vec<_> =
+        [FLOOR].into_iter().chain(standing_block([x0, x1], [x0, x1], 0.0, 1.0)).collect();
     let scene = quads(&walls.into_iter().map(|w| (w, grey())).collect::<Vec<_>>());
     let base = Mesh::new(scene, 0.5 * 2f64.sqrt()).unwrap();
     assert!((0..128).all(|e| level(&base, e) == 3), "legs of ½ on the floor");
@@ -229,7 +219,8 @@ fn what_hangs_close_splits_as_deep_as_it_is_close() {
 #[test]
 fn thousands_of_faces_in_one_place_do_not_split_each_other() {
     let floors = vec![(FLOOR, grey()); 1500];
-    let walls = block(-0.71, 0.79, 1.0).into_iter().map(|w| (w, grey()));
+    let walls =
+        standing_block([-0.71, 0.79], [-0.71, 0.79], 0.0, 1.0).into_iter().map(|w| (w, grey()));
     let base = |faces: &[([[f64; 3]; 4], Material)]| Mesh::new(quads(faces), 1.5).unwrap();
     // Each of the 3000 triangles lies in all others: their sides are its own, or its diagonal.
     let pile = base(&floors);
@@ -277,7 +268,7 @@ fn the_ambient_of_all_unshot_light_is_exact_where_it_is_even() {
     let even = glow.exitance / (Rgb::ONE - glow.reflectance);
     let stopped = |mesh: &Mesh, shots| {
         let settings = Solver { max_steps: Some(shots), ..Default::default() };
-        let s = settings.solve(mesh, &mut exact(), |_| ControlFlow::Continue(())).unwrap();
+        let s = settings.solve(mesh, &mut exact(), keep_going).unwrap();
         assert_eq!(s.stop, StopReason::Shots);
         let mut radiosity = s.radiosity.clone();
         let ambient = s.ledger.add_ambient(mesh, &mut radiosity);

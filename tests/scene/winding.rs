@@ -1,19 +1,19 @@
 //! Faces wound inside out are said in a warning, with the name of their group; others are not.
 
-use crate::common::{cube, quads};
+use crate::common::quads;
+use crate::common::scenes::{block, halves, walls};
 use glam::DVec3;
 use radiosity::{Material, Scene, Triangle, load_obj};
 
-/// Corners of the triangles of a box, seen from inside or from outside.
-fn block(low: DVec3, high: DVec3, inside: bool) -> Vec<[DVec3; 3]> {
-    let unit = cube(&Material::grey("m", 0.5));
-    let put = |p: DVec3| low + (high - low) * p;
-    let corners = (0..12).map(|t| unit.corners(t).map(put));
-    corners.map(|[a, b, c]| if inside { [a, b, c] } else { [a, c, b] }).collect()
+/// Triangles of a box, seen from inside or from outside.
+fn boxed(low: [f64; 3], high: [f64; 3], inside: bool) -> Vec<[DVec3; 3]> {
+    let quads = if inside { walls(low, high) } else { block(low, high) };
+    let triangles = quads.into_iter().flat_map(halves);
+    triangles.map(|corners| corners.map(DVec3::from_array)).collect()
 }
 
 fn room() -> (&'static str, Vec<[DVec3; 3]>) {
-    ("room", block(DVec3::ZERO, DVec3::ONE, true))
+    ("room", boxed([0.0; 3], [1.0; 3], true))
 }
 
 /// The groups that the warning names, which there is at most one of.
@@ -40,18 +40,18 @@ fn named(groups: &[(&str, Vec<[DVec3; 3]>)]) -> String {
 
 #[test]
 fn groups_wound_inside_out_are_named() {
-    let (low, high) = (DVec3::splat(0.3), DVec3::splat(0.6));
-    assert_eq!(named(&[room(), ("block", block(low, high, true))]), "'block'");
+    let (low, high) = ([0.3; 3], [0.6; 3]);
+    assert_eq!(named(&[room(), ("block", boxed(low, high, true))]), "'block'");
     // One side of twelve triangles.
     for side in 0..6 {
-        let mut one = block(low, high, false);
+        let mut one = boxed(low, high, false);
         one[2 * side].swap(1, 2);
         one[2 * side + 1].swap(1, 2);
         assert_eq!(named(&[room(), ("block", one)]), "'block'", "{side}");
     }
     // All of the room but what stands in it.
-    let outside_in = ("room", block(DVec3::ZERO, DVec3::ONE, false));
-    let blocks = ("block", block(low, high, false));
+    let outside_in = ("room", boxed([0.0; 3], [1.0; 3], false));
+    let blocks = ("block", boxed(low, high, false));
     assert_eq!(named(&[outside_in, blocks.clone()]), "'room'");
     // A wall of it.
     let mut walls = room().1;
@@ -59,16 +59,16 @@ fn groups_wound_inside_out_are_named() {
     wall.iter_mut().for_each(|corners| corners.swap(1, 2));
     assert_eq!(named(&[("walls", walls), ("wall", wall), blocks]), "'wall'");
     // Both in one group.
-    let all = [room().1, block(low, high, true)].concat();
+    let all = [room().1, boxed(low, high, true)].concat();
     assert_eq!(named(&[("all", all)]), "'all'");
     // A screen with one face, seen from both sides.
-    let screen = block(DVec3::new(0.5, 0.2, 0.2), DVec3::new(0.9, 0.8, 0.8), true);
+    let screen = boxed([0.5, 0.2, 0.2], [0.9, 0.8, 0.8], true);
     assert_eq!(named(&[room(), ("screen", screen[..2].to_vec())]), "'screen'");
 }
 
 #[test]
 fn groups_that_are_right_are_not() {
-    let block = |low: [f64; 3], high: [f64; 3]| block(low.into(), high.into(), false);
+    let block = |low, high| boxed(low, high, false);
     assert_eq!(named(&[room()]), "");
     assert_eq!(named(&[("block", block([0.; 3], [1.; 3]))]), "");
     // What stands on the floor hides a part of it, which sees nothing but backs.

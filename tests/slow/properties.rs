@@ -3,21 +3,15 @@
 //! `PROPTEST_CASES=10000 cargo test --release --test properties` tries more of them than the
 //! 200 a property that are tried else, `PROPTEST_RNG_SEED=7` others.
 
+use crate::common::keep_going;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 
 use crate::common::closed_forms::exact;
+use crate::common::fakes::StoredRows;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use radiosity::{
-    FormFactors, Material, Mesh, Method, NodeId, Progress, RayRows, Rgb, Row, Scene, Solution,
-    Solver, Triangle,
-};
-
-fn go(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
+use radiosity::{Material, Mesh, Method, RayRows, Rgb, Row, Scene, Solution, Solver, Triangle};
 
 /// The same cases on every run, unless a seed is given.
 fn config() -> ProptestConfig {
@@ -130,45 +124,23 @@ fn mesh_of(faces: &[Face], materials: Vec<Material>) -> Mesh {
     Mesh::new(scene, f64::INFINITY).unwrap()
 }
 
-/// Rows made once.
-struct Made(Vec<Row>);
-
-impl Made {
-    fn by(mesh: &Mesh, maker: &mut dyn FormFactors) -> Made {
-        let all: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
-        let rows = maker.rows(mesh, &all, 1.0).unwrap();
-        rows.iter().zip(&all).for_each(|(row, &n)| row.check(mesh, n).unwrap());
-        Made(rows)
-    }
-
-    fn exact(mesh: &Mesh) -> Made {
-        Made::by(mesh, &mut exact())
-    }
-
-    fn rays(mesh: &Mesh) -> Made {
-        Made::by(mesh, &mut RayRows::new(mesh, RAYS).unwrap().with_full_share(0.0))
-    }
-
-    fn factor(&self, i: usize, j: usize) -> f64 {
-        let entries = &self.0[i].entries;
-        let found = entries.binary_search_by_key(&(j as u32), |e| e.element);
-        found.map_or(0.0, |k| Row::form_factor(entries[k].share))
-    }
+fn exact_rows(mesh: &Mesh) -> StoredRows {
+    StoredRows::of(mesh, &mut exact())
 }
 
-impl FormFactors for Made {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        _: f64,
-    ) -> Result<Vec<Row>, radiosity::Error> {
-        Ok(patches.iter().map(|&p| self.0[mesh.elements_of(p).start].clone()).collect())
-    }
+fn ray_rows(mesh: &Mesh) -> StoredRows {
+    StoredRows::of(mesh, &mut RayRows::new(mesh, RAYS).unwrap().with_full_share(0.0))
+}
 
-    fn preferred_batch_len(&self) -> usize {
-        16
-    }
+fn row<'r>(rows: &'r StoredRows, mesh: &Mesh, e: usize) -> &'r Row {
+    &rows.0[&mesh.element(e)]
+}
+
+/// Form factor from element `i` to element `j`.
+fn factor(rows: &StoredRows, mesh: &Mesh, i: usize, j: usize) -> f64 {
+    let entries = &row(rows, mesh, i).entries;
+    let found = entries.binary_search_by_key(&(j as u32), |e| e.element);
+    found.map_or(0.0, |k| Row::form_factor(entries[k].share))
 }
 
 const RAYS: u32 = 256;
@@ -176,8 +148,8 @@ const RAYS: u32 = 256;
 /// A share of a row, and what closed forms are off by (see `polygon_to_polygon`), rounded up.
 const SHARE: f64 = 3e-10;
 
-fn solve(mesh: &Mesh, rows: &mut Made) -> Solution {
-    Solver::new(Method::Direct).solve(mesh, rows, go).unwrap()
+fn solve(mesh: &Mesh, rows: &mut StoredRows) -> Solution {
+    Solver::new(Method::Direct).solve(mesh, rows, keep_going).unwrap()
 }
 
 fn areas(mesh: &Mesh) -> Vec<f64> {
@@ -214,13 +186,13 @@ proptest! {
     #[test]
     fn exact_rows_are_reciprocal_and_their_light_is_bounded(room in rooms(0..1)) {
         let (mesh, materials) = (room.mesh(), room.materials());
-        let (mut rows, areas) = (Made::exact(&mesh), areas(&mesh));
+        let (mut rows, areas) = (exact_rows(&mesh), areas(&mesh));
         for i in 0..areas.len() {
             // Closed but for the rounding of each entry; nothing sees a back.
-            prop_assert!(Row::form_factor(rows.0[i].escaped) <= SHARE * areas.len() as f64);
-            prop_assert_eq!(rows.0[i].backface, 0);
+            prop_assert!(Row::form_factor(row(&rows, &mesh, i).escaped) <= SHARE * areas.len() as f64);
+            prop_assert_eq!(row(&rows, &mesh, i).backface, 0);
             for j in 0..i {
-                let both = [areas[i] * rows.factor(i, j), areas[j] * rows.factor(j, i)];
+                let both = [areas[i] * factor(&rows, &mesh, i, j), areas[j] * factor(&rows, &mesh, j, i)];
                 prop_assert!((both[0] - both[1]).abs() <= SHARE * (areas[i] + areas[j]));
             }
         }
@@ -240,7 +212,7 @@ proptest! {
         room in rooms(0..4), other in prop::array::uniform12(0.0..10.0f64), which in 0..12usize,
     ) {
         let (mesh, materials) = (room.mesh(), room.materials());
-        let mut rows = if room.inside.is_empty() { Made::exact(&mesh) } else { Made::rays(&mesh) };
+        let mut rows = if room.inside.is_empty() { exact_rows(&mesh) } else { ray_rows(&mesh) };
         let mut painted = |change: &dyn Fn(usize, &mut Material)| {
             let mut materials = materials.clone();
             materials.iter_mut().enumerate().for_each(|(k, m)| change(k, m));
@@ -278,7 +250,7 @@ proptest! {
     ) {
         let (faces, materials) = (room.faces(), room.materials());
         let here = room.mesh();
-        let known = solve(&here, &mut Made::exact(&here)).radiosity;
+        let known = solve(&here, &mut exact_rows(&here)).radiosity;
         let turn = DQuat::from_axis_angle(DVec3::from_array(axis).normalize_or(DVec3::X), angle);
         let scale = 10f64.powf(decades);
         let mut order: Vec<usize> = (0..faces.len()).collect();
@@ -288,7 +260,7 @@ proptest! {
             (corners.map(|p| (turn * p + DVec3::from_array(away)) * scale), material)
         };
         let there = mesh_of(&order.iter().map(moved).collect::<Vec<_>>(), materials.clone());
-        let found = solve(&there, &mut Made::exact(&there)).radiosity;
+        let found = solve(&there, &mut exact_rows(&there)).radiosity;
         let mut back = vec![Rgb::ZERO; found.len()];
         order.iter().zip(&found).for_each(|(&k, b)| back[k] = *b);
         // A thousand sizes away coordinates are off by 1e-13, far less than a share.
@@ -305,16 +277,16 @@ proptest! {
         };
         let faces: Vec<Face> = room.faces().iter().map(larger).collect();
         let there = mesh_of(&faces, room.materials());
-        let rays = [&here, &there].map(Made::rays);
+        let rays = [&here, &there].map(ray_rows);
         prop_assert_eq!(&rays[0].0, &rays[1].0);
         if room.inside.is_empty() {
-            let exact = [&here, &there].map(Made::exact);
+            let exact = [&here, &there].map(exact_rows);
             prop_assert_eq!(&exact[0].0, &exact[1].0);
         }
         for method in Method::ALL {
             let solver = Solver { unshot: 1e-4, ..Solver::new(method) };
             let [a, b] = [(&here, 0), (&there, 1)].map(|(mesh, k)| {
-                solver.solve(mesh, &mut Made(rays[k].0.clone()), go).unwrap().radiosity
+                solver.solve(mesh, &mut rays[k].clone(), keep_going).unwrap().radiosity
             });
             prop_assert_eq!(a, b, "{}", method);
         }
@@ -324,7 +296,7 @@ proptest! {
     #[test]
     fn light_past_blockers_is_neither_lost_nor_made(room in rooms(1..6)) {
         let (mesh, materials) = (room.mesh(), room.materials());
-        let s = solve(&mesh, &mut Made::rays(&mesh));
+        let s = solve(&mesh, &mut ray_rows(&mesh));
         prop_assert!(s.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
         prop_assert!(s.ledger.imbalance() <= 1e-13);
         // The room is closed. What leaves in all is bounded whatever the rays: a row adds up to one.
@@ -346,8 +318,9 @@ proptest! {
         let last = faces.len() - 1;
         split(&mut faces, last, side, at);
         let parts = mesh_of(&faces, materials.clone());
-        let (one, two) = (Made::rays(&whole), Made::rays(&parts));
-        for (a, b) in one.0[..last].iter().zip(&two.0) {
+        let (one, two) = (ray_rows(&whole), ray_rows(&parts));
+        for e in 0..last {
+            let (a, b) = (row(&one, &whole, e), row(&two, &parts, e));
             let mut sums = BTreeMap::new();
             for entry in &b.entries {
                 *sums.entry(entry.element.min(last as u32)).or_insert(0u32) += entry.share;
@@ -376,7 +349,7 @@ proptest! {
         let steps = if black { None } else { Some(1) };
         let solver = Solver { unshot: 1e-13, max_steps: steps, ..Solver::new(Method::Jacobi) };
         let [one, two] = [&whole, &parts].map(|mesh| {
-            solver.solve(mesh, &mut Made::exact(mesh), go).unwrap().radiosity
+            solver.solve(mesh, &mut exact_rows(mesh), keep_going).unwrap().radiosity
         });
         let areas = areas(&parts);
         let last = areas.len() - 1;

@@ -6,16 +6,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::cornell_box;
+use crate::common::{cornell_box, keep_going};
 use glam::{DAffine3, DVec3};
 use radiosity::{
     Error, ErrorKind, FormFactors, Mesh, Method, NodeId, Progress, RayRows, Rgb, Row, Scene,
     Solution, SolveSession, Solver, StopReason,
 };
-
-fn go(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 /// Rays, fewer for dim patches: rows depend on when they are made.
 fn rays(mesh: &Mesh) -> RayRows {
@@ -43,12 +39,12 @@ fn same(a: &Solution, b: &Solution) {
 fn saved_and_read_after_every_batch_a_solve_ends_with_the_same_bits() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
-        let whole = solver.solve(&mesh, &mut rays(&mesh), go).unwrap();
+        let whole = solver.solve(&mesh, &mut rays(&mesh), keep_going).unwrap();
         let mut solve = solver.begin(&mesh).unwrap();
         let mut batches = 0;
         loop {
             let mut rows = rays(&mesh);
-            let stop = solve.advance(&mut rows, go).unwrap();
+            let stop = solve.advance(&mut rows, keep_going).unwrap();
             let bytes = solve.to_bytes();
             if stop.is_some() {
                 break;
@@ -82,11 +78,11 @@ impl FormFactors for Failing {
 fn an_error_of_the_rows_takes_nothing_from_a_solve() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
-        let whole = solver.solve(&mesh, &mut rays(&mesh), go).unwrap();
+        let whole = solver.solve(&mesh, &mut rays(&mesh), keep_going).unwrap();
         let mut solve = solver.begin(&mesh).unwrap();
         let mut failed = 0;
         let stop = loop {
-            match solve.run(&mut Failing(rays(&mesh), 7), go) {
+            match solve.run(&mut Failing(rays(&mesh), 7), keep_going) {
                 Ok(stop) => break stop,
                 Err(e) => assert_eq!(e.kind(), ErrorKind::Device),
             }
@@ -95,7 +91,7 @@ fn an_error_of_the_rows_takes_nothing_from_a_solve() {
             assert!(ledger.imbalance() <= 1e-9);
             // A direct solve has all its rows at once or none.
             if solver.method == Method::Direct {
-                break solve.run(&mut rays(&mesh), go).unwrap();
+                break solve.run(&mut rays(&mesh), keep_going).unwrap();
             }
         };
         println!("{}: failed {failed} times", solver.method);
@@ -109,7 +105,7 @@ fn a_solve_that_is_stopped_at_any_call_goes_on() {
     let mesh = cornell_box(300.0);
     for solver in solvers() {
         let whole = Solver { unshot: 1e-12, ..solver };
-        let whole = whole.solve(&mesh, &mut rays(&mesh).with_full_share(0.0), go).unwrap();
+        let whole = whole.solve(&mesh, &mut rays(&mesh).with_full_share(0.0), keep_going).unwrap();
         let mut solve = Solver { unshot: 1e-12, ..solver }.begin(&mesh).unwrap();
         let (mut calls, mut rows) = (0, rays(&mesh).with_full_share(0.0));
         let stop = loop {
@@ -148,16 +144,16 @@ fn a_solve_that_has_changed_is_saved_with_its_old_rows() {
         let solver = Solver { unshot: 0.02, ..Solver::new(method) };
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = solver.begin(&mesh).unwrap();
-        solve.run(&mut before, go).unwrap();
-        solve.update_geometry(&moved, &mut before, &mut after, go).unwrap();
+        solve.run(&mut before, keep_going).unwrap();
+        solve.update_geometry(&moved, &mut before, &mut after, keep_going).unwrap();
         assert!(solve.stale_flux_bound() > 0.0);
-        solve.advance(&mut after, go).unwrap();
+        solve.advance(&mut after, keep_going).unwrap();
         let bytes = solve.to_bytes();
         let mut again = solver.resume_bytes(&moved, &after, &bytes).unwrap();
         assert!(again.to_bytes() == bytes && again.stale_flux_bound() == solve.stale_flux_bound());
         for solve in [&mut solve, &mut again] {
             solve.set_limits(1e-3, None).unwrap();
-            solve.run(&mut rays(&moved), go).unwrap();
+            solve.run(&mut rays(&moved), keep_going).unwrap();
         }
         same(&again.into_solution().unwrap(), &solve.into_solution().unwrap());
     }
@@ -171,7 +167,7 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     let solver = Solver::new(Method::GaussSeidel);
     let mut rows = rays(&mesh);
     let mut solve = solver.begin(&mesh).unwrap();
-    solve.advance(&mut rows, go).unwrap();
+    solve.advance(&mut rows, keep_going).unwrap();
     solve.save(&path).unwrap();
     let says = |solver: Solver, mesh: &Mesh, rows: &RayRows, words: &str| {
         let Err(e) = solver.resume(mesh, rows, &path) else { panic!("taken: {words}") };
@@ -247,7 +243,7 @@ fn the_process_that_is_killed() {
     let mesh = cornell_box(80.0);
     let mut rows = rays(&mesh);
     let mut solve = killed(&mesh, &rows, method, path);
-    while solve.advance(&mut rows, go).unwrap().is_none() {
+    while solve.advance(&mut rows, keep_going).unwrap().is_none() {
         solve.save(path).unwrap();
     }
     std::fs::write(path.with_extension("done"), bits(&solve.into_solution().unwrap())).unwrap();
@@ -268,7 +264,7 @@ fn killed_at_twenty_random_moments_a_solve_ends_with_the_same_bits() {
         let mut rows = rays(&mesh);
         let start = Instant::now();
         let mut whole = killed(&mesh, &rows, method.parse().unwrap(), Path::new("none"));
-        whole.run(&mut rows, go).unwrap();
+        whole.run(&mut rows, keep_going).unwrap();
         // A fresh process needs a while before its first batch; then a part of the whole.
         let most = start.elapsed().as_millis() as u64 / 2 + 200;
         let mut resumed = 0;

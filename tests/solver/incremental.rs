@@ -1,16 +1,14 @@
 //! Changes of a scene that is solved: the answer of starting over, for less work. No GPU needed.
 
-use crate::common::cornell_box;
+use crate::common::quads;
+use crate::common::scenes::{block, walls};
+use crate::common::{cornell_box, keep_going};
 use glam::{DAffine3, DVec3};
 use radiosity::{
     ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, Solution,
     SolveSession, Solver, StopReason,
 };
 use std::ops::ControlFlow;
-
-fn go(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 /// Rays, as many for each row whatever light it carries: equal equations, however they are solved.
 fn rays(mesh: &Mesh) -> RayRows {
@@ -74,12 +72,12 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
         let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
         let mut solve = solver.begin(&black).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
+        assert_eq!(solve.run(&mut rows, keep_going).unwrap(), StopReason::Converged);
         let made = solve.solution().unwrap().rows_made;
         solve.update_materials(&changed).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
+        assert_eq!(solve.run(&mut rows, keep_going).unwrap(), StopReason::Converged);
         let on = solve.into_solution().unwrap();
-        let over = solver.solve(&changed, &mut rows, go).unwrap();
+        let over = solver.solve(&changed, &mut rows, keep_going).unwrap();
         closes(&on);
         let off = off(&changed, &on, &over);
         println!("{method}: {made} rows, then {}; off {off:.1e}", on.rows_made - made);
@@ -104,12 +102,12 @@ fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
     for method in Method::ALL {
         let mut rows = rays(&mesh);
         let mut solve = by_elements(method).begin(&mesh).unwrap();
-        solve.run(&mut rows, go).unwrap();
+        solve.run(&mut rows, keep_going).unwrap();
         let first = solve.solution().unwrap();
         let dimmed = painted(&mesh, |m| m.exitance *= Rgb::new(0.3, 1e-12, 1e12));
         let dark = painted(&mesh, |m| m.exitance = Rgb::ZERO);
         solve.update_materials(&dimmed).unwrap();
-        solve.run(&mut rows, go).unwrap();
+        solve.run(&mut rows, keep_going).unwrap();
         let then = solve.solution().unwrap();
         assert_eq!((first.shots, first.rows_made), (then.shots, then.rows_made), "{method}");
         for (a, b) in first.radiosity.iter().zip(&then.radiosity) {
@@ -118,7 +116,7 @@ fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
             assert!(off.abs().cmple(4.0 * f64::EPSILON * b.abs()).all(), "{method}: {a} {b}");
         }
         solve.update_materials(&dark).unwrap();
-        assert_eq!(solve.run(&mut rows, go).unwrap(), StopReason::Converged);
+        assert_eq!(solve.run(&mut rows, keep_going).unwrap(), StopReason::Converged);
         let nothing = solve.into_solution().unwrap();
         closes(&nothing);
         assert!(nothing.radiosity.iter().all(|b| *b == Rgb::ZERO), "{method}");
@@ -143,10 +141,10 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
         let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
         let mut solve = solver.begin(&one).unwrap();
-        solve.run(&mut rows, go).unwrap();
+        solve.run(&mut rows, keep_going).unwrap();
         let first = solve.solution().unwrap();
         solve.update_materials(&other).unwrap();
-        solve.run(&mut rows, go).unwrap();
+        solve.run(&mut rows, keep_going).unwrap();
         let second = solve.into_solution().unwrap();
         // No lamp of the first is left in the second: light starts anew, so 0 W are 0 W.
         assert!(second.radiosity.iter().all(|b| b.x == 0.0), "{method}");
@@ -154,7 +152,7 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
         let mixed =
             Solution::linear_combination(&[(Rgb::splat(0.25), &first), (Rgb::splat(3.0), &second)])
                 .unwrap();
-        let at_once = solver.solve(&both, &mut rows, go).unwrap();
+        let at_once = solver.solve(&both, &mut rows, keep_going).unwrap();
         closes(&mixed);
         let off = off(&both, &mixed, &at_once);
         println!("{method}: off {off:.1e}");
@@ -162,9 +160,9 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
     }
     let few = Solution {
         radiosity: vec![],
-        ..Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), go).unwrap()
+        ..Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), keep_going).unwrap()
     };
-    let whole = Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), go).unwrap();
+    let whole = Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), keep_going).unwrap();
     let e = Solution::linear_combination(&[(Rgb::ONE, &whole), (Rgb::ONE, &few)]).unwrap_err();
     assert!(e.kind() == ErrorKind::Setting && e.to_string().contains("0 elements"), "{e}");
     assert!(Solution::linear_combination(&[]).is_err());
@@ -179,15 +177,15 @@ fn an_object_moves_and_all_methods_find_what_starting_over_finds() {
         let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = solver.begin(&mesh).unwrap();
-        solve.run(&mut before, go).unwrap();
+        solve.run(&mut before, keep_going).unwrap();
         assert_eq!(
-            solve.update_geometry(&moved, &mut before, &mut after, go).unwrap(),
+            solve.update_geometry(&moved, &mut before, &mut after, keep_going).unwrap(),
             StopReason::Converged
         );
         assert!(solve.stale_flux_bound() <= SETTLED);
-        solve.run(&mut after, go).unwrap();
+        solve.run(&mut after, keep_going).unwrap();
         let on = solve.into_solution().unwrap();
-        let over = solver.solve(&moved, &mut after, go).unwrap();
+        let over = solver.solve(&moved, &mut after, keep_going).unwrap();
         closes(&on);
         let off = off(&moved, &on, &over);
         println!("{method}: {} rows made, off {off:.1e}", on.rows_made);
@@ -206,7 +204,7 @@ fn a_scene_changes_while_its_light_is_on_its_way() {
     for method in Method::ALL {
         let solver = Solver { unshot: SETTLED, ..by_elements(method) };
         let mut rows = rays(&mesh);
-        let over = solver.solve(&changed, &mut rows, go).unwrap();
+        let over = solver.solve(&changed, &mut rows, keep_going).unwrap();
         for calls in [5, 400] {
             let mut solve = solver.begin(&mesh).unwrap();
             let mut left = calls;
@@ -216,7 +214,7 @@ fn a_scene_changes_while_its_light_is_on_its_way() {
             });
             assert!(stopped.unwrap() == StopReason::Cancelled || method == Method::Direct);
             solve.update_materials(&changed).unwrap();
-            solve.run(&mut rows, go).unwrap();
+            solve.run(&mut rows, keep_going).unwrap();
             let on = solve.into_solution().unwrap();
             closes(&on);
             let off = off(&changed, &on, &over);
@@ -232,13 +230,13 @@ fn an_object_moves_while_memory_for_rows_is_full() {
     let mesh = cornell_box(200.0);
     let moved = shifted(&mesh, "short_block", [40.0, 0.0, -25.0]);
     let solver = Solver { unshot: SETTLED, ..Solver::new(Method::GaussSeidel) };
-    let over = solver.solve(&moved, &mut rays(&moved), go).unwrap();
+    let over = solver.solve(&moved, &mut rays(&moved), keep_going).unwrap();
     for row_memory in [0, 50_000, 200_000] {
         let (mut before, mut after) = (rays(&mesh), rays(&moved));
         let mut solve = Solver { row_memory, ..solver }.begin(&mesh).unwrap();
-        solve.run(&mut before, go).unwrap();
-        solve.update_geometry(&moved, &mut before, &mut after, go).unwrap();
-        solve.run(&mut after, go).unwrap();
+        solve.run(&mut before, keep_going).unwrap();
+        solve.update_geometry(&moved, &mut before, &mut after, keep_going).unwrap();
+        solve.run(&mut after, keep_going).unwrap();
         let on = solve.into_solution().unwrap();
         closes(&on);
         let off = off(&moved, &on, &over);
@@ -255,16 +253,16 @@ fn what_one_stopped_change_leaves_wrong_is_in_doubt_after_the_next() {
     let solver = Solver { unshot: SETTLED, ..Solver::new(Method::GaussSeidel) };
     let [mut first, mut second, mut third] = [&mesh, &once, &twice].map(rays);
     let mut solve = solver.begin(&mesh).unwrap();
-    solve.run(&mut first, go).unwrap();
+    solve.run(&mut first, keep_going).unwrap();
     let stop = |_: &Progress| ControlFlow::Break(());
     solve.update_geometry(&once, &mut first, &mut second, stop).unwrap();
-    solve.run(&mut second, go).unwrap();
-    solve.update_geometry(&twice, &mut second, &mut third, go).unwrap();
-    solve.run(&mut third, go).unwrap();
+    solve.run(&mut second, keep_going).unwrap();
+    solve.update_geometry(&twice, &mut second, &mut third, keep_going).unwrap();
+    solve.run(&mut third, keep_going).unwrap();
     let doubt = solve.stale_flux_bound();
     let on = solve.into_solution().unwrap();
     closes(&on);
-    let off = off(&twice, &on, &solver.solve(&twice, &mut third, go).unwrap());
+    let off = off(&twice, &on, &solver.solve(&twice, &mut third, keep_going).unwrap());
     println!("off {off:.1e}, in doubt {doubt:.1e}");
     // What went wrong is missing in one place and too much in another, and is reflected for ever, at
     // 0.75 at most: no more than three times as much each.
@@ -275,26 +273,16 @@ fn what_one_stopped_change_leaves_wrong_is_in_doubt_after_the_next() {
 fn furnished() -> Scene {
     let (room, lamp) = (Material::grey("room", 0.7), Material::grey("lamp", 0.0));
     let lamp = Material { exitance: Rgb::ONE, ..lamp };
-    let around = |low: DVec3, high: DVec3| {
-        let corner = |k: usize| [0, 1, 2].map(|axis| [low, high][k >> axis & 1][axis]);
-        FACES.map(|face| face.map(corner))
-    };
-    let [low, high] = [[0.3, 0.3, 0.0], [0.335, 0.34, 0.05]].map(DVec3::from_array);
-    let inside_out = |[a, b, c, d]: [[f64; 3]; 4]| [d, c, b, a];
-    let mut all = around(DVec3::ZERO, DVec3::ONE).map(|f| (inside_out(f), room.clone())).to_vec();
+    let mut all = walls([0.0; 3], [1.0; 3]).map(|wall| (wall, room.clone())).to_vec();
     let [x, y, z] = [0.4, 0.6, 0.99];
     all.push(([[x, x, z], [x, y, z], [y, y, z], [y, x, z]], lamp));
-    all.extend(around(low, high).map(|f| (f, room.clone())));
-    let scene = crate::common::quads(&all);
+    all.extend(block([0.3, 0.3, 0.0], [0.335, 0.34, 0.05]).map(|side| (side, room.clone())));
+    let scene = quads(&all);
     let mut triangles = scene.triangles().to_vec();
     triangles.iter_mut().for_each(|t| t.group = u32::from(t.group > 6));
     let groups = ["room", "box"].map(String::from).to_vec();
     Scene::new(scene.positions().to_vec(), triangles, groups, scene.materials().to_vec()).unwrap()
 }
-
-/// Sides of a box from outside; corner k is high in x, y and z where k has the bits 1, 2 and 4.
-const FACES: [[usize; 4]; 6] =
-    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// As a user changes things, at an everyday residual: within what both leave unshot, for a third of
 /// the rows.
@@ -307,14 +295,14 @@ fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
     let settled = Solver { unshot: 1e-6, ..solver };
     let (mut before, mut after) = (rays(&mesh), rays(&changed));
     let mut solve = solver.begin(&mesh).unwrap();
-    solve.run(&mut before, go).unwrap();
+    solve.run(&mut before, keep_going).unwrap();
     let first = solve.solution().unwrap();
-    solve.update_geometry(&changed, &mut before, &mut after, go).unwrap();
-    solve.run(&mut after, go).unwrap();
+    solve.update_geometry(&changed, &mut before, &mut after, keep_going).unwrap();
+    solve.run(&mut after, keep_going).unwrap();
     let doubt = solve.stale_flux_bound();
     let on = solve.into_solution().unwrap();
-    let over = solver.solve(&changed, &mut after, go).unwrap();
-    let judge = settled.solve(&changed, &mut after, go).unwrap();
+    let over = solver.solve(&changed, &mut after, keep_going).unwrap();
+    let judge = settled.solve(&changed, &mut after, keep_going).unwrap();
     let rows = on.rows_made - first.rows_made;
     let [on_off, over_off] = [&on, &over].map(|s| off(&changed, s, &judge));
     println!(
@@ -339,7 +327,7 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     let mesh = cornell_box(200.0);
     let mut rows = rays(&mesh);
     let mut solve: SolveSession = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
-    solve.run(&mut rows, go).unwrap();
+    solve.run(&mut rows, keep_going).unwrap();
     let before = solve.to_bytes();
     let moved = shifted(&mesh, "short_block", [0.0, 0.0, 10.0]);
     let finer = cornell_box(150.0);
@@ -368,7 +356,7 @@ fn a_change_that_is_stopped_tells_its_doubt_and_goes_on() {
     let moved = shifted(&mesh, "tall_block", [0.0, 0.0, 30.0]);
     let (mut before, mut after) = (rays(&mesh), rays(&moved));
     let mut solve = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
-    solve.run(&mut before, go).unwrap();
+    solve.run(&mut before, keep_going).unwrap();
     let stop = |_: &Progress| ControlFlow::Break(());
     let stopped = solve.update_geometry(&moved, &mut before, &mut after, stop).unwrap();
     assert_eq!(stopped, StopReason::Cancelled);
@@ -383,13 +371,13 @@ fn a_change_that_is_stopped_tells_its_doubt_and_goes_on() {
     let stopped = redrawn(&solve);
     let mut further = solve.clone();
     further.set_limits(1e-6, None).unwrap();
-    further.run(&mut after, go).unwrap();
+    further.run(&mut after, keep_going).unwrap();
     let (drawn, block) = (redrawn(&further) - stopped, block.count());
     assert!(
         drawn as usize + after.preferred_batch_len() >= block,
         "{drawn} rows for {block} elements"
     );
-    assert_eq!(solve.run(&mut after, go).unwrap(), StopReason::Converged);
+    assert_eq!(solve.run(&mut after, keep_going).unwrap(), StopReason::Converged);
     let s = solve.into_solution().unwrap();
     closes(&s);
     assert!(s.ledger.unshot_share() <= 0.5e-3);

@@ -1,7 +1,7 @@
 //! Scenes of many triangles: loaded, cut, and a few shots of light, in bounded time and memory.
 
+use crate::common::keep_going;
 use std::fmt::Write;
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh, read_obj};
@@ -18,7 +18,7 @@ fn bake(obj: &str, shots: u64) -> (Mesh, Solution) {
     let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let sorted = start.elapsed();
     let solver = Solver { max_steps: Some(shots), ..Default::default() };
-    let solution = solver.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
+    let solution = solver.solve(&mesh, &mut rays, keep_going).unwrap();
     let shot = start.elapsed();
     let surface = VertexMesh::new(&mesh, &solution.radiosity);
     println!(

@@ -1,17 +1,14 @@
 //! All methods behind one interface: the same answers, ledgers, stop rules. No GPU needed.
 
 use crate::common::closed_forms::exact;
-use crate::common::walls::walls;
-use crate::common::{cornell_box, cube, quads};
+use crate::common::fakes::{GivenRows, StoredRows};
+use crate::common::scenes::{self, walls};
+use crate::common::{cornell_box, cube, keep_going, quads};
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Material, Mesh, Method, NodeId, Progress, RayRows, Rgb,
-    Row, Scene, Solution, Solver, StopReason,
+    Entry, ErrorKind, FormFactors, Material, Mesh, Method, RayRows, Rgb, Row, Scene, Solution,
+    Solver, StopReason,
 };
 use std::ops::ControlFlow;
-
-fn go(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 fn material(reflectance: [f64; 3], exitance: [f64; 3]) -> Material {
     let (reflectance, exitance) = (reflectance.into(), exitance.into());
@@ -32,14 +29,17 @@ fn rays(mesh: &Mesh) -> RayRows {
     RayRows::new(mesh, 1024).unwrap().with_full_share(0.0)
 }
 
+/// Rows of all elements by rays.
+fn stored(mesh: &Mesh) -> StoredRows {
+    StoredRows::of(mesh, &mut rays(mesh))
+}
+
 /// A unit room with a lamp under its ceiling and a block on its floor.
 fn room(surfaces: [Material; 6], lamp: Material, block: Material) -> Scene {
     let lamp_quad = [[0.4, 0.4, 0.95], [0.4, 0.6, 0.95], [0.6, 0.6, 0.95], [0.6, 0.4, 0.95]];
     let mut all: Vec<_> = walls([0.0; 3], [1.0; 3]).into_iter().zip(surfaces).collect();
     all.push((lamp_quad, lamp));
-    // Turned inside out.
-    let sides = walls([0.2, 0.3, 0.01], [0.5, 0.6, 0.4]);
-    all.extend(sides.map(|[a, b, c, d]| ([d, c, b, a], block.clone())));
+    all.extend(scenes::block([0.2, 0.3, 0.01], [0.5, 0.6, 0.4]).map(|side| (side, block.clone())));
     quads(&all)
 }
 
@@ -80,15 +80,15 @@ fn off(s: &Solution, judge: &Solution) -> f64 {
 #[test]
 fn all_methods_agree_with_a_direct_solve() {
     for (name, mesh) in scenes() {
-        let mut maker = Stored::of(&mesh);
-        let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, go).unwrap();
+        let mut maker = stored(&mesh);
+        let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, keep_going).unwrap();
         assert_eq!((judge.stop, judge.steps), (StopReason::Converged, 1));
         println!("{name}, {} elements", mesh.element_count());
         for method in Method::ALL {
             // What 1e-11 of the flux can still bring, ten or a hundred times that in all, is less
             // than 1e-6 of an element that leaves as little as 1e-3 of its share among a thousand.
             let solver = Solver { unshot: 1e-11, ..by_elements(method) };
-            let s = solver.solve(&mesh, &mut maker, go).unwrap();
+            let s = solver.solve(&mesh, &mut maker, keep_going).unwrap();
             let off = off(&s, &judge);
             let imbalance = s.ledger.imbalance();
             println!(
@@ -132,7 +132,7 @@ fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
     // E = C (1−ρ) each. What bounds the error is that of columns, 2⁻³³ a share of 1/192: 2e-8; it
     // moves light from element to element and is not amplified by 1/(1−ρ), since none is lost.
     let mesh = Mesh::new(cube(&grey(0.5, 1.0)), 0.36).unwrap();
-    let mut maker = Stored::by(&mesh, &mut exact());
+    let mut maker = StoredRows::of(&mesh, &mut exact());
     for rho in reflectances {
         let even = [rho; 6];
         let uneven = [rho, 0.5 * rho, rho, 0.9 * rho, 0.0, rho];
@@ -144,7 +144,7 @@ fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
                     continue;
                 }
                 let solver = Solver { unshot: 1e-9, ..by_elements(method) };
-                let s = solver.solve(&mesh, &mut maker, go).unwrap();
+                let s = solver.solve(&mesh, &mut maker, keep_going).unwrap();
                 let worst = s.radiosity.iter().map(|b| (*b / 3.0 - 1.0).abs().max_element());
                 let worst = worst.fold(0.0, f64::max);
                 if bounded {
@@ -171,12 +171,12 @@ fn a_bright_room_is_solved_in_few_steps_whatever_lights_it() {
     let rho = 1.0 - 1e-6;
     let scene = room([(); 6].map(|_| grey(rho, 0.0)), grey(rho, 1.0), grey(rho, 0.0));
     let mesh = Mesh::new(scene, 0.3).unwrap();
-    let mut maker = Stored::of(&mesh);
-    let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, go).unwrap();
+    let mut maker = stored(&mesh);
+    let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, keep_going).unwrap();
     // From the start again after every 3 products, it would need more if cycles did not grow.
     for (restart, most) in [(50, 50), (3, 200)] {
         let solver = Solver { unshot: 1e-7, ..Solver::new(Method::Gmres { restart }) };
-        let s = solver.solve(&mesh, &mut maker, go).unwrap();
+        let s = solver.solve(&mesh, &mut maker, keep_going).unwrap();
         let (off, imbalance) = (off(&s, &judge), s.ledger.imbalance());
         println!(
             "{} elements, restart {restart}: {} steps, off {off:.1e}, imbalance {imbalance:.1e}",
@@ -191,7 +191,7 @@ fn a_bright_room_is_solved_in_few_steps_whatever_lights_it() {
 #[test]
 fn jacobi_gives_the_light_of_so_many_bounces() {
     let mesh = Mesh::new(colours(), 0.4).unwrap();
-    let mut maker = Stored::of(&mesh);
+    let mut maker = stored(&mesh);
     let count = mesh.element_count();
     let flux = |e: usize| mesh.material(mesh.element(e)).exitance * mesh.area(mesh.element(e));
     let mut bounce: Vec<Rgb> = (0..count).map(flux).collect();
@@ -199,7 +199,7 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
     for bounces in 0..5 {
         let solver =
             Solver { unshot: 0.0, max_steps: Some(bounces), ..Solver::new(Method::Jacobi) };
-        let s = solver.solve(&mesh, &mut maker, go).unwrap();
+        let s = solver.solve(&mesh, &mut maker, keep_going).unwrap();
         assert_eq!((s.steps, s.stop), (bounces, StopReason::Steps));
         for (e, (&b, &flux)) in s.radiosity.iter().zip(&leaving).enumerate() {
             let known = flux / mesh.area(mesh.element(e));
@@ -222,10 +222,10 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
 #[test]
 fn gauss_seidel_takes_fewer_sweeps_than_jacobi() {
     let (_, mesh) = &scenes()[3];
-    let mut maker = Stored::of(mesh);
+    let mut maker = stored(mesh);
     let [jacobi, gauss_seidel] = [Method::Jacobi, Method::GaussSeidel].map(|method| {
         let solver = Solver { unshot: 1e-6, ..by_elements(method) };
-        solver.solve(mesh, &mut maker, go).unwrap().steps
+        solver.solve(mesh, &mut maker, keep_going).unwrap().steps
     });
     println!("{jacobi} bounces, {gauss_seidel} sweeps");
     // Where all eigenvalues are real Gauss–Seidel converges like their squares: half the sweeps, and
@@ -237,10 +237,11 @@ fn gauss_seidel_takes_fewer_sweeps_than_jacobi() {
 fn overshoot_saves_shots_where_light_goes_round_long() {
     let scene = room([(); 6].map(|_| grey(0.9, 0.0)), grey(0.5, 8.0), grey(0.9, 0.0));
     let mesh = Mesh::new(scene, 0.2).unwrap();
-    let mut maker = Stored::of(&mesh);
+    let mut maker = stored(&mesh);
     let mut shots = |overshoot, unshot| {
         let method = Method::Shooting { overshoot };
-        let s = Solver { unshot, ..by_elements(method) }.solve(&mesh, &mut maker, go).unwrap();
+        let s =
+            Solver { unshot, ..by_elements(method) }.solve(&mesh, &mut maker, keep_going).unwrap();
         assert!(s.ledger.imbalance() < 1e-12);
         assert!(overshoot || s.ledger.overshot == Rgb::ZERO);
         s.shots
@@ -257,7 +258,7 @@ fn large_patches_may_overshoot_too() {
     let mesh = cornell_box(100.0);
     let [plain, ahead] = [Method::ALL[0], Method::ALL[1]].map(|method| {
         let solver = Solver { unshot: 1e-4, ..Solver::new(method) };
-        solver.solve(&mesh, &mut rays(&mesh), go).unwrap()
+        solver.solve(&mesh, &mut rays(&mesh), keep_going).unwrap()
     });
     println!("{} shots, {} with overshoot", plain.shots, ahead.shots);
     assert!(ahead.stop == StopReason::Converged && ahead.ledger.imbalance() <= 1e-12);
@@ -273,18 +274,19 @@ fn large_patches_may_overshoot_too() {
 #[test]
 fn the_ledger_closes_wherever_a_solve_ends() {
     let (_, mesh) = &scenes()[2];
-    let mut maker = Stored::of(mesh);
+    let mut maker = stored(mesh);
     for method in Method::ALL {
         let solver = Solver { unshot: 1e-9, ..by_elements(method) };
         let mut calls = 0;
         let whole = solver.solve(mesh, &mut maker, |p| {
             calls += 1;
-            go(p)
+            keep_going(p)
         });
         let whole = whole.unwrap();
         for steps in (0..whole.steps).step_by((whole.steps / 7) as usize + 1) {
-            let s =
-                Solver { max_steps: Some(steps), ..solver }.solve(mesh, &mut maker, go).unwrap();
+            let s = Solver { max_steps: Some(steps), ..solver }
+                .solve(mesh, &mut maker, keep_going)
+                .unwrap();
             let stop = if matches!(method, Method::Shooting { .. }) {
                 StopReason::Shots
             } else {
@@ -322,7 +324,7 @@ fn closes(s: &Solution, mesh: &Mesh) {
 #[test]
 fn rows_that_are_not_kept_are_made_again_and_change_nothing() {
     let (_, mesh) = &scenes()[4];
-    let all: usize = Stored::of(mesh).0.values().map(Row::bytes).sum();
+    let all: usize = stored(mesh).0.values().map(Row::bytes).sum();
     for method in Method::ALL {
         let solve = |row_memory| {
             let solver = Solver { unshot: 1e-4, row_memory, ..by_elements(method) };
@@ -331,7 +333,7 @@ fn rows_that_are_not_kept_are_made_again_and_change_nothing() {
                 // Cancelled or not, no more than a batch of rows goes by unheard.
                 assert!(p.rows_made - made <= rays(mesh).preferred_batch_len() as u64);
                 made = p.rows_made;
-                go(p)
+                keep_going(p)
             });
             s.unwrap()
         };
@@ -361,7 +363,7 @@ fn channels_of_any_scale_are_solved_alike() {
     let mesh = Mesh::new(scene, 0.4).unwrap();
     for method in Method::ALL {
         let solver = Solver { unshot: 1e-12, ..by_elements(method) };
-        let s = solver.solve(&mesh, &mut Stored::of(&mesh), go).unwrap();
+        let s = solver.solve(&mesh, &mut stored(&mesh), keep_going).unwrap();
         for b in &s.radiosity {
             assert!(
                 b.y == 0.0 && (b.z * 1e150 / (b.x * 1e-150) - 1.0).abs() < 1e-9,
@@ -375,7 +377,7 @@ fn channels_of_any_scale_are_solved_alike() {
 fn a_dark_scene_is_solved_at_once_by_all() {
     let mesh = Mesh::new(cube(&grey(0.8, 0.0)), 0.36).unwrap();
     for method in Method::ALL {
-        let s = by_elements(method).solve(&mesh, &mut exact(), go).unwrap();
+        let s = by_elements(method).solve(&mesh, &mut exact(), keep_going).unwrap();
         assert_eq!((s.steps, s.rows_made, s.stop), (0, 0, StopReason::Converged));
         assert!(s.radiosity.iter().all(|&b| b == Rgb::ZERO));
     }
@@ -385,7 +387,7 @@ fn a_dark_scene_is_solved_at_once_by_all() {
 fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
     let mesh = Mesh::new(cube(&grey(0.8, 1.0)), 2.0).unwrap();
     let refused = |solver: Solver, mesh: &Mesh, says: &str| {
-        let e = solver.solve(mesh, &mut exact(), go).unwrap_err();
+        let e = solver.solve(mesh, &mut exact(), keep_going).unwrap_err();
         assert!(e.kind() == ErrorKind::Setting && e.to_string().contains(says), "{e}");
     };
     for method in Method::ALL {
@@ -393,7 +395,7 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
             refused(Solver { unshot, ..by_elements(method) }, &mesh, "use 0 to 1");
         }
         let bright = Mesh::new(cube(&grey(0.8, 1e308)), 2.0).unwrap();
-        let e = by_elements(method).solve(&bright, &mut exact(), go).unwrap_err();
+        let e = by_elements(method).solve(&bright, &mut exact(), keep_going).unwrap_err();
         assert!(e.kind() == ErrorKind::Scene && e.place() == "emitted flux", "{e}");
         let half = Row::TOTAL / 2;
         let entry = |element, share| Entry { element, share };
@@ -403,7 +405,7 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
             vec![Row { entries: vec![entry(12, Row::TOTAL)], ..Default::default() }],
         ];
         for rows in bad {
-            let e = by_elements(method).solve(&mesh, &mut Given(rows), go).unwrap_err();
+            let e = by_elements(method).solve(&mesh, &mut GivenRows(rows), keep_going).unwrap_err();
             assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");
         }
     }
@@ -448,38 +450,4 @@ fn repainted(mesh: &Mesh, walls: [Material; 6]) -> Mesh {
     let new = Mesh::new(scene, 0.36).unwrap();
     assert_eq!(new.element_count(), mesh.element_count());
     new
-}
-
-/// Rows that were made before, of all elements and, for shooters that try them, of all roots.
-struct Stored(std::collections::HashMap<NodeId, Row>);
-
-impl Stored {
-    fn of(mesh: &Mesh) -> Stored {
-        Stored::by(mesh, &mut rays(mesh))
-    }
-
-    fn by(mesh: &Mesh, maker: &mut dyn FormFactors) -> Stored {
-        let elements: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
-        let rows = maker.rows(mesh, &elements, 1.0).unwrap();
-        Stored(elements.into_iter().zip(rows).collect())
-    }
-}
-
-impl FormFactors for Stored {
-    fn rows(&mut self, _: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
-        Ok(patches.iter().map(|p| self.0[p].clone()).collect())
-    }
-
-    fn preferred_batch_len(&self) -> usize {
-        16
-    }
-}
-
-/// Returns whatever it is given.
-struct Given(Vec<Row>);
-
-impl FormFactors for Given {
-    fn rows(&mut self, _: &Mesh, _: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
-        Ok(self.0.clone())
-    }
 }

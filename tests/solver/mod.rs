@@ -4,4 +4,4 @@ mod many_triangles;
 mod methods;
 mod odd_geometry;
 mod patch_cut;
-mod shooting;
+pub mod shooting;

@@ -4,15 +4,16 @@
 //! All light then meets fronts, so the flux of all surfaces together is that emitted / (1 − ½), by
 //! energy alone, whatever the noise of the rays.
 
-use crate::common::{cube, quads};
+use crate::common::scenes::{block, halves, paint};
+use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::*;
-use std::ops::ControlFlow;
 
 const UNSHOT: f64 = 1e-4;
 
-fn paint(reflectance: f64, exitance: f64) -> Material {
-    Material { exitance: Rgb::splat(exitance), ..Material::grey("paint", reflectance) }
+/// Triangles of a block, seen from outside.
+fn block_triangles(low: [f64; 3], high: [f64; 3]) -> Vec<[[f64; 3]; 3]> {
+    block(low, high).into_iter().flat_map(halves).collect()
 }
 
 fn glowing() -> Material {
@@ -39,22 +40,6 @@ fn with(scene: Scene, name: &str, material: Material, triangles: &[[[f64; 3]; 3]
     Scene::new(positions, all, groups, materials).unwrap()
 }
 
-fn halves([a, b, c, d]: [[f64; 3]; 4]) -> [[[f64; 3]; 3]; 2] {
-    [[a, b, c], [a, c, d]]
-}
-
-/// A box from outside, or turned inside out.
-fn block(low: [f64; 3], high: [f64; 3], inside_out: bool) -> Vec<[[f64; 3]; 3]> {
-    let unit = cube(&glowing());
-    let put = |p: DVec3| [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * p[k]);
-    (0..unit.triangles().len())
-        .map(|t| {
-            let [a, b, c] = unit.corners(t).map(put);
-            if inside_out { [a, b, c] } else { [a, c, b] }
-        })
-        .collect()
-}
-
 /// The unit cube from inside without wall `without` (x0, x1, y0, y1, z0, z1).
 fn open_cube(without: usize) -> Scene {
     let unit = cube(&glowing());
@@ -68,7 +53,7 @@ fn settle(scene: Scene, size: f64) -> (Mesh, Solution) {
     let mesh = Mesh::new(scene, size).unwrap();
     let mut rays = RayRows::new(&mesh, 1024).unwrap();
     let solver = Solver { unshot: UNSHOT, ..Default::default() };
-    let solution = solver.solve(&mesh, &mut rays, |_| ControlFlow::Continue(())).unwrap();
+    let solution = solver.solve(&mesh, &mut rays, keep_going).unwrap();
     check(&solution.radiosity);
     check(&VertexMesh::new(&mesh, &solution.radiosity).radiosity);
     // Sums of some 1e5 terms, each rounded by 1e-16 of the whole at most.
@@ -153,7 +138,7 @@ fn touching_and_intersecting_walls() {
     // A block that stands on the floor, and one that comes through it, with sides on the sides of
     // elements: what the floor emits within is lost there, and nothing else.
     for bottom in [0.0, -0.5] {
-        let pillar = block([0.25, 0.25, bottom], [0.5; 3], false);
+        let pillar = block_triangles([0.25, 0.25, bottom], [0.5; 3]);
         let scene = with(cube(&glowing()), "pillar", paint(0.5, 0.0), &pillar);
         let (_, solution) = settle(scene, 0.36);
         let Ledger { emitted, escaped: left, backface_loss: back, .. } = solution.ledger;
@@ -259,7 +244,7 @@ fn a_light_flush_in_the_ceiling() {
 #[test]
 fn duplicated_vertices() {
     let shared =
-        with(cube(&glowing()), "block", paint(0.3, 0.0), &block([0.2; 3], [0.6; 3], false));
+        with(cube(&glowing()), "block", paint(0.3, 0.0), &block_triangles([0.2; 3], [0.6; 3]));
     // Every triangle with three of its own.
     let corners = (0..shared.triangles().len()).flat_map(|t| shared.corners(t));
     let own = (0u32..)

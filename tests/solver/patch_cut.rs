@@ -1,22 +1,17 @@
 //! Who shoots: large patches where light is dim and even, small ones elsewhere. No GPU needed.
 
 use std::collections::HashSet;
-use std::ops::ControlFlow;
 
-use crate::common::quads;
+use crate::common::scenes::lamp;
+use crate::common::{keep_going, quads};
 use glam::DVec3;
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, Progress, RayRows, Rgb, Row,
-    Scene, Solution, Solver, StopReason, Triangle,
+    Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, RayRows, Rgb, Row, Scene,
+    Solution, Solver, StopReason, Triangle,
 };
 
-fn go(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
-fn lamp() -> Material {
-    Material { exitance: Rgb::new(9.0, 6.0, 3.0), ..Material::grey("lamp", 0.0) }
-}
+/// Exitance of all lamps, W/m².
+const LAMP: [f64; 3] = [9.0, 6.0, 3.0];
 
 /// A closed room of two units, its walls of `n` × `n` quads each, with a lamp at the middle of its
 /// ceiling.
@@ -45,12 +40,12 @@ fn room(n: u32) -> Scene {
     }
     wall(DVec3::new(0.8, 0.8, 1.99), DVec3::Y * 0.4, DVec3::X * 0.4, 1, 6, 1);
     let names = (0..7).map(|g| format!("g{g}")).collect();
-    let materials = vec![Material::grey("wall", 0.6), lamp()];
+    let materials = vec![Material::grey("wall", 0.6), lamp(LAMP)];
     Scene::new(positions, triangles, names, materials).unwrap()
 }
 
 fn solve(mesh: &Mesh, settings: Solver) -> Solution {
-    settings.solve(mesh, &mut RayRows::new(mesh, 4096).unwrap(), go).unwrap()
+    settings.solve(mesh, &mut RayRows::new(mesh, 4096).unwrap(), keep_going).unwrap()
 }
 
 #[test]
@@ -106,7 +101,7 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
     let mut ceiling = square(5.0);
     ceiling.reverse();
     let scene = quads(&[
-        (down, lamp()),
+        (down, lamp(LAMP)),
         (square(0.0), Material::grey("floor", 0.5)),
         (ceiling, Material::grey("black", 0.0)),
     ]);
@@ -120,7 +115,7 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
         // goes a distance of 5: (1/6)/25 √½ = 0.005, or seen from a cube of area 3 (before there is a
         // row) (1/6)·2 √½ = 0.24. Uneven light is off by the angle, 0.5, times its share and more.
         let settings = Solver { patch_tolerance: 0.3, ..Default::default() };
-        let s = settings.solve(&mesh, &mut maker, go).unwrap();
+        let s = settings.solve(&mesh, &mut maker, keep_going).unwrap();
         assert_eq!(s.stop, StopReason::Converged);
         maker.asked.len()
     };
@@ -144,7 +139,7 @@ fn nobody_shoots_from_under_a_block() {
         .map(|corners| (corners.map(|p| p.to_array()), Material::grey("wall", 0.6)))
         .collect();
     // The last wall is the ceiling: all of it shines.
-    walls[5].1 = lamp();
+    walls[5].1 = lamp(LAMP);
     let empty = quads(&walls);
     // Blocks without a bottom on the two elements nearest to the middle of the floor, the fifth wall:
     // each hides its element's centroid and a tenth of its area.
@@ -199,7 +194,8 @@ fn a_tolerance_of_zero_makes_every_element_shoot() {
     assert!(four.rows_made < all.rows_made / 2);
     for tolerance in [-1.0, f64::NAN] {
         let settings = Solver { patch_tolerance: tolerance, ..Default::default() };
-        let error = settings.solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), go).unwrap_err();
+        let error =
+            settings.solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), keep_going).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     }
 }

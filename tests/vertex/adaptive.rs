@@ -1,8 +1,9 @@
 //! Gathering at vertices: where it splits, what it finds, and that nothing comes apart. No GPU
 //! needed: irradiance is made up, has a closed form, or is found with rays.
 
+use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};
 use crate::common::surface::{assert_watertight, assert_whole};
-use crate::common::{cube, quads};
+use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
@@ -10,10 +11,6 @@ use radiosity::{
     Material, Mesh, RadiosityField, RayGather, RefinementSettings, Rgb, StopReason, VertexMesh,
 };
 use std::ops::ControlFlow;
-
-fn go(_: &GatherProgress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 /// Gathers what a function of the sources and the place says arrives, W/m².
 struct Known<F>(F);
@@ -31,37 +28,9 @@ impl<F: FnMut(&RadiosityField, &GatherPoint) -> f64> Gather for Known<F> {
     }
 }
 
-fn grey() -> Material {
-    Material::grey("grey", 0.5)
-}
-
-/// Emits 1 W/m², reflects nothing.
-fn lamp() -> Material {
-    Material { exitance: Rgb::ONE, ..Material::grey("lamp", 0.0) }
-}
-
 /// The light of elements, one value each, W/m².
 fn shot(mesh: &Mesh, radiosity: &[Rgb]) -> GatheredMesh {
     GatheredMesh::from_elements(mesh, radiosity).unwrap()
-}
-
-type Quad = [[f64; 3]; 4];
-
-/// A rectangle at height `z` that faces up.
-fn up([x0, x1]: [f64; 2], [y0, y1]: [f64; 2], z: f64) -> Quad {
-    [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]
-}
-
-fn down(x: [f64; 2], y: [f64; 2], z: f64) -> Quad {
-    let [a, b, c, d] = up(x, y, z);
-    [a, d, c, b]
-}
-
-/// The walls of a box from `z0` to `z1`, fronts outwards, then its lid.
-fn block([x0, x1]: [f64; 2], [y0, y1]: [f64; 2], z0: f64, z1: f64) -> Vec<Quad> {
-    let (low, high) = (up([x0, x1], [y0, y1], z0), up([x0, x1], [y0, y1], z1));
-    let wall = |k: usize| [low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]];
-    [0, 1, 2, 3].map(wall).into_iter().chain([high]).collect()
 }
 
 /// In [0, 1), by the bits of a place.
@@ -87,7 +56,7 @@ fn unequal_depths_everywhere_leave_no_cracks() {
     let room = cube(&grey());
     let furnished: Vec<(Quad, Material)> = (0..6)
         .map(|k| [0, 1, 2, 3].map(|c| room.positions()[4 * k + c].to_array()))
-        .chain(block([0.3, 0.6], [0.2, 0.5], 0.0, 0.45))
+        .chain(standing_block([0.3, 0.6], [0.2, 0.5], 0.0, 0.45))
         .map(|q| (q, grey()))
         .collect();
     for scene in [room, quads(&furnished)] {
@@ -103,7 +72,7 @@ fn unequal_depths_everywhere_leave_no_cracks() {
             1.0 + f64::from(random(p.position) < 0.04) * random(-p.position)
         });
         let settings = RefinementSettings { tolerance: 0.05, ..RefinementSettings::new(0.08) };
-        let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut spots, go).unwrap();
+        let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut spots, keep_going).unwrap();
         let (least, most) = sizes(&found.mesh);
         println!("{} elements from {least:.3} to {most:.3}", found.mesh.element_count());
         assert!(found.stop == StopReason::Converged && most / least > 7.9, "unequal depths");
@@ -126,7 +95,7 @@ fn the_cornell_box_is_as_watertight_as_its_scene() {
     let mut even = Known(|_: &RadiosityField, p: &GatherPoint| 1.0 + random(p.position));
     let settings =
         RefinementSettings { tolerance: 0.2, elements: 40_000, ..RefinementSettings::new(3.0) };
-    let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut even, go).unwrap();
+    let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut even, keep_going).unwrap();
     assert!(found.mesh.element_count() > 2 * mesh.element_count());
     assert_watertight(&found.mesh, &found.surface);
 }
@@ -164,7 +133,7 @@ fn a_furnace_stays_as_it_is() {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
         let (exact, seen): (_, &mut dyn Gather) = (&mut Known(convex_room), &mut rays);
         for gather in [exact, seen] {
-            let found = settings.gather(&shot(&mesh, &settled), &mesh, gather, go).unwrap();
+            let found = settings.gather(&shot(&mesh, &settled), &mesh, gather, keep_going).unwrap();
             assert_eq!(found.stop, StopReason::Converged);
             // Walls are lights of their own here, which rays find by closed forms too, all of each
             // visible. Those are good to 1e-14 each, edge on too; they are as many as elements.
@@ -189,13 +158,14 @@ const LAMP: f64 = 0.2;
 /// hides what is beyond: from x the lamp is seen from −x on.
 fn half_hidden(p: DVec3) -> f64 {
     let from = (-p.x).clamp(-LAMP, LAMP);
-    let seen = down([from, LAMP], [-LAMP, LAMP], 6.0).map(DVec3::from_array);
+    let seen = facing_down([from, LAMP], [-LAMP, LAMP], 6.0).map(DVec3::from_array);
     point_to_polygon(p, DVec3::Z, &seen)
 }
 
 /// The floor, on a lattice of ¼ that the penumbra, |x| < 0.2, is not symmetric on; and its light.
 fn floor() -> (Mesh, Vec<Rgb>) {
-    let mesh = Mesh::new(quads(&[(up([-0.95, 1.05], [-1.0, 1.0], 0.0), grey())]), 0.36).unwrap();
+    let mesh =
+        Mesh::new(quads(&[(facing_up([-0.95, 1.05], [-1.0, 1.0], 0.0), grey())]), 0.36).unwrap();
     let at = |e: usize| Rgb::splat(0.5 * half_hidden(mesh.centroid(mesh.element(e))));
     let light = (0..mesh.element_count()).map(at).collect();
     (mesh, light)
@@ -204,7 +174,7 @@ fn floor() -> (Mesh, Vec<Rgb>) {
 fn at_the_edge(settings: &RefinementSettings) -> GatheredMesh {
     let (mesh, light) = floor();
     let mut gather = Known(|_: &RadiosityField, p: &GatherPoint| half_hidden(p.position));
-    settings.gather(&shot(&mesh, &light), &mesh, &mut gather, go).unwrap()
+    settings.gather(&shot(&mesh, &light), &mesh, &mut gather, keep_going).unwrap()
 }
 
 /// Interpolated radiosity at `p` of a floor, and the element it is in.
@@ -284,7 +254,7 @@ fn vertices_between_those_that_gather_lie_on_the_parabola() {
             asked += 1;
             curved(belongs(place.position))
         });
-        let found = settings.gather(&light, &mesh, &mut known, go).unwrap();
+        let found = settings.gather(&light, &mesh, &mut known, keep_going).unwrap();
         (found, asked)
     };
     let plain =
@@ -354,18 +324,19 @@ const FOOT: [f64; 2] = [-0.33, 0.29];
 
 #[test]
 fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
-    let bottom = down(FOOT, FOOT, 0.0);
-    let lamp_at = down([1.0, 1.6], [-0.3, 0.3], 3.0);
+    let bottom = facing_down(FOOT, FOOT, 0.0);
+    let lamp_at = facing_down([1.0, 1.6], [-0.3, 0.3], 3.0);
     // Lower than elements are long, and higher, so that its inside is roomy for most of them.
     for (height, bottom) in [(0.05, None), (0.05, Some(bottom)), (0.5, None), (0.5, Some(bottom))] {
-        let stands = block(FOOT, FOOT, 0.0, height).into_iter().chain(bottom);
-        let mut all = vec![(up([-1., 1.], [-1., 1.], 0.0), grey()), (lamp_at, lamp())];
+        let stands = standing_block(FOOT, FOOT, 0.0, height).into_iter().chain(bottom);
+        let mut all =
+            vec![(facing_up([-1., 1.], [-1., 1.], 0.0), grey()), (lamp_at, lamp([1.0; 3]))];
         all.extend(stands.map(|q| (q, Material::grey("black", 0.0))));
         let mesh = Mesh::new(quads(&all), 0.36).unwrap().split_at_contacts(3);
         let light = vec![Rgb::ZERO; mesh.element_count()];
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let settings = RefinementSettings { elements: 3000, ..RefinementSettings::new(0.04) };
-        let found = settings.gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap();
+        let found = settings.gather(&shot(&mesh, &light), &mesh, &mut rays, keep_going).unwrap();
         for k in 0..60 {
             // Before the wall that faces the lamp nothing hides it, and the light is even: on the
             // elements that the wall stands on, too, it is what is gathered at the point directly,
@@ -408,14 +379,16 @@ fn every_sweep_gathers_what_the_one_before_it_found() {
 fn two_runs_give_the_same_bits() {
     let material = Material { exitance: Rgb::new(1.0, 0.5, 0.0), ..grey() };
     let mut walls: Vec<(Quad, Material)> =
-        block([0.2, 0.5], [0.3, 0.6], 0.0, 0.4).into_iter().map(|q| (q, grey())).collect();
-    walls.push((up([0.0, 1.0], [0.0, 1.0], 0.0), grey()));
-    walls.push((down([0.0, 1.0], [0.0, 1.0], 1.0), material));
+        standing_block([0.2, 0.5], [0.3, 0.6], 0.0, 0.4).into_iter().map(|q| (q, grey())).collect();
+    walls.push((facing_up([0.0, 1.0], [0.0, 1.0], 0.0), grey()));
+    walls.push((facing_down([0.0, 1.0], [0.0, 1.0], 1.0), material));
     let mesh = Mesh::new(quads(&walls), 0.3).unwrap();
     let light = vec![Rgb::ONE; mesh.element_count()];
     let [one, two] = [0, 1].map(|_| {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        RefinementSettings::new(0.1).gather(&shot(&mesh, &light), &mesh, &mut rays, go).unwrap()
+        RefinementSettings::new(0.1)
+            .gather(&shot(&mesh, &light), &mesh, &mut rays, keep_going)
+            .unwrap()
     });
     assert!(one.mesh.element_count() > mesh.element_count());
     assert!(one.surface.radiosity == two.surface.radiosity);
@@ -456,7 +429,7 @@ fn settings_out_of_range_are_refused() {
     let light = shot(&mesh, &values);
     let refused = |settings: RefinementSettings, light: &GatheredMesh| {
         let mut never = Known(|_: &RadiosityField, _: &GatherPoint| unreachable!());
-        let error = settings.gather(light, &mesh, &mut never, go).unwrap_err();
+        let error = settings.gather(light, &mesh, &mut never, keep_going).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     };
     let good = RefinementSettings::new(0.1);

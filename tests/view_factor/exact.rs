@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use crate::common::{cube, quads};
+use crate::common::scenes::grey;
+use crate::common::{cube, keep_counting, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::{
@@ -16,19 +17,13 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-fn go(_: usize, _: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 fn exact(scene: &Scene, error: f64) -> ViewFactors {
-    ViewFactors::new(scene, error, &[], go).unwrap().unwrap()
+    ViewFactors::new(scene, error, &[], keep_counting).unwrap().unwrap()
 }
 
 fn index(m: &ViewFactors, name: &str) -> usize {
     m.names.iter().position(|n| n == name).unwrap()
 }
-
-const GREY: fn() -> Material = || Material::grey("grey", 0.5);
 
 /// A square of side `2 r` at height `z` around the axis, its front up or down.
 fn square(r: f64, z: f64, up: bool) -> [[f64; 3]; 4] {
@@ -213,9 +208,9 @@ fn the_same_bits_on_every_run() {
 fn what_is_hidden_is_zero_and_what_meets_a_back_is_told() {
     // Squares of side 1 a unit apart; a screen of side 4 between them, its back to the lower.
     let plates = [
-        (square(0.5, 0.0, true), GREY()),
-        (square(0.5, 1.0, false), GREY()),
-        (square(2.0, 0.5, true), GREY()),
+        (square(0.5, 0.0, true), grey()),
+        (square(0.5, 1.0, false), grey()),
+        (square(2.0, 0.5, true), grey()),
     ];
     let scene = quads(&plates);
     let m = exact(&scene, 1e-4);
@@ -228,7 +223,7 @@ fn what_is_hidden_is_zero_and_what_meets_a_back_is_told() {
     assert_eq!(m.leaks().len(), 3, "all see out beside one another");
 
     // Two-sided, the same screen gives and takes below too, and no back is left.
-    let both = ViewFactors::new(&scene, 1e-4, &[2], go).unwrap().unwrap();
+    let both = ViewFactors::new(&scene, 1e-4, &[2], keep_counting).unwrap().unwrap();
     assert_eq!((both.areas[2], m.areas[2]), (32.0, 16.0));
     assert!((both.factor(0, 2).value - m.back[0].value).abs() < 1e-13);
     assert!((both.factor(2, 0).value - both.factor(0, 2).value / 32.0).abs() < 1e-15);
@@ -239,19 +234,19 @@ fn what_is_hidden_is_zero_and_what_meets_a_back_is_told() {
 fn louvres_of_zero_thickness_side_by_side() {
     // Ten fins stand on end between two plates, one way round or the other: half of what they take
     // meets backs; two-sided, none. Sums do not care which way they face.
-    let mut plates = vec![(square(0.5, 0.0, true), GREY()), (square(0.5, 1.0, false), GREY())];
+    let mut plates = vec![(square(0.5, 0.0, true), grey()), (square(0.5, 1.0, false), grey())];
     for k in 0..10 {
         let x = -0.45 + 0.1 * f64::from(k);
         let mut fin = [[x, -0.5, 0.2], [x, 0.5, 0.2], [x, 0.5, 0.8], [x, -0.5, 0.8]];
         if k % 2 == 0 {
             fin.reverse();
         }
-        plates.push((fin, GREY()));
+        plates.push((fin, grey()));
     }
     let scene = quads(&plates);
     let one = exact(&scene, 1e-4);
     let fins: Vec<usize> = (2..12).collect();
-    let two = ViewFactors::new(&scene, 1e-4, &fins, go).unwrap().unwrap();
+    let two = ViewFactors::new(&scene, 1e-4, &fins, keep_counting).unwrap().unwrap();
     let to_fins = |m: &ViewFactors| fins.iter().map(|&j| m.factor(0, j).value).sum::<f64>();
     let (taken, errors) = (to_fins(&one) + one.back[0].value, 12.0 * 1e-5);
     assert!((taken - to_fins(&two)).abs() < errors, "{taken} {}", to_fins(&two));
@@ -264,7 +259,7 @@ fn louvres_of_zero_thickness_side_by_side() {
 #[test]
 fn a_plate_cut_at_random_is_the_same_plate() {
     // Triangles of one group in one plane make one piece, and in any case the same factor.
-    let whole = quads(&[(square(0.5, 0.0, true), GREY()), (square(0.5, 0.7, false), GREY())]);
+    let whole = quads(&[(square(0.5, 0.0, true), grey()), (square(0.5, 0.7, false), grey())]);
     let mut positions = whole.positions().to_vec();
     let centre = positions.len() as u32;
     positions.push(DVec3::new(0.13, -0.21, 0.0));
@@ -277,7 +272,7 @@ fn a_plate_cut_at_random_is_the_same_plate() {
         triangles.push(radiosity::Triangle { corners, ..first });
     }
     let fanned =
-        Scene::new(positions, triangles, whole.groups().to_vec(), vec![GREY(), GREY()]).unwrap();
+        Scene::new(positions, triangles, whole.groups().to_vec(), vec![grey(), grey()]).unwrap();
     let (a, b) = (exact(&whole, 1e-3), exact(&fanned, 1e-3));
     assert!((a.factor(0, 1).value - b.factor(0, 1).value).abs() < 1e-14);
     assert!((b.factor(1, 0).value - a.factor(1, 0).value).abs() < 1e-14);
@@ -290,7 +285,7 @@ fn sampled_factors_know_their_errors() {
     let truth = exact(&scene, 1e-4);
     let mesh = Mesh::new(scene, 0.18).unwrap();
     let mut rays = RayRows::new(&mesh, 4096).unwrap();
-    let m = ViewFactors::sampled(&mesh, &mut rays, go).unwrap().unwrap();
+    let m = ViewFactors::sampled(&mesh, &mut rays, keep_counting).unwrap().unwrap();
     assert_eq!(m.absent, Missing::NotSeen);
     let (mut within, mut count, mut worst) = (0, 0, 0.0_f64);
     for i in 0..m.names.len() {
@@ -327,7 +322,7 @@ fn sampled_factors_know_their_errors() {
 
 #[test]
 fn an_open_scene_stays_open_when_enforced() {
-    let plates = [(square(0.5, 0.0, true), GREY()), (square(1.0, 0.5, false), GREY())];
+    let plates = [(square(0.5, 0.0, true), grey()), (square(1.0, 0.5, false), grey())];
     let mut m = exact(&quads(&plates), 1e-3);
     let raw = m.clone();
     // As if measured apart, and a little off.
@@ -344,10 +339,10 @@ fn an_open_scene_stays_open_when_enforced() {
 
 #[test]
 fn a_leak_is_found_and_named() {
-    let closed = exact(&cube(&GREY()), 1e-4);
+    let closed = exact(&cube(&grey()), 1e-4);
     assert!(closed.leaks().is_empty());
     // The lid lifted by a thousandth: light gets out over the rim.
-    let mut scene = cube(&GREY());
+    let mut scene = cube(&grey());
     let lid = scene.positions().iter().enumerate().filter(|(k, _)| k / 4 == 5);
     let lid: Vec<usize> = lid.map(|(k, _)| k).collect();
     let mut positions = scene.positions().to_vec();
@@ -367,11 +362,11 @@ fn a_leak_is_found_and_named() {
 #[test]
 fn a_poster_in_the_plane_of_its_wall_is_found() {
     let poster = [[0.3, 0.3, 0.], [0.7, 0.3, 0.], [0.7, 0.7, 0.], [0.3, 0.7, 0.]];
-    let room = cube(&GREY());
+    let room = cube(&grey());
     let mut walls: Vec<([[f64; 3]; 4], Material)> = (0..6)
-        .map(|k| ([0, 1, 2, 3].map(|c| room.positions()[4 * k + c].to_array()), GREY()))
+        .map(|k| ([0, 1, 2, 3].map(|c| room.positions()[4 * k + c].to_array()), grey()))
         .collect();
-    walls.push((poster, GREY()));
+    walls.push((poster, grey()));
     let twice = exact(&quads(&walls), 1e-4);
     // The ceiling sees the poster's part of the floor a second time.
     assert_eq!(twice.overfull().first(), Some(&5));
@@ -403,13 +398,13 @@ fn a_long_floor_and_a_narrow_face_that_sees_a_spot_of_it() {
 
 #[test]
 fn bad_settings_are_refused_and_work_can_be_cancelled() {
-    let scene = cube(&GREY());
+    let scene = cube(&grey());
     for error in [0.0, -1.0, 1.0, f64::NAN, f64::INFINITY] {
-        let e = ViewFactors::new(&scene, error, &[], go).unwrap_err();
+        let e = ViewFactors::new(&scene, error, &[], keep_counting).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains("(0, 1)"), "{e}");
     }
-    let e = ViewFactors::new(&scene, 1e-4, &[6], go).unwrap_err();
+    let e = ViewFactors::new(&scene, 1e-4, &[6], keep_counting).unwrap_err();
     assert!(e.to_string().contains("6 groups"), "{e}");
     let stopped = ViewFactors::new(&scene, 1e-4, &[], |_, _| ControlFlow::Break(()));
     assert!(stopped.unwrap().is_none());
@@ -424,7 +419,7 @@ fn bad_settings_are_refused_and_work_can_be_cancelled() {
 
 #[test]
 fn lists_and_matrix_market_files() {
-    let plates = [(square(0.5, 0.0, true), GREY()), (square(0.5, 1.0, false), GREY())];
+    let plates = [(square(0.5, 0.0, true), grey()), (square(0.5, 1.0, false), grey())];
     let mut m = exact(&quads(&plates), 1e-4);
     m.names[0] = "low, \"1\"\n".into();
     m.factors[1][0] = Factor { to: 0, value: 1.234_56e-7, error: 2e-9 };

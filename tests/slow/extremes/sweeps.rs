@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 use std::num::NonZeroU32;
-use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::{
@@ -13,8 +12,8 @@ use radiosity::{
 
 use super::sweep::Sweep;
 use crate::common::closed_forms::exact;
-use crate::common::files;
 use crate::common::framed::{self as scenes, Frame, HERE, grey};
+use crate::common::{files, keep_counting, keep_going};
 
 /// What makes rows and gathers, and how many steps are gone.
 pub struct Ask<'a> {
@@ -70,10 +69,6 @@ const ROUNDING: f64 = 1e-9;
 /// of it: that is 3e-2 of it.
 const ONE_RAY: f64 = 3e-2;
 
-fn go<T>(_: &T) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 impl Ask<'_> {
     fn steps<T: Copy>(&self, all: impl IntoIterator<Item = T>) -> Vec<T> {
         let all: Vec<T> = all.into_iter().collect();
@@ -121,7 +116,7 @@ fn furnace(mut sweep: Sweep, steps: Vec<(Frame, f64, f64)>, method: Option<Metho
         let mesh = Mesh::new(scenes::furnace(frame, rho, e), 0.8 * frame.scale)?;
         let mut solver = Solver { unshot: 1e-9, ..Solver::for_mesh(&mesh) };
         solver.method = method.unwrap_or(solver.method);
-        let s = solver.solve(&mesh, &mut exact(), go)?;
+        let s = solver.solve(&mesh, &mut exact(), keep_going)?;
         sweep.solved(&s);
         let found = channels(&s.radiosity, e);
         sweep.step(&found, &vec![1.0 / (1.0 - rho); found.len()]);
@@ -162,7 +157,8 @@ fn sphere(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
         let scene = scenes::sphere(frame, 2, grey(rho, 1.0), grey(rho, 0.0));
         let mesh = Mesh::new(scene, f64::INFINITY)?;
         let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let s = Solver { unshot: 1e-9, ..Solver::for_mesh(&mesh) }.solve(&mesh, &mut rows, go)?;
+        let s = Solver { unshot: 1e-9, ..Solver::for_mesh(&mesh) }
+            .solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
         let nodes = (0..mesh.element_count()).map(|k| mesh.element(k));
         let (mut areas, mut means) = ([0.0; 2], [0.0; 2]);
@@ -195,7 +191,7 @@ fn reflectance_of_sphere(ask: &Ask) -> Swept {
 fn plates(mut sweep: Sweep, steps: Vec<Frame>) -> Swept {
     sweep.by("view factors");
     for frame in steps {
-        let matrix = ViewFactors::new(&scenes::plates(frame), 1e-4, &[], |_, _| go(&()))?;
+        let matrix = ViewFactors::new(&scenes::plates(frame), 1e-4, &[], keep_counting)?;
         let matrix = matrix.expect("nobody cancels");
         let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
         sweep.step(&both, &[scenes::PLATES; 2]);
@@ -223,7 +219,7 @@ fn rows_of_plates(ask: &Ask) -> Swept {
     for frame in ask.scales() {
         let mesh = Mesh::new(scenes::plates(frame), 0.1 * frame.scale)?;
         let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, |_, _| go(&()))?;
+        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
         let matrix = matrix.expect("nobody cancels");
         let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
         sweep.step(&both, &[scenes::PLATES; 2]);
@@ -243,7 +239,7 @@ fn rows_of_small_plates(ask: &Ask) -> Swept {
             mesh = mesh.split(&(0..far).collect::<Vec<_>>())?;
         }
         let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, |_, _| go(&()))?;
+        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
         let matrix = matrix.expect("nobody cancels");
         let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
         sweep.step(&both, &[scenes::PLATES; 2]);
@@ -256,7 +252,7 @@ fn settle(scene: Scene, size: f64, ask: &Ask) -> Result<(Mesh, Solution), Error>
     let mesh = Mesh::new(scene, size)?.split_at_contacts(1);
     let rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
     let mut rows = AdaptiveViewpoints::new(ProximityCorrection::new(rows, &mesh, 1.0), 0.05, 1);
-    let solution = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, go)?;
+    let solution = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, keep_going)?;
     Ok((mesh, solution))
 }
 
@@ -296,7 +292,7 @@ fn bake(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let light = |frame: Frame, e: f64, sweep: &mut Sweep| -> Result<Vec<f64>, Error> {
         let scene = files::through_obj(&scenes::room(frame, e, 0.1 * e), folder.path())?;
-        let baked = BakeTarget::Error(0.1).bake(scene, ask.device, go)?;
+        let baked = BakeTarget::Error(0.1).bake(scene, ask.device, keep_going)?;
         sweep.solved(&baked.solution);
         let ply = folder.path().join("scene.ply");
         write_ply(&ply, &baked.light.surface)?;
@@ -334,7 +330,8 @@ fn lamps_apart(ask: &Ask) -> Swept {
         let (mut found, mut known) = (vec![], vec![]);
         for method in Method::ALL {
             let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-            let s = Solver { unshot: 0.0, ..Solver::new(method) }.solve(&mesh, &mut rows, go)?;
+            let s = Solver { unshot: 0.0, ..Solver::new(method) }
+                .solve(&mesh, &mut rows, keep_going)?;
             sweep.solved(&s);
             let mut means = [0.0; 2];
             for (k, b) in s.radiosity.iter().enumerate() {
@@ -357,7 +354,7 @@ fn lamps_together(ask: &Ask) -> Swept {
         let mesh = Mesh::new(scenes::room(HERE, first, second), 0.5)?;
         let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
         let solver = Solver { unshot: 0.0, ..Solver::new(Method::Gmres { restart: 50 }) };
-        let s = solver.solve(&mesh, &mut rows, go)?;
+        let s = solver.solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
         Ok(channels(&s.radiosity, 1.0))
     };
@@ -438,14 +435,14 @@ fn areas(ask: &Ask) -> Swept {
         let scene = scenes::panelled(HERE, side, grey(0.5, 1.0), grey(0.5, 1.0));
         let mesh = Mesh::new(scene, 0.5)?;
         let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let s = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, go)?;
+        let s = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
         let areas = (0..mesh.element_count()).map(|k| mesh.area(mesh.element(k)));
         let leaving: f64 = s.radiosity.iter().zip(areas).map(|(b, a)| b.x * a).sum();
         let light = GatheredMesh::from_elements(&mesh, &s.radiosity)?;
         let gathering =
             RefinementSettings { elements: 0, sweeps: 3, ..RefinementSettings::new(1.0) };
-        let fine = gathering.gather(&light, &mesh, &mut *ask.gatherer(&mesh)?, go)?;
+        let fine = gathering.gather(&light, &mesh, &mut *ask.gatherer(&mesh)?, keep_going)?;
         let mut found = channels(&fine.surface.radiosity, 1.0);
         found.push(leaving / 6.0);
         sweep.step(&found, &vec![2.0; found.len()]);

@@ -3,10 +3,11 @@
 use std::f64::consts::PI;
 use std::num::NonZeroU32;
 
+use crate::common::scenes::grey;
 use crate::common::{cornell_box, cube, gpu, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
-use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Material, Mesh, NodeId, RayRows, Row};
+use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, RayRows, Row};
 
 /// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
 fn largest_pixel(n: u32) -> f64 {
@@ -37,15 +38,14 @@ fn to_group(mesh: &Mesh, row: &Row, group: u32) -> f64 {
     seen.map(|e| Row::form_factor(e.share)).sum()
 }
 
-const GREY: fn() -> Material = || Material::grey("grey", 0.5);
-
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_square_seen_from_a_point_on_its_axis() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     // A speck at the origin looks at a square of side 0.5 at distance 1 (Howell, B-3, four times).
     let speck = [[-1e-3, -1e-3, 0.], [1e-3, -1e-3, 0.], [0., 2e-3, 0.], [-1e-3, 0., 0.]];
     let square = [[-0.25, -0.25, 1.], [-0.25, 0.25, 1.], [0.25, 0.25, 1.], [0.25, -0.25, 1.]];
-    let mesh = Mesh::new(quads(&[(speck, GREY()), (square, GREY())]), f64::INFINITY).unwrap();
+    let mesh = Mesh::new(quads(&[(speck, grey()), (square, grey())]), f64::INFINITY).unwrap();
     let r = (1.0f64 + 0.25 * 0.25).sqrt();
     let exact = 4.0 / PI * (0.25 / r) * (0.25 / r).atan();
     let corners = square.map(DVec3::from_array);
@@ -66,11 +66,11 @@ fn a_square_seen_from_a_point_on_its_axis() {
 /// causes, each with its own bound: pixels, against the closed form from the same points, and the
 /// points, against the closed form from the whole area.
 fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, perimeter: f64) {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let first = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     let (p, q) = (first.map(DVec3::from_array), second.map(DVec3::from_array));
     assert!((polygon_to_polygon(&p, &q) - exact).abs() < 5e-9, "{}", polygon_to_polygon(&p, &q));
-    let mesh = Mesh::new(quads(&[(first, GREY()), (second, GREY())]), 0.1).unwrap();
+    let mesh = Mesh::new(quads(&[(first, grey()), (second, grey())]), 0.1).unwrap();
     let patches: Vec<NodeId> = [0, 1]
         .into_iter()
         .flat_map(|t| mesh.elements_of(mesh.root(t)))
@@ -95,6 +95,7 @@ fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, peri
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn parallel_unit_squares() {
     // Centroid rule: for a triangle of longest edge h, |error| ≤ h²/24·max|∇²F| or less; ∇²F of
     // the point factor is below 4 here, h = 0.0884: 1.3e-3. The outline on the hemicube is at most
@@ -105,6 +106,7 @@ fn parallel_unit_squares() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn perpendicular_unit_squares_that_share_an_edge() {
     // Near the shared edge the point factor runs up to 1/2 like a function of (distance to edge)/
     // (length), so the centroid rule misses up to a share of the edge row's own area times its
@@ -114,9 +116,10 @@ fn perpendicular_unit_squares_that_share_an_edge() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = Mesh::new(cube(&GREY()), 0.3).unwrap();
+    let gpu = gpu();
+    let mesh = Mesh::new(cube(&grey()), 0.3).unwrap();
     let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
     for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
         // Pixels look along directions of at least 1/64 above the horizon: no gap at the edges.
@@ -128,18 +131,19 @@ fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn what_is_out_of_view_is_all_that_is_left_out() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     // A closed cube of 1 536 triangles, of which each face of a hemicube draws only a part: one
     // triangle left out in error would be a hole.
-    let cube = cube(&GREY());
+    let cube = cube(&grey());
     let mut tiles = vec![];
     for wall in (0..cube.triangles().len()).step_by(2) {
         let [a, b, c] = cube.corners(wall);
         let at = |u: u32, v: u32| a + (b - a) * f64::from(u) / 16. + (c - b) * f64::from(v) / 16.;
         for (u, v) in (0..256).map(|k| (k % 16, k / 16)) {
             let corners = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)];
-            tiles.push((corners.map(|p| p.to_array()), GREY()));
+            tiles.push((corners.map(|p| p.to_array()), grey()));
         }
     }
     let mesh = Mesh::new(quads(&tiles), f64::INFINITY).unwrap();
@@ -151,13 +155,14 @@ fn what_is_out_of_view_is_all_that_is_left_out() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn backs_are_told_from_fronts_and_block() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let floor = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     // A screen that shows its back to the floor, close over it, and hides the lid.
     let screen = [[-9., -9., 0.1], [9., -9., 0.1], [9., 9., 0.1], [-9., 9., 0.1]];
     let lid = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
-    let mesh = Mesh::new(quads(&[(floor, GREY()), (screen, GREY()), (lid, GREY())]), 0.5).unwrap();
+    let mesh = Mesh::new(quads(&[(floor, grey()), (screen, grey()), (lid, grey())]), 0.5).unwrap();
     let patches: Vec<NodeId> = mesh.elements_of(mesh.root(0)).map(|e| mesh.element(e)).collect();
     for row in rows(&gpu, &mesh, 64, &patches) {
         assert_eq!(row.entries, []);
@@ -168,7 +173,7 @@ fn backs_are_told_from_fronts_and_block() {
 
 /// GPU and CPU rows of the same patches differ by no more than both their sampling errors.
 fn agree(size: f64, n: u32, rays: u32, count: usize) {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = cornell_box(size);
     let all = mesh.element_count();
     let patches: Vec<NodeId> = (0..count).map(|k| mesh.element(k * 7919 % all)).collect();
@@ -201,18 +206,21 @@ fn agree(size: f64, n: u32, rays: u32, count: usize) {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn hemicubes_agree_with_rays_element_by_element() {
     agree(60.0, 256, 1 << 16, 24);
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn hemicubes_agree_with_rays_triangle_by_triangle() {
     agree(f64::INFINITY, 512, 1 << 18, 32);
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn rows_are_the_same_bits_however_they_are_batched() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = cornell_box(100.0);
     let patches: Vec<NodeId> =
         (0..70).map(|k| mesh.element(k * 13 % mesh.element_count())).collect();
@@ -229,8 +237,9 @@ fn rows_are_the_same_bits_however_they_are_batched() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_far_scene_gives_the_same_rows() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     // Moved by a thousand of its sizes, in steps that 64-bit coordinates hold exactly: the device
     // works about a local origin and sees the very same numbers.
     let near = cornell_box(200.0);
@@ -252,8 +261,9 @@ fn a_far_scene_gives_the_same_rows() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn what_a_device_cannot_do_is_said() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = cornell_box(200.0);
     for n in [0, 7, 100_000] {
         let e = HemicubeRows::new(&gpu, &mesh, n).unwrap_err();
@@ -266,9 +276,10 @@ fn what_a_device_cannot_do_is_said() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn turned_hemicubes_average_pixel_errors_away() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = Mesh::new(cube(&GREY()), 0.1).unwrap();
+    let gpu = gpu();
+    let mesh = Mesh::new(cube(&grey()), 0.1).unwrap();
     // Elements of the walls, some 20 pixels each.
     let patches: Vec<NodeId> = (0..20).map(|k| mesh.element(k * 150 + 7)).collect();
     let make = |k: u32| {

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 
-use crate::common::{cornell_box, cube, gpu};
+use crate::common::{cornell_box, cube, gpu, keep_going};
 use radiosity::{
     AdaptiveViewpoints, Backend, BakeProgress, BakeSettings, BakeTarget, Entry, Error, ErrorKind,
     Fallback, FormFactors, Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
@@ -17,10 +17,6 @@ use radiosity::{GatherPoint, IrradianceSample};
 /// The device as if it had no more than `limits`.
 fn within(limits: GpuLimits) -> Gpu {
     Gpu::within(None, &limits).unwrap()
-}
-
-fn go<T>(_: &T) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }
 
 /// A glowing cube in some elements.
@@ -73,8 +69,9 @@ fn doomed(gpu: &Gpu, mesh: &Mesh, left: u32) -> Doomed<HemicubeRows> {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_lost_device_is_an_error_wherever_it_is_used() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = furnace();
     let mut rows = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
     let mut gather = HemicubeGather::new(&gpu, &mesh, 64).unwrap();
@@ -90,7 +87,7 @@ fn a_lost_device_is_an_error_wherever_it_is_used() {
         HemicubeGather::new(&gpu, &mesh, 64).unwrap_err(),
         Backend::Gpu(gpu.clone()).rows(&mesh, 64, NonZeroU32::MIN).unwrap_err(),
         BakeSettings::for_error(0.1, mesh.scene())
-            .bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), go)
+            .bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), keep_going)
             .unwrap_err(),
     ];
     for e in errors {
@@ -103,22 +100,22 @@ fn a_lost_device_is_an_error_wherever_it_is_used() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_solve_outlives_its_device() {
-    let Some(_) = gpu() else { return };
     let mesh = furnace();
     for method in [Method::ALL[0], Method::ALL[2], Method::ALL[4]] {
         let solver = Solver::new(method);
         let mut alone = HemicubeRows::new(&Gpu::new(None).unwrap(), &mesh, 64).unwrap();
-        let undisturbed = solver.solve(&mesh, &mut alone, go).unwrap();
+        let undisturbed = solver.solve(&mesh, &mut alone, keep_going).unwrap();
         let lost = Gpu::new(None).unwrap();
-        let e = solver.solve(&mesh, &mut doomed(&lost, &mesh, 2), go).unwrap_err();
+        let e = solver.solve(&mesh, &mut doomed(&lost, &mesh, 2), keep_going).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Device);
         let (lost, errors) = (Gpu::new(None).unwrap(), RefCell::new(vec![]));
         let mut relay = Fallback::new(doomed(&lost, &mesh, 2), |e| {
             errors.borrow_mut().push(e);
             HemicubeRows::new(&Gpu::new(None)?, &mesh, 64)
         });
-        let solution = solver.solve(&mesh, &mut relay, go).unwrap();
+        let solution = solver.solve(&mesh, &mut relay, keep_going).unwrap();
         assert_eq!(solution.stop, StopReason::Converged);
         // Rows of the first device were used on, those of the second are the same: so is the light.
         assert!(solution.radiosity == undisturbed.radiosity, "{method}");
@@ -131,8 +128,9 @@ fn a_solve_outlives_its_device() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_relay_may_give_up_and_minds_other_errors_not() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = furnace();
     let mut relay = Fallback::new(doomed(&gpu, &mesh, 0), Err::<RayRows, _>);
     let e = relay.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err();
@@ -158,15 +156,16 @@ fn a_relay_may_give_up_and_minds_other_errors_not() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn gathering_outlives_its_device() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = furnace();
     let light =
         GatheredMesh::from_elements(&mesh, &vec![Rgb::splat(2.0); mesh.element_count()]).unwrap();
     // Nothing bends in a furnace: split it whatever the light says, so that there are two batches.
     let settings =
         RefinementSettings { everywhere: 1, curve: f64::INFINITY, ..RefinementSettings::new(1e-3) };
-    let by = |gather: &mut dyn Gather| settings.gather(&light, &mesh, gather, go).unwrap();
+    let by = |gather: &mut dyn Gather| settings.gather(&light, &mesh, gather, keep_going).unwrap();
     let hemicubes = by(&mut HemicubeGather::new(&gpu, &mesh, 64).unwrap());
     let rays = by(&mut RayGather::new(&mesh, 1024).unwrap());
     let inner = HemicubeGather::new(&gpu, &mesh, 64).unwrap();
@@ -185,8 +184,8 @@ fn gathering_outlives_its_device() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn a_bake_outlives_its_device() {
-    let Some(_) = gpu() else { return };
     let scene = cornell_box(f64::INFINITY).scene().clone();
     // Closed while it shoots; the second is stopped when it hears of that.
     for stop in [false, true] {
@@ -228,8 +227,9 @@ fn a_bake_outlives_its_device() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn without_memory_batches_are_smaller_and_rows_the_same() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = cornell_box(100.0);
     let patches: Vec<NodeId> = (0..40).map(|e| mesh.element(7 * e)).collect();
     let all = HemicubeRows::new(&gpu, &mesh, 128).unwrap().rows(&mesh, &patches, 1.0).unwrap();
@@ -262,8 +262,9 @@ fn without_memory_batches_are_smaller_and_rows_the_same() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn without_memory_places_gather_in_smaller_batches() {
-    let Some(gpu) = gpu() else { return };
+    let gpu = gpu();
     let mesh = cornell_box(100.0);
     let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
     let light = light.unwrap();
@@ -291,8 +292,8 @@ fn without_memory_places_gather_in_smaller_batches() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn what_a_lesser_device_cannot_do_is_told_with_what_it_can() {
-    let Some(_) = gpu() else { return };
     let mesh = furnace();
     let small = within(GpuLimits { texture: 256, ..GpuLimits::MOST });
     // An item buffer is three times as high as wide: 3 · 84 = 252.
@@ -324,65 +325,4 @@ fn what_a_lesser_device_cannot_do_is_told_with_what_it_can() {
         HemicubeRows::new(&gpu, &mesh, 32).unwrap().rows(&mesh, &patches, 1.0).unwrap()
     });
     assert!(one == many);
-}
-
-/// Rows as they are given, of whatever patch.
-struct Given(Row, usize);
-
-impl FormFactors for Given {
-    fn rows(&mut self, _: &Mesh, patches: &[NodeId], _: f64) -> Result<Vec<Row>, Error> {
-        Ok(vec![self.0.clone(); patches.len() - self.1.min(patches.len())])
-    }
-}
-
-#[test]
-fn rows_that_are_none_are_errors_whoever_uses_them() {
-    let mesh = furnace();
-    let row = |element: u32, share: u32, open: u32| {
-        let entries = vec![Entry { element, share }];
-        Row { entries, escaped: open, backface: 0 }
-    };
-    let total = Row::TOTAL;
-    // An element that does not exist; sums too small, too large and beyond 32 bits; a row missing.
-    let bad = [
-        (row(1 << 30, total, 0), 0),
-        (row(1, 5, 0), 0),
-        (row(1, total, 1), 0),
-        (row(1, total, total), 0),
-        (row(1, total, 0), 1),
-    ];
-    let patch = [mesh.root(0)];
-    for (row, missing) in bad {
-        let given = || Given(row.clone(), missing);
-        let near = || ProximityCorrection::new(given(), &mesh, 1e9);
-        let errors = [
-            Solver::new(Method::ALL[0]).solve(&mesh, &mut given(), go).unwrap_err(),
-            near().rows(&mesh, &patch, 1.0).unwrap_err(),
-            AdaptiveViewpoints::new(near(), 0.0, 9).rows(&mesh, &patch, 1.0).unwrap_err(),
-            ViewFactors::sampled(&mesh, &mut given(), |_, _| ControlFlow::Continue(()))
-                .unwrap_err(),
-        ];
-        for e in errors {
-            assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");
-        }
-    }
-}
-
-#[test]
-fn what_takes_long_is_asked_for_in_small_batches() {
-    // Progress is told between batches: the work in one is bounded whatever the settings.
-    let mesh = furnace();
-    let rays = |count| RayRows::new(&mesh, count).unwrap();
-    assert_eq!([1 << 10, 1 << 18, 1 << 20].map(|n| rays(n).preferred_batch_len()), [16, 4, 1]);
-    let parts = |levels| {
-        AdaptiveViewpoints::new(ProximityCorrection::new(rays(64), &mesh, 1.0), 0.1, levels)
-            .preferred_batch_len()
-    };
-    assert_eq!([0, 1, u32::MAX].map(parts), [16, 1, 1]);
-    let Some(gpu) = gpu() else { return };
-    let turned = |n: u32| {
-        let hemicubes = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
-        hemicubes.with_rotations(NonZeroU32::new(n).unwrap()).preferred_batch_len()
-    };
-    assert_eq!([1, 4, 16, 100].map(turned), [16, 4, 1, 1]);
 }

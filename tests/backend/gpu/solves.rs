@@ -1,0 +1,82 @@
+//! Whole solves with rows from hemicubes: against closed forms and path-traced truth.
+
+use radiosity::{HemicubeRows, Material, Mesh, ProximityCorrection, Rgb, Solver};
+
+use crate::bake::cornell_box;
+use crate::common::closed_forms::from_centroid;
+use crate::common::scenes::{self, paint};
+use crate::common::{cube, gpu, keep_going};
+use crate::solver::shooting::{mean_and_worst, unequal_areas};
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn white_furnace_with_hemicubes_keeps_the_energy() {
+    let gpu = gpu();
+    for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
+        let mesh = Mesh::new(cube(&paint(rho, 1.0)), 0.2).unwrap();
+        let settings = Solver { unshot: 1e-7, ..Default::default() };
+        let mut hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
+        let s = settings.solve(&mesh, &mut hemicubes, keep_going).unwrap();
+        let (mean, worst) = mean_and_worst(&mesh, &s, Rgb::splat(answer));
+        // Flux is conserved, so the mean is short by no more than the unshot share, which would
+        // still bring 1/(1−ρ) times itself, relative to 1/(1−ρ).
+        assert!((mean.x / answer - 1.0).abs() < 1e-6, "ρ {rho}: mean {mean}");
+        // An element is off because patches shoot from their centroids (the proximity assumption
+        // of Baum, Rushmeier, Winget 1989), which closed forms from the same centroids show too.
+        // What is left is pixels: an element gets its light from 192 patches of 4 times its area,
+        // with factors of 1/768: 67 pixels of 2e-5, up to 14·√67 of them crossed by the outline
+        // and off by half at random: 4·√192·2e-5·√(115/12) = 0.34 % of its light; six of them.
+        let twin = settings.solve(&mesh, &mut from_centroid(), keep_going).unwrap();
+        let ratio = s.radiosity.iter().zip(&twin.radiosity).map(|(a, b)| (a.x / b.x - 1.0).abs());
+        let pixels = ratio.fold(0.0, f64::max);
+        println!("ρ {rho}: mean {}, worst element {worst:.1e}, by pixels {pixels:.1e}", mean.x);
+        assert!(pixels < 0.02, "ρ {rho}: {pixels}");
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn the_white_furnace_is_even() {
+    let gpu = gpu();
+    // What a whole solve gains: elements of a white furnace at ρ = 0.5 should all have B = 2.
+    let glow = Material { exitance: Rgb::ONE, ..Material::grey("g", 0.5) };
+    let mesh = Mesh::new(cube(&glow), 0.2).unwrap();
+    let uneven = |reach: f64| {
+        let hemicubes = HemicubeRows::new(&gpu, &mesh, 256).unwrap();
+        let mut rows = ProximityCorrection::new(hemicubes, &mesh, reach);
+        let settings = Solver { unshot: 1e-6, ..Default::default() };
+        let s = settings.solve(&mesh, &mut rows, keep_going).unwrap();
+        assert!(s.ledger.imbalance() < 1e-9, "energy is kept");
+        s.radiosity.iter().map(|b| (b.x / 2.0 - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let (raw, mended) = (uneven(-1.0), uneven(2.0));
+    println!("worst element {raw:.4} before, {mended:.4} after");
+    // Pixels alone leave up to 2 % here (see the furnace in shooting.rs), 0.1 % as measured there.
+    assert!(raw > 0.03 && mended < 0.02 && mended < raw / 5.0);
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn thirty_millimetre_elements_err_by_five_per_cent_at_most() {
+    let gpu = gpu();
+    // The bounds are the project's own goal for uniform elements: what is left is elements that
+    // straddle a shadow or a block's foot.
+    let mesh = scenes::cornell_box(30.0);
+    assert_eq!(mesh.element_count(), 13_184);
+    let rows =
+        || ProximityCorrection::new(HemicubeRows::new(&gpu, &mesh, 128).unwrap(), &mesh, 1.0);
+    let solution = cornell_box::solve(&mesh, &mut rows());
+    cornell_box::check(&mesh, &solution, 0.05, 0.01);
+    // Same input, same adapter: the same bits, also from a new device.
+    let again = cornell_box::solve(&mesh, &mut rows());
+    assert!(again.radiosity == solution.radiosity && again.ledger == solution.ledger);
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn unequal_areas_exchange_by_reciprocity() {
+    // At N = 512 an element of factor 1e-3 covers 200 pixels at least, and its outline crosses up
+    // to 14·√200, each off by up to half at random: 4·√(200/12)/200 = 8 %.
+    let gpu = gpu();
+    unequal_areas(|mesh| HemicubeRows::new(&gpu, mesh, 512).unwrap(), 0.13);
+}
