@@ -196,7 +196,7 @@ fn errors_and_times_out_of_range_are_refused() {
         assert_eq!(e.kind(), ErrorKind::Setting);
     }
     let no_time = BakeTarget::Time(Duration::ZERO);
-    let e = no_time.bake(furnace(0.5), &Backend::Cpu, go).unwrap_err();
+    let e = no_time.bake(furnace(0.5), &Backend::Cpu, keep_going).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Setting);
     let bad = |settings: &mut BakeSettings| {
         if let Some(gather) = &mut settings.gather {

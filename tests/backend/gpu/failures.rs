@@ -7,10 +7,9 @@ use std::ops::ControlFlow;
 
 use crate::common::{cornell_box, cube, gpu, keep_going};
 use radiosity::{
-    AdaptiveViewpoints, Backend, BakeProgress, BakeSettings, BakeTarget, Entry, Error, ErrorKind,
-    Fallback, FormFactors, Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
-    Material, Mesh, Method, NodeId, ProximityCorrection, RadiosityField, RayGather, RayRows,
-    RefinementSettings, Rgb, Row, Solver, StopReason, ViewFactors,
+    Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, Fallback, FormFactors,
+    Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows, Material, Mesh, Method,
+    NodeId, RadiosityField, RayGather, RayRows, RefinementSettings, Rgb, Row, Solver, StopReason,
 };
 use radiosity::{GatherPoint, IrradianceSample};
 
