@@ -1,6 +1,10 @@
 //! Geometry that knows nothing of light.
 
 pub(crate) mod aabb;
+pub(crate) mod plane;
+pub(crate) mod polygon;
+pub(crate) mod quadrature;
 pub(crate) mod rounding;
+pub(crate) mod triangulation;
 pub(crate) mod union_find;
 pub(crate) mod weld;

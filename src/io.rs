@@ -5,7 +5,6 @@ mod image;
 mod mtl;
 mod obj;
 mod ply;
-mod polygon;
 mod report;
 mod text;
 mod tone;

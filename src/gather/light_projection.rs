@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::GatherPoint;
-use crate::form_factor::closed_form::clip;
+use crate::geometry::polygon::clip;
 use crate::hemicube::Face;
 
 /// A view from a place that a light fills.

@@ -8,9 +8,9 @@ use glam::DVec3;
 
 use super::files::{self, Files, MOST_BYTES};
 use super::mtl::Library;
-use super::polygon::{MOST_CORNERS_TO_CLIP, triangulate};
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted};
+use crate::geometry::triangulation::{MAX_EAR_CLIPPING_CORNERS, triangulate};
 use crate::scene::{Material, Scene, Triangle};
 
 /// Group of the faces that come before any `o` or `g` line.
@@ -288,7 +288,7 @@ impl Scan {
                     corners.len()
                 );
                 let remedy = format!(
-                    "its outline must not cross itself, and may have {MOST_CORNERS_TO_CLIP} \
+                    "its outline must not cross itself, and may have {MAX_EAR_CLIPPING_CORNERS} \
                      corners unless it is convex; triangles always work"
                 );
                 Error::new(ErrorKind::Scene, text::place(path, face.line), found, remedy)

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
-use crate::form_factor::closed_form::area_vector;
+use crate::geometry::polygon::area_vector;
 use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 

@@ -9,7 +9,9 @@ use super::Estimate;
 use super::exchange::unblocked;
 use super::point_visibility::PointVisibility;
 use super::shaft::{Blocker, Shaft, covers};
-use super::visual_events::{EventPlane, most_even};
+use super::visual_events::{most_even, split_triangle};
+use crate::geometry::plane::Plane;
+use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
 
 /// Most cells that a sum is cut into; what error is left then is told.
@@ -46,7 +48,7 @@ pub(super) struct OccludedPair {
     pub normal: DVec3,
     pub target: Vec<DVec3>,
     pub target_normal: DVec3,
-    pub creases: Vec<EventPlane>,
+    pub creases: Vec<Plane>,
     pub cells: Vec<Cell>,
 }
 
@@ -65,14 +67,6 @@ pub(super) struct Cell {
     /// Number that the place of its next cut is drawn from.
     seed: u64,
 }
-
-/// Radon's rule of seven points and degree five (A. H. Stroud, Approximate Calculation of Multiple
-/// Integrals, 1971, T2:5-1), and one of degree two within it: barycentric orbits and weights.
-const CENTRE: (f64, f64) = (0.225, 0.484_123_183_164);
-const ORBITS: [(f64, f64, f64); 2] = [
-    (0.101_286_507_323_456_34, 0.125_939_180_544_827_15, 0.171_958_938_945),
-    (0.470_142_064_105_115_1, 0.132_394_152_788_506_2, 0.0),
-];
 
 impl Cell {
     /// Of `candidates`, those that matter are kept.
@@ -102,18 +96,12 @@ impl Cell {
         let area = 0.5 * (b - a).cross(c - a).length();
         // Visible and whole, by either rule.
         let (mut five, mut two) = ([0.0; 2], [0.0; 2]);
-        let mut add = |point: DVec3, weights: (f64, f64)| {
-            let seen =
-                eye.look(point, pair.normal, &pair.target, pair.target_normal, &cell.blockers);
+        for node in radon_nodes(corners) {
+            let (normal, facing) = (pair.normal, pair.target_normal);
+            let seen = eye.look(node.point, normal, &pair.target, facing, &cell.blockers);
             for (k, value) in [seen.visible, seen.whole].into_iter().enumerate() {
-                five[k] += area * weights.0 * value;
-                two[k] += area * weights.1 * value;
-            }
-        };
-        add((a + b + c) / 3.0, CENTRE);
-        for (share, weight, within) in ORBITS {
-            for (p, q, r) in [(a, b, c), (b, c, a), (c, a, b)] {
-                add(share * (p + q) + (1.0 - 2.0 * share) * r, (weight, within));
+                five[k] += area * node.degree_5 * value;
+                two[k] += area * node.degree_2 * value;
             }
         }
         let [visible, whole] = [0, 1].map(|k| five[k] - two[k]);
@@ -154,7 +142,7 @@ impl Cell {
     /// spread evenly over them, it is their likely error.
     fn parts(&self, pair: &OccludedPair, eye: &mut PointVisibility) -> Vec<Cell> {
         let triangles = match most_even(&pair.creases, &self.corners) {
-            Some((_, crease)) => crease.cut(&self.corners),
+            Some((_, crease)) => split_triangle(&self.corners, crease),
             None => self.halves().to_vec(),
         };
         let seeds = (1..).map(|k| split_mix64(self.seed ^ k));

@@ -7,9 +7,10 @@ use super::convex_polygons::ConvexPolygon;
 use super::cubature::{Cell, OccludedPair};
 use super::far_field::{FAR_ERROR, far_exchange};
 use super::point_visibility::PointVisibility;
-use super::shaft::{CONTACT, Shaft, Tree, covers, distinct};
-use super::visual_events::{creases, fan, parts_between, standing_on};
-use crate::form_factor::closed_form::{clip, polygon_area, polygon_to_polygon};
+use super::shaft::{CONTACT, ONE, Shaft, Tree, covers};
+use super::visual_events::{creases, parts_between, standing_on};
+use crate::form_factor::closed_form::polygon_to_polygon;
+use crate::geometry::polygon::{clip, fan, merge_close_corners, polygon_area};
 use crate::sampling::hash::split_mix64;
 
 /// What the closed form errs by at most, as a share of the flux from the smaller piece into the
@@ -50,8 +51,8 @@ pub(super) fn link(
     }
     let mut a = clip(&s.corners, at_t, t.normal);
     let mut b = clip(&t.corners, at_s, s.normal);
-    distinct(&mut a);
-    distinct(&mut b);
+    merge_close_corners(&mut a, ONE);
+    merge_close_corners(&mut b, ONE);
     if a.len() < 3 || b.len() < 3 {
         return PairVisibility::Nothing;
     }

@@ -4,105 +4,108 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// Gauss–Legendre rules of two and three points on [0, 1].
-const TWO: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
-const THREE: [(f64, f64); 3] = [
-    (0.112_701_665_379_258_31, 0.277_777_777_777_777_8),
-    (0.5, 0.444_444_444_444_444_4),
-    (0.887_298_334_620_741_7, 0.277_777_777_777_777_8),
-];
+use crate::geometry::polygon::fan;
+use crate::geometry::quadrature::{
+    GAUSS_JACOBI_2, GAUSS_JACOBI_3, GAUSS_LEGENDRE_2, GAUSS_LEGENDRE_3, Node, THREE_POINT_MIN_GAP,
+    TWO_POINT_MIN_GAP, collapsed_point,
+};
 
-/// The same with weight u: along a triangle from its tip.
-const CONE_TWO: [(f64, f64); 2] = [
-    (0.355_051_025_721_682_2, 0.181_958_618_256_022_83),
-    (0.844_948_974_278_317_8, 0.318_041_381_743_977_17),
-];
-const CONE_THREE: [(f64, f64); 3] = [
-    (0.212_340_538_239_152_94, 0.069_826_979_901_454_12),
-    (0.590_533_135_559_265_3, 0.229_241_106_359_586_24),
-    (0.911_412_040_487_296_1, 0.200_931_913_738_959_63),
-];
-
-/// What the rules err by at most, as a share of the flux.
+/// Relative error of [`far_exchange`] at most: 16^(−6), from the table in
+/// [`quadrature`](crate::geometry::quadrature), and checked below.
 pub(super) const FAR_ERROR: f64 = 6e-8;
 
-/// Radii of gap beyond which three points a direction suffice, and two.
-const FAR: f64 = 8.0;
-const VERY_FAR: f64 = 40.0;
+/// Four corners make a parallelogram if both diagonals have the same middle, within this share of
+/// one of them: rounding, far below [`FAR_ERROR`].
+const PARALLELOGRAM_TOLERANCE: f64 = 1e-12;
 
-/// Flux A₁F₁₂ between two convex polygons, unit normals given, that are all before one another, if
-/// they are far enough apart: nothing if the gap is below 8 radii of the larger.
+/// A₁F₁₂ of two convex polygons, unit normals given, that are all before one another, in squares of
+/// the unit of length; none if the gap between them is below 8 radii of the larger.
 ///
-/// Gauss product rules over both on cos θ cos θ′ / (π r²). With singularities z radii off, n
-/// points a direction err by about ρ^(−2n) of the flux, ρ = z + √(z² + 1): 16^(−6), which is
-/// [`FAR_ERROR`], and 80^(−4), half of it.
+/// Gauss product rules over both on cos θ cos θ′ / (π r²), three points a direction, or two beyond
+/// 40 radii; relative error at most [`FAR_ERROR`].
 pub(super) fn far_exchange(
     a: &[DVec3],
     a_normal: DVec3,
     b: &[DVec3],
     b_normal: DVec3,
 ) -> Option<f64> {
-    let ((p, r), (q, s)) = (ball(a), ball(b));
-    let gap = p.distance(q) - r - s;
-    let radius = r.max(s);
-    if gap < FAR * radius {
+    let (centre_a, radius_a) = bounding_sphere(a);
+    let (centre_b, radius_b) = bounding_sphere(b);
+    let gap = centre_a.distance(centre_b) - radius_a - radius_b;
+    let radius = radius_a.max(radius_b);
+    if gap < THREE_POINT_MIN_GAP * radius {
         return None;
     }
-    let rule: &[(f64, f64)] = if gap < VERY_FAR * radius { &THREE } else { &TWO };
-    let (mut here, mut there) = (Vec::new(), Vec::new());
-    nodes(a, rule, &mut here);
-    nodes(b, rule, &mut there);
+    let rules = if gap < TWO_POINT_MIN_GAP * radius { THREE_POINTS } else { TWO_POINTS };
+    let nodes_a = nodes(a, rules);
+    let nodes_b = nodes(b, rules);
     let mut sum = 0.0;
-    for &(x, weight) in &here {
-        let mut part = 0.0;
-        for &(y, other) in &there {
+    for &(x, weight_x) in &nodes_a {
+        let mut seen_from_x = 0.0;
+        for &(y, weight_y) in &nodes_b {
             let ray = y - x;
             let square = ray.length_squared();
-            part -= other * a_normal.dot(ray) * b_normal.dot(ray) / (square * square);
+            seen_from_x -= weight_y * a_normal.dot(ray) * b_normal.dot(ray) / (square * square);
         }
-        sum += weight * part;
+        sum += weight_x * seen_from_x;
     }
     Some(sum / PI)
 }
 
-/// Centre and radius of a ball around a polygon.
-fn ball(polygon: &[DVec3]) -> (DVec3, f64) {
+/// Centre and radius of a sphere around a polygon: the mean of its corners, and the distance of the
+/// farthest.
+fn bounding_sphere(polygon: &[DVec3]) -> (DVec3, f64) {
     let centre = polygon.iter().sum::<DVec3>() / polygon.len() as f64;
     let square = polygon.iter().map(|p| p.distance_squared(centre)).fold(0.0, f64::max);
     (centre, square.sqrt())
 }
 
-/// Points and weights over a polygon, weights adding up to its area.
-fn nodes(polygon: &[DVec3], rule: &[(f64, f64)], into: &mut Vec<(DVec3, f64)>) {
+/// Rules with the same number of points.
+#[derive(Clone, Copy)]
+struct Rules {
+    /// Gauss–Legendre: along the sides of a parallelogram, across a triangle.
+    straight: &'static [Node],
+    /// Gauss–Jacobi with weight u: from the tip of a triangle.
+    from_tip: &'static [Node],
+}
+
+const TWO_POINTS: Rules = Rules { straight: &GAUSS_LEGENDRE_2, from_tip: &GAUSS_JACOBI_2 };
+const THREE_POINTS: Rules = Rules { straight: &GAUSS_LEGENDRE_3, from_tip: &GAUSS_JACOBI_3 };
+
+/// Points and weights over a polygon, weights adding up to its area: a product rule over a
+/// parallelogram, else one over each triangle of a fan.
+fn nodes(polygon: &[DVec3], rules: Rules) -> Vec<(DVec3, f64)> {
+    let mut nodes = Vec::new();
     if let [a, b, c, d] = *polygon
-        && (a + c - b - d).abs().max_element() <= 1e-12 * (c - a).abs().max_element()
+        && (a + c - b - d).abs().max_element()
+            <= PARALLELOGRAM_TOLERANCE * (c - a).abs().max_element()
     {
         let area = (b - a).cross(d - a).length();
-        for &(u, along) in rule {
-            let across =
-                |&(v, weight): &(f64, f64)| (a + u * (b - a) + v * (d - a), area * along * weight);
-            into.extend(rule.iter().map(across));
+        for u in rules.straight {
+            for v in rules.straight {
+                nodes.push((a + u.x * (b - a) + v.x * (d - a), area * u.weight * v.weight));
+            }
         }
-        return;
+        return nodes;
     }
-    let cone: &[(f64, f64)] = if rule.len() == 2 { &CONE_TWO } else { &CONE_THREE };
-    let Some((&a, rest)) = polygon.split_first() else { return };
-    for pair in rest.windows(2) {
-        let (b, c) = (pair[0], pair[1]);
-        let double = (b - a).cross(c - a).length();
-        for &(u, along) in cone {
-            let across = |&(v, weight): &(f64, f64)| {
-                (a + u * ((b - a) + v * (c - b)), double * along * weight)
-            };
-            into.extend(rule.iter().map(across));
+    for triangle in fan(polygon) {
+        let [a, b, c] = triangle;
+        let double_area = (b - a).cross(c - a).length();
+        for u in rules.from_tip {
+            for v in rules.straight {
+                let weight = double_area * u.weight * v.weight;
+                nodes.push((collapsed_point(triangle, u.x, v.x), weight));
+            }
         }
     }
+    nodes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::form_factor::closed_form::{area_vector, polygon_area, polygon_to_polygon};
+    use crate::form_factor::closed_form::polygon_to_polygon;
+    use crate::geometry::polygon::{area_vector, polygon_area};
 
     #[test]
     fn far_pairs_err_no_more_than_is_told() {

@@ -7,9 +7,7 @@ use glam::DVec3;
 use super::shaft::Blocker;
 use crate::form_factor::closed_form::lambert;
 use crate::geometry::aabb::Aabb;
-
-/// Corners off a plane through the eye by less than this share of the reach are in it.
-const CONTACT: f64 = 1e-13;
+use crate::geometry::polygon::{PLANE_TOLERANCE, split_through_origin};
 
 /// Shadow boxes are larger than shadows by this share of the reach: well above rounding.
 const MARGIN: f64 = 1e-9;
@@ -68,7 +66,7 @@ impl PointVisibility {
         for blocker in blockers {
             if self.set_cone(point, blocker) {
                 let shadow = shadow(point, blocker, facing, depth, MARGIN * reach);
-                self.cut(&shadow, CONTACT * reach);
+                self.cut(&shadow, PLANE_TOLERANCE * reach);
                 if self.parts.is_empty() {
                     return Seen { visible: 0.0, whole };
                 }
@@ -99,7 +97,7 @@ impl PointVisibility {
             let (a, b) = (a - point, b - point);
             let across = a.cross(b);
             let length = across.length();
-            if length > CONTACT * a.length() * b.length() {
+            if length > PLANE_TOLERANCE * a.length() * b.length() {
                 self.cone.push(across * (sign / length));
             }
         }
@@ -128,7 +126,8 @@ impl PointVisibility {
                 }
                 self.rest.clear();
                 let start = self.corners.len();
-                split(&self.inside, n, contact, &mut self.rest, &mut self.corners);
+                let (above, below) = (&mut self.rest, &mut self.corners);
+                split_through_origin(&self.inside, n, contact, above, below);
                 self.keep(start);
                 std::mem::swap(&mut self.inside, &mut self.rest);
                 if self.inside.len() < 3 {
@@ -152,37 +151,6 @@ fn shadow(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f6
         bounds.include(v * (depth / down));
     }
     bounds.expanded(margin)
-}
-
-/// Splits a convex polygon by the plane through the origin with unit normal `n`.
-fn split(
-    polygon: &[DVec3],
-    n: DVec3,
-    contact: f64,
-    above: &mut Vec<DVec3>,
-    below: &mut Vec<DVec3>,
-) {
-    let height = |v: DVec3| {
-        let height = n.dot(v);
-        if height.abs() <= contact { 0.0 } else { height }
-    };
-    let Some(&last) = polygon.last() else { return };
-    let (mut a, mut ha) = (last, height(last));
-    for &b in polygon {
-        let hb = height(b);
-        if ha * hb < 0.0 {
-            let crossing = a + (b - a) * (ha / (ha - hb));
-            above.push(crossing);
-            below.push(crossing);
-        }
-        if hb >= 0.0 {
-            above.push(b);
-        }
-        if hb <= 0.0 {
-            below.push(b);
-        }
-        (a, ha) = (b, hb);
-    }
 }
 
 #[cfg(test)]

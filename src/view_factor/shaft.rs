@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 use super::convex_polygons::ConvexPolygon;
-use crate::form_factor::closed_form::{clip, polygon_area};
 use crate::geometry::aabb::Aabb;
+use crate::geometry::plane::Plane;
+use crate::geometry::polygon::{clip, merge_close_corners, polygon_area, polygon_difference};
 
 /// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
 /// and above what pieces may be off their own planes ([`super::convex_polygons::PLANAR`]).
@@ -20,33 +21,10 @@ const SLIVER: f64 = 4.0 * CONTACT;
 
 /// Corners closer than this share of a polygon's extent are one: the line through both is too
 /// uncertain to cut by.
-const ONE: f64 = 1e-9;
+pub(super) const ONE: f64 = 1e-9;
 
 /// Pieces in one leaf of the tree.
 const LEAF: usize = 4;
-
-/// The plane of all points with n·p = offset; its upper side is where n, a unit vector, points.
-#[derive(Clone, Copy, Debug)]
-struct Plane {
-    normal: DVec3,
-    offset: f64,
-}
-
-impl Plane {
-    fn through(point: DVec3, normal: DVec3) -> Plane {
-        Plane { normal, offset: normal.dot(point) }
-    }
-
-    fn height(&self, point: DVec3) -> f64 {
-        self.normal.dot(point) - self.offset
-    }
-
-    /// Largest height in a box.
-    fn highest(&self, bounds: &Aabb) -> f64 {
-        let up = self.normal.cmpge(DVec3::ZERO);
-        self.height(DVec3::select(up, bounds.high, bounds.low))
-    }
-}
 
 /// The convex hull of two polygons that are all before one another: every segment between them.
 pub(super) struct Shaft {
@@ -70,38 +48,27 @@ impl Shaft {
     /// What of `polygon` is strictly within the shaft; nothing if that has no area.
     pub fn clip(&self, polygon: &[DVec3]) -> Option<Vec<DVec3>> {
         for plane in &self.planes {
-            if polygon.iter().all(|&p| plane.height(p) <= CONTACT) {
+            if polygon.iter().all(|&p| plane.signed_distance(p) <= CONTACT) {
                 return None;
             }
         }
         let mut kept = polygon.to_vec();
         for plane in &self.planes {
-            if kept.iter().any(|&p| plane.height(p) < -CONTACT) {
-                let origin = plane.normal * plane.offset;
-                kept = clip(&kept, origin, plane.normal);
+            if kept.iter().any(|&p| plane.signed_distance(p) < -CONTACT) {
+                kept = clip(&kept, plane.nearest_to_origin(), plane.normal);
             }
-            if kept.len() < 3 || kept.iter().all(|&p| plane.height(p) <= CONTACT) {
+            if kept.len() < 3 || kept.iter().all(|&p| plane.signed_distance(p) <= CONTACT) {
                 return None;
             }
         }
-        distinct(&mut kept);
+        merge_close_corners(&mut kept, ONE);
         let size = kept.iter().map(|p| p.distance(kept[0])).fold(0.0, f64::max);
         (polygon_area(&kept) > SLIVER * size).then_some(kept)
     }
 
     fn meets(&self, bounds: &Aabb) -> bool {
         self.bounds.overlaps(bounds)
-            && self.planes.iter().all(|plane| plane.highest(bounds) > CONTACT)
-    }
-}
-
-/// Leaves one of corners that are one.
-pub(super) fn distinct(polygon: &mut Vec<DVec3>) {
-    let Some(&first) = polygon.first() else { return };
-    let near = ONE * polygon.iter().map(|p| p.distance(first)).fold(0.0, f64::max);
-    polygon.dedup_by(|a, b| a.distance(*b) <= near);
-    while polygon.len() > 1 && polygon[polygon.len() - 1].distance(first) <= near {
-        polygon.pop();
+            && self.planes.iter().all(|plane| plane.max_signed_distance(bounds) > CONTACT)
     }
 }
 
@@ -180,23 +147,6 @@ fn lies_on(piece: &ConvexPolygon, other: &ConvexPolygon) -> bool {
     piece.normal.dot(other.normal) > 0.0 && piece.corners.iter().all(flat)
 }
 
-/// What `cover`, convex and in the same plane, leaves of a convex polygon, in convex parts.
-fn minus(polygon: &[DVec3], cover: &ConvexPolygon) -> Vec<Vec<DVec3>> {
-    let mut parts = Vec::new();
-    let mut inside = polygon.to_vec();
-    for (k, &a) in cover.corners.iter().enumerate() {
-        let b = cover.corners[(k + 1) % cover.corners.len()];
-        let outwards = (b - a).cross(cover.normal).normalize_or_zero();
-        let outside = clip(&inside, a, outwards);
-        if outside.len() > 2 {
-            parts.push(outside);
-        }
-        inside = clip(&inside, a, -outwards);
-    }
-    // Nothing inside: no overlap, and no need to have cut.
-    if inside.len() > 2 { parts } else { vec![polygon.to_vec()] }
-}
-
 /// Pieces in a tree of boxes.
 pub(super) struct Tree {
     pieces: Vec<ConvexPolygon>,
@@ -254,7 +204,10 @@ impl Tree {
             let mut parts = vec![back.corners.clone()];
             for front in fronts.nearby(&Aabb::from_points(piece.corners.iter().copied())) {
                 if lies_on(front, &back) {
-                    parts = parts.iter().flat_map(|part| minus(part, front)).collect();
+                    parts = parts
+                        .iter()
+                        .flat_map(|part| polygon_difference(part, &front.corners, front.normal))
+                        .collect();
                 }
             }
             backs
@@ -347,7 +300,7 @@ mod tests {
                 let (p, q) = (within(&a, &mut state), within(&b, &mut state));
                 let middle = p.lerp(q, random(&mut state).abs());
                 // Rounding of a few operations on lengths below 4.
-                assert!(shaft.planes.iter().all(|plane| plane.height(middle) > -1e-14));
+                assert!(shaft.planes.iter().all(|plane| plane.signed_distance(middle) > -1e-14));
                 let hit = p + (q - p) * (n.dot(c[0] - p) / n.dot(q - p));
                 let inside = |t: &[DVec3], least: f64| {
                     let side = |k: usize| n.cross(t[(k + 1) % t.len()] - t[k]).dot(hit - t[k]);

@@ -1,21 +1,27 @@
-//! Polygons in space, cut into triangles.
+//! Polygons in space, convex or not, cut into triangles.
+//!
+//! A fan from the first corner covers every convex outline and some others. Where it does not, ears
+//! are clipped off one by one in the polygon's own plane (D. Eberly, "Triangulation by Ear
+//! Clipping", 2002; the `earcut` crate). Either way the areas of the triangles must sum to that of
+//! the outline (Newell's formula); an outline that crosses itself fails this and is refused.
 
 use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
 
-/// Corners a polygon may have when no fan covers it: ear clipping is quadratic at worst.
-pub(super) const MOST_CORNERS_TO_CLIP: usize = 10_000;
+/// Corners a polygon may have when no fan covers it: ear clipping takes time quadratic in them at
+/// worst. Chosen by hand.
+pub(crate) const MAX_EAR_CLIPPING_CORNERS: usize = 10_000;
 
-/// Height of a triangle that the rounding of its corners hides, in units of the polygon's extent or of
-/// its largest coordinate, if that is more.
-const LOST: f64 = 8.0 * f64::EPSILON;
+/// Triangles no higher than this are flat but for the rounding of their corners: a few operations on
+/// coordinates. In units of the polygon's extent or of its largest coordinate, if that is more.
+const FLAT_HEIGHT: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
 ///
 /// A fan from the first corner where that covers it, else ear clipping. A polygon with fewer than
 /// three corners, or all on a line, gives one triangle without area. `None` when the areas of the
 /// triangles do not sum to that of the outline, as where it crosses itself.
-pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
+pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     let (n, &origin) = (corners.len(), corners.first()?);
     if n == 3 {
         return Some(vec![[0, 1, 2]]);
@@ -25,8 +31,8 @@ pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     let points: Vec<DVec3> = corners.iter().map(|&p| (p - origin) / extent).collect();
     // Rounding is a step of the coordinates, wherever the polygon is.
     let reach = corners.iter().map(|p| p.abs().max_element()).fold(extent, f64::max) / extent;
-    let lost = LOST * reach;
-    if extent == 0.0 || on_a_line(&points, lost) {
+    let flat_height = FLAT_HEIGHT * reach;
+    if extent == 0.0 || on_a_line(&points, flat_height) {
         return Some(vec![[0, 0, 0]]);
     }
     // Newell's normal: its length is twice the area of a flat polygon.
@@ -38,32 +44,32 @@ pub(super) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
         return None;
     }
     let up = newell / doubled_area;
-    if fan_covers(&points, up, lost) {
+    if fan_covers(&points, up, flat_height) {
         return Some((1..n - 1).map(|i| [0, i, i + 1]).collect());
     }
-    let (triangles, covered) = clip(&points, up, lost)?;
+    let (triangles, covered) = ear_clip(&points, up, flat_height)?;
     ((covered - doubled_area).abs() <= rounding).then_some(triangles)
 }
 
 /// Whether all corners lie on the line through the first and the one farthest from it.
-fn on_a_line(points: &[DVec3], lost: f64) -> bool {
+fn on_a_line(points: &[DVec3], flat_height: f64) -> bool {
     let farther = |a: DVec3, b: DVec3| if b.length() > a.length() { b } else { a };
     let far = points.iter().copied().fold(DVec3::ZERO, farther);
-    points.iter().all(|p| far.cross(*p).length() <= lost)
+    points.iter().all(|p| far.cross(*p).length() <= flat_height)
 }
 
 /// Whether each triangle of the fan from the first corner, which is the origin, turns about `up`
 /// and has area.
-fn fan_covers(points: &[DVec3], up: DVec3, lost: f64) -> bool {
+fn fan_covers(points: &[DVec3], up: DVec3, flat_height: f64) -> bool {
     points[1..].windows(2).all(|edge| {
         let (a, b) = (edge[0], edge[1]);
-        a.cross(b).dot(up) > lost * a.length().max(b.length()).max((b - a).length())
+        a.cross(b).dot(up) > flat_height * a.length().max(b.length()).max((b - a).length())
     })
 }
 
 /// Ear clipping in the plane across `up`: triangles, and twice the area that they cover there.
-fn clip(points: &[DVec3], up: DVec3, lost: f64) -> Option<(Vec<[usize; 3]>, f64)> {
-    if points.len() > MOST_CORNERS_TO_CLIP {
+fn ear_clip(points: &[DVec3], up: DVec3, flat_height: f64) -> Option<(Vec<[usize; 3]>, f64)> {
+    if points.len() > MAX_EAR_CLIPPING_CORNERS {
         return None;
     }
     let points: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
@@ -84,7 +90,7 @@ fn clip(points: &[DVec3], up: DVec3, lost: f64) -> Option<(Vec<[usize; 3]>, f64)
             triangle.swap(1, 2);
         }
         // Ears can be flat where corners lie within an edge.
-        if turn.abs() > lost * (b - a).length().max((c - b).length()).max((a - c).length()) {
+        if turn.abs() > flat_height * (b - a).length().max((c - b).length()).max((a - c).length()) {
             triangles.push(triangle);
         }
     }

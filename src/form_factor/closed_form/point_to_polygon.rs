@@ -1,0 +1,43 @@
+//! From a surface element to a polygon: Lambert's formula.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::face::{Edge, Face, edges};
+use crate::geometry::polygon::{PLANE_TOLERANCE, area_vector, clip, max_distance};
+
+/// Form factor from a surface element at `point` with unit `normal` to the front of `polygon`: the
+/// share of the light leaving the element that arrives there.
+///
+/// What lies below the element's horizon is clipped off. The factor is 0 where the element is
+/// behind the polygon's plane, and also in that plane (within 1e-13 of its distance to the farthest
+/// corner), even on the polygon's own rim: from there it is seen edge on.
+///
+/// Lambert's formula, F = 1/(2π) Σ Γᵢ·n, Γᵢ as long as the angle that edge i subtends and
+/// perpendicular to the plane of edge and point (J. H. Lambert, Photometria, 1760; D. R. Baum,
+/// H. E. Rushmeier, J. M. Winget, "Improving radiosity solutions through the use of analytically
+/// determined form-factors", SIGGRAPH 1989). Beyond 64 radii of the polygon, Gauss cubature of
+/// cos θ cos θ′ / (π r²). Relative error below 1e-12 away from grazing angles, at any distance;
+/// absolute below 1e-14 always.
+pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
+    let facing = area_vector(polygon).normalize_or_zero();
+    let Some(&corner) = polygon.first() else { return 0.0 };
+    if facing.dot(point - corner) <= PLANE_TOLERANCE * max_distance(polygon, point) {
+        return 0.0;
+    }
+    Face::new(clip(polygon, point, normal), facing)
+        .map_or(0.0, |face| face.factor_from(point, normal).clamp(0.0, 1.0))
+}
+
+/// Lambert's formula for a polygon that is all above the horizon of the surface element at `point`
+/// with unit `normal`; negative if the element is behind the polygon.
+pub(crate) fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
+    let along_normal = |edge: Edge| {
+        let (a, b) = (edge.start - point, edge.end - point);
+        let across = a.cross(b - a);
+        let sine = across.length();
+        if sine > 0.0 { sine.atan2(a.dot(b)) * normal.dot(across) / sine } else { 0.0 }
+    };
+    -edges(corners).map(along_normal).sum::<f64>() / TAU
+}
