@@ -5,7 +5,6 @@ mod image;
 mod mtl;
 mod obj;
 mod ply;
-mod report;
 mod text;
 mod tone;
 mod view_factor_tables;
@@ -19,7 +18,6 @@ use crate::error::{Error, ErrorKind};
 pub use image::{write_exr, write_png};
 pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
-pub use report::{Report, Seconds};
 pub use tone::ToneCurve;
 pub use view_factor_tables::{write_matrix_market, write_view_factor_list, write_view_factors};
 

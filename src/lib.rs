@@ -87,8 +87,8 @@ pub use form_factor::viewpoints::AdaptiveViewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
 pub use gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 pub use io::{
-    Report, Seconds, ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply,
-    write_png, write_view_factor_list, write_view_factors,
+    ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
+    write_view_factor_list, write_view_factors,
 };
 pub use mesh::{Mesh, NodeId};
 pub use progress::StopReason;

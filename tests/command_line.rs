@@ -1,21 +1,13 @@
-//! The examples as commands: what they write, and how they refuse.
+//! The program: what its commands write, and how they refuse wrong usage and bad scenes.
+#![cfg(feature = "cli")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// An example beside this test's own binary.
-fn example(name: &str) -> Command {
-    let mut path = std::env::current_exe().expect("the test's own path");
-    path.pop();
-    path.pop();
-    path.push("examples");
-    path.push(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    assert!(path.exists(), "{} is missing: cargo build --examples", path.display());
-    Command::new(path)
-}
-
-fn run(name: &str, args: &[&str]) -> Output {
-    example(name).args(args).output().expect("the example starts")
+/// Runs `radiosity COMMAND ARGS…`.
+fn run(command: &str, args: &[&str]) -> Output {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+    program.arg(command).args(args).output().expect("the program starts")
 }
 
 /// The command fails, prints one error that contains every one of `words`, and writes no PLY.
@@ -65,6 +57,15 @@ fn bake_writes_all_it_says() {
     assert!(size("elements.ply") > size("ply"), "corners of elements are not shared");
     let json = std::fs::read(folder.path().join("box.one.json")).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    for key in ["scene", "adapter", "settings", "triangles", "elements", "vertices", "shots"] {
+        assert!(json.get(key).is_some(), "{key}");
+    }
+    for part in ["emitted", "absorbed", "left", "back", "unshot", "overshot"] {
+        assert_eq!(json["ledger"][part].as_array().unwrap().len(), 3, "{part}");
+    }
+    for stage in ["load", "mesh", "draw", "reduce", "readback", "solve", "vertices", "write"] {
+        assert!(json["seconds"][stage].is_number(), "{stage}");
+    }
     assert_eq!(json["triangles"], 32);
     assert_eq!(json["settings"]["hemicube"], 32);
     let drawn = json["hemicubes_by_resolution"].as_object().unwrap();
@@ -160,7 +161,7 @@ fn view_factors_writes_a_matrix_a_file() {
     let mut args = vec![scene.to_str().unwrap(), "--sampled"];
     args.extend(["--element-size", "0.2", "--hemicube", "64"]);
     args.extend(device());
-    let out = run("view_factors", &args);
+    let out = run("view-factors", &args);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let csv = std::fs::read_to_string(folder.path().join("plates.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
@@ -169,6 +170,41 @@ fn view_factors_writes_a_matrix_a_file() {
     // 0.19982; elements of 0.18 at distance 1 and pixels of 1/32 cost well under 0.01.
     assert!((rows[1][2].parse::<f64>().unwrap() - 0.19982).abs() < 0.01, "{csv}");
     assert!((rows[2][3].parse::<f64>().unwrap() - 0.80018).abs() < 0.01, "{csv}");
+}
+
+#[test]
+fn help_and_version_succeed() {
+    for args in
+        [&["--help"][..], &["bake", "-h"], &["view-factors", "--help"], &["trade-off", "-h"]]
+    {
+        let out = run(args[0], &args[1..]);
+        let text = String::from_utf8_lossy(&out.stdout);
+        assert!(out.status.success() && text.starts_with("usage: radiosity"), "{args:?}: {text}");
+    }
+    let out = run("--version", &[]);
+    assert_eq!(out.stdout, format!("radiosity {}\n", env!("CARGO_PKG_VERSION")).as_bytes());
+}
+
+#[test]
+fn wrong_usage_has_status_2_and_says_what_would_be_right() {
+    for (args, words) in [
+        (&["fry"][..], &["'fry'", "bake, view-factors, trade-off", "radiosity --help"][..]),
+        (&["--what"], &["--what"]),
+        (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
+        (&["bake", "a.obj", "b.obj"], &["b.obj", "one at a time"]),
+        (&["bake", "a.obj", "--rays", "many"], &["--rays", "'many'", "whole number"]),
+        (&["view-factors", "--error", "1e-3"], &["no scene", "usage: radiosity view-factors"]),
+        (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy"]),
+        (&["view-factors", "a.obj", "--cpu"], &["--cpu need --sampled"]),
+        (&["view-factors", "a.obj", "--sampled", "--error", "1"], &["not for --sampled"]),
+        (&["trade-off", "--slow"], &["--slow", "usage: radiosity trade-off"]),
+    ] {
+        let out = run(args[0], &args[1..]);
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{args:?}: {error}");
+        assert!(out.stdout.is_empty(), "{args:?}");
+        assert!(words.iter().all(|word| error.contains(word)), "{args:?}: {error}");
+    }
 }
 
 #[test]

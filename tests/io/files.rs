@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::{
-    Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Report, Rgb, Solver, VertexMesh,
+    Camera, ErrorKind, Material, Mesh, RadianceImage, RayRows, Rgb, Solver, VertexMesh,
     ViewFactors, write_exr, write_ply, write_png, write_view_factors,
 };
 
@@ -127,27 +127,6 @@ fn a_camera_sees_what_stands_before_it() {
 }
 
 #[test]
-fn a_report_has_every_key() {
-    let report = Report { scene: "box.obj".into(), shots: 7, ..Default::default() };
-    let json = report.to_json();
-    for key in ["scene", "adapter", "settings", "triangles", "elements", "vertices", "shots"] {
-        assert!(json.get(key).is_some(), "{key}");
-    }
-    assert_eq!(json["shots"], 7);
-    for part in ["emitted", "absorbed", "left", "back", "unshot"] {
-        assert_eq!(json["ledger"][part].as_array().unwrap().len(), 3);
-    }
-    let stages =
-        ["load", "mesh", "draw", "reduce", "readback", "solve", "vertices", "write", "total"];
-    assert!(stages.iter().all(|s| json["seconds"][s].is_number()));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("r.json");
-    report.write(&path).unwrap();
-    let read: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-    assert_eq!(read, json);
-}
-
-#[test]
 fn view_factors_of_a_cube_as_csv() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.36).unwrap();
     let mut rays = RayRows::new(&mesh, 4096).unwrap();
@@ -193,7 +172,6 @@ fn a_place_that_cannot_be_written_is_named() {
         write_ply(missing, &surface).unwrap_err(),
         write_exr(missing, &image).unwrap_err(),
         write_png(missing, &image).unwrap_err(),
-        Report::default().write(missing).unwrap_err(),
     ] {
         assert_eq!(e.kind(), ErrorKind::File);
         assert!(e.to_string().contains("no/such/folder/x"), "{e}");

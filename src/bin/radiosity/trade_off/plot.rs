@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::grid::short;
+use super::grid::short;
 
 pub const BLACK: RGBColor = RGBColor(30, 30, 30);
 pub const GREY: RGBColor = RGBColor(95, 95, 95);

@@ -1,61 +1,53 @@
-//! What each repair of form factors costs and gains, on the Cornell box.
+//! What closed forms for near receivers cost and gain, on the Cornell box. A table; nothing is
+//! repeated. Runs in full only:
 //!
-//!     cargo run --release --example repairs [-- ELEMENT_SIZE [HEMICUBE]]
+//!     RADIOSITY_BENCH=full cargo bench --bench near_repair
 //!
-//! Per configuration: raw reciprocity over all pairs of elements, A_i F_ij against A_j F_ji, as an
-//! error of the smaller one's factor; then a bake, its hemicubes and seconds, and its errors at
+//! Per reach of the correction: raw reciprocity over all pairs of elements, A_i F_ij against A_j F_ji,
+//! as an error of the smaller one's factor; then a bake, its hemicubes and seconds, and its errors at
 //! points of path-traced truth.
 
+mod common;
 #[path = "../tests/common/truth.rs"]
 mod truth;
 
-use std::ops::ControlFlow;
-use std::process::ExitCode;
 use std::time::Instant;
 
+use common::go;
 use radiosity::{
-    Error, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver,
-    VertexMesh, load_obj,
+    Backend, Error, FormFactors, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver,
+    VertexMesh,
 };
 
-const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
 const TRUTH: &str = include_str!("../tests/data/cornell_box.truth.json");
 
-fn main() -> ExitCode {
-    let mut args = std::env::args().skip(1);
-    let mut number = |default: f64| args.next().map_or(Ok(default), |a| a.parse::<f64>());
-    let (Ok(size), Ok(resolution)) = (number(30.0), number(128.0)) else {
-        eprintln!("usage: repairs [ELEMENT_SIZE [HEMICUBE]]");
-        return ExitCode::from(2);
-    };
-    match run(size, resolution as u32) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("error: {e}");
-            ExitCode::FAILURE
-        }
-    }
-}
+/// Longest edge of an element, mm.
+const ELEMENT_SIZE: f64 = 30.0;
 
-fn run(size: f64, resolution: u32) -> Result<(), Error> {
-    let mesh = Mesh::new(load_obj(SCENE)?, size)?;
-    let gpu = Gpu::new(None)?;
-    let adapter = gpu.adapter();
-    println!("Cornell box, {} elements, hemicube {resolution}", mesh.element_count());
-    println!("{} ({}), {}", adapter.name, adapter.kind, adapter.driver);
+/// Pixels along an edge of a hemicube's top face.
+const HEMICUBE: u32 = 128;
+
+fn main() -> Result<(), Error> {
+    if !common::full() {
+        println!("near_repair: left out; RADIOSITY_BENCH=full cargo bench --bench near_repair");
+        return Ok(());
+    }
+    let mesh = common::cornell_mesh(ELEMENT_SIZE);
+    let Backend::Gpu(gpu) = common::gpu() else { unreachable!("a graphics adapter was asked for") };
+    println!("Cornell box, {} elements, hemicube {HEMICUBE}", mesh.element_count());
     println!(
         "{:14} {:>9} {:>9} {:>9} | {:>8} {:>6} | {:>7} {:>7} {:>7} {:>7}",
         "rows", "RMS", "worst", "moved", "hemicub.", "s", "area", "median", "edge", "bias"
     );
     for (name, reach) in [("plain", -1.0), ("near 1", 1.0), ("near 3", 3.0)] {
-        let hemicubes = || HemicubeRows::new(&gpu, &mesh, resolution);
+        let hemicubes = || HemicubeRows::new(&gpu, &mesh, HEMICUBE);
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
         let (rms, worst) = reciprocity(&mesh, &mut rows)?;
         let moved = rows.moved();
 
         let start = Instant::now();
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
-        let solution = Solver::default().solve(&mesh, &mut rows, |_| ControlFlow::Continue(()))?;
+        let solution = Solver::default().solve(&mesh, &mut rows, go)?;
         let surface = VertexMesh::new(&mesh, &solution.radiosity);
         let seconds = start.elapsed().as_secs_f64();
         let errors = truth::compare(&surface, TRUTH);

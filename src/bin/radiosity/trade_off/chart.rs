@@ -1,4 +1,4 @@
-//! The picture: error over time of all runs, and of each knob's by itself.
+//! The chart: error over time of all runs in one panel, then of each setting's runs by themselves.
 
 use std::io::Cursor;
 
@@ -7,10 +7,10 @@ use image::{RgbImage, imageops};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use crate::Found;
-use crate::grid::{Ask, Panel, percent};
-use crate::measure::Judge;
-use crate::plot::{Axes, BLACK, Canvas, Font, GREY, LIGHT, Mark, range};
+use super::Results;
+use super::grid::{Panel, Target, percent};
+use super::plot::{Axes, BLACK, Canvas, Font, GREY, LIGHT, Mark, range};
+use super::reference::Reference;
 
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 1700;
@@ -19,25 +19,25 @@ const HEIGHT: u32 = 1700;
 const FINER: u32 = 3;
 
 const FRONT: RGBColor = RGBColor(31, 95, 168);
-const DIAL: RGBColor = RGBColor(205, 72, 20);
+const TARGET: RGBColor = RGBColor(205, 72, 20);
 const SERIES: [RGBColor; 3] = [FRONT, RGBColor(150, 60, 140), RGBColor(30, 130, 70)];
 
-pub fn svg(found: &Found) -> Result<String, String> {
+pub fn svg(results: &Results) -> Result<String, String> {
     fonts()?;
     let mut text = String::new();
     let area = SVGBackend::with_string(&mut text, (WIDTH, HEIGHT)).into_drawing_area();
-    found.draw(&Canvas::new(&area, 1.0, 0.04)?)?;
+    results.draw(&Canvas::new(&area, 1.0, 0.04)?)?;
     area.present().map_err(|e| e.to_string())?;
     drop(area);
     Ok(text)
 }
 
-pub fn png(found: &Found) -> Result<Vec<u8>, String> {
+pub fn png(results: &Results) -> Result<Vec<u8>, String> {
     fonts()?;
     let (width, height) = (FINER * WIDTH, FINER * HEIGHT);
     let mut pixels = vec![0; 3 * (width * height) as usize];
     let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-    found.draw(&Canvas::new(&area, f64::from(FINER), 0.17)?)?;
+    results.draw(&Canvas::new(&area, f64::from(FINER), 0.17)?)?;
     area.present().map_err(|e| e.to_string())?;
     drop(area);
     let large = RgbImage::from_raw(width, height, pixels).expect("as many pixels");
@@ -61,17 +61,17 @@ fn fonts() -> Result<(), String> {
 
 type Drawn = Result<(), String>;
 
-impl Found {
+impl Results {
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
         let middle = f64::from(WIDTH) / 2.0;
         let title = format!("What a bake of {} costs and how far it is off", self.scene);
         canvas.text(&title, (middle, 32.0), Font::new(30.0, BLACK).bold().anchor(HPos::Center))?;
-        let against = match &self.judge {
-            Judge::Truth(points) => {
-                let count = points.iter().filter(|p| p.kind == "area").count();
+        let against = match &self.reference {
+            Reference::Truth(points) => {
+                let count = points.iter().filter(|p| p.is_over_area()).count();
                 format!("errors against truth, at {count} points spread over the area")
             }
-            Judge::Finest(_) => "errors against a finer run, which has its own".into(),
+            Reference::Finest(_) => "errors against a finer run, which has its own".into(),
         };
         let line = format!("{}; {against}", self.adapter);
         canvas.text(&line, (middle, 68.0), Font::new(19.0, GREY).anchor(HPos::Center))?;
@@ -105,34 +105,34 @@ impl Found {
         for (name, mark, colour) in [
             ("fixed settings", Mark::Dot(5.0), LIGHT),
             ("the best of them, and what was changed", Mark::Dot(6.0), FRONT),
-            ("chosen by the dial", Mark::Diamond(11.0), DIAL),
+            ("chosen by the dial", Mark::Diamond(11.0), TARGET),
         ] {
             canvas.mark(mark, (x + 12.0, y), colour)?;
             canvas.text(name, (x + 30.0, y), font)?;
             x += 62.0 + canvas.text_width(name, font)?;
         }
-        canvas.line(&[(x, y), (x + 26.0, y)], DIAL, 1.0)?;
+        canvas.line(&[(x, y), (x + 26.0, y)], TARGET, 1.0)?;
         canvas.text("error asked of it", (x + 34.0, y), font)
     }
 
     fn main<B: DrawingBackend>(&self, canvas: &Canvas<B>, frame: [f64; 4]) -> Drawn {
         let runs = &self.grid.runs;
-        let asked = |k: usize| match runs[k].ask {
-            Ask::Dial(error) => Some(error),
-            Ask::Settings(_) => None,
+        let asked = |k: usize| match runs[k].target {
+            Target::Error(error) => Some(error),
+            Target::Settings(_) => None,
         };
-        let dial: Vec<(usize, f64)> =
+        let targets: Vec<(usize, f64)> =
             (0..runs.len()).filter_map(|k| Some((k, asked(k)?))).collect();
-        let errors = self.measured.iter().map(|m| m.errors.area).chain(dial.iter().map(|d| d.1));
+        let errors = self.measured.iter().map(|m| m.errors.area).chain(targets.iter().map(|d| d.1));
         let seconds = range(self.measured.iter().map(|m| m.seconds), 0.07);
         let mut axes = Axes::new(frame, seconds, range(errors, 0.07));
         axes.draw(canvas, 20.0, true)?;
-        for &(_, error) in &dial {
+        for &(_, error) in &targets {
             let (_, y) = axes.at(1.0, error);
-            canvas.line(&[(axes.left, y), (axes.right, y)], DIAL, 1.0)?;
+            canvas.line(&[(axes.left, y), (axes.right, y)], TARGET, 1.0)?;
             axes.cross(&[(axes.left, y), (axes.right, y)]);
             let text = format!("{} asked", percent(error));
-            let font = Font::new(16.0, DIAL).anchor(HPos::Right);
+            let font = Font::new(16.0, TARGET).anchor(HPos::Right);
             let width = canvas.text_width(&text, font)?;
             canvas.text(&text, (axes.right - 6.0, y - 11.0), font)?;
             axes.take((axes.right - 6.0 - width / 2.0, y - 11.0), width / 2.0);
@@ -149,14 +149,14 @@ impl Found {
             canvas.mark(Mark::Dot(6.0), at, FRONT)?;
             axes.take(at, 6.0);
         }
-        for &(k, _) in &dial {
+        for &(k, _) in &targets {
             let at = self.at(&axes, k);
-            canvas.mark(Mark::Diamond(12.0), at, DIAL)?;
+            canvas.mark(Mark::Diamond(12.0), at, TARGET)?;
             axes.take(at, 11.0);
         }
-        for &(k, error) in &dial {
+        for &(k, error) in &targets {
             let at = self.at(&axes, k);
-            let font = Font::new(20.0, DIAL).bold();
+            let font = Font::new(20.0, TARGET).bold();
             axes.label(canvas, &format!("dial {}", percent(error)), at, font)?;
         }
         for (&k, &at) in self.front.iter().zip(&front) {
@@ -194,7 +194,7 @@ impl Found {
         axes.draw(canvas, 17.0, first)?;
         for (k, run) in self.grid.runs.iter().enumerate() {
             let at = self.at(&axes, k);
-            if matches!(run.ask, Ask::Settings(_)) && axes.holds(at) {
+            if matches!(run.target, Target::Settings(_)) && axes.holds(at) {
                 canvas.mark(Mark::Dot(3.0), at, LIGHT)?;
                 axes.cross(&[at, at]);
             }

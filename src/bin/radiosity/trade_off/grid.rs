@@ -1,15 +1,16 @@
-//! The settings that are tried: one knob at a time around one base, and the dial's own choices.
+//! The settings that are tried: one knob at a time around one base, and those chosen for an error
+//! target.
 
 use std::num::NonZeroU32;
 
 use radiosity::{BakeSettings, Scene};
 
-/// What one run is given.
-pub enum Ask {
+/// How far a run goes.
+pub enum Target {
     /// Fixed settings.
     Settings(Box<BakeSettings>),
-    /// An error, by the dial.
-    Dial(f64),
+    /// Until the error is estimated to be below this.
+    Error(f64),
 }
 
 /// One bake.
@@ -17,7 +18,7 @@ pub struct Run {
     /// The knob that was turned for it.
     pub knob: &'static str,
     pub value: String,
-    pub ask: Ask,
+    pub target: Target,
 }
 
 /// Runs in the order of a knob's values, each with its label.
@@ -47,7 +48,7 @@ pub struct Grid {
 impl Grid {
     pub fn new(scene: &Scene, quick: bool) -> Grid {
         let all = [0.1, 0.05, 0.02, 0.01];
-        let (errors, middle, dial) =
+        let (errors, middle, targets) =
             if quick { (&all[..3], 0.05, &all[..2]) } else { (&all[..], 0.02, &all[..]) };
         let base = BakeSettings::for_error(middle, scene);
         let mut grid = Grid {
@@ -64,8 +65,12 @@ impl Grid {
             }
         }
         grid.turn(&base, quick);
-        for &error in dial {
-            grid.runs.push(Run { knob: "dial", value: percent(error), ask: Ask::Dial(error) });
+        for &error in targets {
+            grid.runs.push(Run {
+                knob: "dial",
+                value: percent(error),
+                target: Target::Error(error),
+            });
         }
         grid
     }
@@ -126,7 +131,9 @@ impl Grid {
         let label =
             |e: &BakeSettings| e.gather.as_ref().map_or(0, |g| g.refinement.sweeps).to_string();
         let sweeps = self.vary(base, "sweeps", "sweeps", &[1.0, 2.0, 3.0], label, |e, f| {
-            e.gather.iter_mut().for_each(|g| g.refinement.sweeps = f as u32);
+            if let Some(gather) = &mut e.gather {
+                gather.refinement.sweeps = f as u32;
+            }
         });
         let label =
             |e: &BakeSettings| percent(e.gather.as_ref().map_or(0.0, |g| g.refinement.tolerance));
@@ -161,11 +168,12 @@ impl Grid {
 
     /// A run of these settings, the one there is if they are not new.
     fn add(&mut self, knob: &'static str, value: String, settings: BakeSettings) -> usize {
-        let same = |run: &Run| matches!(&run.ask, Ask::Settings(other) if **other == settings);
+        let same =
+            |run: &Run| matches!(&run.target, Target::Settings(other) if **other == settings);
         if let Some(there) = self.runs.iter().position(same) {
             return there;
         }
-        self.runs.push(Run { knob, value, ask: Ask::Settings(Box::new(settings)) });
+        self.runs.push(Run { knob, value, target: Target::Settings(Box::new(settings)) });
         self.runs.len() - 1
     }
 

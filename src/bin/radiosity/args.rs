@@ -1,0 +1,149 @@
+//! What the commands share in reading their arguments, and in ending.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+
+use lexopt::prelude::*;
+use radiosity::{Backend, Error, ErrorKind};
+
+/// Why a command ended without having done its work.
+pub enum Stop {
+    /// Its help was asked for.
+    Help,
+    /// Arguments that it cannot understand.
+    Usage(String),
+    /// The work failed.
+    Failed(Error),
+    /// The work failed, and the user has been told of it.
+    Reported,
+}
+
+impl Stop {
+    pub fn usage(message: impl Into<String>) -> Stop {
+        Stop::Usage(message.into())
+    }
+
+    /// Tells the user, and gives the exit status of the program.
+    pub fn report(self, command: &str, usage: &str) -> ExitCode {
+        match self {
+            Stop::Help => {
+                println!("{usage}");
+                ExitCode::SUCCESS
+            }
+            Stop::Usage(message) => {
+                let (synopsis, _) = usage.split_once("\n\n").unwrap_or((usage, ""));
+                let program = ["radiosity", command].join(" ");
+                eprintln!("error: {message}\n\n{synopsis}\n\nFor help: {} --help", program.trim());
+                ExitCode::from(2)
+            }
+            Stop::Failed(error) => {
+                eprintln!("error: {error}");
+                ExitCode::FAILURE
+            }
+            Stop::Reported => ExitCode::FAILURE,
+        }
+    }
+}
+
+impl From<lexopt::Error> for Stop {
+    fn from(error: lexopt::Error) -> Stop {
+        Stop::Usage(error.to_string())
+    }
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Stop {
+        Stop::Failed(error)
+    }
+}
+
+/// The value of `option`, which was just read. `expected` says what it should be, for errors.
+pub fn value<T: FromStr>(
+    parser: &mut lexopt::Parser,
+    option: &str,
+    expected: &str,
+) -> Result<T, Stop> {
+    let text = parser.value()?.string()?;
+    text.parse().map_err(|_| wrong_value(option, &text, expected))
+}
+
+/// The value of `option`: exactly `N` numbers with commas between.
+pub fn numbers<T: FromStr, const N: usize>(
+    parser: &mut lexopt::Parser,
+    option: &str,
+    expected: &str,
+) -> Result<[T; N], Stop> {
+    let text = parser.value()?.string()?;
+    let numbers: Result<Vec<T>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let array = numbers.ok().and_then(|numbers| numbers.try_into().ok());
+    array.ok_or_else(|| wrong_value(option, &text, expected))
+}
+
+/// The error for a value that is not as expected.
+pub fn wrong_value(option: &str, found: &str, expected: &str) -> Stop {
+    Stop::Usage(format!("--{option} takes {expected}, not '{found}'"))
+}
+
+/// The one scene of a command that takes one.
+pub fn only_scene(scenes: Vec<PathBuf>) -> Result<PathBuf, Stop> {
+    let mut scenes = scenes.into_iter();
+    match (scenes.next(), scenes.next()) {
+        (Some(scene), None) => Ok(scene),
+        (None, _) => Err(Stop::usage("no scene given: name an OBJ file")),
+        (Some(_), Some(second)) => {
+            let second = second.display();
+            Err(Stop::Usage(format!("a second scene, '{second}': one at a time, please")))
+        }
+    }
+}
+
+/// What makes form factors, as the user names it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Device {
+    /// Hemicubes on the adapter with this in its name, or on the best.
+    Gpu(Option<String>),
+    /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
+    Cpu,
+}
+
+impl Device {
+    /// The adapter that `--adapter` names.
+    pub fn named(parser: &mut lexopt::Parser) -> Result<Device, Stop> {
+        Ok(Device::Gpu(Some(value(parser, "adapter", "a part of an adapter's name")?)))
+    }
+
+    pub fn open(&self) -> Result<Backend, Error> {
+        match self {
+            Device::Gpu(name) => Backend::gpu(name.as_deref()),
+            Device::Cpu => Ok(Backend::Cpu),
+        }
+    }
+}
+
+/// Refuses an output that could not be written before any work is done for it.
+///
+/// # Errors
+/// [`ErrorKind::File`] when no file can be created in the folder of `path`.
+pub fn check_writable(path: &Path) -> Result<(), Error> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let probe = folder.join(format!(".radiosity-{}", std::process::id()));
+    let result = std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe));
+    result.map_err(|e| {
+        let place = format!("output folder {}", folder.display());
+        let remedy = "choose a folder that exists and can be written";
+        Error::new(ErrorKind::File, place, e.to_string(), remedy).with_source(e)
+    })
+}
+
+/// Writes a file; errors name it.
+///
+/// # Errors
+/// [`ErrorKind::File`] when that fails.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    std::fs::write(path, bytes).map_err(|e| {
+        let remedy = "choose a folder that exists, can be written and has room";
+        let found = format!("cannot be written: {e}");
+        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
+    })
+}

@@ -1,0 +1,343 @@
+//! `radiosity bake`: from a scene file to radiosity at vertices, a report and a picture.
+
+pub mod settings;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::DVec3;
+use lexopt::prelude::*;
+use radiosity::{
+    Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorEstimate, RadianceImage,
+    Scene, VertexMesh, load_obj, write_exr, write_ply, write_png,
+};
+use settings::{Adjustment, Setting};
+
+use crate::args::{self, Device, Stop};
+use crate::progress;
+use crate::report::Report;
+
+pub const USAGE: &str = "\
+usage: radiosity bake SCENE.obj [--out STEM] [--error X | --time SECONDS | --gather none|needed|all]
+            [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--pixel-gather]
+            [--elements] [--adapter NAME | --cpu]
+
+Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and, with
+a camera, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless
+given.
+
+How far to go:
+  --error X         until the estimated error of the vertices' radiosity is below this share, root
+                    mean square over the area: 0.02 for 2 %
+  --time SECONDS    as exact as these seconds allow
+  --gather WHICH    without either: vertices that gather the settled light: none, needed (elements
+                    are split where the light is not linear in them), or all (of elements that are
+                    all split once more) [none]
+
+Settings, each chosen by what is asked for unless set by hand; in brackets those of --gather none:
+  --element-size X  longest edge of an element that light is shot on, scene unit [diagonal / 32]
+  --contacts N      levels that elements are split which other surfaces touch [3]
+  --hemicube N      pixels along an edge of a hemicube's top face, even, for patches that shoot
+                    much; a half or a quarter of them for dim ones, but no less than 16 [128]
+  --full-share F    a patch shoots much from this share of the emitted light on; with 0 all do
+  --near R          closed forms for receivers within R patch diameters; -1 for none [1]
+  --viewpoints TOL  see a patch from its parts too, and go down to the elements where more than
+                    this share of its light lands on other triangles by them; four times the
+                    hemicubes or more [not done]
+  --rotations K     hemicubes a viewpoint, each turned further, averaged [1]
+  --unshot F        stop at this share of unshot flux [0.0001]
+  --solver NAME     how light is spread: shooting, overshoot, jacobi, gauss-seidel, gmres or direct
+                    [gmres where reflectance is near one, else shooting]
+  --shots N         stop after this many shots, or steps of another solver
+  --row-memory MB   memory for form-factor rows that are kept [1024]
+  --patch-tolerance X  how much of its light a patch may send wrong for being large; 0 makes all
+                    patches as small as they can be [0.004]
+  --patch-level N   the smallest patches are 4^N elements [0]
+  --ambient         add the light not yet shot, spread evenly; the files say so
+Of vertices that gather:
+  --gather-size X   longest edge of the elements whose corners gather first, scene unit
+  --gather-contacts N  levels that these are split which other surfaces touch
+  --rays N          rays a vertex gathers with
+  --noise T         up to 16 times as many rays where they disagree by this share; inf for never
+  --bend T          split where a side's middle is off by this share of its radiosity
+  --curve T         split once more, without a gather, where parabolas bend by more; inf for nowhere
+  --smallest X      elements with no longer edge are not split
+  --max-elements N  elements there may be [524288]
+  --sweeps N        times that all vertices gather, the last time what they found before
+
+Files and devices:
+  --state FILE      write the state of the solve there now and then, and go on from it if it is
+                    there: what is killed loses its last moments only; not with --time, which
+                    solves many times
+  --camera ...      eye, target, vertical field of view in degrees
+  --image W,H       size of the picture in pixels [512,512]
+  --pixel-gather    every pixel of the picture gathers the settled light for itself
+  --elements        write STEM.elements.ply too: each element with its own value, not smoothed
+  --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
+  --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
+                    light goes along";
+
+/// What is asked of a bake.
+pub struct Bake {
+    pub scene: PathBuf,
+    /// Path of the output without its ending.
+    out: PathBuf,
+    pub target: Target,
+    /// Settings made by hand, in their order.
+    adjustments: Vec<Adjustment>,
+    camera: Option<Camera>,
+    /// Pixels of the picture: width and height.
+    image: (u32, u32),
+    /// Whether the pixels of the picture gather.
+    pixel_gather: bool,
+    /// Whether to write the elements' own values too.
+    elements: bool,
+    device: Device,
+}
+
+/// How far to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// As far as fixed settings do.
+    Settings(Gather),
+    /// Until the error is estimated to be below this share.
+    Error(f64),
+    /// As far as these seconds allow.
+    Seconds(f64),
+}
+
+/// Which vertices gather.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gather {
+    None,
+    Needed,
+    All,
+}
+
+/// Rays along a pixel's side.
+const SAMPLES: u32 = 4;
+
+/// Rays of a pixel that gathers where no vertex does.
+const PIXEL_RAYS: u32 = 2048;
+
+/// Runs the command.
+pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
+    let report = Bake::parse(parser)?.run()?;
+    println!("{}", report.table());
+    Ok(())
+}
+
+impl Bake {
+    fn parse(parser: &mut lexopt::Parser) -> Result<Bake, Stop> {
+        let mut scenes = vec![];
+        let (mut out, mut gather, mut state) = (None, None, false);
+        let mut bake = Bake {
+            scene: PathBuf::new(),
+            out: PathBuf::new(),
+            target: Target::Settings(Gather::None),
+            adjustments: vec![],
+            camera: None,
+            image: (512, 512),
+            pixel_gather: false,
+            elements: false,
+            device: Device::Gpu(None),
+        };
+        while let Some(arg) = parser.next()? {
+            match arg {
+                Long("help") | Short('h') => return Err(Stop::Help),
+                Long("out") => out = Some(PathBuf::from(parser.value()?)),
+                Long("error") => {
+                    bake.target = Target::Error(args::value(parser, "error", "a number")?);
+                }
+                Long("time") => {
+                    bake.target = Target::Seconds(args::value(parser, "time", "a number")?);
+                }
+                Long("gather") => {
+                    gather = Some(args::value(parser, "gather", "one of none, needed, all")?);
+                }
+                Long("ambient") => bake.adjustments.push(Box::new(|s| s.solve.ambient = true)),
+                Long("state") => {
+                    let path = PathBuf::from(parser.value()?);
+                    state = true;
+                    bake.adjustments
+                        .push(Box::new(move |s| s.solve.checkpoint = Some(path.clone())));
+                }
+                Long("camera") => bake.camera = Some(camera(parser)?),
+                Long("image") => {
+                    let expected = "2 whole numbers with a comma between them";
+                    let [width, height] = args::numbers(parser, "image", expected)?;
+                    bake.image = (width, height);
+                }
+                Long("pixel-gather") => bake.pixel_gather = true,
+                Long("elements") => bake.elements = true,
+                Long("adapter") => bake.device = Device::named(parser)?,
+                Long("cpu") => bake.device = Device::Cpu,
+                Long(name) => match Setting::named(name) {
+                    Some(setting) => bake.adjustments.push(setting.adjustment(parser)?),
+                    None => return Err(arg.unexpected().into()),
+                },
+                Value(path) => scenes.push(path.into()),
+                Short(_) => return Err(arg.unexpected().into()),
+            }
+        }
+        if state && matches!(bake.target, Target::Seconds(_)) {
+            return Err(Stop::usage("--state is for one solve, --time for many: use --error"));
+        }
+        if let Some(gather) = gather {
+            bake.set_gather(gather);
+        }
+        bake.scene = args::only_scene(scenes)?;
+        bake.out = out.unwrap_or_else(|| bake.scene.with_extension(""));
+        Ok(bake)
+    }
+
+    /// Says which vertices gather, whatever else is asked for.
+    fn set_gather(&mut self, choice: Gather) {
+        if let Target::Settings(gather) = &mut self.target {
+            *gather = choice;
+        }
+        self.adjustments.push(Box::new(move |settings| match (choice, &mut settings.gather) {
+            (Gather::None, gather) => *gather = None,
+            (Gather::Needed, Some(gather)) => gather.refinement.everywhere = 0,
+            (Gather::All, Some(gather)) => gather.refinement.everywhere = 1,
+            (_, None) => {}
+        }));
+    }
+
+    /// From the scene file to STEM.ply, STEM.json and, with a camera, STEM.exr and STEM.png.
+    fn run(self) -> Result<Report, Error> {
+        let start = Instant::now();
+        args::check_writable(&self.out)?;
+        let (width, height) = self.image;
+        if let Some(camera) = &self.camera {
+            camera.check(width, height, SAMPLES)?;
+        }
+        let mut scene = load_obj(&self.scene)?;
+        scene.check_winding();
+        for warning in scene.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        let (warnings, triangles) = (scene.warnings().to_vec(), scene.triangles().len());
+        let load = start.elapsed().as_secs_f64();
+        let opening = Instant::now();
+        let device = self.device.open()?;
+        let open = opening.elapsed().as_secs_f64();
+        let baked = progress::of_bake(|report| self.bake(scene, &device, report))?;
+        let writing = Instant::now();
+        self.write_surface(&baked)?;
+        if let Some(camera) = self.camera {
+            let image = self.picture(&camera, &baked, &device)?;
+            write_exr(self.out.with_added_extension("exr"), &image)?;
+            write_png(self.out.with_added_extension("png"), &image)?;
+        }
+        let report = Report {
+            scene: self.scene.display().to_string(),
+            adapter: device.adapter(),
+            target: self.target,
+            triangles,
+            load,
+            open,
+            write: writing.elapsed().as_secs_f64(),
+            total: start.elapsed().as_secs_f64(),
+            warnings,
+            baked,
+        };
+        let json = format!("{:#}\n", report.to_json());
+        args::write_file(&self.out.with_added_extension("json"), json.as_bytes())?;
+        Ok(report)
+    }
+
+    fn bake(
+        &self,
+        scene: Scene,
+        device: &Backend,
+        progress: progress::OfBake,
+    ) -> Result<BakeResult, Error> {
+        let overrides = |settings: &mut BakeSettings| {
+            for adjustment in &self.adjustments {
+                adjustment(settings);
+            }
+        };
+        match self.target {
+            Target::Error(error) => {
+                BakeTarget::Error(error).bake_with(scene, device, overrides, progress)
+            }
+            Target::Seconds(seconds) => {
+                BakeTarget::seconds(seconds)?.bake_with(scene, device, overrides, progress)
+            }
+            Target::Settings(gather) => {
+                let mut settings = match gather {
+                    Gather::None => BakeSettings::elements_only(&scene),
+                    Gather::Needed | Gather::All => BakeSettings::gathering(&scene),
+                };
+                overrides(&mut settings);
+                settings.bake(scene, device, progress)
+            }
+        }
+    }
+
+    /// Writes the vertices and, if asked for, the elements.
+    fn write_surface(&self, baked: &BakeResult) -> Result<(), Error> {
+        let mut surface = baked.light.surface.clone();
+        surface.comments = comments(baked);
+        write_ply(self.out.with_added_extension("ply"), &surface)?;
+        if self.elements {
+            let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
+            write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
+        }
+        Ok(())
+    }
+
+    /// The picture, interpolated between vertices or gathered by its pixels.
+    fn picture(
+        &self,
+        camera: &Camera,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<RadianceImage, Error> {
+        let (width, height) = self.image;
+        if !self.pixel_gather {
+            return camera.image(&baked.light.surface, width, height, SAMPLES);
+        }
+        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
+        let mut gather = device.gather(&baked.light.mesh, rays)?;
+        let image = progress::of_count("pixels of the picture", |report| {
+            camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
+        })?;
+        Ok(image.expect("its progress never stops it"))
+    }
+}
+
+impl std::str::FromStr for Gather {
+    type Err = ();
+
+    fn from_str(name: &str) -> Result<Gather, ()> {
+        match name {
+            "none" => Ok(Gather::None),
+            "needed" => Ok(Gather::Needed),
+            "all" => Ok(Gather::All),
+            _ => Err(()),
+        }
+    }
+}
+
+fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
+    let expected = "7 numbers with commas between them: eye, target, degrees";
+    let [a, b, c, d, e, f, vertical_fov] = args::numbers(parser, "camera", expected)?;
+    Ok(Camera { eye: DVec3::new(a, b, c), target: DVec3::new(d, e, f), vertical_fov })
+}
+
+/// What the PLY file says of itself.
+fn comments(baked: &BakeResult) -> Vec<String> {
+    let mut comments = vec![];
+    if baked.settings.solve.ambient {
+        comments.push("ambient term of the unshot light added to the elements".into());
+    }
+    let ErrorEstimate { total, samples, .. } = baked.estimate;
+    comments.push(format!(
+        "estimated error {:.3} % of radiosity, RMS over area, at {samples} places; vertices have \
+         their own",
+        100.0 * total
+    ));
+    comments
+}

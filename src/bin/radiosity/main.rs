@@ -1,0 +1,76 @@
+//! The command-line program.
+//!
+//! ```text
+//! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, JSON, EXR, PNG
+//! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
+//! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
+//! ```
+//!
+//! Results go to files, summaries to standard output, progress, warnings and errors to standard
+//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage.
+
+mod args;
+mod bake;
+mod progress;
+mod report;
+mod trade_off;
+mod view_factors;
+
+use std::process::ExitCode;
+
+use args::Stop;
+use lexopt::prelude::*;
+
+const USAGE: &str = "\
+usage: radiosity COMMAND SCENE.obj… [options]
+
+  bake          the radiosity of a scene, at the vertices of a mesh
+  view-factors  view factors between the groups of scenes
+  trade-off     what a bake of a scene costs and how far it is off, over its settings
+
+Options of a command: radiosity COMMAND --help. Of the program: --help, --version.";
+
+/// A command: its name, its help text, and what runs it on the arguments that follow the name.
+struct Command {
+    name: &'static str,
+    usage: &'static str,
+    run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
+}
+
+const COMMANDS: [Command; 3] = [
+    Command { name: "bake", usage: bake::USAGE, run: bake::run },
+    Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
+    Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
+];
+
+fn main() -> ExitCode {
+    let mut parser = lexopt::Parser::from_env();
+    match command(&mut parser) {
+        Ok(Some(command)) => match (command.run)(&mut parser) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(stop) => stop.report(command.name, command.usage),
+        },
+        Ok(None) => ExitCode::SUCCESS,
+        Err(stop) => stop.report("", USAGE),
+    }
+}
+
+/// The command that the first argument names, or none where there is nothing left to do.
+fn command(parser: &mut lexopt::Parser) -> Result<Option<&'static Command>, Stop> {
+    match parser.next()? {
+        Some(Long("help") | Short('h')) => Err(Stop::Help),
+        Some(Long("version") | Short('V')) => {
+            println!("radiosity {}", env!("CARGO_PKG_VERSION"));
+            Ok(None)
+        }
+        Some(Value(name)) => {
+            let command = COMMANDS.iter().find(|command| *command.name == *name);
+            command.map(Some).ok_or_else(|| {
+                let names = COMMANDS.map(|command| command.name).join(", ");
+                Stop::usage(format!("no command '{}': there are {names}", name.display()))
+            })
+        }
+        Some(other) => Err(other.unexpected().into()),
+        None => Err(Stop::usage("no command given")),
+    }
+}

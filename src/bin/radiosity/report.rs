@@ -1,0 +1,162 @@
+//! The report of a bake: what was done, with what, and where the light and the time went; as JSON
+//! and as a small table.
+
+use radiosity::{BakeResult, Ledger, Rgb};
+use serde_json::{Map, Value, json};
+
+use crate::bake::{Target, settings};
+
+/// What the report tells of.
+pub struct Report {
+    /// The scene, as the user named it.
+    pub scene: String,
+    /// Name, type and driver of what made the rows.
+    pub adapter: [String; 3],
+    /// What was asked for.
+    pub target: Target,
+    /// Triangles with area.
+    pub triangles: usize,
+    /// Seconds of reading the scene.
+    pub load: f64,
+    /// Seconds of opening the device.
+    pub open: f64,
+    /// Seconds of drawing the picture and writing all other files.
+    pub write: f64,
+    /// Seconds of all.
+    pub total: f64,
+    /// What deserves a look.
+    pub warnings: Vec<String>,
+    pub baked: BakeResult,
+}
+
+impl Report {
+    /// Seconds are wall time. Draw, reduce and read-back are parts of making rows; `solve` is the
+    /// rest of the shooting, repairs of rows included.
+    pub fn to_json(&self) -> Value {
+        let baked = &self.baked;
+        let (s, error) = (baked.timings, baked.estimate);
+        let [name, kind, driver] = &self.adapter;
+        let by_resolution = baked.hemicubes_by_resolution.iter();
+        let by_resolution: Map<String, Value> =
+            by_resolution.map(|(pixels, count)| (pixels.to_string(), json!(count))).collect();
+        json!({
+            "scene": self.scene,
+            "adapter": { "name": name, "type": kind, "driver": driver },
+            "goal": match self.target {
+                Target::Settings(_) => Value::Null,
+                Target::Error(error) => json!({ "error": error }),
+                Target::Seconds(seconds) => json!({ "seconds": seconds }),
+            },
+            "settings": settings::report(&baked.settings),
+            "triangles": self.triangles,
+            "shot_elements": baked.mesh.element_count(),
+            "elements": baked.light.mesh.element_count(),
+            "vertices": baked.light.surface.positions.len(),
+            "shots": baked.solution.shots,
+            "hemicubes": baked.hemicubes,
+            "hemicubes_by_resolution": by_resolution,
+            "gathers": baked.light.gathers,
+            "gather_change": baked.light.change,
+            "gather_stop": self.gather_stop(),
+            "near_moved": baked.mean_near_correction,
+            "stop": baked.solution.stop.to_string(),
+            "ledger": ledger(&baked.solution.ledger),
+            "error": {
+                "total": error.total, "mesh": error.mesh, "sampling": error.sampling,
+                "settling": error.truncation, "unshot": error.unshot,
+                "unshot_bound": error.unshot_bound, "places": error.samples,
+            },
+            "seconds": {
+                "load": self.load, "open": self.open, "mesh": s.mesh, "draw": s.draw,
+                "reduce": s.reduce, "readback": s.readback, "solve": s.solve,
+                "vertices": s.vertices, "certificate": s.estimate, "write": self.write,
+                "total": self.total,
+            },
+            "warnings": self.warnings,
+        })
+    }
+
+    /// Why gathering stopped.
+    fn gather_stop(&self) -> String {
+        match self.baked.settings.gather {
+            Some(_) => self.baked.light.stop.to_string(),
+            None => "none".into(),
+        }
+    }
+
+    /// A line a subject, shares in percent.
+    pub fn table(&self) -> String {
+        let [name, kind, driver] = &self.adapter;
+        let (baked, light) = (&self.baked, &self.baked.light);
+        let (ledger, error, s) = (baked.solution.ledger, baked.estimate, baked.timings);
+        let emitted = ledger.emitted.element_sum();
+        let share = |flux: Rgb| {
+            if emitted > 0.0 { 100.0 * flux.element_sum() / emitted } else { 0.0 }
+        };
+        [
+            format!("adapter    {name} ({kind}), {driver}"),
+            format!(
+                "mesh       {} triangles, {} elements that shot, {} in the end, {} vertices",
+                self.triangles,
+                baked.mesh.element_count(),
+                light.mesh.element_count(),
+                light.surface.positions.len()
+            ),
+            format!(
+                "shooting   {} shots, {} hemicubes, {}",
+                baked.solution.shots, baked.hemicubes, baked.solution.stop
+            ),
+            format!(
+                "gathering  {} places, {}, changed the vertices by {:.2} %",
+                light.gathers,
+                self.gather_stop(),
+                100.0 * light.change
+            ),
+            format!(
+                "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",
+                share(ledger.absorbed),
+                share(ledger.escaped),
+                share(ledger.backface_loss),
+                share(ledger.unshot)
+            ),
+            format!(
+                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, unshot {:.2}",
+                100.0 * error.total,
+                100.0 * error.mesh,
+                100.0 * error.sampling,
+                100.0 * error.truncation,
+                100.0 * error.unshot
+            ),
+            format!(
+                "seconds    load {:.2}, open {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, \
+                 read back {:.2}, solve {:.2}, vertices {:.2}, error {:.2}, write {:.2}, \
+                 total {:.2}",
+                self.load,
+                self.open,
+                s.mesh,
+                s.draw,
+                s.reduce,
+                s.readback,
+                s.solve,
+                s.vertices,
+                s.estimate,
+                self.write,
+                self.total
+            ),
+        ]
+        .join("\n")
+    }
+}
+
+/// Where the light went, W per channel.
+fn ledger(ledger: &Ledger) -> Value {
+    let Ledger { emitted, absorbed, escaped, backface_loss, unshot, overshot } = ledger;
+    json!({
+        "emitted": emitted.to_array(),
+        "absorbed": absorbed.to_array(),
+        "left": escaped.to_array(),
+        "back": backface_loss.to_array(),
+        "unshot": unshot.to_array(),
+        "overshot": overshot.to_array(),
+    })
+}

@@ -1,0 +1,264 @@
+//! `radiosity view-factors`: view factors between the groups of scenes, as tables.
+
+mod files;
+
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use files::Format;
+use lexopt::prelude::*;
+use radiosity::{BakeSettings, Error, ErrorKind, Estimate, Mesh, Scene, ViewFactors, load_obj};
+
+use crate::args::{self, Device, Stop};
+use crate::progress;
+
+pub const USAGE: &str = "\
+usage: radiosity view-factors SCENE.obj… [--error E] [--two-sided NAME]… [--enforce]
+                    [--format F,…] [--out DIR]
+       radiosity view-factors SCENE.obj… --sampled [--element-size X] [--hemicube N]
+                    [--adapter NAME | --cpu] [--enforce] [--format F,…] [--out DIR]
+
+Writes the view factors between the groups (or objects) of each file beside it, or in DIR, and
+prints them with their standard errors and what raw numbers say of closure, reciprocity and bounds.
+F[i, j] is the share of the flux leaving group i (row) that arrives at group j (column); `open` is
+what leaves the scene, `back` what meets the backs of surfaces.
+
+  --error E         absolute error wanted of every factor [1e-4]
+  --two-sided NAME  this group gives and takes on both sides; its area is that of both
+  --enforce         make the matrix keep closure and reciprocity, and say what that changed
+  --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
+                    SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
+                    f_from_row_to_column and standard_error [csv,list]
+  --sampled         from hemicubes, one an element: for scenes of more than some ten thousand
+                    polygons; the error is what it is
+  --element-size X  longest edge of the elements that are seen from [diagonal / 32]
+  --hemicube N      pixels along an edge of a hemicube's top face, even [128]
+  --adapter NAME    a graphics adapter with NAME in its name
+  --cpu             rays on the CPU instead of hemicubes, N squared a row";
+
+/// Groups whose factors are printed at most.
+const MAX_PRINTED: usize = 16;
+
+/// Absolute error of a factor where none is asked for.
+const DEFAULT_ERROR: f64 = 1e-4;
+
+/// Pixels along an edge of a hemicube's top face where none are asked for.
+const DEFAULT_HEMICUBE: u32 = 128;
+
+/// What is asked of the command.
+struct Options {
+    scenes: Vec<PathBuf>,
+    /// The folder for files, or none for that of each scene.
+    out: Option<PathBuf>,
+    formats: Vec<Format>,
+    enforce: bool,
+    method: Method,
+}
+
+enum Method {
+    Exact { error: f64, two_sided: Vec<String> },
+    Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
+}
+
+/// Runs the command: all scenes, whatever becomes of the others.
+pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
+    let options = Options::parse(parser)?;
+    let mut failed = false;
+    for scene in &options.scenes {
+        if let Err(e) = options.run(scene) {
+            eprintln!("error: {e}");
+            failed = true;
+        }
+    }
+    if failed { Err(Stop::Reported) } else { Ok(()) }
+}
+
+impl Options {
+    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
+        let (mut scenes, mut out, mut enforce) = (vec![], None, false);
+        let mut formats = vec![Format::Csv, Format::List];
+        let (mut error, mut two_sided) = (None, vec![]);
+        let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
+        let mut device = None;
+        while let Some(arg) = parser.next()? {
+            match arg {
+                Long("help") | Short('h') => return Err(Stop::Help),
+                Long("out") => out = Some(parser.value()?.into()),
+                Long("format") => formats = Format::list(parser)?,
+                Long("enforce") => enforce = true,
+                Long("error") => error = Some(args::value(parser, "error", "a number")?),
+                Long("two-sided") => {
+                    two_sided.push(args::value(parser, "two-sided", "a group's name")?);
+                }
+                Long("sampled") => sampled = true,
+                Long("element-size") => {
+                    element_size = Some(args::value(parser, "element-size", "a number")?);
+                }
+                Long("hemicube") => {
+                    hemicube = Some(args::value(parser, "hemicube", "a whole number of pixels")?);
+                }
+                Long("adapter") => device = Some(Device::named(parser)?),
+                Long("cpu") => device = Some(Device::Cpu),
+                Value(path) => scenes.push(path.into()),
+                _ => return Err(arg.unexpected().into()),
+            }
+        }
+        if scenes.is_empty() {
+            return Err(Stop::usage("no scene given: name one or more OBJ files"));
+        }
+        let only_exact = error.is_some() || !two_sided.is_empty();
+        let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
+        let method = if sampled {
+            if only_exact {
+                return Err(Stop::usage("--error and --two-sided are not for --sampled"));
+            }
+            let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
+            let device = device.unwrap_or(Device::Gpu(None));
+            Method::Sampled { element_size, hemicube, device }
+        } else {
+            if only_sampled {
+                let needing = "--element-size, --hemicube, --adapter and --cpu need --sampled";
+                return Err(Stop::usage(needing));
+            }
+            Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided }
+        };
+        Ok(Options { scenes, out, formats, enforce, method })
+    }
+
+    fn run(&self, path: &Path) -> Result<(), Error> {
+        let stem = match (&self.out, path.file_stem()) {
+            (Some(folder), Some(name)) => folder.join(name),
+            _ => path.with_extension(""),
+        };
+        for format in &self.formats {
+            args::check_writable(&format.path(&stem))?;
+        }
+        let scene = load_obj(path)?;
+        for warning in scene.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        let start = Instant::now();
+        let mut matrix = self.method.matrix(scene)?;
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{}: {} groups, {seconds:.3} s", path.display(), matrix.names.len());
+        print_checks(&matrix);
+        if self.enforce {
+            matrix = enforce(&matrix);
+        }
+        if matrix.names.len() <= MAX_PRINTED {
+            print_factors(&matrix);
+        }
+        for format in &self.formats {
+            format.write(&stem, &matrix)?;
+        }
+        Ok(())
+    }
+}
+
+impl Method {
+    /// The view factors between the groups of `scene`.
+    fn matrix(&self, scene: Scene) -> Result<ViewFactors, Error> {
+        let matrix = match self {
+            Method::Exact { error, two_sided } => {
+                let groups = group_indices(&scene, two_sided)?;
+                progress::of_count("groups", |report| {
+                    ViewFactors::new(&scene, *error, &groups, report)
+                })?
+            }
+            Method::Sampled { element_size, hemicube, device } => {
+                let size = element_size
+                    .unwrap_or_else(|| BakeSettings::elements_only(&scene).solve.element_size);
+                let mesh = Mesh::new(scene, size)?;
+                let device = device.open()?;
+                let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
+                let [name, kind, _] = device.adapter();
+                println!("{} elements, {name} ({kind})", mesh.element_count());
+                progress::of_count("elements", |report| {
+                    ViewFactors::sampled(&mesh, &mut rows, report)
+                })?
+            }
+        };
+        Ok(matrix.expect("its progress never stops it"))
+    }
+}
+
+/// Makes the matrix keep closure and reciprocity, and prints what that changed.
+fn enforce(matrix: &ViewFactors) -> ViewFactors {
+    let (enforced, report) = matrix.enforced();
+    println!(
+        "enforced: factors changed by {:.1e} RMS, {:.1e} at most; {} of {} rows closed; \
+         closure left {:.1e}",
+        report.rms,
+        report.worst,
+        report.closed,
+        matrix.names.len(),
+        report.left
+    );
+    enforced
+}
+
+/// Group numbers of names.
+fn group_indices(scene: &Scene, names: &[String]) -> Result<Vec<usize>, Error> {
+    let index = |name: &String| {
+        let index = scene.groups().iter().position(|group| group == name);
+        index.ok_or_else(|| {
+            let all = scene.groups().join(", ");
+            let remedy = format!("the scene has {all}");
+            Error::new(ErrorKind::Setting, "--two-sided", format!("no group '{name}'"), remedy)
+        })
+    };
+    names.iter().map(index).collect()
+}
+
+/// Prints closure, reciprocity and bounds of the raw numbers, and which groups see out.
+fn print_checks(m: &ViewFactors) {
+    let checks = m.checks();
+    let name = |i: usize| &m.names[i];
+    let (r, b) = (checks.reciprocity, checks.bounds);
+    println!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.worst);
+    println!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.worst);
+    if b.worst > 0.0 {
+        let (from, to) = (name(b.at.0), name(b.at.1));
+        println!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.worst);
+    } else {
+        println!("bounds: kept");
+    }
+    if let Some(&worst) = m.overfull().first() {
+        eprintln!(
+            "warning: more than all of {}'s flux arrives, {:.3e} too much: are two surfaces in one \
+             place?",
+            name(worst),
+            -m.open[worst].value
+        );
+    }
+    let leaks = m.leaks();
+    if let Some(&worst) = leaks.first() {
+        eprintln!(
+            "warning: {} of {} groups see out of the scene; {} loses most, {:.3e}",
+            leaks.len(),
+            m.names.len(),
+            name(worst),
+            m.open[worst].value
+        );
+    } else {
+        println!("closed: no group sees out");
+    }
+}
+
+/// Prints the factors of every group, each with its error.
+fn print_factors(m: &ViewFactors) {
+    let width = m.names.iter().map(|n| n.chars().count()).max().unwrap_or(0).max(4);
+    println!("{:>width$} → {:<width$} {:>12} {:>9}", "from", "to", "F", "± error");
+    let line = |from: &str, to: &str, e: Estimate| {
+        println!("{from:>width$} → {to:<width$} {:12.9} {:9.1e}", e.value, e.error);
+    };
+    for (i, from) in m.names.iter().enumerate() {
+        for f in &m.factors[i] {
+            let e = Estimate { value: f.value, error: f.error };
+            line(from, &m.names[f.to as usize], e);
+        }
+        line(from, "open", m.open[i]);
+        line(from, "back", m.back[i]);
+    }
+}

@@ -1,0 +1,84 @@
+//! The formats that a matrix of view factors is written in.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use npyz::WriterBuilder;
+use radiosity::{
+    Error, ErrorKind, Estimate, ViewFactors, write_matrix_market, write_view_factor_list,
+    write_view_factors,
+};
+
+use crate::args::{self, Stop};
+
+#[derive(Clone, Copy, PartialEq)]
+pub enum Format {
+    Csv,
+    List,
+    MatrixMarket,
+    Npy,
+}
+
+/// One entry of the array in an `.npy` file.
+#[derive(npyz::Serialize, npyz::AutoSerialize)]
+struct Entry {
+    f_from_row_to_column: f64,
+    standard_error: f64,
+}
+
+impl Format {
+    /// The value of `--format`.
+    pub fn list(parser: &mut lexopt::Parser) -> Result<Vec<Format>, Stop> {
+        let expected = "some of csv, list, mtx, npy, with commas between";
+        let text: String = args::value(parser, "format", expected)?;
+        let formats: Option<Vec<Format>> = text.split(',').map(Format::named).collect();
+        formats.ok_or_else(|| args::wrong_value("format", &text, expected))
+    }
+
+    fn named(name: &str) -> Option<Format> {
+        match name {
+            "csv" => Some(Format::Csv),
+            "list" => Some(Format::List),
+            "mtx" => Some(Format::MatrixMarket),
+            "npy" => Some(Format::Npy),
+            _ => None,
+        }
+    }
+
+    pub fn path(self, stem: &Path) -> PathBuf {
+        stem.with_added_extension(match self {
+            Format::Csv => "csv",
+            Format::List => "list.csv",
+            Format::MatrixMarket => "mtx",
+            Format::Npy => "npy",
+        })
+    }
+
+    pub fn write(self, stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
+        let path = self.path(stem);
+        match self {
+            Format::Csv => write_view_factors(path, matrix),
+            Format::List => write_view_factor_list(path, matrix),
+            Format::MatrixMarket => write_matrix_market(path, matrix),
+            Format::Npy => write_npy(&path, matrix).map_err(|e| {
+                let place = path.display().to_string();
+                Error::new(ErrorKind::File, place, e.to_string(), "it must be writable")
+            }),
+        }
+    }
+}
+
+fn write_npy(path: &Path, matrix: &ViewFactors) -> std::io::Result<()> {
+    let n = matrix.names.len();
+    let file = BufWriter::new(File::create(path)?);
+    let options = npyz::WriteOptions::new().default_dtype().shape(&[n as u64, n as u64]);
+    let mut writer = options.writer(file).begin_nd()?;
+    for from in 0..n {
+        for to in 0..n {
+            let Estimate { value, error } = matrix.factor(from, to);
+            writer.push(&Entry { f_from_row_to_column: value, standard_error: error })?;
+        }
+    }
+    writer.finish()
+}
