@@ -11,7 +11,7 @@ fn peak() -> usize {
 }
 
 #[test]
-fn memory_is_within_a_modest_multiple_of_the_file() {
+fn peak_memory_is_bounded_by_file_size() {
     const BYTES: usize = 8 << 20;
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     // Numbers as short as they can be, so that what is made of them is the most.

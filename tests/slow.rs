@@ -3,6 +3,10 @@
 mod common;
 
 mod slow {
+    mod accuracy;
     mod extremes;
+    mod kill_and_resume;
+    mod many_triangles;
     mod properties;
+    mod view_factors;
 }

@@ -9,7 +9,7 @@ use crate::common::{cube, quads};
 
 /// Some places see a small bright spot, which few rays find or miss by chance.
 #[test]
-fn rays_that_disagree_get_more() {
+fn noisy_points_get_more_rays() {
     let spot = [[-0.3, 0.0, 1.4], [0.3, 0.0, 1.4], [0.3, 0.0, 2.0], [-0.3, 0.0, 2.0]];
     let corners = spot.map(DVec3::from_array);
     let scene = quads(&[(spot, Material::grey("spot", 0.5))]);

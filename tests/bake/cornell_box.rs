@@ -1,8 +1,8 @@
 //! The Cornell box, from file to vertices, against path-traced truth.
 
-use crate::common::truth;
-use crate::common::{cornell_box, keep_going};
 use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh};
+
+use crate::common::{cornell_box, keep_going, truth};
 
 const TRUTH: &str = include_str!("../data/cornell_box.truth.json");
 
@@ -27,7 +27,7 @@ pub fn check(mesh: &Mesh, solution: &Solution, rms: f64, median: f64) {
 }
 
 #[test]
-fn rays_instead_of_hemicubes_give_the_same_picture() {
+fn cornell_box_by_rays_matches_path_tracer() {
     // Elements twice as large, so that rays are not waited for; the error of interpolation grows by
     // up to the square of that.
     let mesh = cornell_box(60.0);

@@ -1,7 +1,7 @@
 //! The scenes that are swept: any size, anywhere, as bright and as bright beside others as asked.
 
 use glam::{DQuat, DVec3};
-use radiosity::{Material, Rgb, Scene, Triangle};
+use radiosity::{Material, Mesh, Rgb, Scene, Triangle, VertexMesh};
 
 use super::scenes::{block, quads, walls};
 
@@ -141,4 +141,11 @@ pub fn sphere(frame: Frame, levels: u32, cap: Material, rest: Material) -> Scene
     let positions = faces.iter().flatten().map(place).collect();
     let names = ["rest", "cap"].map(String::from).to_vec();
     Scene::new(positions, triangles, names, vec![rest, cap]).expect("a good scene")
+}
+
+/// A surface of one radiosity over the room at `frame`.
+pub fn even_surface(frame: Frame, radiosity: f64) -> VertexMesh {
+    let mesh = Mesh::new(room(frame, 1.0, 1.0), f64::INFINITY).unwrap();
+    let values = vec![Rgb::splat(radiosity); mesh.element_count()];
+    VertexMesh::per_element(&mesh, &values)
 }

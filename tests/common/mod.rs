@@ -8,6 +8,7 @@ pub mod framed;
 pub mod scenes;
 pub mod surface;
 pub mod truth;
+pub mod view_factors;
 
 use std::ops::ControlFlow;
 

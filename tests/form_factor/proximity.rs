@@ -1,9 +1,10 @@
 //! The proximity repair: what it mends, what it leaves alone, and what that is worth.
 
-use crate::common::closed_forms::{exact, from_centroid};
-use crate::common::cube;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{FormFactors, Material, Mesh, NodeId, ProximityCorrection, Row};
+
+use crate::common::closed_forms::{exact, from_centroid};
+use crate::common::cube;
 
 fn dense(mesh: &Mesh, row: &Row) -> Vec<f64> {
     let mut factors = vec![0.0; mesh.element_count()];
@@ -26,7 +27,7 @@ fn patches(mesh: &Mesh) -> Vec<NodeId> {
 }
 
 #[test]
-fn near_entries_come_close_to_the_area_averaged_factor() {
+fn near_entries_approach_area_averaged_factor() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patches = patches(&mesh);
     let truth = exact().rows(&mesh, &patches, 1.0).unwrap();
@@ -54,7 +55,7 @@ fn near_entries_come_close_to_the_area_averaged_factor() {
 }
 
 #[test]
-fn a_mended_entry_is_the_closed_form_from_the_receiver() {
+fn corrected_entry_is_closed_form_from_receiver() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patch = patches(&mesh)[0];
     let row = &ProximityCorrection::new(from_centroid(), &mesh, 0.0)
@@ -75,7 +76,7 @@ fn a_mended_entry_is_the_closed_form_from_the_receiver() {
 }
 
 #[test]
-fn rows_out_of_reach_are_left_as_they_are() {
+fn rows_out_of_reach_stay_unchanged() {
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.2).unwrap();
     let patches = patches(&mesh);
     let raw = from_centroid().rows(&mesh, &patches, 1.0).unwrap();

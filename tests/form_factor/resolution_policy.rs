@@ -1,10 +1,11 @@
 //! Effort follows the flux at stake: coarse rows for patches that shoot little.
 
-use crate::common::{cornell_box, keep_going, quads};
 use radiosity::{
     AdaptiveViewpoints, Error, FormFactors, Material, Mesh, NodeId, ProximityCorrection, RayRows,
     Rgb, Row, Solution, Solver,
 };
+
+use crate::common::{cornell_box, keep_going, quads};
 
 /// Shares of the emitted flux for which rows are made at full resolution, half and a quarter: a
 /// halving is enough for 2^2.5 = 5.7 times less light.
@@ -17,7 +18,7 @@ pub fn some_elements(mesh: &Mesh) -> Vec<NodeId> {
 }
 
 #[test]
-fn rows_for_little_light_have_fewer_rays() {
+fn dim_patches_get_fewer_rays() {
     let mesh = cornell_box(200.0);
     let patches = some_elements(&mesh);
     let make = |n: u32| RayRows::new(&mesh, n).unwrap().with_full_share(FULL);
@@ -62,7 +63,7 @@ fn lamps() -> Mesh {
 }
 
 #[test]
-fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
+fn solver_passes_largest_unshot_share_of_batch() {
     let mesh = lamps();
     let mut told = Told::default();
     Solver { unshot: 0.0, ..Default::default() }.solve(&mesh, &mut told, keep_going).unwrap();
@@ -76,7 +77,7 @@ fn the_solver_says_what_the_brightest_of_a_batch_is_about_to_shoot() {
 }
 
 #[test]
-fn repairs_pass_on_what_is_at_stake() {
+fn wrappers_pass_unshot_share_on() {
     let mesh = cornell_box(200.0);
     let near = ProximityCorrection::new(Told::default(), &mesh, 1.0);
     let mut rows = AdaptiveViewpoints::new(near, 0.0, u32::MAX);
@@ -104,7 +105,7 @@ pub fn solve<M: FormFactors>(
 }
 
 #[test]
-fn rows_of_several_counts_of_rays_keep_the_energy_and_the_bits() {
+fn mixed_ray_counts_conserve_energy_and_bits() {
     let mesh = cornell_box(100.0);
     let rays = || RayRows::new(&mesh, 4096).unwrap();
     let (some, all) = (solve(&mesh, rays).0, solve(&mesh, || rays().with_full_share(0.0)).0);

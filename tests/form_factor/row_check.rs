@@ -1,13 +1,14 @@
 //! Rows that break the contract of `FormFactors` are refused, whoever asked for them.
 
-use crate::common::closed_forms::exact;
-use crate::common::fakes::GivenRows;
-use crate::common::scenes::paint;
-use crate::common::{cube, keep_counting, keep_going};
 use radiosity::{
     AdaptiveViewpoints, Entry, Error, ErrorKind, FormFactors, Mesh, Method, NodeId,
     ProximityCorrection, Row, Solver, ViewFactors,
 };
+
+use crate::common::closed_forms::exact;
+use crate::common::fakes::GivenRows;
+use crate::common::scenes::paint;
+use crate::common::{cube, keep_counting, keep_going};
 
 /// The same row for every patch, but `missing` rows too few.
 struct RepeatedRow {
@@ -22,7 +23,7 @@ impl FormFactors for RepeatedRow {
 }
 
 #[test]
-fn rows_that_are_none_are_errors_whoever_uses_them() {
+fn every_user_rejects_invalid_rows() {
     let mesh = Mesh::new(cube(&paint(0.5, 1.0)), 0.3).unwrap();
     let row = |element: u32, share: u32, escaped: u32| {
         let entries = vec![Entry { element, share }];
@@ -54,7 +55,7 @@ fn rows_that_are_none_are_errors_whoever_uses_them() {
 }
 
 #[test]
-fn rows_that_break_their_contract_are_refused() {
+fn shooting_rejects_invalid_rows() {
     let mesh = Mesh::new(cube(&paint(0.8, 1.0)), 2.0).unwrap();
     let half = Row::TOTAL / 2;
     let entry = |element, share| Entry { element, share };

@@ -1,12 +1,13 @@
 //! The visibility repair: what it finds behind a plate, and what it spends where there is none.
 
-use crate::common::closed_forms::{ClosedForms, from_centroid};
-use crate::common::{cube, quads};
 use radiosity::form_factor::closed_form::polygon_to_polygon;
 use radiosity::{
     AdaptiveViewpoints, Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId,
     ProximityCorrection, RayRows, Row,
 };
+
+use crate::common::closed_forms::{ClosedForms, from_centroid};
+use crate::common::{cube, quads};
 
 /// Where the plate stands: the patch's centroid is at x = 2/3, behind it.
 const PLATE: f64 = 0.7;
@@ -36,7 +37,7 @@ fn to_wall(mesh: &Mesh, row: &Row) -> f64 {
 }
 
 #[test]
-fn a_patch_half_behind_a_plate_is_seen_from_both_sides() {
+fn patch_behind_plate_is_seen_from_both_sides() {
     let (mesh, patch) = screened();
     let corners = |q: [[f64; 3]; 4]| q.map(glam::DVec3::from_array);
     let before = corners([[PLATE, 0., 0.], [1., 0., 0.], [1., 1., 0.], [PLATE, PLATE, 0.]]);
@@ -69,7 +70,7 @@ fn a_patch_half_behind_a_plate_is_seen_from_both_sides() {
 }
 
 #[test]
-fn rows_are_the_same_alone_in_company_and_again() {
+fn rows_are_independent_of_batching() {
     let (mesh, patch) = screened();
     let patches: Vec<NodeId> =
         mesh.children(patch).unwrap().into_iter().chain([mesh.element(0), mesh.root(3)]).collect();
@@ -87,7 +88,7 @@ fn rows_are_the_same_alone_in_company_and_again() {
 }
 
 #[test]
-fn each_part_is_mended_for_itself() {
+fn each_part_is_corrected_by_itself() {
     // Near walls and four elements a patch; closed forms, so that nothing turns with a node's id.
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 0.4).unwrap();
     let near = || ProximityCorrection::new(from_centroid(), &mesh, 1.0);
@@ -120,7 +121,7 @@ fn each_part_is_mended_for_itself() {
 }
 
 #[test]
-fn nothing_is_spent_beyond_the_comparison_in_the_open() {
+fn open_patches_cost_one_comparison() {
     // Two unit squares, one apart. Patches of 16 elements have corners within r = 0.17 of their
     // centroid. What the mean of their parts' views differs by is of second order: the factor's
     // curvature, at most about 4 over the distance squared, times r²/2 for the corner parts' own
@@ -148,7 +149,7 @@ fn nothing_is_spent_beyond_the_comparison_in_the_open() {
 }
 
 #[test]
-fn a_maker_that_withholds_rows_is_named() {
+fn rejects_missing_rows_by_name() {
     struct Short(ClosedForms);
     impl FormFactors for Short {
         fn rows(

@@ -1,15 +1,16 @@
 //! Meshes of unequal depths: split by hand, split where surfaces touch, shot from; and the ambient
 //! term, which knows their areas. No GPU needed.
 
-use crate::common::closed_forms::exact;
-use crate::common::scenes::{grey, standing_block};
-use crate::common::surface::assert_whole;
-use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::{
     ErrorKind, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason, Triangle,
     VertexMesh,
 };
+
+use crate::common::closed_forms::exact;
+use crate::common::scenes::{grey, standing_block};
+use crate::common::surface::assert_whole;
+use crate::common::{cube, keep_going, quads};
 
 /// Splits a pseudo-random quarter of the elements, `times` times.
 fn split_at_random(mut mesh: Mesh, times: u32) -> Mesh {
@@ -42,7 +43,7 @@ fn under(mesh: &Mesh, t: usize, p: DVec3) -> (usize, f64) {
 }
 
 #[test]
-fn parts_tile_what_was_split_and_elements_stay_numbered() {
+fn split_tiles_and_renumbers_in_order() {
     let mesh = split_at_random(Mesh::new(cube(&grey()), 0.8).unwrap(), 4);
     let levels: Vec<u32> = (0..mesh.element_count()).map(|e| level(&mesh, e)).collect();
     assert!(levels.iter().max().unwrap() >= &(levels.iter().min().unwrap() + 3));
@@ -87,7 +88,7 @@ fn parts_tile_what_was_split_and_elements_stay_numbered() {
 }
 
 #[test]
-fn what_is_split_takes_the_place_of_one_and_no_split_goes_too_deep() {
+fn split_replaces_element_up_to_maximum_depth() {
     let mesh = Mesh::new(cube(&grey()), 0.8).unwrap();
     let split = mesh.split(&[3, 7]).unwrap();
     assert_eq!(split.element_count(), mesh.element_count() + 6);
@@ -106,7 +107,7 @@ fn what_is_split_takes_the_place_of_one_and_no_split_goes_too_deep() {
 }
 
 #[test]
-fn unequal_depths_shoot_as_well_as_equal_ones() {
+fn unequal_depths_shoot_like_equal_ones() {
     let glow = Material { exitance: Rgb::ONE, ..grey() };
     let uneven = |mesh: &Mesh| {
         let settings = Solver { unshot: 1e-6, ..Default::default() };
@@ -159,7 +160,7 @@ fn floor_under(p: DVec3) -> usize {
 }
 
 #[test]
-fn elements_are_split_where_a_box_stands_and_nowhere_else() {
+fn contact_splits_only_where_box_stands() {
     // Between the lattice lines of all levels here, multiples of 1/8.
     let (x0, x1) = (-0.71, 0.79);
     let walls: Vec<_> =
@@ -190,13 +191,13 @@ fn elements_are_split_where_a_box_stands_and_nowhere_else() {
 }
 
 #[test]
-fn surfaces_that_share_edges_split_nothing() {
+fn shared_edges_are_no_contact() {
     let empty = Mesh::new(cube(&grey()), 0.3).unwrap();
     assert_eq!(empty.split_at_contacts(3).element_count(), empty.element_count());
 }
 
 #[test]
-fn what_hangs_close_splits_as_deep_as_it_is_close() {
+fn gap_width_decides_contact_depth() {
     // Cells of legs ½, ¼, ⅛ have areas of ⅛, 1/32, 1/128; 15 % of the roots are 0.053, 0.0265,
     // 0.01326. The fourth level is not asked for.
     for (gap, deeper) in [(0.054, 0), (0.052, 1), (0.027, 1), (0.026, 2), (0.0134, 2), (0.0131, 3)]
@@ -217,7 +218,7 @@ fn what_hangs_close_splits_as_deep_as_it_is_close() {
 }
 
 #[test]
-fn thousands_of_faces_in_one_place_do_not_split_each_other() {
+fn crowded_triangles_skip_each_other() {
     let floors = vec![(FLOOR, grey()); 1500];
     let walls =
         standing_block([-0.71, 0.79], [-0.71, 0.79], 0.0, 1.0).into_iter().map(|w| (w, grey()));
@@ -234,7 +235,7 @@ fn thousands_of_faces_in_one_place_do_not_split_each_other() {
 }
 
 #[test]
-fn triangles_that_cross_split_each_other_along_the_cut() {
+fn crossing_triangles_split_along_the_cut() {
     // The cut runs along y = 1.1, z = 0, from x = 1 to where the first one ends, 2.9: through two
     // of the second one's sides, or one and the corner opposite.
     for z in [0.3, 0.0] {
@@ -261,7 +262,7 @@ fn triangles_that_cross_split_each_other_along_the_cut() {
 }
 
 #[test]
-fn the_ambient_of_all_unshot_light_is_exact_where_it_is_even() {
+fn ambient_term_is_exact_for_even_light() {
     let glow = Material { exitance: Rgb::new(1.0, 2.0, 0.5), ..grey() };
     let glow = Material { reflectance: Rgb::new(0.5, 0.8, 0.0), ..glow };
     let mesh = split_at_random(Mesh::new(cube(&glow), 0.8).unwrap(), 1);

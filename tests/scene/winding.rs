@@ -1,9 +1,10 @@
 //! Faces wound inside out are said in a warning, with the name of their group; others are not.
 
-use crate::common::quads;
-use crate::common::scenes::{block, halves, walls};
 use glam::DVec3;
 use radiosity::{Material, Scene, Triangle, load_obj};
+
+use crate::common::quads;
+use crate::common::scenes::{block, halves, walls};
 
 /// Triangles of a box, seen from inside or from outside.
 fn boxed(low: [f64; 3], high: [f64; 3], inside: bool) -> Vec<[DVec3; 3]> {
@@ -39,7 +40,7 @@ fn named(groups: &[(&str, Vec<[DVec3; 3]>)]) -> String {
 }
 
 #[test]
-fn groups_wound_inside_out_are_named() {
+fn names_groups_wound_inside_out() {
     let (low, high) = ([0.3; 3], [0.6; 3]);
     assert_eq!(named(&[room(), ("block", boxed(low, high, true))]), "'block'");
     // One side of twelve triangles.
@@ -67,7 +68,7 @@ fn groups_wound_inside_out_are_named() {
 }
 
 #[test]
-fn groups_that_are_right_are_not() {
+fn accepts_groups_wound_right() {
     let block = |low, high| boxed(low, high, false);
     assert_eq!(named(&[room()]), "");
     assert_eq!(named(&[("block", block([0.; 3], [1.; 3]))]), "");
@@ -85,7 +86,7 @@ fn groups_that_are_right_are_not() {
 }
 
 #[test]
-fn a_face_that_nobody_sees_says_nothing() {
+fn ignores_face_that_sees_nothing() {
     let plate = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     let mut scene = quads(&[(plate, Material::grey("m", 0.5))]);
     scene.check_winding();

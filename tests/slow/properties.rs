@@ -3,15 +3,16 @@
 //! `PROPTEST_CASES=10000 cargo test --release --test properties` tries more of them than the
 //! 200 a property that are tried else, `PROPTEST_RNG_SEED=7` others.
 
-use crate::common::keep_going;
 use std::collections::BTreeMap;
 
-use crate::common::closed_forms::exact;
-use crate::common::fakes::StoredRows;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use radiosity::{Material, Mesh, Method, RayRows, Rgb, Row, Scene, Solution, Solver, Triangle};
+
+use crate::common::closed_forms::exact;
+use crate::common::fakes::StoredRows;
+use crate::common::keep_going;
 
 /// The same cases on every run, unless a seed is given.
 fn config() -> ProptestConfig {
@@ -184,7 +185,7 @@ proptest! {
 
     /// What holds of one solution by exact rows in a convex room.
     #[test]
-    fn exact_rows_are_reciprocal_and_their_light_is_bounded(room in rooms(0..1)) {
+    fn exact_rows_are_reciprocal_and_light_bounded(room in rooms(0..1)) {
         let (mesh, materials) = (room.mesh(), room.materials());
         let (mut rows, areas) = (exact_rows(&mesh), areas(&mesh));
         for i in 0..areas.len() {
@@ -208,7 +209,7 @@ proptest! {
     /// Twice one light and half another give twice and half of what each gives; what reflects more
     /// makes all brighter. By the same rows, so that rounding of sums is all that there is.
     #[test]
-    fn light_adds_up_and_reflectance_makes_all_brighter(
+    fn light_is_linear_and_monotone_in_reflectance(
         room in rooms(0..4), other in prop::array::uniform12(0.0..10.0f64), which in 0..12usize,
     ) {
         let (mesh, materials) = (room.mesh(), room.materials());
@@ -244,7 +245,7 @@ proptest! {
     /// Exact rows know nothing of where a scene is, how it is turned, how large it is or in which order
     /// its faces are.
     #[test]
-    fn nothing_depends_on_place_size_turn_or_order(
+    fn light_is_invariant_under_motion_and_order(
         room in rooms(0..1), axis in prop::array::uniform3(-1.0..1.0f64), angle in 0.0..6.3,
         away in prop::array::uniform3(-1e3..1e3f64), decades in -9.0..9.0f64, shuffle in any::<u64>(),
     ) {
@@ -270,7 +271,7 @@ proptest! {
     /// A power of two times the size gives the same bits, by exact rows and by rays, past whatever
     /// hangs inside.
     #[test]
-    fn a_power_of_two_changes_no_bit(room in rooms(0..4), power in -30..=30i32) {
+    fn scaling_by_power_of_two_changes_no_bit(room in rooms(0..4), power in -30..=30i32) {
         let here = room.mesh();
         let larger = |(corners, material): &Face| {
             (corners.map(|p| p * 2f64.powi(power)), *material)
@@ -294,7 +295,7 @@ proptest! {
 
     /// Rays past anything: all that is emitted is accounted for, and no more than E/(1−ρ) is about.
     #[test]
-    fn light_past_blockers_is_neither_lost_nor_made(room in rooms(1..6)) {
+    fn occluded_light_is_conserved(room in rooms(1..6)) {
         let (mesh, materials) = (room.mesh(), room.materials());
         let s = solve(&mesh, &mut ray_rows(&mesh));
         prop_assert!(s.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
@@ -310,7 +311,7 @@ proptest! {
     /// A polygon in two parts is the same polygon. The last one is split, so that all other rows are by
     /// the same rays: what they have sent to it they send to its parts.
     #[test]
-    fn a_split_polygon_is_the_same_to_all_others(
+    fn split_polygon_receives_the_same_rows(
         room in rooms(1..4), side in 0..3usize, at in 0.1..0.9f64,
     ) {
         let (mut faces, materials) = (room.faces(), room.materials());
@@ -336,7 +337,7 @@ proptest! {
     /// By exact rows: one bounce gives the parts of a polygon, in the mean over their area, what it gives
     /// the whole, and all others the same; and if it reflects nothing, all bounces do.
     #[test]
-    fn a_split_wall_gets_and_gives_the_same(
+    fn split_wall_exchanges_the_same_light(
         room in rooms(0..1), which in 0..24usize, side in 0..3usize, at in 0.1..0.9f64, black: bool,
     ) {
         let (mut faces, mut materials) = (room.faces(), room.materials());

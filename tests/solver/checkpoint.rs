@@ -2,16 +2,14 @@
 //! bits of one that was not. No GPU needed.
 
 use std::ops::ControlFlow;
-use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
-use crate::common::{cornell_box, keep_going};
 use glam::{DAffine3, DVec3};
 use radiosity::{
-    Error, ErrorKind, FormFactors, Mesh, Method, NodeId, Progress, RayRows, Rgb, Row, Scene,
-    Solution, SolveSession, Solver, StopReason,
+    Error, ErrorKind, FormFactors, Mesh, Method, NodeId, Progress, RayRows, Row, Scene, Solution,
+    Solver, StopReason,
 };
+
+use crate::common::{cornell_box, keep_going};
 
 /// Rays, fewer for dim patches: rows depend on when they are made.
 fn rays(mesh: &Mesh) -> RayRows {
@@ -36,7 +34,7 @@ fn same(a: &Solution, b: &Solution) {
 }
 
 #[test]
-fn saved_and_read_after_every_batch_a_solve_ends_with_the_same_bits() {
+fn resuming_after_every_batch_changes_no_bit() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
         let whole = solver.solve(&mesh, &mut rays(&mesh), keep_going).unwrap();
@@ -75,7 +73,7 @@ impl FormFactors for Failing {
 }
 
 #[test]
-fn an_error_of_the_rows_takes_nothing_from_a_solve() {
+fn row_errors_lose_no_progress() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
         let whole = solver.solve(&mesh, &mut rays(&mesh), keep_going).unwrap();
@@ -101,7 +99,7 @@ fn an_error_of_the_rows_takes_nothing_from_a_solve() {
 }
 
 #[test]
-fn a_solve_that_is_stopped_at_any_call_goes_on() {
+fn cancelled_solve_converges_to_same_light() {
     let mesh = cornell_box(300.0);
     for solver in solvers() {
         let whole = Solver { unshot: 1e-12, ..solver };
@@ -135,7 +133,7 @@ fn a_solve_that_is_stopped_at_any_call_goes_on() {
 
 /// A solve whose scene has changed, with old rows that nobody can make again.
 #[test]
-fn a_solve_that_has_changed_is_saved_with_its_old_rows() {
+fn changed_solve_saves_its_old_rows() {
     let mesh = cornell_box(150.0);
     let by = DAffine3::from_translation(DVec3::new(5.0, 0.0, 5.0));
     let moved =
@@ -160,7 +158,7 @@ fn a_solve_that_has_changed_is_saved_with_its_old_rows() {
 }
 
 #[test]
-fn other_scenes_settings_and_files_are_refused_with_a_reason() {
+fn rejects_states_of_other_solves_and_damaged_files() {
     let mesh = cornell_box(300.0);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("light.state");
@@ -223,71 +221,4 @@ fn other_scenes_settings_and_files_are_refused_with_a_reason() {
     assert!(e.kind() == ErrorKind::File && e.to_string().contains("none"), "{e}");
     let e = solve.save(folder.path().join("no/such/folder")).unwrap_err();
     assert!(e.kind() == ErrorKind::File && e.to_string().contains("no/such"), "{e}");
-}
-
-/// The solve that is killed; some 2 s where rows are kept, a state every batch or every 16.
-fn killed<'m>(mesh: &'m Mesh, rows: &RayRows, method: Method, path: &Path) -> SolveSession<'m> {
-    let solver = Solver { unshot: 1e-5, row_memory: 1 << 20, ..Solver::new(method) };
-    match path.exists() {
-        true => solver.resume(mesh, rows, path).expect("the state is whole"),
-        false => solver.begin(mesh).unwrap(),
-    }
-}
-
-/// Not a test by itself: the process that is killed, told by the environment what to solve.
-#[test]
-fn the_process_that_is_killed() {
-    let Some(path) = std::env::var_os("RADIOSITY_KILLED") else { return };
-    let path = Path::new(&path);
-    let method = std::env::var("RADIOSITY_METHOD").unwrap().parse().unwrap();
-    let mesh = cornell_box(80.0);
-    let mut rows = rays(&mesh);
-    let mut solve = killed(&mesh, &rows, method, path);
-    while solve.advance(&mut rows, keep_going).unwrap().is_none() {
-        solve.save(path).unwrap();
-    }
-    std::fs::write(path.with_extension("done"), bits(&solve.into_solution().unwrap())).unwrap();
-}
-
-fn bits(s: &Solution) -> Vec<u8> {
-    let bits = |b: &Rgb| b.to_array().map(f64::to_le_bytes).concat();
-    s.radiosity.iter().flat_map(bits).collect()
-}
-
-#[test]
-fn killed_at_twenty_random_moments_a_solve_ends_with_the_same_bits() {
-    let mesh = cornell_box(80.0);
-    let mut random = 0x2545_f491_4f6c_dd1du64;
-    for (method, kills) in [("shooting", 10), ("gauss-seidel", 5), ("gmres", 5)] {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("light.state");
-        let mut rows = rays(&mesh);
-        let start = Instant::now();
-        let mut whole = killed(&mesh, &rows, method.parse().unwrap(), Path::new("none"));
-        whole.run(&mut rows, keep_going).unwrap();
-        // A fresh process needs a while before its first batch; then a part of the whole.
-        let most = start.elapsed().as_millis() as u64 / 2 + 200;
-        let mut resumed = 0;
-        for _ in 0..kills {
-            let mut child = process(method, &path);
-            random ^= random << 13;
-            random ^= random >> 7;
-            random ^= random << 17;
-            std::thread::sleep(Duration::from_millis(random % most));
-            child.kill().unwrap();
-            child.wait().unwrap();
-            resumed += u32::from(path.exists());
-        }
-        assert!(process(method, &path).wait().unwrap().success());
-        let end = std::fs::read(path.with_extension("done")).unwrap();
-        println!("{method}: killed {kills} times within {most} ms, {resumed} with a state");
-        assert!(resumed > 0 && end == bits(&whole.into_solution().unwrap()), "{method}");
-    }
-}
-
-fn process(method: &str, state: &Path) -> std::process::Child {
-    let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "the_process_that_is_killed"]);
-    command.env("RADIOSITY_KILLED", state).env("RADIOSITY_METHOD", method);
-    command.stdout(Stdio::null()).spawn().unwrap()
 }

@@ -1,14 +1,15 @@
 //! Changes of a scene that is solved: the answer of starting over, for less work. No GPU needed.
 
-use crate::common::quads;
-use crate::common::scenes::{block, walls};
-use crate::common::{cornell_box, keep_going};
+use std::ops::ControlFlow;
+
 use glam::{DAffine3, DVec3};
 use radiosity::{
     ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, Solution,
     SolveSession, Solver, StopReason,
 };
-use std::ops::ControlFlow;
+
+use crate::common::scenes::{block, walls};
+use crate::common::{cornell_box, keep_going, quads};
 
 /// Rays, as many for each row whatever light it carries: equal equations, however they are solved.
 fn rays(mesh: &Mesh) -> RayRows {
@@ -54,7 +55,7 @@ const SETTLED: f64 = 1e-11;
 const SAME: f64 = 1e-10;
 
 #[test]
-fn materials_change_and_all_methods_find_what_starting_over_finds() {
+fn changed_materials_match_new_solve() {
     let mesh = cornell_box(200.0);
     // Brighter, redder and greyer; a wall that was black takes on a colour; a second lamp.
     let black = painted(&mesh, |m| {
@@ -97,7 +98,7 @@ fn materials_change_and_all_methods_find_what_starting_over_finds() {
 }
 
 #[test]
-fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
+fn dimming_all_lamps_takes_no_work() {
     let mesh = cornell_box(200.0);
     for method in Method::ALL {
         let mut rows = rays(&mesh);
@@ -124,7 +125,7 @@ fn lamps_dimmed_alike_take_no_work_and_lamps_switched_off_leave_nothing() {
 }
 
 #[test]
-fn lights_solved_one_by_one_with_the_same_rows_add_up() {
+fn separate_lights_combine_linearly() {
     let mesh = cornell_box(200.0);
     let lit = |ceiling: [f64; 3], wall: [f64; 3]| {
         painted(&mesh, |m| match m.name.as_str() {
@@ -169,7 +170,7 @@ fn lights_solved_one_by_one_with_the_same_rows_add_up() {
 }
 
 #[test]
-fn an_object_moves_and_all_methods_find_what_starting_over_finds() {
+fn moved_object_matches_new_solve() {
     let mesh = cornell_box(150.0);
     let moved = shifted(&mesh, "short_block", [40.0, 0.0, -25.0]);
     for method in Method::ALL {
@@ -195,7 +196,7 @@ fn an_object_moves_and_all_methods_find_what_starting_over_finds() {
 
 /// Light that a method has in hand, in the middle of a sweep or a cycle, is not lost on a change.
 #[test]
-fn a_scene_changes_while_its_light_is_on_its_way() {
+fn change_in_mid_solve_loses_no_light() {
     let mesh = cornell_box(200.0);
     let changed = painted(&mesh, |m| match m.name.as_str() {
         "light" => m.exitance *= Rgb::new(0.5, 0.25, 3.0),
@@ -226,7 +227,7 @@ fn a_scene_changes_while_its_light_is_on_its_way() {
 /// Old rows make way for new ones where memory for rows is full, and rows that memory does not hold
 /// are made again.
 #[test]
-fn an_object_moves_while_memory_for_rows_is_full() {
+fn moved_object_with_full_row_memory() {
     let mesh = cornell_box(200.0);
     let moved = shifted(&mesh, "short_block", [40.0, 0.0, -25.0]);
     let solver = Solver { unshot: SETTLED, ..Solver::new(Method::GaussSeidel) };
@@ -246,7 +247,7 @@ fn an_object_moves_while_memory_for_rows_is_full() {
 
 /// Light that was left where it was when an object moved stays in doubt when it moves again.
 #[test]
-fn what_one_stopped_change_leaves_wrong_is_in_doubt_after_the_next() {
+fn stale_flux_survives_the_next_change() {
     let mesh = cornell_box(200.0);
     let once = shifted(&mesh, "tall_block", [0.0, 0.0, 30.0]);
     let twice = shifted(&once, "tall_block", [30.0, 0.0, 0.0]);
@@ -287,7 +288,7 @@ fn furnished() -> Scene {
 /// As a user changes things, at an everyday residual: within what both leave unshot, for a third of
 /// the rows.
 #[test]
-fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
+fn small_change_takes_a_third_of_the_rows() {
     let mesh = Mesh::new(furnished(), 0.06).unwrap();
     let changed = painted(&mesh, |m| m.exitance *= 0.5);
     let changed = shifted(&changed, "box", [0.05, 0.02, 0.0]);
@@ -323,7 +324,7 @@ fn a_dimmed_lamp_and_a_moved_box_take_a_third_of_the_rows() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_changes_nothing() {
+fn rejects_unfit_changes_and_keeps_state() {
     let mesh = cornell_box(200.0);
     let mut rows = rays(&mesh);
     let mut solve: SolveSession = Solver::new(Method::GaussSeidel).begin(&mesh).unwrap();
@@ -351,7 +352,7 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn a_change_that_is_stopped_tells_its_doubt_and_goes_on() {
+fn cancelled_change_reports_stale_flux_and_resumes() {
     let mesh = cornell_box(200.0);
     let moved = shifted(&mesh, "tall_block", [0.0, 0.0, 30.0]);
     let (mut before, mut after) = (rays(&mesh), rays(&moved));

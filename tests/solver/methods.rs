@@ -1,14 +1,16 @@
 //! All methods behind one interface: the same answers, ledgers, stop rules. No GPU needed.
 
-use crate::common::closed_forms::exact;
-use crate::common::fakes::{GivenRows, StoredRows};
-use crate::common::scenes::{self, walls};
-use crate::common::{cornell_box, cube, keep_going, quads};
+use std::ops::ControlFlow;
+
 use radiosity::{
     Entry, ErrorKind, FormFactors, Material, Mesh, Method, RayRows, Rgb, Row, Scene, Solution,
     Solver, StopReason,
 };
-use std::ops::ControlFlow;
+
+use crate::common::closed_forms::exact;
+use crate::common::fakes::{GivenRows, StoredRows};
+use crate::common::scenes::{self, walls};
+use crate::common::{cornell_box, cube, keep_going, quads};
 
 fn material(reflectance: [f64; 3], exitance: [f64; 3]) -> Material {
     let (reflectance, exitance) = (reflectance.into(), exitance.into());
@@ -78,7 +80,7 @@ fn off(s: &Solution, judge: &Solution) -> f64 {
 }
 
 #[test]
-fn all_methods_agree_with_a_direct_solve() {
+fn all_methods_match_direct_solve() {
     for (name, mesh) in scenes() {
         let mut maker = stored(&mesh);
         let judge = Solver::new(Method::Direct).solve(&mesh, &mut maker, keep_going).unwrap();
@@ -112,7 +114,7 @@ fn all_methods_agree_with_a_direct_solve() {
 }
 
 #[test]
-fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
+fn white_furnace_holds_up_to_reflectance_one() {
     let reflectances = [
         0.0,
         0.1,
@@ -165,7 +167,7 @@ fn white_furnaces_up_to_a_reflectance_of_one_minus_a_millionth() {
 }
 
 #[test]
-fn a_bright_room_is_solved_in_few_steps_whatever_lights_it() {
+fn gmres_needs_few_steps_in_bright_room() {
     // Rows by rays and one small lamp: no answer by heart, but in a closed room all that is emitted
     // is absorbed, and the direct solve is the judge.
     let rho = 1.0 - 1e-6;
@@ -189,7 +191,7 @@ fn a_bright_room_is_solved_in_few_steps_whatever_lights_it() {
 }
 
 #[test]
-fn jacobi_gives_the_light_of_so_many_bounces() {
+fn jacobi_steps_are_bounces() {
     let mesh = Mesh::new(colours(), 0.4).unwrap();
     let mut maker = stored(&mesh);
     let count = mesh.element_count();
@@ -220,7 +222,7 @@ fn jacobi_gives_the_light_of_so_many_bounces() {
 }
 
 #[test]
-fn gauss_seidel_takes_fewer_sweeps_than_jacobi() {
+fn gauss_seidel_needs_fewer_sweeps_than_jacobi() {
     let (_, mesh) = &scenes()[3];
     let mut maker = stored(mesh);
     let [jacobi, gauss_seidel] = [Method::Jacobi, Method::GaussSeidel].map(|method| {
@@ -234,7 +236,7 @@ fn gauss_seidel_takes_fewer_sweeps_than_jacobi() {
 }
 
 #[test]
-fn overshoot_saves_shots_where_light_goes_round_long() {
+fn overshoot_saves_shots_in_bright_room() {
     let scene = room([(); 6].map(|_| grey(0.9, 0.0)), grey(0.5, 8.0), grey(0.9, 0.0));
     let mesh = Mesh::new(scene, 0.2).unwrap();
     let mut maker = stored(&mesh);
@@ -254,7 +256,7 @@ fn overshoot_saves_shots_where_light_goes_round_long() {
 }
 
 #[test]
-fn large_patches_may_overshoot_too() {
+fn overshoot_works_with_large_patches() {
     let mesh = cornell_box(100.0);
     let [plain, ahead] = [Method::ALL[0], Method::ALL[1]].map(|method| {
         let solver = Solver { unshot: 1e-4, ..Solver::new(method) };
@@ -272,7 +274,7 @@ fn large_patches_may_overshoot_too() {
 }
 
 #[test]
-fn the_ledger_closes_wherever_a_solve_ends() {
+fn energy_balances_wherever_solve_ends() {
     let (_, mesh) = &scenes()[2];
     let mut maker = stored(mesh);
     for method in Method::ALL {
@@ -322,7 +324,7 @@ fn closes(s: &Solution, mesh: &Mesh) {
 }
 
 #[test]
-fn rows_that_are_not_kept_are_made_again_and_change_nothing() {
+fn dropped_rows_are_made_again_unchanged() {
     let (_, mesh) = &scenes()[4];
     let all: usize = stored(mesh).0.values().map(Row::bytes).sum();
     for method in Method::ALL {
@@ -374,7 +376,7 @@ fn channels_of_any_scale_are_solved_alike() {
 }
 
 #[test]
-fn a_dark_scene_is_solved_at_once_by_all() {
+fn dark_scene_is_solved_at_once_by_all() {
     let mesh = Mesh::new(cube(&grey(0.8, 0.0)), 0.36).unwrap();
     for method in Method::ALL {
         let s = by_elements(method).solve(&mesh, &mut exact(), keep_going).unwrap();
@@ -384,7 +386,7 @@ fn a_dark_scene_is_solved_at_once_by_all() {
 }
 
 #[test]
-fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
+fn rejects_bad_settings_rows_and_sizes() {
     let mesh = Mesh::new(cube(&grey(0.8, 1.0)), 2.0).unwrap();
     let refused = |solver: Solver, mesh: &Mesh, says: &str| {
         let e = solver.solve(mesh, &mut exact(), keep_going).unwrap_err();
@@ -426,7 +428,7 @@ fn bad_settings_rows_and_sizes_are_refused_with_a_reason() {
 }
 
 #[test]
-fn the_rule_picks_by_size_and_reflectance() {
+fn for_mesh_picks_by_size_and_reflectance() {
     let pick = |scene: Scene, size| {
         let mesh = Mesh::new(scene, size).unwrap();
         let solver = Solver::for_mesh(&mesh);

@@ -4,10 +4,11 @@
 //! All light then meets fronts, so the flux of all surfaces together is that emitted / (1 − ½), by
 //! energy alone, whatever the noise of the rays.
 
-use crate::common::scenes::{block, halves, paint};
-use crate::common::{cube, keep_going, quads};
 use glam::DVec3;
 use radiosity::*;
+
+use crate::common::scenes::{block, halves, paint};
+use crate::common::{cube, keep_going, quads};
 
 const UNSHOT: f64 = 1e-4;
 
@@ -198,7 +199,7 @@ fn one_triangle() {
 }
 
 #[test]
-fn a_light_flush_in_the_ceiling() {
+fn lamp_flush_in_the_ceiling() {
     let (low, high) = (0.375, 0.625);
     let room = || {
         let walls = open_cube(5);

@@ -2,13 +2,14 @@
 
 use std::collections::HashSet;
 
-use crate::common::scenes::lamp;
-use crate::common::{keep_going, quads};
 use glam::DVec3;
 use radiosity::{
     Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, RayRows, Rgb, Row, Scene,
     Solution, Solver, StopReason, Triangle,
 };
+
+use crate::common::scenes::lamp;
+use crate::common::{keep_going, quads};
 
 /// Exitance of all lamps, W/m².
 const LAMP: [f64; 3] = [9.0, 6.0, 3.0];
@@ -49,7 +50,7 @@ fn solve(mesh: &Mesh, settings: Solver) -> Solution {
 }
 
 #[test]
-fn many_small_triangles_need_no_more_rows_than_a_few_large_ones() {
+fn clusters_need_no_more_rows_than_quadtrees() {
     // Walls of 2 triangles of 256 elements, and of 512 triangles.
     let (plain, cut) = (room(1), room(16));
     let plain = Mesh::new(plain, 2.0 * 2f64.sqrt() / 16.0).unwrap();
@@ -94,7 +95,7 @@ impl FormFactors for Sent {
 }
 
 #[test]
-fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
+fn unevenly_lit_wall_shoots_in_parts() {
     let square = |z: f64| [[0., 0., z], [1., 0., z], [1., 1., z], [0., 1., z]];
     let mut down = square(4.0);
     down.reverse();
@@ -129,7 +130,7 @@ fn a_wall_that_is_lit_on_one_side_does_not_shoot_as_one() {
 
 /// A large patch is seen from one place. Where something stands on that place, another is taken.
 #[test]
-fn nobody_shoots_from_under_a_block() {
+fn viewpoint_under_a_block_is_avoided() {
     let mut walls: Vec<_> = (0..3)
         .flat_map(|k| {
             let axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -170,7 +171,7 @@ fn nobody_shoots_from_under_a_block() {
 }
 
 #[test]
-fn clusters_keep_the_energy_and_give_the_same_bits_every_time() {
+fn clusters_conserve_energy_and_bits() {
     let mesh = Mesh::new(room(8), f64::INFINITY).unwrap();
     let [one, two] = [0, 1].map(|_| solve(&mesh, Solver::default()));
     assert!(one.ledger.imbalance() <= 1e-9, "{}", one.ledger.imbalance());
@@ -185,7 +186,7 @@ fn clusters_keep_the_energy_and_give_the_same_bits_every_time() {
 }
 
 #[test]
-fn a_tolerance_of_zero_makes_every_element_shoot() {
+fn zero_tolerance_shoots_by_elements() {
     let mesh = Mesh::new(room(2), 0.8).unwrap();
     let all = solve(&mesh, Solver { patch_tolerance: 0.0, ..Default::default() });
     assert_eq!(all.rows_made as usize, mesh.element_count());

@@ -1,16 +1,18 @@
 //! Gathering at vertices: where it splits, what it finds, and that nothing comes apart. No GPU
 //! needed: irradiance is made up, has a closed form, or is found with rays.
 
-use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};
-use crate::common::surface::{assert_watertight, assert_whole};
-use crate::common::{cube, keep_going, quads};
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
     Error, ErrorKind, Gather, GatherPoint, GatherProgress, GatheredMesh, IrradianceSample,
     Material, Mesh, RadiosityField, RayGather, RefinementSettings, Rgb, StopReason, VertexMesh,
 };
-use std::ops::ControlFlow;
+
+use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};
+use crate::common::surface::{assert_watertight, assert_whole};
+use crate::common::{cube, keep_going, quads};
 
 /// Gathers what a function of the sources and the place says arrives, W/m².
 struct Known<F>(F);
@@ -52,7 +54,7 @@ fn sizes(mesh: &Mesh) -> (f64, f64) {
 }
 
 #[test]
-fn unequal_depths_everywhere_leave_no_cracks() {
+fn unequal_depths_leave_no_cracks() {
     let room = cube(&grey());
     let furnished: Vec<(Quad, Material)> = (0..6)
         .map(|k| [0, 1, 2, 3].map(|c| room.positions()[4 * k + c].to_array()))
@@ -88,7 +90,7 @@ fn unequal_depths_everywhere_leave_no_cracks() {
 }
 
 #[test]
-fn the_cornell_box_is_as_watertight_as_its_scene() {
+fn cornell_box_is_as_watertight_as_scene() {
     let mesh = crate::common::cornell_box(70.0).split_at_contacts(3);
     let dark = vec![Rgb::ZERO; mesh.element_count()];
     assert_watertight(&mesh, &VertexMesh::new(&mesh, &dark));
@@ -123,7 +125,7 @@ fn flux(s: &VertexMesh) -> f64 {
 }
 
 #[test]
-fn a_furnace_stays_as_it_is() {
+fn furnace_is_a_fixed_point() {
     for reflectance in [0.5, 0.8] {
         let glow = Material { exitance: Rgb::ONE, ..Material::grey("glow", reflectance) };
         let mesh = Mesh::new(cube(&glow), 0.8).unwrap();
@@ -192,7 +194,7 @@ fn at(surface: &VertexMesh, p: DVec3) -> (f64, usize) {
 }
 
 #[test]
-fn elements_are_split_at_the_shadow_and_nowhere_else() {
+fn splits_only_at_the_shadow() {
     let brightest = 0.5 * half_hidden(DVec3::new(0.2, 0.0, 0.0));
     let (base, _) = floor();
     let largest = sizes(&base).1;
@@ -239,7 +241,7 @@ fn elements_are_split_at_the_shadow_and_nowhere_else() {
 
 /// Where light is a parabola, a vertex that follows it without a look is as good as one that looks.
 #[test]
-fn vertices_between_those_that_gather_lie_on_the_parabola() {
+fn interpolated_vertices_lie_on_parabola() {
     let (mesh, radiosity) = floor();
     let light = shot(&mesh, &radiosity);
     let curved =
@@ -273,7 +275,7 @@ fn vertices_between_those_that_gather_lie_on_the_parabola() {
 }
 
 #[test]
-fn settings_bound_how_many_and_how_small() {
+fn settings_bound_count_and_size() {
     let (base, _) = floor();
     let fine = RefinementSettings {
         tolerance: 0.001,
@@ -323,7 +325,7 @@ fn places(found: &GatheredMesh) -> usize {
 const FOOT: [f64; 2] = [-0.33, 0.29];
 
 #[test]
-fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
+fn no_darkness_leaks_from_under_block() {
     let bottom = facing_down(FOOT, FOOT, 0.0);
     let lamp_at = facing_down([1.0, 1.6], [-0.3, 0.3], 3.0);
     // Lower than elements are long, and higher, so that its inside is roomy for most of them.
@@ -351,7 +353,7 @@ fn no_darkness_leaks_from_under_what_stands_on_a_floor() {
 }
 
 #[test]
-fn every_sweep_gathers_what_the_one_before_it_found() {
+fn sweeps_gather_from_previous_sweep() {
     // Light from nowhere is taken for half of what is known: reflectance ½, no emission, so that the
     // light of each sweep is half of the last one's.
     let mesh = Mesh::new(cube(&grey()), 0.8).unwrap();
@@ -401,7 +403,7 @@ fn two_runs_give_the_same_bits() {
 }
 
 #[test]
-fn progress_may_stop_it_and_keeps_what_was_reached() {
+fn cancelled_gather_keeps_what_was_reached() {
     let (mesh, light) = floor();
     for stop_at in [0, 1, 2] {
         let mut told: Vec<GatherProgress> = vec![];
@@ -424,7 +426,7 @@ fn progress_may_stop_it_and_keeps_what_was_reached() {
 }
 
 #[test]
-fn settings_out_of_range_are_refused() {
+fn rejects_settings_out_of_range() {
     let (mesh, values) = floor();
     let light = shot(&mesh, &values);
     let refused = |settings: RefinementSettings, light: &GatheredMesh| {

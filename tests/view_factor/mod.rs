@@ -1,1 +1,3 @@
+mod checks;
 mod exact;
+mod sampled;

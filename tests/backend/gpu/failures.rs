@@ -5,13 +5,14 @@ use std::cell::RefCell;
 use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 
-use crate::common::{cornell_box, cube, gpu, keep_going};
 use radiosity::{
     Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, Fallback, FormFactors,
-    Gather, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows, Material, Mesh, Method,
-    NodeId, RadiosityField, RayGather, RayRows, RefinementSettings, Rgb, Row, Solver, StopReason,
+    Gather, GatherPoint, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
+    IrradianceSample, Material, Mesh, Method, NodeId, RadiosityField, RayGather, RayRows,
+    RefinementSettings, Rgb, Row, Solver, StopReason,
 };
-use radiosity::{GatherPoint, IrradianceSample};
+
+use crate::common::{cornell_box, cube, gpu, keep_going};
 
 /// The device as if it had no more than `limits`.
 fn within(limits: GpuLimits) -> Gpu {
@@ -69,7 +70,7 @@ fn doomed(gpu: &Gpu, mesh: &Mesh, left: u32) -> Doomed<HemicubeRows> {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_lost_device_is_an_error_wherever_it_is_used() {
+fn lost_device_is_an_error_everywhere() {
     let gpu = gpu();
     let mesh = furnace();
     let mut rows = HemicubeRows::new(&gpu, &mesh, 64).unwrap();
@@ -100,7 +101,7 @@ fn a_lost_device_is_an_error_wherever_it_is_used() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_solve_outlives_its_device() {
+fn solve_falls_back_with_the_same_bits() {
     let mesh = furnace();
     for method in [Method::ALL[0], Method::ALL[2], Method::ALL[4]] {
         let solver = Solver::new(method);
@@ -128,7 +129,7 @@ fn a_solve_outlives_its_device() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_relay_may_give_up_and_minds_other_errors_not() {
+fn fallback_passes_on_errors_of_no_device() {
     let gpu = gpu();
     let mesh = furnace();
     let mut relay = Fallback::new(doomed(&gpu, &mesh, 0), Err::<RayRows, _>);
@@ -156,7 +157,7 @@ fn a_relay_may_give_up_and_minds_other_errors_not() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn gathering_outlives_its_device() {
+fn gathering_falls_back_to_rays() {
     let gpu = gpu();
     let mesh = furnace();
     let light =
@@ -184,7 +185,7 @@ fn gathering_outlives_its_device() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_bake_outlives_its_device() {
+fn bake_falls_back_and_reports_failure_once() {
     let scene = cornell_box(f64::INFINITY).scene().clone();
     // Closed while it shoots; the second is stopped when it hears of that.
     for stop in [false, true] {
@@ -227,7 +228,7 @@ fn a_bake_outlives_its_device() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn without_memory_batches_are_smaller_and_rows_the_same() {
+fn little_memory_draws_same_rows_in_smaller_batches() {
     let gpu = gpu();
     let mesh = cornell_box(100.0);
     let patches: Vec<NodeId> = (0..40).map(|e| mesh.element(7 * e)).collect();
@@ -262,7 +263,7 @@ fn without_memory_batches_are_smaller_and_rows_the_same() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn without_memory_places_gather_in_smaller_batches() {
+fn little_memory_gathers_the_same_in_smaller_batches() {
     let gpu = gpu();
     let mesh = cornell_box(100.0);
     let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
@@ -292,7 +293,7 @@ fn without_memory_places_gather_in_smaller_batches() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_a_lesser_device_cannot_do_is_told_with_what_it_can() {
+fn limits_of_small_device_are_reported() {
     let mesh = furnace();
     let small = within(GpuLimits { texture: 256, ..GpuLimits::MOST });
     // An item buffer is three times as high as wide: 3 · 84 = 252.

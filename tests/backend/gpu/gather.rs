@@ -2,15 +2,16 @@
 
 use std::f64::consts::PI;
 
-use crate::common::fakes::GivenRadiosity;
-use crate::common::scenes::{Quad, facing_down, grey, lamp};
-use crate::common::{cornell_box, cube, gpu, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
     ErrorKind, Gather, GatherPoint, Gpu, HemicubeGather, IrradianceSample, Material, Mesh,
     RadiosityField, RayGather, Rgb, Scene, Triangle,
 };
+
+use crate::common::fakes::GivenRadiosity;
+use crate::common::scenes::{Quad, facing_down, grey, lamp};
+use crate::common::{cornell_box, cube, gpu, quads};
 
 /// What `places` see of `light` in hemicubes of resolution `n`.
 fn gather_all(
@@ -20,6 +21,7 @@ fn gather_all(
     places: &[GatherPoint],
 ) -> Vec<IrradianceSample> {
     let mut gather = HemicubeGather::new(gpu, &light.mesh, n).unwrap();
+
     gather.gather(&light.sources(), places).unwrap()
 }
 
@@ -87,7 +89,7 @@ fn hemicubes_agree_with_rays() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_furnace_is_as_bright_as_its_walls() {
+fn furnace_irradiance_is_even() {
     let gpu = gpu();
     // One material and shared corners: the walls are one light, which surrounds every place.
     let cube = cube(&Material::grey("furnace", 0.5));
@@ -106,7 +108,7 @@ fn a_furnace_is_as_bright_as_its_walls() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_comes_straight_from_a_light_is_its_closed_form() {
+fn direct_light_is_the_closed_form() {
     let gpu = gpu();
     // A square overhead under a ceiling, one edge on the horizon's far side, one cut by it.
     let overhead = facing_down([-0.5, 0.5], [-0.5, 0.5], 2.0);
@@ -141,7 +143,7 @@ fn what_comes_straight_from_a_light_is_its_closed_form() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_half_hidden_light_gives_what_is_left() {
+fn half_hidden_light_matches_clipped_polygon() {
     let gpu = gpu();
     // Shadows with an edge parallel to the light's, and at angles to it; places at and off its axis.
     let square = facing_down([-0.5, 0.5], [-0.5, 0.5], 2.0);
@@ -185,7 +187,7 @@ fn a_half_hidden_light_gives_what_is_left() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn lights_of_many_triangles() {
+fn light_of_many_triangles_matches_closed_form() {
     let gpu = gpu();
     // A bulb: an octahedron cut into 512 triangles, on a sphere of radius 0.2.
     let mut bulb = vec![];
@@ -241,7 +243,7 @@ fn lights_of_many_triangles() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn more_lights_than_are_looked_at_apart() {
+fn lights_beyond_eight_are_left_to_pixels() {
     let gpu = gpu();
     let lamps: Vec<Quad> = (0..12)
         .map(|k| (f64::from(k % 4) - 1.6, f64::from(k / 4) - 1.2))
@@ -263,7 +265,7 @@ fn more_lights_than_are_looked_at_apart() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn close_to_a_large_light_its_pixels_count() {
+fn large_light_nearby_is_left_to_pixels() {
     let gpu = gpu();
     let sheet = facing_down([-1.0, 1.0], [-1.0, 1.0], 1.0);
     let light = dark(&[(sheet, lamp(LAMP))]);
@@ -280,7 +282,7 @@ fn close_to_a_large_light_its_pixels_count() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn linear_light_is_reproduced_between_corners() {
+fn linear_radiosity_is_interpolated() {
     let gpu = gpu();
     // A floor of sides 4 under a place at height 1, cut unevenly.
     let floor = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
@@ -310,7 +312,7 @@ fn linear_light_is_reproduced_between_corners() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn the_same_bits_however_they_are_batched() {
+fn gather_is_independent_of_batching() {
     let gpu = gpu();
     let light = GivenRadiosity::new(cornell_box(100.0), |t, p| p / 600.0 + 0.1 * (t % 3) as f64);
     let places = light.places(70, 0.01);
@@ -326,7 +328,7 @@ fn the_same_bits_however_they_are_batched() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_is_open_what_shows_its_back_and_how_near_it_is() {
+fn sky_backs_and_distance_match_closed_forms() {
     let gpu = gpu();
     let place = place([0.0; 3], [0.0, 0.0, 1.0]);
     let wide = |z: f64| facing_down([-1e3 * z, 1e3 * z], [-1e3 * z, 1e3 * z], z);
@@ -354,7 +356,7 @@ fn what_is_open_what_shows_its_back_and_how_near_it_is() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_does_not_fit_is_said() {
+fn rejects_bad_resolutions_and_fields() {
     let gpu = gpu();
     let light = GivenRadiosity::new(cornell_box(200.0), |_, _| Rgb::ONE);
     for n in [0, 7, 100_000] {

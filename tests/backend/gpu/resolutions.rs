@@ -1,12 +1,13 @@
 //! Rows for little light are drawn at a lower resolution.
 
+use radiosity::{FormFactors, HemicubeRows};
+
 use crate::common::{cornell_box, gpu};
 use crate::form_factor::resolution_policy::{FULL, SHARES, solve, some_elements};
-use radiosity::{FormFactors, HemicubeRows};
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn rows_for_little_light_are_those_of_smaller_hemicubes() {
+fn dim_patches_get_smaller_hemicubes() {
     let gpu = gpu();
     let mesh = cornell_box(100.0);
     let patches = some_elements(&mesh);
@@ -34,7 +35,7 @@ fn rows_for_little_light_are_those_of_smaller_hemicubes() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn rows_of_several_resolutions_keep_the_energy_and_the_bits() {
+fn mixed_resolutions_conserve_energy_and_bits() {
     let gpu = gpu();
     let mesh = cornell_box(60.0);
     let (solution, rows) = solve(&mesh, || HemicubeRows::new(&gpu, &mesh, 64).unwrap());

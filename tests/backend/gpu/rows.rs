@@ -3,11 +3,12 @@
 use std::f64::consts::PI;
 use std::num::NonZeroU32;
 
-use crate::common::scenes::grey;
-use crate::common::{cornell_box, cube, gpu, quads};
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, RayRows, Row};
+
+use crate::common::scenes::grey;
+use crate::common::{cornell_box, cube, gpu, quads};
 
 /// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
 fn largest_pixel(n: u32) -> f64 {
@@ -40,7 +41,7 @@ fn to_group(mesh: &Mesh, row: &Row, group: u32) -> f64 {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_square_seen_from_a_point_on_its_axis() {
+fn square_on_axis_matches_closed_form() {
     let gpu = gpu();
     // A speck at the origin looks at a square of side 0.5 at distance 1 (Howell, B-3, four times).
     let speck = [[-1e-3, -1e-3, 0.], [1e-3, -1e-3, 0.], [0., 2e-3, 0.], [-1e-3, 0., 0.]];
@@ -96,7 +97,7 @@ fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, peri
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn parallel_unit_squares() {
+fn parallel_unit_squares_match_closed_form() {
     // Centroid rule: for a triangle of longest edge h, |error| ≤ h²/24·max|∇²F| or less; ∇²F of
     // the point factor is below 4 here, h = 0.0884: 1.3e-3. The outline on the hemicube is at most
     // the square's, 4 sides of 1 at distance 1, in units of half a face: 4 times 1, wherever the
@@ -107,7 +108,7 @@ fn parallel_unit_squares() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn perpendicular_unit_squares_that_share_an_edge() {
+fn perpendicular_unit_squares_match_closed_form() {
     // Near the shared edge the point factor runs up to 1/2 like a function of (distance to edge)/
     // (length), so the centroid rule misses up to a share of the edge row's own area times its
     // factor's variation: 0.0625 · 1/2 · 1/4. The outline spans at most two faces: 8 half-faces.
@@ -117,7 +118,7 @@ fn perpendicular_unit_squares_that_share_an_edge() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
+fn closed_cube_has_no_gaps() {
     let gpu = gpu();
     let mesh = Mesh::new(cube(&grey()), 0.3).unwrap();
     let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
@@ -132,7 +133,7 @@ fn every_wall_of_a_closed_cube_is_seen_and_nothing_else() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_is_out_of_view_is_all_that_is_left_out() {
+fn culling_leaves_no_holes() {
     let gpu = gpu();
     // A closed cube of 1 536 triangles, of which each face of a hemicube draws only a part: one
     // triangle left out in error would be a hole.
@@ -156,7 +157,7 @@ fn what_is_out_of_view_is_all_that_is_left_out() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn backs_are_told_from_fronts_and_block() {
+fn back_faces_block_and_are_counted() {
     let gpu = gpu();
     let floor = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     // A screen that shows its back to the floor, close over it, and hides the lid.
@@ -219,7 +220,7 @@ fn hemicubes_agree_with_rays_triangle_by_triangle() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn rows_are_the_same_bits_however_they_are_batched() {
+fn rows_are_independent_of_batching() {
     let gpu = gpu();
     let mesh = cornell_box(100.0);
     let patches: Vec<NodeId> =
@@ -238,7 +239,7 @@ fn rows_are_the_same_bits_however_they_are_batched() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn a_far_scene_gives_the_same_rows() {
+fn far_scene_has_the_same_rows() {
     let gpu = gpu();
     // Moved by a thousand of its sizes, in steps that 64-bit coordinates hold exactly: the device
     // works about a local origin and sees the very same numbers.
@@ -262,7 +263,7 @@ fn a_far_scene_gives_the_same_rows() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn what_a_device_cannot_do_is_said() {
+fn rejects_bad_resolutions_and_adapters() {
     let gpu = gpu();
     let mesh = cornell_box(200.0);
     for n in [0, 7, 100_000] {
@@ -277,7 +278,7 @@ fn what_a_device_cannot_do_is_said() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn turned_hemicubes_average_pixel_errors_away() {
+fn rotations_average_pixel_errors() {
     let gpu = gpu();
     let mesh = Mesh::new(cube(&grey()), 0.1).unwrap();
     // Elements of the walls, some 20 pixels each.

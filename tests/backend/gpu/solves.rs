@@ -10,7 +10,7 @@ use crate::solver::shooting::{mean_and_worst, unequal_areas};
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn white_furnace_with_hemicubes_keeps_the_energy() {
+fn white_furnace_conserves_energy() {
     let gpu = gpu();
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {
         let mesh = Mesh::new(cube(&paint(rho, 1.0)), 0.2).unwrap();
@@ -36,7 +36,7 @@ fn white_furnace_with_hemicubes_keeps_the_energy() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn the_white_furnace_is_even() {
+fn proximity_correction_evens_white_furnace() {
     let gpu = gpu();
     // What a whole solve gains: elements of a white furnace at ρ = 0.5 should all have B = 2.
     let glow = Material { exitance: Rgb::ONE, ..Material::grey("g", 0.5) };
@@ -57,7 +57,7 @@ fn the_white_furnace_is_even() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn thirty_millimetre_elements_err_by_five_per_cent_at_most() {
+fn cornell_box_matches_path_tracer() {
     let gpu = gpu();
     // The bounds are the project's own goal for uniform elements: what is left is elements that
     // straddle a shadow or a block's foot.

@@ -55,10 +55,15 @@ pub const ALL: [fn(&Ask) -> Swept; 23] = [
 const PIXELS: u32 = 64;
 
 const SCALES: &str = "1e-9 to 1e9";
+
 const SHIFTS: &str = "1e-6 to 1e6 sizes";
+
 const EXITANCES: &str = "1e-30 to 1e30 W/m²";
+
 const REFLECTANCES: &str = "0 to 1 − 1e-6";
+
 const RATIOS: &str = "1 to 1e12";
+
 const FURNACE: &str = "furnace, E/(1−ρ)";
 
 /// Rounding alone, of some million sums, and some of them of what nearly cancels.

@@ -1,0 +1,44 @@
+//! The camera image of a surface.
+
+use glam::DVec3;
+use radiosity::{Camera, ErrorKind, Material, Mesh, RayRows, Rgb, Solver, VertexMesh};
+
+use crate::common::{keep_going, quads};
+
+#[test]
+fn image_shows_fronts_and_black_backs() {
+    // A glowing square left of a dark one, seen from its front; nothing around.
+    let glow = Material { exitance: Rgb::splat(std::f64::consts::PI), ..Material::grey("g", 0.0) };
+    let left = [[-1., -1., 0.], [0., -1., 0.], [0., 1., 0.], [-1., 1., 0.]];
+    let right = [[0., -1., 0.], [1., -1., 0.], [1., 1., 0.], [0., 1., 0.]];
+    let mesh = Mesh::new(quads(&[(left, glow), (right, Material::grey("d", 0.0))]), 9.0).unwrap();
+    let solution =
+        Solver::default().solve(&mesh, &mut RayRows::new(&mesh, 16).unwrap(), keep_going).unwrap();
+    let surface = VertexMesh::new(&mesh, &solution.radiosity);
+    let camera = Camera { eye: DVec3::new(0., 0., 2.), target: DVec3::ZERO, vertical_fov: 90.0 };
+    // 8 pixels span 4 at distance 2: half a unit each. Radiance of the glow is 1.
+    let image = camera.image(&surface, 8, 8, 2).unwrap();
+    let row = |y: usize| image.pixels[8 * y..8 * y + 8].iter().map(|c| c.x).collect::<Vec<_>>();
+    assert_eq!(row(0), [0.0; 8]);
+    for (x, radiance) in row(3).into_iter().enumerate() {
+        let want = if (2..4).contains(&x) { 1.0 } else { 0.0 };
+        assert!((radiance - want).abs() < 1e-12, "{x}: {radiance}");
+    }
+    // From behind, backs are black.
+    let behind = Camera { eye: DVec3::new(0., 0., -2.), ..camera };
+    assert!(behind.image(&surface, 8, 8, 1).unwrap().pixels.iter().all(|&c| c == Rgb::ZERO));
+    // Straight up, and bad settings.
+    let up = Camera { eye: DVec3::ZERO, target: DVec3::Y, vertical_fov: 40.0 };
+    assert!(up.image(&surface, 2, 2, 1).is_ok());
+    for bad in [
+        Camera { vertical_fov: 0.0, ..camera },
+        Camera { vertical_fov: 180.0, ..camera },
+        Camera { target: camera.eye, ..camera },
+        Camera { eye: DVec3::NAN, ..camera },
+    ] {
+        assert_eq!(bad.image(&surface, 8, 8, 1).unwrap_err().kind(), ErrorKind::Setting);
+    }
+    for (width, height, samples) in [(0, 8, 1), (8, 0, 1), (1 << 20, 8, 1), (8, 8, 0)] {
+        assert!(camera.image(&surface, width, height, samples).is_err());
+    }
+}
