@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
-use radiosity::{Backend, BakeTarget, Material, Rgb, Scene, Triangle, load_obj};
+use radiosity::{AdapterInfo, Backend, BakeTarget, Material, Rgb, Scene, Triangle, load_obj};
 
 /// A box of walls: seen from inside, or from outside. `material` says what each of the six is of.
 fn block(
@@ -70,7 +70,7 @@ fn clutter() -> Scene {
 fn dial(c: &mut Criterion) {
     let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     let device = Backend::gpu(None).expect("a graphics adapter");
-    let [name, kind, driver] = device.adapter();
+    let AdapterInfo { name, kind, driver } = device.adapter();
     eprintln!("adapter: {name} ({kind}), {driver}");
     let mut group = c.benchmark_group("dial");
     for (name, scene) in [

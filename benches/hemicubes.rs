@@ -8,7 +8,7 @@
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, StageSeconds, load_obj};
+use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, Timings, load_obj};
 
 fn stages(c: &mut Criterion) {
     let gpu = Gpu::new(None).expect("a graphics adapter");
@@ -33,11 +33,11 @@ fn measure(c: &mut Criterion, gpu: &Gpu, mesh: &Mesh, resolution: u32) {
         let patches: Vec<NodeId> =
             (next..next + batch).map(|k| mesh.element(k * 7919 % mesh.element_count())).collect();
         next += batch;
-        let (before, start) = (hemicubes.seconds(), Instant::now());
+        let (before, start) = (hemicubes.timings(), Instant::now());
         hemicubes.rows(mesh, &patches, 1.0).expect("rows");
-        (start.elapsed(), before, hemicubes.seconds())
+        (start.elapsed(), before, hemicubes.timings())
     };
-    type Part = fn(&StageSeconds) -> f64;
+    type Part = fn(&Timings) -> f64;
     let parts: [(&str, Option<Part>); 4] = [
         ("all", None),
         ("draw", Some(|s| s.draw)),

@@ -138,6 +138,6 @@ fn radiance(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 // Whether the light that a tile looks for is seen: red where all is drawn, alpha where the light
 // is drawn alone. Each is masked out where the other is drawn.
 @fragment
-fn sought(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+fn light_visibility(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     return vec4f(select(0.0, in.sought, front));
 }

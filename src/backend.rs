@@ -1,27 +1,42 @@
-//! Who sees: hemicubes on a graphics device, or rays on the CPU.
+//! The two backends: hemicubes on a graphics device, or rays on the CPU.
+//!
+//! ```text
+//!                 FormFactors (rows)        Gather (light at points)
+//! Backend::Gpu    gpu::HemicubeRows         gpu::HemicubeGather
+//! Backend::Cpu    cpu::RayRows              cpu::RayGather
+//! ```
+//!
+//! Both columns hold to one contract each ([`crate::FormFactors`], [`crate::Gather`]), so that a
+//! solver does not know which backend it uses, and [`Fallback`] can go from one to the other in the
+//! middle of a solve. Without the feature `gpu` only the CPU is there.
 
-pub(crate) mod cpu;
-pub(crate) mod fallback;
-pub(crate) mod gpu;
+mod adapter;
+pub mod cpu;
+mod fallback;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+mod rows;
 
 use std::num::NonZeroU32;
-use std::time::Instant;
 
-use crate::backend::cpu::gather::RayGather;
-use crate::backend::cpu::rows::RayRows;
-use crate::backend::gpu::{Gpu, HemicubeGather, HemicubeRows, StageSeconds};
+pub use adapter::{AdapterInfo, AdapterKind};
+pub use fallback::Fallback;
+pub use rows::BackendRows;
+
 use crate::error::Error;
-use crate::form_factor::{FormFactors, Row};
 use crate::gather::Gather;
-use crate::mesh::{Mesh, NodeId};
-use crate::progress::Timings;
+use crate::mesh::Mesh;
+use cpu::{RayGather, RayRows};
+#[cfg(feature = "gpu")]
+use gpu::{Gpu, HemicubeGather, HemicubeRows};
 
 /// What makes rows and gathers light.
 #[derive(Clone, Debug)]
 pub enum Backend {
-    /// HemicubeRows on a graphics device.
+    /// Hemicubes on a graphics device.
+    #[cfg(feature = "gpu")]
     Gpu(Gpu),
-    /// RayScene on the CPU, as many a row as the hemicube's top face would have pixels.
+    /// Rays on the CPU, as many a row as the hemicube's top face would have pixels.
     Cpu,
 }
 
@@ -30,60 +45,68 @@ impl Backend {
     ///
     /// # Errors
     /// Those of [`Gpu::new`].
+    #[cfg(feature = "gpu")]
     pub fn gpu(name: Option<&str>) -> Result<Backend, Error> {
         Ok(Backend::Gpu(Gpu::new(name)?))
     }
 
-    /// Name, type and driver.
-    pub fn adapter(&self) -> [String; 3] {
+    /// The adapter that this backend runs on.
+    pub fn adapter(&self) -> AdapterInfo {
         match self {
-            Backend::Gpu(gpu) => {
-                let adapter = gpu.adapter().clone();
-                [adapter.name, adapter.kind, adapter.driver]
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(gpu) => gpu.adapter().clone(),
+            Backend::Cpu => {
+                AdapterInfo { name: "rays".into(), kind: AdapterKind::Cpu, driver: "none".into() }
             }
-            Backend::Cpu => ["rays".into(), "CPU".into(), "none".into()],
         }
     }
 
-    /// Whoever makes rows over `mesh`, each from `rotations` hemicubes of `resolution`.
+    /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
+    /// the top face, or from `rotations`·`resolution`² rays.
     ///
     /// # Errors
-    /// Those of [`HemicubeRows::new`] and [`RayRows::new`].
+    /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new) and [`RayRows::new`].
     pub fn rows(
         &self,
         mesh: &Mesh,
         resolution: u32,
         rotations: NonZeroU32,
     ) -> Result<BackendRows, Error> {
-        let rows = match self {
+        match self {
+            #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) => {
-                let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?.with_rotations(rotations);
-                Rows::Gpu(Box::new(hemicubes))
+                let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?;
+                Ok(hemicubes.with_rotations(rotations).into())
             }
             Backend::Cpu => {
                 crate::hemicube::check_resolution(resolution)?;
                 let rays = (resolution * resolution).saturating_mul(rotations.get());
-                Rows::Cpu(RayRows::new(mesh, rays)?)
+                Ok(RayRows::new(mesh, rays)?.into())
             }
-        };
-        Ok(BackendRows { rows, seconds: 0.0 })
+        }
     }
 
+    /// Whether light is gathered with hemicubes: on graphics hardware. A software device draws them
+    /// more slowly than rays are cast.
     pub(crate) fn gathers_by_hemicubes(&self) -> bool {
-        matches!(self, Backend::Gpu(gpu) if gpu.adapter().kind != "CPU")
+        match self {
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(gpu) => gpu.adapter().kind != AdapterKind::Cpu,
+            Backend::Cpu => false,
+        }
     }
 
-    /// Whoever gathers over the scene of `mesh` with about `rays` looks a place: hemicubes on the
-    /// device, or rays where that is the CPU, which takes less time there than drawing.
+    /// A gatherer over the scene of `mesh` with about `rays` samples a point: hemicubes on graphics
+    /// hardware, rays on the CPU otherwise.
     ///
     /// # Errors
-    /// Those of [`HemicubeGather::new`] and [`RayGather::new`].
+    /// Those of [`HemicubeGather::new`](crate::HemicubeGather::new) and [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
     }
 
-    /// The same, with more rays where they disagree: see [`RayGather::with_noise`]. HemicubeRows are what
-    /// they are.
+    /// As [`Backend::gather`], with more rays where they disagree: see [`RayGather::with_noise`].
+    /// Hemicubes are as they are.
     pub(crate) fn gather_evenly(
         &self,
         mesh: &Mesh,
@@ -91,92 +114,14 @@ impl Backend {
         noise: f64,
         dim: f64,
     ) -> Result<Box<dyn Gather>, Error> {
-        Ok(match self {
+        match self {
+            #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_by_hemicubes() => {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
-                Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?)
+                Ok(Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?))
             }
-            _ => Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim)),
-        })
-    }
-}
-
-/// Makes the rows of a [`Backend`], and counts the time.
-#[derive(Debug)]
-pub struct BackendRows {
-    rows: Rows,
-    seconds: f64,
-}
-
-#[derive(Debug)]
-enum Rows {
-    Gpu(Box<HemicubeRows>),
-    Cpu(RayRows),
-}
-
-impl BackendRows {
-    /// Full resolution, or all rays, for patches that shoot at least this share of the light; 0 for all.
-    pub fn with_full_share(self, full_share: f64) -> BackendRows {
-        let rows = match self.rows {
-            Rows::Gpu(hemicubes) => Rows::Gpu(Box::new(hemicubes.with_full_share(full_share))),
-            Rows::Cpu(rays) => Rows::Cpu(rays.with_full_share(full_share)),
-        };
-        BackendRows { rows, ..self }
-    }
-
-    /// HemicubeRows drawn at each resolution; none where there are rays.
-    pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
-        match &self.rows {
-            Rows::Gpu(hemicubes) => hemicubes.drawn_by_resolution(),
-            Rows::Cpu(_) => vec![],
-        }
-    }
-
-    /// Seconds of drawing, reducing and reading back; rays are all drawing.
-    pub fn timings(&self) -> Timings {
-        match &self.rows {
-            Rows::Gpu(hemicubes) => {
-                let StageSeconds { draw, reduce, readback } = hemicubes.seconds();
-                Timings { draw, reduce, readback, ..Timings::default() }
-            }
-            Rows::Cpu(_) => Timings { draw: self.seconds, ..Timings::default() },
-        }
-    }
-
-    /// Seconds spent on rows, all in all.
-    pub fn seconds(&self) -> f64 {
-        self.seconds
-    }
-}
-
-impl FormFactors for BackendRows {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        unshot_share: f64,
-    ) -> Result<Vec<Row>, Error> {
-        let start = Instant::now();
-        let rows = match &mut self.rows {
-            Rows::Gpu(hemicubes) => hemicubes.rows(mesh, patches, unshot_share),
-            Rows::Cpu(rays) => rays.rows(mesh, patches, unshot_share),
-        };
-        self.seconds += start.elapsed().as_secs_f64();
-        rows
-    }
-
-    fn preferred_batch_len(&self) -> usize {
-        match &self.rows {
-            Rows::Gpu(hemicubes) => hemicubes.preferred_batch_len(),
-            Rows::Cpu(rays) => rays.preferred_batch_len(),
-        }
-    }
-
-    fn fingerprint(&self) -> String {
-        match &self.rows {
-            Rows::Gpu(hemicubes) => hemicubes.fingerprint(),
-            Rows::Cpu(rays) => rays.fingerprint(),
+            _ => Ok(Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim))),
         }
     }
 }

@@ -54,6 +54,9 @@
 //! Specular or glossy reflection, transparency, textures, participating media, polarisation, time.
 //! Light leaves and arrives diffusely, and an emitter is a surface.
 
+// Hemicube geometry and some queries of meshes are used by the GPU passes only.
+#![cfg_attr(not(feature = "gpu"), allow(dead_code))]
+
 pub mod backend;
 pub mod bake;
 pub mod camera;
@@ -73,9 +76,9 @@ pub mod view_factor;
 mod visibility;
 
 pub use backend::cpu::{RayGather, RayRows};
-pub use backend::fallback::Fallback;
-pub use backend::gpu::{AdapterInfo, Gpu, GpuLimits, HemicubeGather, HemicubeRows, StageSeconds};
-pub use backend::{Backend, BackendRows};
+#[cfg(feature = "gpu")]
+pub use backend::gpu::{Gpu, GpuLimits, HemicubeGather, HemicubeRows};
+pub use backend::{AdapterInfo, AdapterKind, Backend, BackendRows, Fallback};
 pub use bake::{
     BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate, GatherSettings,
     SolveSettings,

@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::{Backend, Mesh, Scene, load_obj};
+use radiosity::{AdapterInfo, Backend, Mesh, Scene, load_obj};
 
 /// The Cornell box that ships with the crate; its unit is the millimetre.
 pub fn cornell_box() -> Scene {
@@ -20,7 +20,7 @@ pub fn cornell_mesh(size: f64) -> Mesh {
 /// The graphics adapter, whose name is printed: no number means anything without it.
 pub fn gpu() -> Backend {
     let backend = Backend::gpu(None).expect("a graphics adapter");
-    let [name, kind, driver] = backend.adapter();
+    let AdapterInfo { name, kind, driver } = backend.adapter();
     eprintln!("adapter: {name} ({kind}), {driver}");
     backend
 }

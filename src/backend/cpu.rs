@@ -1,7 +1,7 @@
-//! Rows and gathers by rays on the CPU.
+//! Rays on the CPU: rows of form factors, and light gathered at points.
 
-pub(crate) mod gather;
-pub(crate) mod rows;
+mod gather;
+mod rows;
 
 pub use gather::RayGather;
 pub use rows::RayRows;

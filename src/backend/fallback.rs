@@ -1,4 +1,12 @@
-//! One device until it fails, then another: what was solved by then stays.
+//! One maker of rows or gatherer until its device fails, then another.
+//!
+//! ```text
+//! ask ─► first ─ ok, or an error that is no device's ─► answer
+//!          │
+//!          └ device error e ─► next(e) ─► second, which answers this and all later questions
+//! ```
+//!
+//! Rows and light that the first has made stay in use: what was solved until the failure is kept.
 
 use std::fmt;
 
@@ -7,31 +15,34 @@ use crate::form_factor::{FormFactors, Row};
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::{Mesh, NodeId};
 
-/// Who makes rows, or gathers, until its device fails, and who goes on from there.
+/// A first maker of rows, or gatherer, and a second one that replaces it when its device fails.
 ///
-/// A solver that asks a relay for rows never learns that the first device was lost: what was spread
-/// stays spread, and the second makes the rows that are still wanted.
+/// A solver that uses it as its [`FormFactors`] does not notice the change: flux already distributed
+/// stays distributed, and the second makes the rows that are still wanted.
 pub struct Fallback<'a, A, B = A> {
     first: A,
     second: Option<B>,
-    next: Next<'a, B>,
+    make_second: MakeSecond<'a, B>,
 }
 
-type Next<'a, B> = Box<dyn FnMut(Error) -> Result<B, Error> + 'a>;
+type MakeSecond<'a, B> = Box<dyn FnMut(Error) -> Result<B, Error> + 'a>;
 
 impl<'a, A, B> Fallback<'a, A, B> {
-    /// `first` until it fails with an error that [is of its device](Error::is_of_device); then whom
-    /// `next` gives, which is told of the error and may return one instead.
-    pub fn new(first: A, next: impl FnMut(Error) -> Result<B, Error> + 'a) -> Fallback<'a, A, B> {
-        Fallback { first, second: None, next: Box::new(next) }
+    /// `first` until it fails with an error that [is of its device](Error::is_device_error); then
+    /// what `make_second` returns, which gets that error and may return an error instead.
+    pub fn new(
+        first: A,
+        make_second: impl FnMut(Error) -> Result<B, Error> + 'a,
+    ) -> Fallback<'a, A, B> {
+        Fallback { first, second: None, make_second: Box::new(make_second) }
     }
 
-    /// Who began.
+    /// The maker that began.
     pub fn first(&self) -> &A {
         &self.first
     }
 
-    /// Who goes on, once the first has failed.
+    /// The maker that goes on, once the first has failed.
     pub fn second(&self) -> Option<&B> {
         self.second.as_ref()
     }
@@ -43,7 +54,7 @@ impl<'a, A, B> Fallback<'a, A, B> {
     ) -> Result<T, Error> {
         if self.second.is_none() {
             match first(&mut self.first) {
-                Err(e) if e.is_device_error() => self.second = Some((self.next)(e)?),
+                Err(e) if e.is_device_error() => self.second = Some((self.make_second)(e)?),
                 done => return done,
             }
         }
@@ -65,13 +76,17 @@ impl<A: FormFactors, B: FormFactors> FormFactors for Fallback<'_, A, B> {
     }
 
     fn preferred_batch_len(&self) -> usize {
-        self.second
-            .as_ref()
-            .map_or(self.first.preferred_batch_len(), |second| second.preferred_batch_len())
+        match &self.second {
+            Some(second) => second.preferred_batch_len(),
+            None => self.first.preferred_batch_len(),
+        }
     }
 
     fn fingerprint(&self) -> String {
-        self.second.as_ref().map_or_else(|| self.first.fingerprint(), |second| second.fingerprint())
+        match &self.second {
+            Some(second) => second.fingerprint(),
+            None => self.first.fingerprint(),
+        }
     }
 }
 
@@ -87,7 +102,7 @@ impl<A: Gather, B: Gather> Gather for Fallback<'_, A, B> {
 
 impl<A: fmt::Debug, B: fmt::Debug> fmt::Debug for Fallback<'_, A, B> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut relay = f.debug_struct("Relay");
-        relay.field("first", &self.first).field("second", &self.second).finish_non_exhaustive()
+        let mut fields = f.debug_struct("Fallback");
+        fields.field("first", &self.first).field("second", &self.second).finish_non_exhaustive()
     }
 }

@@ -1,8 +1,10 @@
 //! The one room that knows wgpu: device, item buffer, reduction; hemicubes come out as
 //! rows, or as the light that they gather.
 
+mod adapters;
 mod device;
 mod draw_list;
+mod error;
 mod gather;
 mod hemisphere_sum;
 mod item_buffer;
@@ -10,6 +12,7 @@ mod item_table;
 mod layout;
 mod limits;
 mod memory;
+mod pipeline;
 mod radiance;
 mod readback;
 mod reduce;
@@ -19,8 +22,8 @@ mod rows;
 mod sources;
 mod split_float;
 
-pub use device::{AdapterInfo, Gpu};
+pub use crate::backend::AdapterInfo;
+pub use device::Gpu;
 pub use gather::HemicubeGather;
 pub use limits::GpuLimits;
-pub use readback::StageSeconds;
 pub use rows::HemicubeRows;

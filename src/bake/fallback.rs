@@ -5,8 +5,7 @@
 
 use std::cell::{Cell, OnceCell};
 
-use crate::backend::fallback::Fallback;
-use crate::backend::{Backend, BackendRows};
+use crate::backend::{Backend, BackendRows, Fallback};
 use crate::bake::settings::SolveSettings;
 use crate::error::{Error, ErrorKind};
 use crate::gather::Gather;

@@ -296,7 +296,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::backend::cpu::rows::RayRows;
+    use crate::backend::cpu::RayRows;
     use crate::solver::patch_cut::ShootingPatch;
 
     fn shooters(saved: &mut Saved) -> &mut Vec<ShootingPatch> {

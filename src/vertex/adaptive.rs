@@ -345,7 +345,7 @@ impl<'a> AdaptiveGather<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::cpu::gather::RayGather;
+    use crate::backend::cpu::RayGather;
 
     #[test]
     fn what_changed_is_all_there_is_to_gather() {

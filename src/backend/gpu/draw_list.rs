@@ -1,5 +1,11 @@
 //! Triangles in chunks that lie close together, so that a face of a hemicube draws only those that
 //! can be in its view.
+//!
+//! ```text
+//! drawing order   t7 t2 t9 t4 | t1 t0 t5 t8 | t3 t6 …      median splits of the longest extent
+//! chunks          [ box 0    ] [ box 1    ] [ box 2 …      at most MAX_TRIANGLES_PER_CHUNK each
+//! in view         [ run 0                 ]                boxes behind no plane of the view
+//! ```
 
 use std::ops::Range;
 
@@ -10,25 +16,26 @@ use crate::hemicube::Face;
 use crate::scene::Scene;
 
 /// Triangles in a chunk at most: below this, testing a box costs more than drawing what is in it.
-const CHUNK: usize = 16;
+/// Chosen by hand; no measurement kept.
+const MAX_TRIANGLES_PER_CHUNK: usize = 16;
 
-/// Triangles in a run after which another begins: software devices handle a draw with anything to
-/// clip in time that grows with its square.
-const RUN: usize = 128;
+/// Triangles in a run from which on another begins: software devices handle a draw with anything to
+/// clip in time that grows with its square. Chosen by hand; no measurement kept.
+const MAX_TRIANGLES_PER_DRAW: usize = 128;
 
 /// An order of drawing, and the box around each run of it.
 #[derive(Debug)]
 pub struct DrawList {
-    /// Triangle at each place of the drawing order.
+    /// Triangle at each position of the drawing order.
     pub order: Vec<u32>,
-    /// GatherPoint of each triangle in the drawing order.
-    pub places: Vec<u32>,
+    /// Position of each triangle in the drawing order.
+    pub position_of: Vec<u32>,
     chunks: Vec<Chunk>,
 }
 
 #[derive(Debug)]
 struct Chunk {
-    places: Range<u32>,
+    positions: Range<u32>,
     centre: DVec3,
     half: DVec3,
 }
@@ -43,35 +50,39 @@ impl DrawList {
         halve(&mut order, 0, &middles, &mut runs);
         // The device rounds to 32 bits: boxes grow by a few steps of its coordinates.
         let margin = scene.bounds().longest_side() * 8.0 * f64::from(f32::EPSILON);
-        let around = |places: Range<u32>| {
-            let triangles = order[places.start as usize..places.end as usize].iter();
+        let around = |positions: Range<u32>| {
+            let triangles = order[positions.start as usize..positions.end as usize].iter();
             let corners = triangles.flat_map(|&t| scene.corners(t as usize));
             let bounds = Aabb::from_points(corners);
             let centre = bounds.low.midpoint(bounds.high);
-            Chunk { places, centre, half: bounds.size() / 2.0 + margin }
+            Chunk { positions, centre, half: bounds.size() / 2.0 + margin }
         };
         let chunks = runs.into_iter().map(around).collect();
-        let mut places = vec![0; order.len()];
-        (0..).zip(&order).for_each(|(place, &t)| places[t as usize] = place);
-        DrawList { order, places, chunks }
+        let mut position_of = vec![0; order.len()];
+        for (position, &t) in (0..).zip(&order) {
+            position_of[t as usize] = position;
+        }
+        DrawList { order, position_of, chunks }
     }
 
-    /// Places whose triangles can be seen by `face` from `eye`, in few runs.
+    /// Runs of the drawing order whose triangles can be seen by `face` from `eye`.
     pub fn in_view(&self, eye: DVec3, face: &Face) -> Vec<Range<u32>> {
         let Face { right, up, forward, bottom } = *face;
         // Inward normals of the five planes through the eye that bound the view.
         let planes =
             [forward, forward + right, forward - right, forward - up, up - bottom * forward];
         let mut runs: Vec<Range<u32>> = vec![];
-        for Chunk { places, centre, half } in &self.chunks {
+        for Chunk { positions, centre, half } in &self.chunks {
             // The box's farthest point along a normal is behind the plane: so is all of it.
             let behind = |n: &DVec3| n.dot(centre - eye) + n.abs().dot(*half) < 0.0;
             if planes.iter().any(behind) {
                 continue;
             }
             match runs.last_mut() {
-                Some(run) if run.end == places.start && run.len() < RUN => run.end = places.end,
-                _ => runs.push(places.clone()),
+                Some(run) if run.end == positions.start && run.len() < MAX_TRIANGLES_PER_DRAW => {
+                    run.end = positions.end
+                }
+                _ => runs.push(positions.clone()),
             }
         }
         runs
@@ -79,7 +90,7 @@ impl DrawList {
 }
 
 fn halve(order: &mut [u32], start: u32, middles: &[DVec3], runs: &mut Vec<Range<u32>>) {
-    if order.len() <= CHUNK {
+    if order.len() <= MAX_TRIANGLES_PER_CHUNK {
         runs.push(start..start + order.len() as u32);
         return;
     }
@@ -117,32 +128,32 @@ mod tests {
     }
 
     #[test]
-    fn every_triangle_has_one_place() {
-        let chunks = DrawList::new(&sphere());
-        for (place, &t) in (0..).zip(&chunks.order) {
-            assert_eq!(chunks.places[t as usize], place);
+    fn every_triangle_has_one_position() {
+        let draw_list = DrawList::new(&sphere());
+        for (position, &t) in (0..).zip(&draw_list.order) {
+            assert_eq!(draw_list.position_of[t as usize], position);
         }
-        let covered: u32 = chunks.chunks.iter().map(|c| c.places.len() as u32).sum();
+        let covered: u32 = draw_list.chunks.iter().map(|c| c.positions.len() as u32).sum();
         assert_eq!(covered, 1000);
-        assert!(chunks.chunks.iter().all(|c| c.places.len() <= CHUNK));
+        assert!(draw_list.chunks.iter().all(|c| c.positions.len() <= MAX_TRIANGLES_PER_CHUNK));
     }
 
     #[test]
     fn what_a_face_sees_is_in_its_runs_and_most_of_the_rest_is_not() {
         let scene = sphere();
-        let chunks = DrawList::new(&scene);
+        let draw_list = DrawList::new(&scene);
         let faces = Face::all(&Frame::new(DVec3::new(0.6, 0.0, 0.8), 0.3));
         let mut drawn = 0;
         for face in &faces {
-            let runs = chunks.in_view(DVec3::ZERO, face);
+            let runs = draw_list.in_view(DVec3::ZERO, face);
             drawn += runs.iter().map(|r| r.len()).sum::<usize>();
             for t in 0..1000 {
                 let d = scene.corners(t)[0];
                 let w = d.dot(face.forward);
                 let (h, v) = (d.dot(face.right) / w, d.dot(face.up) / w);
                 let seen = w > 0.0 && h.abs() < 1.0 && v < 1.0 && v > face.bottom;
-                let place = chunks.places[t];
-                assert!(!seen || runs.iter().any(|r| r.contains(&place)), "triangle {t}");
+                let position = draw_list.position_of[t];
+                assert!(!seen || runs.iter().any(|r| r.contains(&position)), "triangle {t}");
             }
         }
         // Half the sphere is above the horizon; boxes of chunks reach over into other views.

@@ -1,4 +1,13 @@
-//! RefinementSettings with hemicubes: batches drawn, added up and read back.
+//! Irradiance gathered with hemicubes: batches drawn, added up and read back.
+//!
+//! ```text
+//! points ─► GatherJob: 5 faces + a tile for each light seen on its own ─► radiance images
+//!                                                                              │
+//! IrradianceSample ◄─ sample(sums, job), checked ◄─ readback ◄─ hemisphere sum ┘
+//! ```
+//!
+//! What comes straight from a light is its closed form times the share of its tile that is seen;
+//! all other light is the sum of radiosity × form factor over the pixels of the hemicube.
 
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
@@ -10,9 +19,10 @@ use super::device::Gpu;
 use super::draw_list::DrawList;
 use super::hemisphere_sum::HemisphereSum;
 use super::layout::{Corner, RadianceTriangle, RadianceView, Sums, TILE, Tile};
+use super::limits::GpuLimits;
 use super::memory::Memory;
-use super::radiance::{Radiance, View, image_size};
-use super::readback::{Readback, StageSeconds};
+use super::radiance::{DrawnScene, Radiance, TargetSize, View};
+use super::readback::{Readback, Results, Timer};
 use super::sources::SourceBuffers;
 use super::split_float::SplitFloat;
 use crate::error::{Error, ErrorKind};
@@ -21,10 +31,11 @@ use crate::gather::lights::{APART, Lights, NO_LIGHT};
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::Mesh;
+use crate::progress::Timings;
 use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
 
-/// Gathers with hemicubes (Cohen and Greenberg 1985) on a graphics device, one a place.
+/// Gathers with hemicubes (Cohen and Greenberg 1985) on a graphics device, one a point.
 ///
 /// A pixel sees a point of the scene and takes the radiosity there times its exact form factor.
 /// Lights get an image of their own, that they fill: what comes straight from one is its closed
@@ -32,20 +43,18 @@ use crate::scene::{Rgb, Scene};
 #[derive(Debug)]
 pub struct HemicubeGather {
     gpu: Gpu,
-    chunks: DrawList,
+    draw_list: DrawList,
     lights: Lights,
     /// What there is memory for; none while it makes room for the light.
     batches: Option<Batches>,
-    local: SplitFloat,
-    turns: CellRotation,
+    coordinates: SplitFloat,
+    rotations: CellRotation,
     /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
-    bright: f64,
+    radiance_unit: f64,
     triangles: usize,
-    resolution: u32,
-    slots: u32,
-    /// Places in a batch at most.
-    most: u32,
-    seconds: StageSeconds,
+    /// Images of a batch; fewer where memory is short.
+    size: TargetSize,
+    timings: Timings,
     drawn: u64,
 }
 
@@ -55,181 +64,196 @@ struct Batches {
     radiance: Radiance,
     sum: HemisphereSum,
     readback: Readback,
-    /// Places at once, at most.
-    most: u32,
+    /// Points at once, at most.
+    max_points: u32,
     _memory: Memory,
 }
 
-/// What one place looks at: views to draw, and the lights apart with their form factors as if
-/// nothing were in between.
-struct Look {
+/// What one point sees: views to draw, and the lights seen on their own with their form factors as
+/// if nothing were in between.
+struct GatherJob {
     views: Vec<View>,
     tiles: Vec<Tile>,
-    apart: Vec<(u32, f64)>,
+    lights: Vec<(u32, f64)>,
 }
 
-/// Images of a batch take at most this many bytes, if more than one.
+/// Images of a batch take at most this many bytes, if more than one. Chosen by hand; no measurement
+/// kept.
 const BATCH_BYTES: u64 = 64 << 20;
 
-/// Places in a batch at most.
+/// Points in a batch at most. Chosen by hand; no measurement kept.
 const MAX_BATCH: u32 = 64;
 
 impl HemicubeGather {
-    /// HemicubeRows with a top face of `resolution` × `resolution` pixels in the scene of `mesh`.
+    /// Hemicubes with a top face of `resolution` × `resolution` pixels in the scene of `mesh`.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a
-    /// scene that does not fit the device; [`ErrorKind::Memory`] when there is no memory for a single
-    /// hemicube; [`ErrorKind::Device`] when the device fails.
+    /// scene that does not fit the device; [`ErrorKind::Memory`] when there is no memory for a
+    /// single hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeGather, Error> {
         hemicube::check_resolution(resolution)?;
         let scene = mesh.scene();
         let lights = Lights::new(mesh.shared_scene());
-        let slots = lights.lights.len().min(APART) as u32;
-        let batch = batch(gpu, scene, resolution, slots)?;
-        let (local, turns) = (SplitFloat::new(scene), CellRotation::new(&scene.bounds()));
-        let bright = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
-        let bright = if bright > 0.0 { bright.log2().floor().exp2() } else { 1.0 };
-        let chunks = DrawList::new(scene);
-        let order = (&chunks.order[..], &local, bright);
-        let size = (resolution, slots);
-        let batches =
-            gpu.fit(batch, |m, most| Batches::new(m, scene, &lights, order, size, most))?;
-        Ok(HemicubeGather {
+        let tiles = lights.lights.len().min(APART) as u32;
+        let size = target_size(gpu.limits(), scene, resolution, tiles)?;
+        let brightest = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
+        let mut gather = HemicubeGather {
             gpu: gpu.clone(),
-            chunks,
+            draw_list: DrawList::new(scene),
             lights,
-            most: batches.most,
-            batches: Some(batches),
-            local,
-            turns,
-            bright,
+            batches: None,
+            coordinates: SplitFloat::new(scene),
+            rotations: CellRotation::new(&scene.bounds()),
+            radiance_unit: if brightest > 0.0 { brightest.log2().floor().exp2() } else { 1.0 },
             triangles: scene.triangles().len(),
-            resolution,
-            slots,
-            seconds: StageSeconds::default(),
+            size,
+            timings: Timings::default(),
             drawn: 0,
-        })
+        };
+        let batches = gather.make_batches(scene)?;
+        gather.size.batch = batches.max_points;
+        gather.batches = Some(batches);
+        Ok(gather)
     }
 
-    /// Time spent so far.
-    pub fn seconds(&self) -> StageSeconds {
-        self.seconds
+    /// Time of the passes so far.
+    pub fn timings(&self) -> Timings {
+        self.timings
     }
 
-    /// HemicubeRows drawn so far.
+    /// Hemicubes drawn so far.
     pub fn drawn(&self) -> u64 {
         self.drawn
     }
 
-    fn look(&self, scene: &Scene, place: &GatherPoint) -> Look {
-        let mut apart = self.lights.importance_ranked(place);
-        let mut fits = vec![];
-        apart.retain(|&(light, _)| {
+    /// Images of `self.size`, or fewer of them where memory is short.
+    fn make_batches(&self, scene: &Scene) -> Result<Batches, Error> {
+        let drawn = DrawnScene {
+            scene,
+            lights: &self.lights,
+            order: &self.draw_list.order,
+            coordinates: &self.coordinates,
+            radiance_unit: self.radiance_unit,
+        };
+        self.gpu.retry_with_smaller_batches(self.size.batch, |memory, batch| {
+            Batches::new(memory, drawn, TargetSize { batch, ..self.size })
+        })
+    }
+
+    fn job(&self, scene: &Scene, point: &GatherPoint) -> GatherJob {
+        let mut lights = self.lights.importance_ranked(point);
+        let mut projections = vec![];
+        lights.retain(|&(light, _)| {
             let triangles = self.lights.lights[light as usize].triangles.iter();
-            let view = LightProjection::new(place, triangles.map(|&t| scene.corners(t as usize)));
-            fits.extend(view);
-            view.is_some()
+            let corners = triangles.map(|&t| scene.corners(t as usize));
+            let projection = LightProjection::new(point, corners);
+            projections.extend(projection);
+            projection.is_some()
         });
-        let frame = Frame::new(place.normal, self.turns.at(place.position, place.near) * FRAC_PI_2);
-        let mut lights = [NO_LIGHT; APART];
-        lights.iter_mut().zip(&apart).for_each(|(l, a)| *l = a.0);
-        let [eye, eye_low] = self.local.parts(place.position);
+        let frame =
+            Frame::new(point.normal, self.rotations.at(point.position, point.near) * FRAC_PI_2);
+        let mut ids = [NO_LIGHT; APART];
+        for (id, light) in ids.iter_mut().zip(&lights) {
+            *id = light.0;
+        }
+        let [eye, eye_low] = self.coordinates.parts(point.position);
         let view = |face: Face, light: u32| View {
             view: RadianceView {
                 eye,
-                near: self.local.length(place.near),
+                near: self.coordinates.length(point.near),
                 right: face.right.as_vec3().to_array(),
                 bottom: face.bottom as f32,
                 up: face.up.as_vec3().to_array(),
                 light,
                 forward: face.forward.as_vec3().to_array(),
-                apart: apart.len() as u32,
+                apart: lights.len() as u32,
                 eye_low,
                 padding: 0,
-                lights,
+                lights: ids,
             },
-            places: self.chunks.in_view(place.position, &face),
+            runs: self.draw_list.in_view(point.position, &face),
         };
         let faces = Face::all(&frame).into_iter().map(|face| view(face, NO_LIGHT));
-        let of_lights = fits.iter().zip(&apart).map(|(fit, a)| view(fit.face, a.0));
+        let of_lights = projections.iter().zip(&lights).map(|(p, light)| view(p.face, light.0));
         let views = faces.chain(of_lights).collect();
-        let mut tiles: Vec<Tile> = fits.iter().map(|fit| tile(fit, &frame)).collect();
-        tiles.resize(self.slots as usize, Tile::default());
-        Look { views, tiles, apart }
+        let mut tiles: Vec<Tile> = projections.iter().map(|p| tile(p, &frame)).collect();
+        tiles.resize(self.size.tiles as usize, Tile::default());
+        GatherJob { views, tiles, lights }
     }
 
-    fn gathered(&self, sums: &Sums, look: &Look) -> IrradianceSample {
+    fn sample(&self, sums: &Sums, job: &GatherJob) -> IrradianceSample {
         let mut direct = Rgb::ZERO;
-        for (&(light, factor), &[seen, whole]) in look.apart.iter().zip(&sums.lights) {
+        for (&(light, factor), &[seen, alone]) in job.lights.iter().zip(&sums.lights) {
             let (light, seen) = (&self.lights.lights[light as usize], f64::from(seen));
             direct += light.exitance
-                * match light.convex {
-                    true => factor * seen / f64::from(whole).max(f64::MIN_POSITIVE),
-                    false => seen,
+                * if light.convex {
+                    factor * seen / f64::from(alone).max(f64::MIN_POSITIVE)
+                } else {
+                    seen
                 };
         }
         let [r, g, b] = sums.radiosity.map(f64::from);
         IrradianceSample {
-            irradiance: Rgb::new(r, g, b) * self.bright + direct,
+            irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct,
             direct,
             escaped: sums.open.into(),
             backface: sums.back.into(),
-            inverse_distance: self.local.inverse_length(sums.nearness),
+            inverse_distance: self.coordinates.inverse_length(sums.nearness),
         }
     }
 
     fn gather_batch(
         &mut self,
         batches: &Batches,
-        (scene, bindings): (&Scene, &wgpu::BindGroup),
-        places: &[GatherPoint],
+        light: &Upload,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
         let start = Instant::now();
-        let looks: Vec<Look> = places.par_iter().map(|p| self.look(scene, p)).collect();
-        let views: Vec<&[View]> = looks.iter().map(|l| &l.views[..]).collect();
-        let tiles: Vec<Tile> = looks.iter().flat_map(|l| &l.tiles).copied().collect();
+        let jobs: Vec<GatherJob> = points.par_iter().map(|p| self.job(light.scene, p)).collect();
+        let views: Vec<&[View]> = jobs.iter().map(|job| &job.views[..]).collect();
+        let tiles: Vec<Tile> = jobs.iter().flat_map(|job| &job.tiles).copied().collect();
         let gpu = &self.gpu;
         let Batches { radiance, sum, readback, .. } = batches;
-        let mut seconds = self.seconds;
-        let gathered: Result<Vec<IrradianceSample>, String> = gpu.attempt(|| {
+        let mut timings = self.timings;
+        let timer = Timer { start, timings: &mut timings };
+        let samples: Result<Vec<IrradianceSample>, String> = gpu.with_error_scopes(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let queries = readback.queries();
-            radiance.draw(gpu, &mut encoder, bindings, &views, queries);
-            sum.sum(gpu, &mut encoder, places.len() as u32, &tiles, queries);
-            let source = (&sum.sums, size_of::<Sums>() as u64 * places.len() as u64);
-            readback.finish(gpu, encoder, source, (start, &mut seconds), |bytes| {
+            radiance.draw(&gpu.queue, &mut encoder, &light.bindings, &views, queries);
+            sum.sum(&gpu.queue, &mut encoder, points.len() as u32, &tiles, queries);
+            let bytes = size_of::<Sums>() as u64 * points.len() as u64;
+            let results = Results { buffer: &sum.sums, bytes };
+            readback.finish(gpu, encoder, results, timer, |bytes| {
                 let sums: &[Sums] = bytemuck::cast_slice(bytes);
-                sums.iter().zip(&looks).map(|(s, look)| checked(self.gathered(s, look))).collect()
+                sums.iter().zip(&jobs).map(|(s, job)| checked(self.sample(s, job))).collect()
             })
         })?;
-        self.seconds = seconds;
-        self.drawn += places.len() as u64;
-        gathered.map_err(|found| gpu.wrong(found))
+        self.timings = timings;
+        self.drawn += points.len() as u64;
+        samples.map_err(|found| gpu.invalid_result(found))
     }
 
     /// Puts the light on the device. Where there is no memory for it, smaller batches make room.
-    fn ready(&mut self, sources: &RadiosityField) -> Result<(Batches, Upload), Error> {
-        let (gpu, scene) = (&self.gpu, sources.mesh.scene());
-        let order = (&self.chunks.order[..], &self.local, self.bright);
-        let size = (self.resolution, self.slots);
+    fn upload<'s>(&mut self, sources: &RadiosityField<'s>) -> Result<(Batches, Upload<'s>), Error> {
+        let scene = sources.mesh.scene();
         loop {
             let batches = match self.batches.take() {
                 Some(batches) => batches,
-                None => gpu.fit(self.most, |memory, most| {
-                    Batches::new(memory, scene, &self.lights, order, size, most)
-                })?,
+                None => self.make_batches(scene)?,
             };
-            let upload = gpu.attempt(|| {
-                let memory = Memory::new(gpu);
-                let buffers = SourceBuffers::new(&memory, sources, self.triangles, self.bright)?;
-                let bindings = batches.radiance.bindings(gpu, &buffers);
-                Ok(Upload { bindings, _memory: memory })
+            let gpu = &self.gpu;
+            let upload = gpu.with_error_scopes(|| {
+                let memory = gpu.memory();
+                let (triangles, unit) = (self.triangles, self.radiance_unit);
+                let buffers = SourceBuffers::new(&memory, sources, gpu.limits(), triangles, unit)?;
+                let bindings = batches.radiance.bindings(&gpu.device, &buffers);
+                Ok(Upload { scene, bindings, _memory: memory })
             });
             match upload {
                 Ok(upload) => return Ok((batches, upload)),
-                Err(e) if e.kind() == ErrorKind::Memory && batches.most > 1 => {
-                    self.most = batches.most / 2;
+                Err(e) if e.kind() == ErrorKind::Memory && batches.max_points > 1 => {
+                    self.size.batch = batches.max_points / 2;
                 }
                 Err(e) => {
                     self.batches = Some(batches);
@@ -241,38 +265,32 @@ impl HemicubeGather {
 }
 
 /// The light to be gathered, on the device.
-struct Upload {
+struct Upload<'s> {
+    scene: &'s Scene,
     bindings: wgpu::BindGroup,
     _memory: Memory,
 }
 
 impl Batches {
-    fn new(
-        memory: Memory,
-        scene: &Scene,
-        lights: &Lights,
-        order: (&[u32], &SplitFloat, f64),
-        (resolution, slots): (u32, u32),
-        most: u32,
-    ) -> Result<Batches, Error> {
-        let size = (resolution, slots, most);
-        let radiance = Radiance::new(&memory, scene, lights, order, size)?;
-        let sum = HemisphereSum::new(&memory, &radiance.layers, resolution, slots)?;
+    fn new(memory: Memory, drawn: DrawnScene, size: TargetSize) -> Result<Batches, Error> {
+        let radiance = Radiance::new(&memory, drawn, size)?;
+        let sum = HemisphereSum::new(&memory, &radiance.targets, size)?;
         let readback = Readback::new(&memory, sum.sums.size())?;
-        Ok(Batches { radiance, sum, readback, most, _memory: memory })
+        Ok(Batches { radiance, sum, readback, max_points: size.batch, _memory: memory })
     }
 }
 
-/// What was gathered, if it can be; or what is wrong with it.
-fn checked(found: IrradianceSample) -> Result<IrradianceSample, String> {
+/// A sample that can be, or what is wrong with it.
+fn checked(sample: IrradianceSample) -> Result<IrradianceSample, String> {
     // Shares are sums of weights that sum to 1; of 3·4096² pixels in 32 bits to better than this.
     let share = |x: f64| (0.0..=1.01).contains(&x);
     let light = |c: Rgb| c.is_finite() && c.min_element() >= 0.0;
-    let good = light(found.irradiance) && light(found.direct) && share(found.escaped);
-    match good && share(found.backface) && found.inverse_distance.is_finite() {
-        true => Ok(found),
-        false => Err(format!("{found:?} for a place")),
+    let shares = share(sample.escaped) && share(sample.backface);
+    let good = light(sample.irradiance) && light(sample.direct) && shares;
+    if good && sample.inverse_distance.is_finite() {
+        return Ok(sample);
     }
+    Err(format!("{sample:?} for a place"))
 }
 
 impl Gather for HemicubeGather {
@@ -281,48 +299,48 @@ impl Gather for HemicubeGather {
         sources: &RadiosityField,
         places: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        let (batches, upload) = self.ready(sources)?;
+        let (batches, light) = self.upload(sources)?;
         let mut gathered = Vec::with_capacity(places.len());
-        let light = (sources.mesh.scene(), &upload.bindings);
-        for places in places.chunks(batches.most as usize) {
-            gathered.extend(self.gather_batch(&batches, light, places)?);
+        for points in places.chunks(batches.max_points as usize) {
+            gathered.extend(self.gather_batch(&batches, &light, points)?);
         }
         self.batches = Some(batches);
         Ok(gathered)
     }
 }
 
-/// How many places fit a batch on this device, if it can do any.
-fn batch(gpu: &Gpu, scene: &Scene, resolution: u32, slots: u32) -> Result<u32, Error> {
-    let limits = gpu.device.limits();
-    let setting = |place: String, found: String, remedy: String| {
-        Err(Error::new(ErrorKind::Setting, place, found, remedy))
-    };
-    let texture = limits.max_texture_dimension_2d;
-    let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let fits = |n: &u32| image_size(*n, slots)[1] <= texture;
+/// The images of a batch on a device of these limits, if it can draw any.
+fn target_size(
+    limits: GpuLimits,
+    scene: &Scene,
+    resolution: u32,
+    tiles: u32,
+) -> Result<TargetSize, Error> {
+    let of = |resolution: u32| TargetSize { resolution, tiles, batch: 1 };
+    let fits = |n: &u32| of(*n).pixels()[1] <= limits.texture;
+    let [width, height] = of(resolution).pixels();
     if !fits(&resolution) {
         let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
-        return setting(
-            format!("hemicube resolution {resolution}"),
-            format!("an image of {} lines", image_size(resolution, slots)[1]),
-            format!("this device allows resolutions up to {most}"),
-        );
+        let place = format!("hemicube resolution {resolution}");
+        let found = format!("an image of {height} lines");
+        let remedy = format!("this device allows resolutions up to {most}");
+        return Err(Error::new(ErrorKind::Setting, place, found, remedy));
     }
-    // Lights are there twice.
-    let each = size_of::<RadianceTriangle>().max(3 * size_of::<Corner>()) as u64;
+    // Triangles of lights are drawn once more on their own.
+    let triangle_bytes = size_of::<RadianceTriangle>().max(3 * size_of::<Corner>()) as u64;
     let triangles = scene.triangles().len() as u64;
-    if 2 * triangles * each > buffer {
-        let (found, most) = (format!("{triangles} triangles"), buffer / each / 2);
-        return setting("scene".into(), found, format!("this device holds {most}"));
+    if 2 * triangles * triangle_bytes > limits.buffer {
+        let found = format!("{triangles} triangles");
+        let remedy = format!("this device holds {}", limits.buffer / triangle_bytes / 2);
+        return Err(Error::new(ErrorKind::Setting, "scene".to_string(), found, remedy));
     }
     // Four floats of colour a pixel.
-    let [width, height] = image_size(resolution, slots);
     let image = u64::from(width) * u64::from(height) * 16;
-    Ok(MAX_BATCH.min((BATCH_BYTES / image).max(1) as u32).min(limits.max_texture_array_layers))
+    let batch = MAX_BATCH.min((BATCH_BYTES / image).max(1) as u32).min(limits.layers);
+    Ok(TargetSize { batch, ..of(resolution) })
 }
 
-/// Where the pixels of a light's tile look, in the place's frame.
+/// Where the pixels of a light's tile look, in the frame of the point.
 fn tile(fit: &LightProjection, frame: &Frame) -> Tile {
     let Frame { tangent, bitangent, normal } = *frame;
     let local =
@@ -344,7 +362,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_light_is_an_error() {
+    fn rejects_negative_or_infinite_samples() {
         let good = IrradianceSample {
             irradiance: Rgb::ONE,
             escaped: 0.25,
@@ -361,7 +379,7 @@ mod tests {
             IrradianceSample { inverse_distance: f64::INFINITY, ..good },
         ];
         for found in bad {
-            assert!(checked(found).unwrap_err().contains("Gathered"), "{found:?}");
+            assert!(checked(found).unwrap_err().contains("IrradianceSample"), "{found:?}");
         }
     }
 }

@@ -1,17 +1,24 @@
-//! The render pass: the scene's triangles over every face of a batch of hemicubes.
+//! The draw pass of rows: the scene's triangles over every face of a batch of hemicubes.
+//!
+//! ```text
+//! corners, triangles ──► vertex ──► rasterizer ──► fragment ──► one layer a hemicube, R32Uint
+//! views (5 a hemicube) ──┘          depth test     item of      N wide:  top face    N lines
+//!                                                  the pixel             side +t     N/2
+//!                                                                        side −t     N/2
+//!                                                                        side +b     N/2
+//!                                                                        side −b     N/2
+//! ```
+//!
+//! The twin on the CPU is `backend/cpu/item_buffer.rs`.
 
 use std::ops::Range;
 
-use super::device::Gpu;
-use super::item_table::ItemTable;
-use super::layout::{FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::layout::{Corner, FaceView, ITEM_BUFFER_WGSL, TriangleCells};
 use super::memory::Memory;
-use super::render_targets::{DepthMode, RenderTargets};
-use super::resolution::Resolution;
-use super::split_float::SplitFloat;
+use super::pipeline::{self, DepthMode};
+use super::render_targets::RenderTargets;
 use crate::error::Error;
 use crate::hemicube::Face;
-use crate::mesh::Mesh;
 
 /// What it takes to draw the item buffers of a batch of hemicubes, whatever their resolution.
 #[derive(Debug)]
@@ -21,77 +28,67 @@ pub struct ItemBuffer {
     views: wgpu::Buffer,
 }
 
-/// One face of a hemicube, and the places in the drawing order that it can see.
+/// One face of a hemicube, and the runs of the drawing order that it can see.
 pub struct View {
     pub face: FaceView,
-    pub places: Vec<Range<u32>>,
+    pub runs: Vec<Range<u32>>,
 }
 
 impl ItemBuffer {
     /// What an item buffer is made of.
     pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-    /// For the triangles of `mesh` in drawing order, in `local` coordinates; `batch` hemicubes.
+    /// For triangles in drawing order, three `corners` each; `batch` hemicubes.
     pub fn new(
         memory: &Memory,
-        mesh: &Mesh,
-        cells: &ItemTable,
-        order: &[u32],
-        local: &SplitFloat,
+        corners: &[Corner],
+        triangles: &[TriangleCells],
         batch: u32,
     ) -> Result<Self, Error> {
-        let device = &memory.gpu.device;
-        let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
-        let corners = local.corners(corners);
-        let triangles: Vec<TriangleCells> =
-            order.iter().map(|&t| cells.triangles[t as usize]).collect();
-        let corners = memory.storage("corners", bytemuck::cast_slice(&corners))?;
-        let triangles = memory.storage("triangles", bytemuck::cast_slice(&triangles))?;
+        let device = &memory.device;
+        let corners = memory.storage("corners", bytemuck::cast_slice(corners))?;
+        let triangles = memory.storage("triangles", bytemuck::cast_slice(triangles))?;
         let bytes = u64::from(batch) * 5 * size_of::<FaceView>() as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let views = memory.buffer("views", bytes, usage)?;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("item_buffer.wgsl"),
-            source: wgpu::ShaderSource::Wgsl(ITEM_BUFFER_WGSL.into()),
-        });
-        let (target, nearest) = (ItemBuffer::FORMAT.into(), DepthMode::Nearest);
-        let pipeline =
-            RenderTargets::pipeline(&memory.gpu, &module, None, "fragment", target, nearest);
-        let buffers = [&corners, &triangles, &views];
-        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("item buffer"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[0, 1, 2].map(|k: usize| wgpu::BindGroupEntry {
-                binding: k as u32,
-                resource: buffers[k].as_entire_binding(),
-            }),
-        });
+        let module = pipeline::shader(device, "item_buffer.wgsl", ITEM_BUFFER_WGSL);
+        let draw = pipeline::Draw {
+            module: &module,
+            layout: None,
+            fragment: "fragment",
+            target: ItemBuffer::FORMAT.into(),
+            depth_mode: DepthMode::Nearest,
+        };
+        let pipeline = draw.create(device);
+        let resources = [&corners, &triangles, &views].map(|b| b.as_entire_binding());
+        let layout = pipeline.get_bind_group_layout(0);
+        let bindings = pipeline::bind_group(device, "item buffer", &layout, 0, &resources);
         Ok(ItemBuffer { pipeline, bindings, views })
     }
 
     /// Records the drawing of the hemicubes that `views` (five each) look out from on the layers of
-    /// `at`, with timestamps before the first (query 0) and after the last (query 1).
+    /// `targets`, with timestamps before the first (query 0) and after the last (query 1).
     pub fn draw(
         &self,
-        gpu: &Gpu,
+        queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
-        at: &Resolution,
+        targets: &RenderTargets,
         views: &[View],
         queries: Option<&wgpu::QuerySet>,
     ) {
         let faces: Vec<FaceView> = views.iter().map(|v| v.face).collect();
-        gpu.queue.write_buffer(&self.views, 0, bytemuck::cast_slice(&faces));
+        queue.write_buffer(&self.views, 0, bytemuck::cast_slice(&faces));
         let count = views.len() / 5;
-        for h in 0..count {
-            let mut pass = at.layers.pass(encoder, h, count, queries);
+        let pixels = targets.texture.width();
+        for hemicube in 0..count {
+            let mut pass = targets.pass(encoder, hemicube, count, queries);
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &self.bindings, &[]);
-            let n = at.pixels;
             for face in 0..5 {
-                let (lines, view) = (Face::rows(face, n), 5 * h + face);
+                let (lines, view) = (Face::rows(face, pixels), 5 * hemicube + face);
                 let (y, height) = (lines.start as f32, lines.len() as f32);
-                pass.set_viewport(0.0, y, n as f32, height, 0.0, 1.0);
-                for run in &views[view].places {
+                pass.set_viewport(0.0, y, pixels as f32, height, 0.0, 1.0);
+                for run in &views[view].runs {
                     pass.draw(3 * run.start..3 * run.end, view as u32..view as u32 + 1);
                 }
             }

@@ -1,6 +1,9 @@
-//! What of a device may be used.
+//! How much of a device may be used, and how much of it the passes need.
 
-/// The most that may be asked of a device; what it cannot do anyway is not asked either.
+use super::error::place;
+use crate::error::{Error, ErrorKind};
+
+/// The most that is asked of a device; what it cannot do anyway is not asked either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GpuLimits {
     /// Bytes of device memory that buffers and textures may take, all together. Batches are made
@@ -8,10 +11,10 @@ pub struct GpuLimits {
     pub memory: u64,
     /// Bytes of one buffer. It bounds elements and triangles: a row takes 4 bytes an element.
     pub buffer: u64,
-    /// Pixels along an edge of a texture. It bounds resolutions: a hemicube is three times as high as
-    /// its top face.
+    /// Pixels along an edge of a texture. It bounds resolutions: a hemicube is three times as high
+    /// as its top face.
     pub texture: u32,
-    /// RenderTargets of a texture, one for each hemicube of a batch.
+    /// Layers of a texture, one for each hemicube of a batch.
     pub layers: u32,
 }
 
@@ -21,14 +24,54 @@ impl GpuLimits {
         GpuLimits { memory: u64::MAX, buffer: u64::MAX, texture: u32::MAX, layers: u32::MAX };
 
     /// What to ask of an adapter that has so much.
-    pub(super) fn of(&self, has: &wgpu::Limits) -> wgpu::Limits {
+    pub(super) fn requested(&self, available: &wgpu::Limits) -> wgpu::Limits {
         let least = wgpu::Limits::downlevel_defaults();
+        let binding = available.max_storage_buffer_binding_size;
         wgpu::Limits {
-            max_texture_dimension_2d: has.max_texture_dimension_2d.min(self.texture),
+            max_texture_dimension_2d: available.max_texture_dimension_2d.min(self.texture),
             max_texture_array_layers: least.max_texture_array_layers.min(self.layers),
-            max_buffer_size: has.max_buffer_size.min(self.buffer),
-            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size.min(self.buffer),
+            max_buffer_size: available.max_buffer_size.min(self.buffer),
+            max_storage_buffer_binding_size: binding.min(self.buffer),
             ..least
         }
     }
+
+    /// These limits, or those of a device where they are lower.
+    pub(super) fn within(&self, device: &wgpu::Limits) -> GpuLimits {
+        let buffer = device.max_storage_buffer_binding_size.min(device.max_buffer_size);
+        GpuLimits {
+            memory: self.memory,
+            buffer: self.buffer.min(buffer),
+            texture: self.texture.min(device.max_texture_dimension_2d),
+            layers: self.layers.min(device.max_texture_array_layers),
+        }
+    }
+}
+
+/// Checks that a device on the named adapter was opened with enough for every pass.
+///
+/// # Errors
+/// [`ErrorKind::Setting`] with the first limit that is too low.
+pub fn check_device(adapter: &str, device: &wgpu::Limits) -> Result<(), Error> {
+    let needs = [
+        // `reduce.wgsl` and the vertex stage of `radiance.wgsl`.
+        ("max_storage_buffers_per_shader_stage", device.max_storage_buffers_per_shader_stage, 4),
+        // Vertex and fragment stage of `radiance.wgsl` share a bind group.
+        ("max_bindings_per_bind_group", device.max_bindings_per_bind_group, 6),
+        ("max_inter_stage_shader_variables", device.max_inter_stage_shader_variables, 5),
+        // `reduce.wgsl` and `hemisphere_sum.wgsl`.
+        ("max_compute_workgroup_size_x", device.max_compute_workgroup_size_x, 64),
+        ("max_compute_invocations_per_workgroup", device.max_compute_invocations_per_workgroup, 64),
+        ("max_compute_workgroups_per_dimension", device.max_compute_workgroups_per_dimension, 768),
+    ];
+    for (limit, found, needed) in needs {
+        if found < needed {
+            let found = format!("a device opened with {limit} = {found}");
+            let remedy = format!(
+                "open it with at least {needed}, as wgpu::Limits::downlevel_defaults() does"
+            );
+            return Err(Error::new(ErrorKind::Setting, place(adapter), found, remedy));
+        }
+    }
+    Ok(())
 }

@@ -1,21 +1,56 @@
-//! Backend memory: every buffer and texture is taken here, and counted.
+//! Device memory: every buffer and texture is created here, and counted against one budget.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::device::Gpu;
+use super::error::device_error;
 use crate::error::{Error, ErrorKind};
 
-/// What one maker holds of a device's memory; given back when it goes.
+/// Bytes that all users of a device may take together, and those taken.
+#[derive(Debug)]
+pub struct MemoryBudget {
+    limit: u64,
+    taken: AtomicU64,
+}
+
+impl MemoryBudget {
+    /// `limit` bytes, none of them taken.
+    pub fn new(limit: u64) -> MemoryBudget {
+        MemoryBudget { limit, taken: AtomicU64::new(0) }
+    }
+
+    /// Takes `bytes`, or says how many are taken where that is more than is left.
+    fn take(&self, bytes: u64) -> Result<(), u64> {
+        let add = |taken: u64| taken.checked_add(bytes).filter(|sum| *sum <= self.limit);
+        self.taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).map(|_| ())
+    }
+
+    fn give_back(&self, bytes: u64) {
+        self.taken.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+/// The buffers and textures of one user of a device; their bytes go back to the budget when it is
+/// dropped.
 #[derive(Debug)]
 pub struct Memory {
-    pub gpu: Gpu,
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    /// Name of the adapter, for errors.
+    pub adapter: String,
+    budget: Arc<MemoryBudget>,
     held: AtomicU64,
 }
 
 impl Memory {
     /// Nothing yet.
-    pub fn new(gpu: &Gpu) -> Memory {
-        Memory { gpu: gpu.clone(), held: AtomicU64::new(0) }
+    pub fn new(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        adapter: String,
+        budget: Arc<MemoryBudget>,
+    ) -> Memory {
+        Memory { device, queue, adapter, budget, held: AtomicU64::new(0) }
     }
 
     /// A buffer of `bytes`.
@@ -29,7 +64,7 @@ impl Memory {
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer, Error> {
         self.take(label, bytes)?;
-        Ok(self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: bytes,
             usage,
@@ -56,11 +91,11 @@ impl Memory {
         // Not `create_buffer_init`, which panics where there is no memory.
         let bytes = contents.len() as u64;
         let buffer = self.buffer(label, bytes, usage | wgpu::BufferUsages::COPY_DST)?;
-        self.gpu.queue.write_buffer(&buffer, 0, contents);
+        self.queue.write_buffer(&buffer, 0, contents);
         Ok(buffer)
     }
 
-    /// A texture of one mip level.
+    /// A texture of one mip level: width, height and layers.
     ///
     /// # Errors
     /// [`ErrorKind::Memory`] when that is more than is left.
@@ -74,7 +109,7 @@ impl Memory {
         let [width, height, depth_or_array_layers] = size;
         let texel = format.block_copy_size(None).unwrap_or(4);
         self.take(label, size.into_iter().chain([texel]).map(u64::from).product())?;
-        Ok(self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+        Ok(self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d { width, height, depth_or_array_layers },
             mip_level_count: 1,
@@ -86,21 +121,19 @@ impl Memory {
         }))
     }
 
-    fn take(&self, what: &str, bytes: u64) -> Result<(), Error> {
-        let Err(taken) = self.gpu.taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |t| {
-            t.checked_add(bytes).filter(|sum| *sum <= self.gpu.memory)
-        }) else {
-            self.held.fetch_add(bytes, Ordering::Relaxed);
-            return Ok(());
-        };
-        let most = self.gpu.memory;
-        let found = format!("{bytes} bytes for {what} when {taken} of {most} are taken");
-        Err(self.gpu.failed(ErrorKind::Memory, found))
+    fn take(&self, label: &str, bytes: u64) -> Result<(), Error> {
+        if let Err(taken) = self.budget.take(bytes) {
+            let limit = self.budget.limit;
+            let found = format!("{bytes} bytes for {label} when {taken} of {limit} are taken");
+            return Err(device_error(&self.adapter, ErrorKind::Memory, found));
+        }
+        self.held.fetch_add(bytes, Ordering::Relaxed);
+        Ok(())
     }
 }
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        self.gpu.taken.fetch_sub(self.held.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.budget.give_back(self.held.load(Ordering::Relaxed));
     }
 }

@@ -1,9 +1,18 @@
-//! The compute pass: item buffers to dense rows in fixed point.
+//! The compute pass of rows: item buffers to dense rows in fixed point.
+//!
+//! ```text
+//! layers of R32Uint ──copy──► items (lines padded to `stride` words)
+//! items, weights, slot of each item ──► reduce ──► rows: slots words a hemicube
+//!                                                        [open, back, element 0, element 1, …]
+//! ```
+//!
+//! A thread adds up a strip of [`STRIP`] pixels of one column; sums meet in integer atomics, so that
+//! their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
-use super::item_table::ItemTable;
 use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
 use super::memory::Memory;
-use super::resolution::Resolution;
+use super::pipeline;
+use super::render_targets::RenderTargets;
 use crate::error::Error;
 use crate::hemicube;
 
@@ -12,7 +21,7 @@ use crate::hemicube;
 pub struct Reduce {
     pipeline: wgpu::ComputePipeline,
     /// The row slot of each item.
-    slot_of: wgpu::Buffer,
+    slot_of_item: wgpu::Buffer,
     /// The item buffers once more, as plain memory: reading them as a texture costs more than the
     /// copy does.
     items: wgpu::Buffer,
@@ -21,40 +30,36 @@ pub struct Reduce {
     slots: u32,
 }
 
+/// Hemicubes that are reduced together.
+#[derive(Clone, Copy, Debug)]
+pub struct BatchSize {
+    /// Pixels along an edge of the top face, at most.
+    pub resolution: u32,
+    /// Words of a row: what meets nothing, what meets backs, then one an element.
+    pub slots: u32,
+    /// Hemicubes, at most.
+    pub hemicubes: u32,
+}
+
 impl Reduce {
     /// Bytes of one item buffer in memory.
     pub fn items_bytes(resolution: u32) -> u64 {
         u64::from(stride(resolution)) * u64::from(3 * resolution) * 4
     }
 
-    /// For `batch` hemicubes of at most `resolution`, to rows of `slots` words.
-    pub fn new(
-        memory: &Memory,
-        cells: &ItemTable,
-        resolution: u32,
-        slots: u32,
-        batch: u32,
-    ) -> Result<Self, Error> {
-        let device = &memory.gpu.device;
-        let slot_of = memory.storage("slots", bytemuck::cast_slice(&cells.slots))?;
+    /// For item buffers whose item k counts for slot `slot_of_item[k]` of the row.
+    pub fn new(memory: &Memory, slot_of_item: &[u32], size: BatchSize) -> Result<Self, Error> {
+        let BatchSize { resolution, slots, hemicubes } = size;
+        let device = &memory.device;
+        let slot_of_item = memory.storage("slots", bytemuck::cast_slice(slot_of_item))?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let row_bytes = u64::from(batch) * u64::from(slots) * 4;
+        let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("reduce.wgsl"),
-            source: wgpu::ShaderSource::Wgsl(REDUCE_WGSL.into()),
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("reduce"),
-            layout: None,
-            module: &module,
-            entry_point: Some("reduce"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
-        let item_bytes = Reduce::items_bytes(resolution) * u64::from(batch);
+        let module = pipeline::shader(device, "reduce.wgsl", REDUCE_WGSL);
+        let pipeline = pipeline::compute(device, &module, "reduce");
+        let item_bytes = Reduce::items_bytes(resolution) * u64::from(hemicubes);
         let items = memory.buffer("items", item_bytes, usage)?;
-        Ok(Reduce { pipeline, slot_of, items, rows, slots })
+        Ok(Reduce { pipeline, slot_of_item, items, rows, slots })
     }
 
     /// What the pass reads and writes for hemicubes of `resolution`, at most the one that this was
@@ -64,36 +69,25 @@ impl Reduce {
         let weights = memory.storage("weights", bytemuck::cast_slice(&weights))?;
         let reduction = Reduction { resolution, slots: self.slots, stride: stride(resolution) };
         let reduction = memory.uniform("reduction", bytemuck::bytes_of(&reduction))?;
-        let resources = [
-            self.items.as_entire_binding(),
-            weights.as_entire_binding(),
-            self.rows.as_entire_binding(),
-            reduction.as_entire_binding(),
-            self.slot_of.as_entire_binding(),
-        ];
-        let entries: Vec<_> = (0..)
-            .zip(resources)
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        Ok(memory.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("reduce"),
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        }))
+        let resources = [&self.items, &weights, &self.rows, &reduction, &self.slot_of_item]
+            .map(|buffer| buffer.as_entire_binding());
+        let layout = self.pipeline.get_bind_group_layout(0);
+        Ok(pipeline::bind_group(&memory.device, "reduce", &layout, 0, &resources))
     }
 
-    /// Records the reduction of the first `count` hemicubes on the layers of `at`, with a timestamp
-    /// after it (query 2).
+    /// Records the reduction of the first `count` hemicubes on `targets`, with the bindings for
+    /// their resolution and a timestamp after it (query 2).
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        at: &Resolution,
+        targets: &RenderTargets,
+        bindings: &wgpu::BindGroup,
         count: u32,
         queries: Option<&wgpu::QuerySet>,
     ) {
-        let n = at.pixels;
+        let pixels = targets.texture.width();
         encoder.clear_buffer(&self.rows, 0, None);
-        at.layers.copy(encoder, &self.items, stride(n) * 4, count);
+        targets.copy(encoder, &self.items, stride(pixels) * 4, count);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),
             timestamp_writes: queries.map(|query_set| wgpu::ComputePassTimestampWrites {
@@ -103,13 +97,13 @@ impl Reduce {
             }),
         });
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &at.bindings, &[]);
-        pass.dispatch_workgroups(n.div_ceil(WORKGROUP), (3 * n).div_ceil(STRIP), count);
+        pass.set_bind_group(0, bindings, &[]);
+        pass.dispatch_workgroups(pixels.div_ceil(WORKGROUP), (3 * pixels).div_ceil(STRIP), count);
     }
 }
 
 /// Words from one line of an item buffer in memory to the next: lines start at multiples of 256
 /// bytes.
-fn stride(resolution: u32) -> u32 {
+pub fn stride(resolution: u32) -> u32 {
     resolution.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4)
 }

@@ -1,24 +1,19 @@
-//! What is drawn on: a layer a hemicube, so that its pixels do not depend on its place in a batch.
+//! What is drawn on: a layer a hemicube, so that its pixels do not depend on its index in a batch.
+//!
+//! ```text
+//! texture  ┌ layer 0 ┐ ┌ layer 1 ┐ … ┌ layer batch−1 ┐
+//! depth    └─ one buffer, cleared at the start of each layer's pass ─┘
+//! ```
 
-use super::device::Gpu;
 use super::memory::Memory;
 use crate::error::Error;
 
-/// RenderTargets of one texture, and the depth buffer that they share.
+/// Layers of one texture, and the depth buffer that they share.
 #[derive(Debug)]
 pub struct RenderTargets {
     pub texture: wgpu::Texture,
     layers: Vec<wgpu::TextureView>,
     depth: wgpu::TextureView,
-}
-
-/// What of the triangles drawn ends up in a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthMode {
-    /// The nearest triangle, front or back.
-    Nearest,
-    /// Whether there is any front, hidden or not.
-    AnyFront,
 }
 
 impl RenderTargets {
@@ -109,48 +104,5 @@ impl RenderTargets {
             },
             wgpu::Extent3d { width: self.texture.width(), height, depth_or_array_layers: count },
         );
-    }
-
-    /// A pipeline that draws on layers of `target`: entry point `vertex` of `module`, then
-    /// `fragment`. Depth is reversed: nearer is greater.
-    pub fn pipeline(
-        gpu: &Gpu,
-        module: &wgpu::ShaderModule,
-        layout: Option<&wgpu::PipelineLayout>,
-        fragment: &str,
-        target: wgpu::ColorTargetState,
-        shown: DepthMode,
-    ) -> wgpu::RenderPipeline {
-        let (compare, cull_mode) = match shown {
-            DepthMode::Nearest => (wgpu::CompareFunction::Greater, None),
-            DepthMode::AnyFront => (wgpu::CompareFunction::Always, Some(wgpu::Face::Back)),
-        };
-        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(fragment),
-            layout,
-            vertex: wgpu::VertexState {
-                module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(shown == DepthMode::Nearest),
-                depth_compare: Some(compare),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module,
-                entry_point: Some(fragment),
-                compilation_options: Default::default(),
-                targets: &[Some(target)],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
     }
 }

@@ -1,4 +1,4 @@
-//! What drawing and adding up need for each resolution; all else they share.
+//! What drawing and reducing need for each resolution; all else the resolutions share.
 
 use super::item_buffer::ItemBuffer;
 use super::memory::Memory;
@@ -12,10 +12,10 @@ use crate::form_factor::resolution_policy;
 pub struct Resolution {
     /// Pixels along an edge of the top face.
     pub pixels: u32,
-    pub layers: RenderTargets,
+    pub targets: RenderTargets,
     /// What `reduce` reads and writes.
     pub bindings: wgpu::BindGroup,
-    /// HemicubeRows drawn so far.
+    /// Hemicubes drawn so far.
     pub drawn: u64,
 }
 
@@ -35,7 +35,7 @@ impl Resolution {
     }
 
     fn new(memory: &Memory, reduce: &Reduce, pixels: u32, batch: u32) -> Result<Resolution, Error> {
-        let layers = RenderTargets::new(memory, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch)?;
-        Ok(Resolution { pixels, layers, bindings: reduce.bindings(memory, pixels)?, drawn: 0 })
+        let targets = RenderTargets::new(memory, ItemBuffer::FORMAT, [pixels, 3 * pixels], batch)?;
+        Ok(Resolution { pixels, targets, bindings: reduce.bindings(memory, pixels)?, drawn: 0 })
     }
 }

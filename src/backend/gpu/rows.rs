@@ -1,4 +1,13 @@
 //! Form-factor rows from hemicubes: batches drawn, reduced and read back.
+//!
+//! ```text
+//! patches ─► views (frame, turned by a hash of the patch; 5 faces) ─► item buffer ─► reduce
+//!                                                                                      │
+//! rows ◄─ mean over rotations ◄─ sparse(dense row), sum checked ◄─ readback ◄──────────┘
+//! ```
+//!
+//! A batch holds as many hemicubes as [`BATCH_BYTES`], [`MAX_BATCH`] and the device's limits allow,
+//! and a half or a quarter of them where memory is short.
 
 use std::f64::consts::FRAC_PI_2;
 use std::num::NonZeroU32;
@@ -11,15 +20,17 @@ use super::draw_list::DrawList;
 use super::item_buffer::{ItemBuffer, View};
 use super::item_table::ItemTable;
 use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
+use super::limits::GpuLimits;
 use super::memory::Memory;
-use super::readback::{Readback, StageSeconds};
-use super::reduce::Reduce;
+use super::readback::{Readback, Results, Timer};
+use super::reduce::{BatchSize, Reduce};
 use super::resolution::Resolution;
 use super::split_float::SplitFloat;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::{Mesh, NodeId};
+use crate::progress::Timings;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::visibility::offset;
 
@@ -35,16 +46,16 @@ use crate::visibility::offset;
 #[derive(Debug)]
 pub struct HemicubeRows {
     gpu: Gpu,
-    chunks: DrawList,
+    draw_list: DrawList,
     batches: Batches,
-    local: SplitFloat,
+    coordinates: SplitFloat,
     slots: u32,
     /// Rows that are best asked for at once, however many hemicubes there is memory for: it decides
     /// the order of shots.
-    batch: u32,
+    preferred_batch: u32,
     rotations: NonZeroU32,
-    full_share: f64,
-    seconds: StageSeconds,
+    pub(in crate::backend) full_share: f64,
+    timings: Timings,
 }
 
 /// What draws hemicubes, a batch at a time.
@@ -55,8 +66,8 @@ struct Batches {
     /// The full resolution, then what it is halved to.
     resolutions: Vec<Resolution>,
     readback: Readback,
-    /// HemicubeRows at once, at most.
-    most: u32,
+    /// Hemicubes at once, at most.
+    max_hemicubes: u32,
     _memory: Memory,
 }
 
@@ -64,7 +75,7 @@ struct Batches {
 /// that much in a fraction of a second.
 const BATCH_BYTES: u64 = 32 << 20;
 
-/// HemicubeRows in a batch at most.
+/// Hemicubes in a batch at most. Chosen by hand; no measurement kept.
 const MAX_BATCH: u32 = 16;
 
 impl HemicubeRows {
@@ -73,8 +84,8 @@ impl HemicubeRows {
     /// resolution for all, and the time that rows take falls by a third (measured in three scenes).
     pub const FULL_SHARE: f64 = 4e-3;
 
-    /// HemicubeRows with a top face of `resolution` × `resolution` pixels over `mesh`, and fewer for
-    /// patches that shoot little.
+    /// Hemicubes with a top face of `resolution` × `resolution` pixels over `mesh`, and fewer
+    /// pixels for patches that shoot little.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an unusable resolution ([`hemicube::check_resolution`]) or a mesh
@@ -82,57 +93,47 @@ impl HemicubeRows {
     /// hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeRows, Error> {
         hemicube::check_resolution(resolution)?;
-        let limits = gpu.device.limits();
-        let setting = |place: String, found: String, remedy: String| {
-            Err(Error::new(ErrorKind::Setting, place, found, remedy))
-        };
-        let texture = limits.max_texture_dimension_2d;
-        let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let fits = |n: &u32| 3 * n <= texture && Reduce::items_bytes(*n) <= buffer;
-        if !fits(&resolution) {
-            let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
-            return setting(
-                format!("hemicube resolution {resolution}"),
-                format!("an item buffer of {resolution} × {} pixels", 3 * resolution),
-                format!("this device allows resolutions up to {most}"),
-            );
-        }
-        let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
-        let triangles = mesh.scene().triangles().len() as u64;
-        let (row_bytes, items) = (u64::from(slots) * 4, ItemTable::count(mesh));
-        let triangle_bytes = 3 * size_of::<Corner>() as u64;
-        if (row_bytes + 64).max(items * 4).max(triangles * triangle_bytes) > buffer {
-            return setting(
-                "mesh".into(),
-                format!("{items} finest cells of elements in {triangles} triangles"),
-                format!("this device holds {} and {}", buffer / 4 - 16, buffer / triangle_bytes),
-            );
-        }
+        let limits = gpu.limits();
+        check_resolution_fits(limits, resolution)?;
+        check_mesh_fits(limits, mesh)?;
+        let slots = slots(mesh);
         let item_bytes = Reduce::items_bytes(resolution);
-        let batch = MAX_BATCH
+        let preferred_batch = MAX_BATCH
             .min((BATCH_BYTES / item_bytes).max(1) as u32)
-            .min(limits.max_texture_array_layers)
-            .min((buffer / item_bytes) as u32)
-            .min(((buffer - 64) / row_bytes) as u32);
-        let local = SplitFloat::new(mesh.scene());
-        let (cells, chunks) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
-        let batches = gpu.fit(batch, |memory, most| {
-            let item_buffer = ItemBuffer::new(&memory, mesh, &cells, &chunks.order, &local, most)?;
-            let reduce = Reduce::new(&memory, &cells, resolution, slots, most)?;
-            let resolutions = Resolution::halved(&memory, &reduce, resolution, most)?;
+            .min(limits.layers)
+            .min((limits.buffer / item_bytes) as u32)
+            .min(((limits.buffer - ROW_MARGIN) / (u64::from(slots) * 4)) as u32);
+        let coordinates = SplitFloat::new(mesh.scene());
+        let (table, draw_list) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
+        let order = &draw_list.order;
+        let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
+        let corners = coordinates.corners(corners);
+        let triangles: Vec<_> = order.iter().map(|&t| table.triangles[t as usize]).collect();
+        let batches = gpu.retry_with_smaller_batches(preferred_batch, |memory, hemicubes| {
+            let item_buffer = ItemBuffer::new(&memory, &corners, &triangles, hemicubes)?;
+            let size = BatchSize { resolution, slots, hemicubes };
+            let reduce = Reduce::new(&memory, &table.slots, size)?;
+            let resolutions = Resolution::halved(&memory, &reduce, resolution, hemicubes)?;
             let readback = Readback::new(&memory, reduce.rows.size())?;
-            Ok(Batches { item_buffer, reduce, resolutions, readback, most, _memory: memory })
+            Ok(Batches {
+                item_buffer,
+                reduce,
+                resolutions,
+                readback,
+                max_hemicubes: hemicubes,
+                _memory: memory,
+            })
         })?;
         Ok(HemicubeRows {
             gpu: gpu.clone(),
-            chunks,
+            draw_list,
             batches,
-            local,
+            coordinates,
             slots,
-            batch,
+            preferred_batch,
             rotations: NonZeroU32::MIN,
             full_share: HemicubeRows::FULL_SHARE,
-            seconds: StageSeconds::default(),
+            timings: Timings::default(),
         })
     }
 
@@ -155,17 +156,17 @@ impl HemicubeRows {
         HemicubeRows { full_share, ..self }
     }
 
-    /// Time spent so far.
-    pub fn seconds(&self) -> StageSeconds {
-        self.seconds
+    /// Time of the passes so far.
+    pub fn timings(&self) -> Timings {
+        self.timings
     }
 
-    /// HemicubeRows drawn so far, each rotation of one counted.
+    /// Hemicubes drawn so far, each rotation of one counted.
     pub fn drawn(&self) -> u64 {
         self.batches.resolutions.iter().map(|r| r.drawn).sum()
     }
 
-    /// HemicubeRows drawn so far at each resolution: pixels along an edge of the top face, and how
+    /// Hemicubes drawn so far at each resolution: pixels along an edge of the top face, and how
     /// many; the full one first, then what it is halved to.
     pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
         self.batches.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
@@ -174,10 +175,10 @@ impl HemicubeRows {
     /// The faces of the hemicube over `patch`, turned by `angle` (radians).
     fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), angle);
-        let near = self.local.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
+        let near = self.coordinates.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
         let centre = mesh.centroid(patch);
-        let [eye, eye_low] = self.local.parts(centre);
-        let own_triangle = self.chunks.places[mesh.triangle(patch)];
+        let [eye, eye_low] = self.coordinates.parts(centre);
+        let own_triangle = self.draw_list.position_of[mesh.triangle(patch)];
         Face::all(&frame).map(|face| View {
             face: FaceView {
                 eye,
@@ -191,11 +192,11 @@ impl HemicubeRows {
                 eye_low,
                 padding_2: 0,
             },
-            places: self.chunks.in_view(centre, &face),
+            runs: self.draw_list.in_view(centre, &face),
         })
     }
 
-    /// One hemicube a patch, each with its turn, of resolution number `at`.
+    /// One hemicube a patch, each turned by its angle, of resolution number `at`.
     fn draw_batch(
         &mut self,
         mesh: &Mesh,
@@ -204,27 +205,61 @@ impl HemicubeRows {
     ) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
         let views: Vec<View> =
-            patches.iter().flat_map(|&(p, turn)| self.views(mesh, p, turn)).collect();
+            patches.iter().flat_map(|&(p, angle)| self.views(mesh, p, angle)).collect();
         let count = patches.len() as u32;
         let (gpu, slots) = (&self.gpu, self.slots);
         let Batches { item_buffer, reduce, resolutions, readback, .. } = &mut self.batches;
-        let resolution = &mut resolutions[at];
-        let seconds = &mut self.seconds;
-        let rows: Result<Vec<Row>, String> = gpu.attempt(|| {
+        let Resolution { targets, bindings, drawn, .. } = &mut resolutions[at];
+        let timer = Timer { start, timings: &mut self.timings };
+        let rows: Result<Vec<Row>, String> = gpu.with_error_scopes(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let queries = readback.queries();
-            item_buffer.draw(gpu, &mut encoder, resolution, &views, queries);
-            reduce.reduce(&mut encoder, resolution, count, queries);
-            let source = (&reduce.rows, u64::from(count * slots) * 4);
-            readback.finish(gpu, encoder, source, (start, seconds), |bytes| {
+            item_buffer.draw(&gpu.queue, &mut encoder, targets, &views, queries);
+            reduce.reduce(&mut encoder, targets, bindings, count, queries);
+            let results = Results { buffer: &reduce.rows, bytes: u64::from(count * slots) * 4 };
+            readback.finish(gpu, encoder, results, timer, |bytes| {
                 let dense: &[u32] = bytemuck::cast_slice(bytes);
                 let rows = dense.chunks_exact(slots as usize).zip(patches);
                 rows.map(|(dense, &(patch, _))| sparse(dense, patch)).collect()
             })
         })?;
-        resolution.drawn += u64::from(count);
-        rows.map_err(|found| gpu.wrong(found))
+        *drawn += u64::from(count);
+        rows.map_err(|found| gpu.invalid_result(found))
     }
+}
+
+/// Bytes that a buffer of rows is larger than its rows, at least: alignment and the three ticks.
+const ROW_MARGIN: u64 = 64;
+
+/// Words of a dense row over `mesh`.
+fn slots(mesh: &Mesh) -> u32 {
+    mesh.element_count() as u32 + FIRST_ELEMENT
+}
+
+fn check_resolution_fits(limits: GpuLimits, resolution: u32) -> Result<(), Error> {
+    let fits = |n: &u32| 3 * n <= limits.texture && Reduce::items_bytes(*n) <= limits.buffer;
+    if fits(&resolution) {
+        return Ok(());
+    }
+    let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
+    let place = format!("hemicube resolution {resolution}");
+    let found = format!("an item buffer of {resolution} × {} pixels", 3 * resolution);
+    let remedy = format!("this device allows resolutions up to {most}");
+    Err(Error::new(ErrorKind::Setting, place, found, remedy))
+}
+
+fn check_mesh_fits(limits: GpuLimits, mesh: &Mesh) -> Result<(), Error> {
+    let (row_bytes, items) = (u64::from(slots(mesh)) * 4, ItemTable::count(mesh));
+    let triangles = mesh.scene().triangles().len() as u64;
+    let triangle_bytes = 3 * size_of::<Corner>() as u64;
+    let largest = (row_bytes + ROW_MARGIN).max(items * 4).max(triangles * triangle_bytes);
+    if largest <= limits.buffer {
+        return Ok(());
+    }
+    let found = format!("{items} finest cells of elements in {triangles} triangles");
+    let (cells, most) = (limits.buffer / 4 - 16, limits.buffer / triangle_bytes);
+    let remedy = format!("this device holds {cells} and {most}");
+    Err(Error::new(ErrorKind::Setting, "mesh".to_string(), found, remedy))
 }
 
 impl FormFactors for HemicubeRows {
@@ -241,7 +276,7 @@ impl FormFactors for HemicubeRows {
         let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
         let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
         let mut rows = Vec::with_capacity(turned.len());
-        for batch in turned.chunks(self.batches.most as usize) {
+        for batch in turned.chunks(self.batches.max_hemicubes as usize) {
             rows.extend(self.draw_batch(mesh, batch, at)?);
         }
         if count == 1 {
@@ -252,7 +287,7 @@ impl FormFactors for HemicubeRows {
     }
 
     fn preferred_batch_len(&self) -> usize {
-        (self.batch / self.rotations.get()).max(1) as usize
+        (self.preferred_batch / self.rotations.get()).max(1) as usize
     }
 
     fn fingerprint(&self) -> String {
@@ -268,7 +303,7 @@ fn rotation(patch: NodeId) -> f64 {
     unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
 }
 
-/// The row of `patch` from what the device says; or what is wrong with that.
+/// The row of `patch` from the device's dense row; or what is wrong with that.
 fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
     let seen = dense[FIRST_ELEMENT as usize..].iter();
     let entries = (0..)
@@ -277,10 +312,10 @@ fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
         .map(|(element, &share)| Entry { element, share })
         .collect();
     let row = Row { entries, escaped: dense[OPEN as usize], backface: dense[BACK as usize] };
-    match row.sum() == u64::from(Row::TOTAL) {
-        true => Ok(row),
-        false => Err(format!("shares of patch {} that sum to {}", patch.0, row.closure())),
+    if row.sum() != u64::from(Row::TOTAL) {
+        return Err(format!("shares of patch {} that sum to {}", patch.0, row.closure()));
     }
+    Ok(row)
 }
 
 #[cfg(test)]
@@ -302,7 +337,7 @@ mod tests {
         });
         let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            h.batches.resolutions[0].layers.texture.as_image_copy(),
+            h.batches.resolutions[0].targets.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout {

@@ -1,9 +1,17 @@
-//! The settled light on the device: quadtrees, and the radiosity at their elements' corners.
+//! The light to be gathered on the device: quadtrees, and the radiosity at their elements' corners.
+//!
+//! ```text
+//! lattices[t] ─► nodes[first + cell]  the node of that cell, at the deepest level that triangle t's
+//!                    │                quadtree is complete to
+//!                    ▼
+//!                INNER + k ─► nodes[k .. k+4], its children, and so on down to
+//!                    e     ─► elements: corners a, b, c of element e in three lines of a texture
+//! ```
 
 use rayon::prelude::*;
 
-use super::device::Gpu;
 use super::layout::{ELEMENTS_A_LINE, INNER, Lattice};
+use super::limits::GpuLimits;
 use super::memory::Memory;
 use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
@@ -16,30 +24,35 @@ pub struct SourceBuffers {
     pub lattices: wgpu::Buffer,
     /// Per node, [`INNER`] plus the first of its four children, or its element.
     pub nodes: wgpu::Buffer,
-    /// Per element, the reflected radiosity at its three corners, per channel, one below the other; [`ELEMENTS_A_LINE`] side by side.
+    /// Per element, the reflected radiosity at its three corners, per channel, one below the
+    /// other; [`ELEMENTS_A_LINE`] elements side by side.
     pub elements: wgpu::TextureView,
 }
 
 impl SourceBuffers {
-    /// MatrixChecks `sources` against a scene of so many triangles, and uploads them, in units of `bright`
-    /// W/m².
+    /// Checks `sources` against a scene of so many triangles, and uploads them, in units of
+    /// `radiance_unit` W/m².
     pub fn new(
         memory: &Memory,
         sources: &RadiosityField,
+        limits: GpuLimits,
         triangles: usize,
-        bright: f64,
+        radiance_unit: f64,
     ) -> Result<SourceBuffers, Error> {
-        check(&memory.gpu, sources, triangles)?;
+        check(limits, sources, triangles)?;
         let RadiosityField { mesh, corners, reflected } = *sources;
         let (lattices, nodes) = quadtrees(mesh);
-        let value = |k: u32| (reflected[k as usize] / bright).as_vec3().extend(0.0).to_array();
+        let value =
+            |k: u32| (reflected[k as usize] / radiance_unit).as_vec3().extend(0.0).to_array();
         let line = ELEMENTS_A_LINE as usize;
         let lines = corners.len().div_ceil(line);
         let mut texels = vec![[0f32; 4]; lines * 3 * line];
         texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(
             |(texels, corners)| {
                 for (x, corner) in corners.iter().enumerate() {
-                    (0..3).for_each(|k| texels[k * line + x] = value(corner[k]));
+                    for k in 0..3 {
+                        texels[k * line + x] = value(corner[k]);
+                    }
                 }
             },
         );
@@ -53,7 +66,7 @@ impl SourceBuffers {
             rows_per_image: None,
         };
         let texels = bytemuck::cast_slice(&texels);
-        memory.gpu.queue.write_texture(elements.as_image_copy(), texels, layout, elements.size());
+        memory.queue.write_texture(elements.as_image_copy(), texels, layout, elements.size());
         Ok(SourceBuffers {
             lattices: memory.storage("lattices", bytemuck::cast_slice(&lattices))?,
             nodes: memory.storage("nodes", bytemuck::cast_slice(&nodes))?,
@@ -90,7 +103,7 @@ fn quadtrees(mesh: &Mesh) -> (Vec<Lattice>, Vec<u32>) {
     (lattices, nodes)
 }
 
-fn check(gpu: &Gpu, sources: &RadiosityField, triangles: usize) -> Result<(), Error> {
+fn check(limits: GpuLimits, sources: &RadiosityField, triangles: usize) -> Result<(), Error> {
     let RadiosityField { mesh, corners, reflected } = *sources;
     let setting = |found: String, remedy: String| {
         Err(Error::new(ErrorKind::Setting, "sources".to_string(), found, remedy))
@@ -107,10 +120,8 @@ fn check(gpu: &Gpu, sources: &RadiosityField, triangles: usize) -> Result<(), Er
     if let Some(k) = corners.iter().flatten().find(|&&k| k as usize >= reflected.len()) {
         return setting(format!("corner value {k}"), format!("must be below {}", reflected.len()));
     }
-    let limits = gpu.device.limits();
-    let buffer = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     // There are fewer than three nodes an element: less than 4/3 in trees and one in lattices.
-    let most = u64::from(limits.max_texture_dimension_2d / 3 * ELEMENTS_A_LINE).min(buffer / 12);
+    let most = u64::from(limits.texture / 3 * ELEMENTS_A_LINE).min(limits.buffer / 12);
     if elements as u64 > most {
         return setting(format!("{elements} elements"), format!("this device holds {most}"));
     }

@@ -1,7 +1,7 @@
 //! The report of a bake: what was done, with what, and where the light and the time went; as JSON
 //! and as a small table.
 
-use radiosity::{BakeResult, Ledger, Rgb};
+use radiosity::{AdapterInfo, BakeResult, Ledger, Rgb};
 use serde_json::{Map, Value, json};
 
 use crate::bake::{Target, settings};
@@ -11,7 +11,7 @@ pub struct Report {
     /// The scene, as the user named it.
     pub scene: String,
     /// Name, type and driver of what made the rows.
-    pub adapter: [String; 3],
+    pub adapter: AdapterInfo,
     /// What was asked for.
     pub target: Target,
     /// Triangles with area.
@@ -35,13 +35,13 @@ impl Report {
     pub fn to_json(&self) -> Value {
         let baked = &self.baked;
         let (s, error) = (baked.timings, baked.estimate);
-        let [name, kind, driver] = &self.adapter;
+        let AdapterInfo { name, kind, driver } = &self.adapter;
         let by_resolution = baked.hemicubes_by_resolution.iter();
         let by_resolution: Map<String, Value> =
             by_resolution.map(|(pixels, count)| (pixels.to_string(), json!(count))).collect();
         json!({
             "scene": self.scene,
-            "adapter": { "name": name, "type": kind, "driver": driver },
+            "adapter": { "name": name, "type": kind.to_string(), "driver": driver },
             "goal": match self.target {
                 Target::Settings(_) => Value::Null,
                 Target::Error(error) => json!({ "error": error }),
@@ -86,7 +86,7 @@ impl Report {
 
     /// A line a subject, shares in percent.
     pub fn table(&self) -> String {
-        let [name, kind, driver] = &self.adapter;
+        let AdapterInfo { name, kind, driver } = &self.adapter;
         let (baked, light) = (&self.baked, &self.baked.light);
         let (ledger, error, s) = (baked.solution.ledger, baked.estimate, baked.timings);
         let emitted = ledger.emitted.element_sum();

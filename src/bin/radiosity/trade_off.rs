@@ -142,7 +142,7 @@ impl Options {
             measured,
             reference,
             scene: self.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            adapter: device.adapter()[0].clone(),
+            adapter: device.adapter().name,
         };
         self.write("csv", results.csv().as_bytes())?;
         self.write("svg", chart::svg(&results).map_err(|e| self.bad_chart(&e))?.as_bytes())?;

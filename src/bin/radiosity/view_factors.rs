@@ -8,7 +8,9 @@ use std::time::Instant;
 
 use files::Format;
 use lexopt::prelude::*;
-use radiosity::{BakeSettings, Error, ErrorKind, Estimate, Mesh, Scene, ViewFactors, load_obj};
+use radiosity::{
+    AdapterInfo, BakeSettings, Error, ErrorKind, Estimate, Mesh, Scene, ViewFactors, load_obj,
+};
 
 use crate::args::{self, Device, Stop};
 use crate::progress;
@@ -172,7 +174,7 @@ impl Method {
                 let mesh = Mesh::new(scene, size)?;
                 let device = device.open()?;
                 let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
-                let [name, kind, _] = device.adapter();
+                let AdapterInfo { name, kind, .. } = device.adapter();
                 println!("{} elements, {name} ({kind})", mesh.element_count());
                 progress::of_count("elements", |report| {
                     ViewFactors::sampled(&mesh, &mut rows, report)

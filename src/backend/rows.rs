@@ -1,0 +1,116 @@
+//! Rows of either backend behind one type, with the time that they take.
+
+use std::time::Instant;
+
+use super::cpu::RayRows;
+#[cfg(feature = "gpu")]
+use super::gpu::HemicubeRows;
+use crate::error::Error;
+use crate::form_factor::{FormFactors, Row};
+use crate::mesh::{Mesh, NodeId};
+use crate::progress::Timings;
+
+/// Form-factor rows of a [`crate::Backend`], made by [`crate::Backend::rows`].
+#[derive(Debug)]
+pub struct BackendRows {
+    source: Box<dyn RowSource>,
+    seconds: f64,
+}
+
+/// What the row makers of all backends can do beside making rows.
+trait RowSource: FormFactors + std::fmt::Debug + Send + Sync {
+    /// See [`BackendRows::with_full_share`].
+    fn set_full_share(&mut self, full_share: f64);
+
+    /// See [`BackendRows::drawn_by_resolution`].
+    fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
+        vec![]
+    }
+
+    /// Time of the passes, where they are timed one by one.
+    fn pass_timings(&self) -> Option<Timings> {
+        None
+    }
+}
+
+impl RowSource for RayRows {
+    fn set_full_share(&mut self, full_share: f64) {
+        self.full_share = full_share;
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl RowSource for HemicubeRows {
+    fn set_full_share(&mut self, full_share: f64) {
+        self.full_share = full_share;
+    }
+
+    fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
+        HemicubeRows::drawn_by_resolution(self)
+    }
+
+    fn pass_timings(&self) -> Option<Timings> {
+        Some(self.timings())
+    }
+}
+
+impl From<RayRows> for BackendRows {
+    fn from(rows: RayRows) -> BackendRows {
+        BackendRows { source: Box::new(rows), seconds: 0.0 }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<HemicubeRows> for BackendRows {
+    fn from(rows: HemicubeRows) -> BackendRows {
+        BackendRows { source: Box::new(rows), seconds: 0.0 }
+    }
+}
+
+impl BackendRows {
+    /// Full resolution, or all rays, for patches that shoot at least this share of the emitted
+    /// flux, in [0, 1]; with 0 for all.
+    pub fn with_full_share(mut self, full_share: f64) -> BackendRows {
+        self.source.set_full_share(full_share);
+        self
+    }
+
+    /// Hemicubes drawn so far at each resolution (pixels along an edge of the top face, count);
+    /// none where rays are cast.
+    pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
+        self.source.drawn_by_resolution()
+    }
+
+    /// Time of the passes so far: draw, reduce and readback. Casting rays is all draw.
+    pub fn timings(&self) -> Timings {
+        let rays = Timings { draw: self.seconds, ..Default::default() };
+        self.source.pass_timings().unwrap_or(rays)
+    }
+
+    /// Seconds spent on rows so far, all in all.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+}
+
+impl FormFactors for BackendRows {
+    fn rows(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        unshot_share: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let start = Instant::now();
+        let rows = self.source.rows(mesh, patches, unshot_share);
+        self.seconds += start.elapsed().as_secs_f64();
+        rows
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        self.source.preferred_batch_len()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.source.fingerprint()
+    }
+}
