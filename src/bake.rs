@@ -21,9 +21,12 @@
 //! Shooting is done once; its error is chosen small beforehand. Rows and gathers come from a
 //! [`Backend`](crate::Backend); when a graphics device fails underway, rays on the CPU go on.
 
+mod controller;
 mod error_estimate;
+mod estimator;
 mod fallback;
 mod gather_phase;
+pub mod model;
 mod pipeline;
 mod progress;
 mod result;

@@ -4,17 +4,17 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::backend::Backend;
+use crate::bake::controller::ErrorTarget;
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::gather_phase::GatherPhase;
-use crate::bake::progress::{BakeProgress, ProgressCallback};
+use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
-use crate::bake::shooting_phase::ShootingPhase;
+use crate::bake::shooting_phase;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Scene;
-use crate::vertex::adaptive::AdaptiveGather;
 use crate::vertex::gathering::GatheredMesh;
 
 impl BakeSettings {
@@ -36,15 +36,6 @@ impl BakeSettings {
     }
 }
 
-/// An error to be reached.
-#[derive(Clone, Copy)]
-pub(super) struct ErrorTarget<'a> {
-    /// Root mean square error, relative, in (0, 1).
-    pub error: f64,
-    /// Sets by hand what was chosen, after every choice.
-    pub overrides: &'a dyn Fn(&mut BakeSettings),
-}
-
 /// Bakes as far as `settings` go and, given a `target`, on until the estimated error meets it.
 pub(super) fn run(
     settings: &BakeSettings,
@@ -53,30 +44,39 @@ pub(super) fn run(
     target: Option<ErrorTarget>,
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
+    settings.check()?;
     let backend = &ResilientBackend::new(backend);
-    let shot = ShootingPhase::new(settings, scene, backend, progress)?;
-    let light = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
-    let (light, estimate, shot, settings) = match &settings.gather {
+    let mut reporter = Reporter { backend, callback: progress };
+    let mut clock = StageClock::start();
+    let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
+    let shot_light = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
+    let baked = match &settings.gather {
         Some(gather) if shot.solution.stop != StopReason::Cancelled => {
-            let mesh = Mesh::new(scene.clone(), gather.element_size)?;
-            let mesh = mesh.split_at_contacts(gather.contact_levels);
-            let state = AdaptiveGather::new(mesh.clone(), &light);
-            let looks = backend.gather(&mesh, gather.rays, gather.noise_tolerance, state.dim())?;
-            GatherPhase { effort: settings.clone(), state, looks, device: backend, shot }
-                .until(target, progress)?
+            let mesh = Mesh::new(scene.clone(), gather.element_size)?
+                .split_at_contacts(gather.contact_levels);
+            let halves = (settings.solve.clone(), gather.clone());
+            GatherPhase::new(halves, target, mesh, &shot_light, &shot, backend)?
+                .run(&mut reporter, &mut clock)?
         }
-        _ => shot.judge(settings, light, backend, progress)?,
+        _ => shooting_phase::estimate_elements(
+            &shot,
+            settings,
+            shot_light,
+            backend,
+            &mut reporter,
+            &mut clock,
+        )?,
     };
     Ok(BakeResult {
         mesh: shot.mesh,
         solution: shot.solution,
-        light,
-        estimate,
-        settings,
+        light: baked.light,
+        estimate: baked.estimate,
+        settings: baked.settings,
         hemicubes: shot.hemicubes,
         hemicubes_by_resolution: shot.hemicubes_by_resolution,
-        mean_near_correction: shot.near_moved,
+        mean_near_correction: shot.mean_near_correction,
         device_failure: backend.failure(),
-        timings: shot.seconds,
+        timings: clock.timings,
     })
 }

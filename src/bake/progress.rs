@@ -1,10 +1,12 @@
-//! What a bake tells while it works.
+//! What a bake tells while it works, and where its time goes.
 
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 use crate::bake::error_estimate::ErrorEstimate;
 use crate::bake::fallback::ResilientBackend;
 use crate::error::Error;
+use crate::progress::{Timings, lap};
 use crate::solver::Progress;
 use crate::vertex::gathering::GatherProgress;
 
@@ -33,14 +35,35 @@ pub enum BakeProgress {
 /// The caller's callback; [`ControlFlow::Break`] stops the bake.
 pub(super) type ProgressCallback<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
 
-/// Reports `stage`; before that, once, that the device of `backend` has failed.
-pub(super) fn report(
-    backend: &ResilientBackend,
-    stage: &BakeProgress,
-    progress: ProgressCallback,
-) -> ControlFlow<()> {
-    if let Some(error) = backend.new_failure() {
-        progress(&BakeProgress::DeviceFailed(error))?;
+/// Reports stages to the caller and, once, that the device has failed.
+pub(super) struct Reporter<'a> {
+    pub backend: &'a ResilientBackend<'a>,
+    pub callback: ProgressCallback<'a>,
+}
+
+impl Reporter<'_> {
+    /// Reports `stage`, and before that a failure of the device that was not reported yet.
+    pub fn report(&mut self, stage: BakeProgress) -> ControlFlow<()> {
+        if let Some(error) = self.backend.new_failure() {
+            (self.callback)(&BakeProgress::DeviceFailed(error))?;
+        }
+        (self.callback)(&stage)
     }
-    progress(stage)
+}
+
+/// Attributes time to the stages of a bake.
+pub(super) struct StageClock {
+    pub timings: Timings,
+    lap_start: Instant,
+}
+
+impl StageClock {
+    pub fn start() -> StageClock {
+        StageClock { timings: Timings::default(), lap_start: Instant::now() }
+    }
+
+    /// Seconds since the start or the last lap.
+    pub fn lap(&mut self) -> f64 {
+        lap(&mut self.lap_start)
+    }
 }

@@ -35,3 +35,10 @@ pub struct BakeResult {
     /// Wall time by stage.
     pub timings: Timings,
 }
+
+/// Light with its estimated error, and the settings it took.
+pub(super) struct BakedLight {
+    pub light: GatheredMesh,
+    pub estimate: ErrorEstimate,
+    pub settings: BakeSettings,
+}

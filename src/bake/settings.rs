@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use crate::bake::model;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
@@ -123,47 +124,43 @@ impl BakeSettings {
         settings
     }
 
-    /// What it takes, by experience, for vertices to be off by `error`: a share of their radiosity,
-    /// root mean square over the area of `scene`.
+    /// What the [model](crate::bake::model) of error and cost says it takes for vertices of `scene` to
+    /// be off by `error`: a share of their radiosity, root mean square over the area. Below 1e-4 and
+    /// above 0.3 they are those of the nearest of these.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
+        let e = model::clamped(error, model::ERRORS);
         let diagonal = scene.bounds().diagonal();
-        let e = error.clamp(1e-4, 0.3);
-        let hemicube = match e {
-            e if e > 0.03 => 32,
-            e if e > 0.006 => 64,
-            e if e > 0.003 => 128,
-            _ => 256,
-        };
-        let contacts = if e < 0.009 { 3 } else { 2 };
-        let gathering = RefinementSettings {
-            tolerance: (2.5 * e).min(0.1),
-            curve: e / 4.0,
-            sweeps: if e > 0.03 { 1 } else { 2 },
-            ..RefinementSettings::new(0.1 * diagonal * e.powf(0.85))
+        let shooting_edge = model::SHOOTING_EDGE.setting(e);
+        let solver = Solver {
+            unshot: e / model::ERROR_OVER_UNSHOT,
+            patch_tolerance: model::patch_tolerance(e),
+            ..Solver::default()
         };
         let solve = SolveSettings {
-            element_size: diagonal * (0.105 * e.powf(0.4)).max(0.6 * e),
-            contact_levels: contacts,
-            hemicube_resolution: hemicube,
+            element_size: diagonal * shooting_edge.max(model::COARSE_SHOOTING_EDGE.setting(e)),
+            contact_levels: model::shooting_contact_levels(e),
+            hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
             rotations: NonZeroU32::MIN,
-            near_reach: 1.0,
+            near_reach: model::NEAR_REACH,
             viewpoint_tolerance: None,
-            solver: Solver {
-                unshot: e / 40.0,
-                patch_tolerance: e.min(0.02 + 0.4 * e),
-                ..Solver::default()
-            },
+            solver,
             gmres_if_bright: true,
             checkpoint: None,
             ambient: false,
         };
+        let refinement = RefinementSettings {
+            tolerance: model::BEND.setting(e).min(model::MAX_BEND),
+            curve: model::CURVE.setting(e),
+            sweeps: model::sweeps(e),
+            ..RefinementSettings::new(model::SMALLEST_EDGE.times(diagonal).setting(e))
+        };
         let gather = GatherSettings {
-            element_size: 0.3 * diagonal * e.powf(0.3),
-            contact_levels: if e > 0.07 { 1 } else { contacts },
-            rays: (20.0 / e).ceil() as u32,
+            element_size: model::GATHER_EDGE.times(diagonal).setting(e),
+            contact_levels: model::gathering_contact_levels(e),
+            rays: (model::RAYS_TIMES_ERROR / e).ceil() as u32,
             noise_tolerance: e,
-            refinement: gathering,
+            refinement,
         };
         BakeSettings { solve, gather: Some(gather) }
     }

@@ -1,12 +1,23 @@
-//! The first half of a bake: light that is shot, on elements.
+//! The first phase of a bake: light is shot on elements.
+//!
+//! The scene is cut into elements, more finely where surfaces touch. Rows of form factors come from
+//! the backend, are corrected for near receivers and, if asked for, averaged over several viewpoints
+//! of a patch; a solver sends light along them. Given a checkpoint file the solve goes on from it.
+//!
+//! ```text
+//! backend ─► ProximityCorrection ─► AdaptiveViewpoints ─► Solver ─► radiosity of elements
+//! ```
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::bake::error_estimate::{ErrorEstimate, ErrorEstimator, LEAST_PLACES};
+use crate::bake::estimator::ErrorEstimator;
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
-use crate::bake::progress::{BakeProgress, ProgressCallback, report};
+use crate::bake::model;
+use crate::bake::progress::{BakeProgress, Reporter, StageClock};
+use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
@@ -14,101 +25,61 @@ use crate::form_factor::proximity::ProximityCorrection;
 use crate::form_factor::viewpoints::AdaptiveViewpoints;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::progress::{Timings, lap};
 use crate::scene::Scene;
-use crate::solver::{Progress, Solution};
+use crate::solver::{Progress, Solution, Solver};
 use crate::vertex::gathering::GatheredMesh;
 
-/// Light that was shot.
-pub(super) struct ShootingPhase {
+/// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
+const CHECKPOINT_INTERVAL: u32 = 10;
+
+/// What the first phase leaves to the second.
+pub(super) struct ShotLight {
     pub mesh: Mesh,
     pub solution: Solution,
+    /// Rows drawn or cast, those of all rotations and viewpoints.
     pub hemicubes: u64,
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
-    pub near_moved: f64,
-    pub seconds: Timings,
-    pub since: Instant,
+    /// Mean share of a row that the proximity correction moved.
+    pub mean_near_correction: f64,
 }
 
-impl ShootingPhase {
-    pub fn new(
-        settings: &BakeSettings,
-        scene: &Arc<Scene>,
-        device: &ResilientBackend,
-        progress: ProgressCallback,
-    ) -> Result<ShootingPhase, Error> {
-        let mut since = Instant::now();
-        settings.check()?;
-        let settings = &settings.solve;
-        let mesh = Mesh::new(scene.clone(), settings.element_size)?
-            .split_at_contacts(settings.contact_levels);
-        let rows = device.rows(&mesh, settings)?;
-        let near = ProximityCorrection::new(rows, &mesh, settings.near_reach);
-        let levels = if settings.viewpoint_tolerance.is_some() { u32::MAX } else { 0 };
-        let tolerance = settings.viewpoint_tolerance.unwrap_or(1.0);
-        let mut rows = AdaptiveViewpoints::new(near, tolerance, levels);
-        let mut seconds = Timings { mesh: lap(&mut since), ..Default::default() };
-        let mut tell = |p: &Progress| report(device, &BakeProgress::Shooting(*p), progress);
-        let mut solution = solve(settings, &mesh, &mut rows, &mut tell)?;
-        if settings.ambient {
-            solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
-        }
-        let relay: &ResilientRows = rows.inner().inner();
-        let mut in_rows = 0.0;
-        for maker in [relay.first()].into_iter().chain(relay.second()) {
-            seconds += maker.timings();
-            in_rows += maker.seconds();
-        }
-        seconds.solve = lap(&mut since) - in_rows;
-        let rotations = u64::from(settings.rotations.get());
-        let hemicubes = (solution.rows_made + rows.extra()) * rotations;
-        let near_moved = rows.inner().moved();
-        let hemicubes_by_resolution = relay.first().drawn_by_resolution();
-        drop(rows);
-        Ok(ShootingPhase {
-            mesh,
-            solution,
-            hemicubes,
-            hemicubes_by_resolution,
-            near_moved,
-            seconds,
-            since,
-        })
+/// Shoots the light of `scene`.
+pub(super) fn shoot(
+    settings: &SolveSettings,
+    scene: &Arc<Scene>,
+    backend: &ResilientBackend,
+    reporter: &mut Reporter,
+    clock: &mut StageClock,
+) -> Result<ShotLight, Error> {
+    let mesh =
+        Mesh::new(scene.clone(), settings.element_size)?.split_at_contacts(settings.contact_levels);
+    let near = ProximityCorrection::new(backend.rows(&mesh, settings)?, &mesh, settings.near_reach);
+    let mut rows = match settings.viewpoint_tolerance {
+        Some(tolerance) => AdaptiveViewpoints::new(near, tolerance, u32::MAX),
+        None => AdaptiveViewpoints::new(near, 1.0, 0),
+    };
+    clock.timings.mesh = clock.lap();
+    let mut progress = |p: &Progress| reporter.report(BakeProgress::Shooting(*p));
+    let mut solution = solve(settings, &mesh, &mut rows, &mut progress)?;
+    if settings.ambient {
+        solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
     }
-
-    /// The elements' own light, as it is.
-    pub fn judge(
-        mut self,
-        effort: &BakeSettings,
-        mut light: GatheredMesh,
-        device: &ResilientBackend,
-        progress: ProgressCallback,
-    ) -> Result<(GatheredMesh, ErrorEstimate, ShootingPhase, BakeSettings), Error> {
-        self.seconds.vertices = lap(&mut self.since);
-        let spread = |corners: &[u32; 3]| {
-            let [a, b, c] = corners.map(|v| light.reflected[v as usize]);
-            a.distance(b).max(b.distance(c)).max(c.distance(a)) / 4.0
-        };
-        let rest: Vec<f64> = light.corners.iter().map(spread).collect();
-        let mut looks = device.gather(&self.mesh, LOOKS, f64::INFINITY, 0.0)?;
-        let ledger = &self.solution.ledger;
-        let judged =
-            ErrorEstimator { light: &light, sources: &light, rest: &rest, ledger, sweeps: 0 };
-        let of = LEAST_PLACES;
-        let mut cancelled = self.solution.stop == StopReason::Cancelled;
-        let (certificate, error) = judged.judge(of, &mut *looks, &mut |samples| {
-            cancelled = cancelled
-                || report(device, &BakeProgress::Estimating { samples, of }, progress).is_break();
-            if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })?;
-        light.surface.error = error;
-        self.seconds.estimate = lap(&mut self.since);
-        let _ = report(device, &BakeProgress::Estimated(certificate), progress);
-        Ok((light, certificate, self, effort.clone()))
+    let sources: &ResilientRows = rows.inner().inner();
+    let mut row_seconds = 0.0;
+    for source in [sources.first()].into_iter().chain(sources.second()) {
+        clock.timings += source.timings();
+        row_seconds += source.seconds();
     }
+    clock.timings.solve = clock.lap() - row_seconds;
+    let rotations = u64::from(settings.rotations.get());
+    let hemicubes = (solution.rows_made + rows.extra()) * rotations;
+    let mean_near_correction = rows.inner().moved();
+    let hemicubes_by_resolution = sources.first().drawn_by_resolution();
+    drop(rows);
+    Ok(ShotLight { mesh, solution, hemicubes, hemicubes_by_resolution, mean_near_correction })
 }
 
-/// Spreads the light of `mesh`; from a saved state on if there is one, and saves it.
+/// Spreads the light of `mesh`; from a checkpoint on if there is one, and writes one now and then.
 fn solve(
     settings: &SolveSettings,
     mesh: &Mesh,
@@ -116,27 +87,75 @@ fn solve(
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, Error> {
     let solver = settings.solver_for(mesh);
-    let Some(path) = &settings.checkpoint else { return solver.solve(mesh, rows, progress) };
-    let mut solve = match path.exists() {
-        true => solver.resume(mesh, rows, path)?,
-        false => solver.begin(mesh)?,
-    };
-    let (mut saved, mut took) = (Instant::now(), Duration::ZERO);
+    match &settings.checkpoint {
+        Some(path) => solve_with_checkpoints(&solver, path, mesh, rows, progress),
+        None => solver.solve(mesh, rows, progress),
+    }
+}
+
+fn solve_with_checkpoints(
+    solver: &Solver,
+    path: &Path,
+    mesh: &Mesh,
+    rows: &mut dyn FormFactors,
+    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Solution, Error> {
+    let mut session =
+        if path.exists() { solver.resume(mesh, rows, path)? } else { solver.begin(mesh)? };
+    let mut saved = Instant::now();
+    let mut saving_time = Duration::ZERO;
     loop {
-        let stop = solve.advance(rows, &mut *progress)?;
-        if stop.is_some() || saved.elapsed() >= SAVING * took {
+        let stop = session.advance(rows, &mut *progress)?;
+        if stop.is_some() || saved.elapsed() >= CHECKPOINT_INTERVAL * saving_time {
             let start = Instant::now();
-            solve.save(path)?;
-            (saved, took) = (Instant::now(), start.elapsed());
+            session.save(path)?;
+            saved = Instant::now();
+            saving_time = start.elapsed();
         }
         if stop.is_some() {
-            return solve.into_solution();
+            return session.into_solution();
         }
     }
 }
 
-/// Solving goes on for so many times what saving takes.
-const SAVING: u32 = 10;
+/// The elements' own light as a result: no vertex gathers, and the error is estimated.
+pub(super) fn estimate_elements(
+    shot: &ShotLight,
+    settings: &BakeSettings,
+    mut light: GatheredMesh,
+    backend: &ResilientBackend,
+    reporter: &mut Reporter,
+    clock: &mut StageClock,
+) -> Result<BakedLight, Error> {
+    clock.timings.vertices = clock.lap();
+    let mut gatherer = backend.gather(&shot.mesh, model::ELEMENT_RAYS, f64::INFINITY, 0.0)?;
+    let estimator = ErrorEstimator {
+        light: &light,
+        lit_by: None,
+        element_residual: &corner_spread(&light),
+        ledger: &shot.solution.ledger,
+        sweeps: 0,
+    };
+    let of = *model::SAMPLES.start();
+    let mut cancelled = shot.solution.stop == StopReason::Cancelled;
+    let (estimate, vertex_error) = estimator.estimate(of, &mut *gatherer, &mut |samples| {
+        cancelled =
+            cancelled || reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+        if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    light.surface.error = vertex_error;
+    clock.timings.estimate = clock.lap();
+    // The bake ends here, whatever the callback says.
+    let _ = reporter.report(BakeProgress::Estimated(estimate));
+    Ok(BakedLight { light, estimate, settings: settings.clone() })
+}
 
-/// Looks a place where vertices do not gather.
-const LOOKS: u32 = 1024;
+/// A quarter of the largest difference between the corners of each element, W/m²: what its middle may
+/// be off by, up to a factor that is the same for all.
+fn corner_spread(light: &GatheredMesh) -> Vec<f64> {
+    let spread = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|v| light.reflected[v as usize]);
+        a.distance(b).max(b.distance(c)).max(c.distance(a)) / 4.0
+    };
+    light.corners.iter().map(spread).collect()
+}

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
-use crate::bake::pipeline::{self, ErrorTarget};
+use crate::bake::controller::ErrorTarget;
 use crate::bake::progress::{BakeProgress, ProgressCallback};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
+use crate::bake::{model, pipeline};
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
 
@@ -36,18 +37,6 @@ pub enum BakeTarget {
     /// last that was done is returned; if none was, what was reached.
     Time(Duration),
 }
-
-/// The first error to be tried within a time, which takes little.
-const FIRST: f64 = 0.2;
-
-/// An error that is so many times smaller takes that many times, to this power, as long.
-const COST: f64 = 1.5;
-
-/// Share of the time left that the next error is chosen for: what it will take is a guess.
-const PRUDENCE: f64 = 0.5;
-
-/// Less than this much smaller is not worth a start from nothing.
-const WORTHWHILE: f64 = 1.3;
 
 impl BakeTarget {
     /// The target [`BakeTarget::Time`], in seconds of wall time.
@@ -147,7 +136,7 @@ fn bake_in_time(
         settings.solve.checkpoint = None;
     };
     let mut best: Option<BakeResult> = None;
-    let mut error = FIRST;
+    let mut error = model::INITIAL_ERROR;
     loop {
         let attempt_start = Instant::now();
         let mut stopped = false;
@@ -167,9 +156,9 @@ fn bake_in_time(
             (attempt, _) => attempt?,
         };
         let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
-        let affordable = PRUDENCE * remaining / attempt_start.elapsed().as_secs_f64();
-        let improvement = affordable.powf(1.0 / COST);
-        if stopped || improvement < WORTHWHILE {
+        let taken = attempt_start.elapsed().as_secs_f64();
+        let improvement = model::affordable_improvement(remaining, taken);
+        if stopped || improvement < model::MIN_IMPROVEMENT {
             return Ok(baked);
         }
         best = Some(baked);

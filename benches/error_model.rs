@@ -1,0 +1,288 @@
+//! Measures the model of error and cost that bakes are steered by (`radiosity::bake::model`), and
+//! prints each law beside the model's number.
+//!
+//!     cargo bench --bench error_model [-- SCENE.obj …]
+//!
+//! Without scenes it takes scenes/cornell_box.obj. Rays on the CPU, so that it runs anywhere.
+//!
+//! - One setting at a time is varied around those for an error of 5 %, and the part of the estimated
+//!   error that follows it is fitted: part = scale · setting^exponent.
+//! - The scene is baked to several errors, and the settings and seconds that it came to are fitted.
+//! - The standard errors of vertices are compared with how far they are from a finer bake.
+//!
+//! Fits are by least squares of the logarithms. A part below 1e-6 is left out of its fit.
+
+#[path = "../tests/common/truth.rs"]
+mod truth;
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use radiosity::bake::model::{self, PowerLaw};
+use radiosity::{
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, GatherSettings, Scene,
+    VertexMesh, load_obj,
+};
+
+/// The error around whose settings others are varied.
+const BASE: f64 = 0.05;
+
+/// Errors that the scene is baked to.
+const TARGETS: [f64; 4] = [0.1, 0.07, 0.05, 0.035];
+
+/// The error of the bake that others are compared with: its own is small beside theirs.
+const REFERENCE: f64 = 0.015;
+
+/// Points at which bakes are compared.
+const POINTS: usize = 400;
+
+fn main() -> Result<(), Error> {
+    let arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
+    let mut scenes: Vec<String> = arguments.collect();
+    if scenes.is_empty() {
+        scenes.push(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj").into());
+    }
+    for path in &scenes {
+        let start = Instant::now();
+        let scene = Arc::new(load_obj(path)?);
+        let name = Path::new(path).file_name().unwrap_or_default().display();
+        println!("{name}: {} triangles, rays on the CPU", scene.triangles().len());
+        println!("{:24} {:>10} {:>10}   measured", "law", "fitted", "model");
+        let bench = Bench { scene };
+        bench.parts()?;
+        bench.targets()?;
+        bench.against_reference()?;
+        println!("{:.0} s\n", start.elapsed().as_secs_f64());
+    }
+    Ok(())
+}
+
+struct Bench {
+    scene: Arc<Scene>,
+}
+
+impl Bench {
+    fn bake(&self, settings: &BakeSettings) -> Result<BakeResult, Error> {
+        settings.bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))
+    }
+
+    /// Each part of the error against the setting that it follows.
+    fn parts(&self) -> Result<(), Error> {
+        let none = |_: &mut BakeSettings, _: f64| {};
+        let mesh = self.part(
+            none,
+            &[4.0, 2.0, 1.0, 0.5],
+            |e| e.mesh,
+            |gather, factor| {
+                gather.refinement.tolerance *= factor;
+                gather.refinement.smallest *= factor;
+                gather.refinement.curve *= factor;
+                gather.rays *= 4;
+            },
+        )?;
+        row("mesh ~ bend, edge", &mesh, Some(1.0));
+        let sampling = self.part(
+            none,
+            &[0.25, 1.0, 4.0, 16.0],
+            |e| e.sampling,
+            |gather, factor| {
+                gather.rays = (f64::from(gather.rays) * factor) as u32;
+                gather.noise_tolerance = f64::INFINITY;
+            },
+        )?;
+        row("sampling ~ rays", &sampling, Some(-model::RQMC_EXPONENT));
+        let unshot = |settings: &mut BakeSettings, factor| settings.solve.solver.unshot *= factor;
+        let unshot = self.part(unshot, &[64.0, 16.0, 4.0, 1.0], |e| e.unshot, |_, _| {})?;
+        row("unshot ~ unshot share", &unshot, Some(1.0));
+        let truncation = self.part(
+            none,
+            &[1.0, 2.0, 3.0],
+            |e| e.truncation,
+            |gather, sweeps| {
+                gather.refinement.sweeps = sweeps as u32;
+            },
+        )?;
+        // A geometric series: the ratio of one sweep to the next.
+        let ratios: Vec<f64> = truncation.windows(2).map(|pair| pair[1].1 / pair[0].1).collect();
+        let ratio = ratios.iter().product::<f64>().powf(1.0 / ratios.len() as f64);
+        let model = format!("x{:.2}", self.mean_reflectance());
+        println!(
+            "{:24} {:>10} {model:>10}   {}",
+            "truncation a sweep",
+            format!("x{ratio:.2}"),
+            list(&truncation)
+        );
+        Ok(())
+    }
+
+    /// One part of the estimated error for each factor that settings are changed by.
+    fn part(
+        &self,
+        solve: impl Fn(&mut BakeSettings, f64),
+        factors: &[f64],
+        part: impl Fn(&ErrorEstimate) -> f64,
+        gather: impl Fn(&mut GatherSettings, f64),
+    ) -> Result<Vec<(f64, f64)>, Error> {
+        let mut found = vec![];
+        for &factor in factors {
+            let mut settings = BakeSettings::for_error(BASE, &self.scene);
+            solve(&mut settings, factor);
+            settings.gather.iter_mut().for_each(|settings| gather(settings, factor));
+            found.push((factor, part(&self.bake(&settings)?.estimate)));
+        }
+        Ok(found)
+    }
+
+    /// What settings and seconds a bake to an error comes to, against the estimated error.
+    fn targets(&self) -> Result<(), Error> {
+        let diagonal = self.scene.bounds().diagonal();
+        let (mut seconds, mut rays, mut bend, mut edge) = (vec![], vec![], vec![], vec![]);
+        for error in TARGETS {
+            let start = Instant::now();
+            let baked = BakeTarget::Error(error)
+                .bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))?;
+            seconds.push((error, start.elapsed().as_secs_f64()));
+            let Some(gather) = baked.settings.gather else { continue };
+            rays.push((error, f64::from(gather.rays)));
+            bend.push((error, gather.refinement.tolerance));
+            edge.push((error, gather.refinement.smallest / diagonal));
+        }
+        row("seconds ~ error", &seconds, Some(-model::COST_EXPONENT));
+        law("rays", &rays, model::RAYS_TIMES_ERROR, -1.0);
+        let PowerLaw { scale, exponent, .. } = model::BEND;
+        law("bend", &bend, scale, exponent);
+        let PowerLaw { scale, exponent, .. } = model::SMALLEST_EDGE;
+        law("smallest edge", &edge, scale, exponent);
+        Ok(())
+    }
+
+    /// Errors against a finer bake: of elements that light is shot on, and of the estimates.
+    fn against_reference(&self) -> Result<(), Error> {
+        let reference = self.bake(&BakeSettings::for_error(REFERENCE, &self.scene))?;
+        let reference = &reference.light.surface;
+        let mut errors = vec![];
+        for factor in [4.0, 2.0, 1.0] {
+            let mut settings = BakeSettings::for_error(BASE, &self.scene);
+            settings.solve.element_size *= factor;
+            // What vertices gather shows what was shot; they are as good as they can be otherwise.
+            settings.gather = BakeSettings::for_error(0.5 * BASE, &self.scene).gather;
+            settings.gather.iter_mut().for_each(|gather| gather.refinement.sweeps = 1);
+            let baked = self.bake(&settings)?;
+            errors.push((factor, compare(&baked.light.surface, reference).error));
+        }
+        row("error ~ shooting edge", &errors, Some(1.0 / model::SHOOTING_EDGE.exponent));
+        for error in [0.1, BASE] {
+            let baked = BakeTarget::Error(error)
+                .bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))?;
+            let compared = compare(&baked.light.surface, reference);
+            println!(
+                "{:24} {:>10} {:>10}   asked {error}, estimated {:.4}, off by {:.4}; {:.0} % of \
+                 points within 2 standard errors",
+                "tail factor",
+                format!("{:.2}", compared.tail_factor),
+                format!("{:.2}", model::TAIL_FACTOR),
+                baked.estimate.total,
+                compared.error,
+                100.0 * compared.within
+            );
+        }
+        Ok(())
+    }
+
+    fn mean_reflectance(&self) -> f64 {
+        let (mut sum, mut area) = (radiosity::Rgb::ZERO, 0.0);
+        for (t, triangle) in self.scene.triangles().iter().enumerate() {
+            let reflectance = self.scene.materials()[triangle.material as usize].reflectance;
+            sum += reflectance * self.scene.area(t);
+            area += self.scene.area(t);
+        }
+        (sum / area).max_element()
+    }
+}
+
+/// How far one surface is from another.
+struct Comparison {
+    /// Relative root mean square over the area.
+    error: f64,
+    /// Share of the points that are off by up to twice their standard error.
+    within: f64,
+    /// What the model's tail factor would have to be for 95 % of them.
+    tail_factor: f64,
+}
+
+/// Compares `surface` with `reference` at points spread over its area: the centroids of faces.
+fn compare(surface: &VertexMesh, reference: &VertexMesh) -> Comparison {
+    let area = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
+        (b - a).cross(c - a).length() / 2.0
+    };
+    let stride = surface.faces.iter().map(area).sum::<f64>() / POINTS as f64;
+    let mut found = vec![];
+    let mut next = stride / 2.0;
+    let mut sum = 0.0;
+    for face in &surface.faces {
+        sum += area(face);
+        let corners = face.map(|v| surface.positions[v as usize]);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let centroid = corners.iter().sum::<glam::DVec3>() / 3.0;
+        let radiosity =
+            face.map(|v| surface.radiosity[v as usize]).iter().sum::<glam::DVec3>() / 3.0;
+        let error = face.map(|v| surface.error[v as usize]).iter().sum::<f64>() / 3.0;
+        while next < sum {
+            next += stride;
+            if let Some((truth, _)) = truth::at(reference, centroid, normal) {
+                found.push((radiosity, error, truth));
+            }
+        }
+    }
+    let count = found.len().max(1) as f64;
+    let floor = model::RADIOSITY_FLOOR * found.iter().map(|f| f.2.length()).sum::<f64>() / count;
+    let square = |f: &(glam::DVec3, f64, glam::DVec3)| {
+        (f.0.distance(f.2) / f.0.length().max(f.2.length()).max(floor)).powi(2)
+    };
+    let error = (found.iter().map(square).sum::<f64>() / count).sqrt();
+    // Points that emit only are exact, and have no standard error.
+    let judged = found.iter().filter(|f| f.1 > 0.0);
+    let mut ratios: Vec<f64> = judged.map(|f| f.0.distance(f.2) / f.1).collect();
+    ratios.sort_by(f64::total_cmp);
+    let quantile = ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(0.0);
+    let within = ratios.partition_point(|&ratio| ratio <= 2.0) as f64 / ratios.len().max(1) as f64;
+    Comparison { error, within, tail_factor: model::TAIL_FACTOR * quantile / 2.0 }
+}
+
+/// A line of the table for value = scale · setting^exponent, given both.
+fn law(name: &str, points: &[(f64, f64)], scale: f64, exponent: f64) {
+    let (fitted_scale, fitted_exponent) = fit(points);
+    println!(
+        "{name:24} {:>10} {:>10}   {}",
+        format!("{fitted_scale:.2} e^{fitted_exponent:.2}"),
+        format!("{scale:.2} e^{exponent:.2}"),
+        list(points)
+    );
+}
+
+/// The same for the exponent alone.
+fn row(name: &str, points: &[(f64, f64)], exponent: Option<f64>) {
+    let model = exponent.map_or(String::new(), |exponent| format!("^{exponent:.2}"));
+    let fitted = format!("^{:.2}", fit(points).1);
+    println!("{name:24} {fitted:>10} {model:>10}   {}", list(points));
+}
+
+fn list(points: &[(f64, f64)]) -> String {
+    points.iter().map(|(x, y)| format!("{x}: {y:.4}")).collect::<Vec<_>>().join("  ")
+}
+
+/// Scale and exponent of the power law through `points`, by least squares of the logarithms.
+fn fit(points: &[(f64, f64)]) -> (f64, f64) {
+    let logs: Vec<(f64, f64)> =
+        points.iter().filter(|p| p.1 > 1e-6).map(|p| (p.0.ln(), p.1.ln())).collect();
+    let count = logs.len() as f64;
+    let x = logs.iter().map(|p| p.0).sum::<f64>() / count;
+    let y = logs.iter().map(|p| p.1).sum::<f64>() / count;
+    let covariance: f64 = logs.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    let variance: f64 = logs.iter().map(|p| (p.0 - x).powi(2)).sum();
+    let exponent = covariance / variance;
+    ((y - exponent * x).exp(), exponent)
+}

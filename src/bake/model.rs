@@ -1,0 +1,352 @@
+//! The model of error and cost that a bake is steered by: one table of its numbers.
+//!
+//! The error of a bake is a root mean square over the area, relative to the radiosity. It has four
+//! parts, independent enough that their squares add up, and each follows one setting:
+//!
+//! | part | follows | as | cost of it |
+//! |---|---|---|---|
+//! | mesh | bend tolerance t and smallest edge h of gathering elements | t, h | vertices ∝ 1/t … 1/h² |
+//! | sampling | rays n a vertex | n^−[`RQMC_EXPONENT`] | ∝ n |
+//! | truncation | sweeps s of gathering | (mean reflectance)^s | ∝ s |
+//! | unshot | share u of the flux not yet shot | u | shots ∝ ln 1/u |
+//!
+//! The model is used four times:
+//!
+//! 1. *Before:* [`BakeSettings::for_error`](crate::BakeSettings::for_error) turns an error into
+//!    settings by the laws below, knob = scale · error^exponent, scaled by the scene's diagonal.
+//! 2. *After a pilot:* a few points that gather twice say how many rays it takes in this scene.
+//! 3. *After every estimate:* the parts that are too large are lowered to [`water_filling_cap`], each
+//!    by its own law in one step of bounded size.
+//! 4. *Within a time:* cost = constant · error^−[`COST_EXPONENT`] says which error still fits in.
+//!
+//! Where nothing else is said, a number was chosen by hand, so that three rooms come out at or below
+//! the errors asked for at little cost: `scenes/cornell_box.obj`, a room lit from the next room and
+//! one with many small boxes. No record of single measurements was kept.
+//! `cargo bench --bench error_model [-- SCENE.obj …]` measures the laws and prints them beside the
+//! model's numbers.
+
+use std::ops::RangeInclusive;
+
+/// A setting as a power of the error it is for: setting = scale · error^exponent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PowerLaw {
+    /// The setting for an error of 1: of lengths, as a share of the scene's diagonal.
+    pub scale: f64,
+    /// How steeply the setting follows the error; the error follows the setting with one over this.
+    pub exponent: f64,
+}
+
+impl PowerLaw {
+    const fn new(scale: f64, exponent: f64) -> PowerLaw {
+        PowerLaw { scale, exponent }
+    }
+
+    /// The same for lengths in the scene's unit, given the scene's `diagonal`.
+    pub(super) fn times(self, diagonal: f64) -> PowerLaw {
+        PowerLaw { scale: self.scale * diagonal, ..self }
+    }
+
+    /// The setting for `error`, relative root mean square.
+    pub fn setting(self, error: f64) -> f64 {
+        self.scale * error.powf(self.exponent)
+    }
+}
+
+// ---- 1. Settings for an error ------------------------------------------------------------------
+
+/// Errors that the laws below are for; those outside get the settings of the nearest of these.
+pub const ERRORS: RangeInclusive<f64> = 1e-4..=0.3;
+
+/// Longest edge of the elements that light is shot on, share of the diagonal: error ∝ edge^2.5.
+pub const SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.105, 0.4);
+
+/// The same for errors at which it is the larger of the two.
+pub const COARSE_SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.6, 1.0);
+
+/// Longest edge of the elements whose corners gather first, share of the diagonal. It follows
+/// the error slowly, since elements are split where light is not linear.
+pub const GATHER_EDGE: PowerLaw = PowerLaw::new(0.3, 0.3);
+
+/// Edge below which gathering elements are not split, share of the diagonal.
+pub const SMALLEST_EDGE: PowerLaw = PowerLaw::new(0.1, 0.85);
+
+/// Share of the radiosity by which a side may bend before it is split. About a quarter of the bend is
+/// left after the split, by the remainder of a parabola: 0.6 of the error asked for.
+pub const BEND: PowerLaw = PowerLaw::new(2.5, 1.0);
+
+/// The largest bend tolerance.
+pub const MAX_BEND: f64 = 0.1;
+
+/// Share of the radiosity that the parabola of an element may be off from the exported triangles.
+pub const CURVE: PowerLaw = PowerLaw::new(0.25, 1.0);
+
+/// The error asked for over the share of flux left unshot: shooting is to be a small part of the
+/// error, since it is not repeated.
+pub const ERROR_OVER_UNSHOT: f64 = 40.0;
+
+/// The solver's patch tolerance: the error itself, or [`PATCH_TOLERANCE_BASE`] plus this share of it
+/// where that is less.
+pub const PATCH_TOLERANCE_SHARE: f64 = 0.4;
+
+/// See [`PATCH_TOLERANCE_SHARE`].
+pub const PATCH_TOLERANCE_BASE: f64 = 0.02;
+
+/// Rays a vertex times the error, before a pilot says more.
+pub const RAYS_TIMES_ERROR: f64 = 20.0;
+
+/// Hemicube resolution by error: the first whose bound the error is above; the last for all others.
+/// Halving the error about doubles the pixels of an edge, in powers of two.
+pub const HEMICUBE_RESOLUTIONS: [(f64, u32); 4] =
+    [(0.03, 32), (0.006, 64), (0.003, 128), (0.0, 256)];
+
+/// Levels by which elements at contacts are split.
+pub const CONTACT_LEVELS: u32 = 2;
+
+/// Below this error they are split once more.
+pub const FINE_CONTACTS_BELOW: f64 = 0.009;
+
+/// Above this error gathering elements at contacts are split once only.
+pub const COARSE_CONTACTS_ABOVE: f64 = 0.07;
+
+/// Up to this error vertices gather twice, since the first time they see what was shot on elements.
+pub const TWO_SWEEPS_UP_TO: f64 = 0.03;
+
+/// Receivers within this many patch diameters get closed-form factors, whatever the error.
+pub const NEAR_REACH: f64 = 1.0;
+
+/// The solver's patch tolerance for `error`.
+pub(super) fn patch_tolerance(error: f64) -> f64 {
+    error.min(PATCH_TOLERANCE_BASE + PATCH_TOLERANCE_SHARE * error)
+}
+
+/// Pixels along an edge of a hemicube's top face for `error`.
+pub(super) fn hemicube_resolution(error: f64) -> u32 {
+    let [.., (_, finest)] = HEMICUBE_RESOLUTIONS;
+    let step = HEMICUBE_RESOLUTIONS.into_iter().find(|&(bound, _)| error > bound);
+    step.map_or(finest, |(_, resolution)| resolution)
+}
+
+/// Levels by which elements that shoot are split at contacts, for `error`.
+pub(super) fn shooting_contact_levels(error: f64) -> u32 {
+    if error < FINE_CONTACTS_BELOW { CONTACT_LEVELS + 1 } else { CONTACT_LEVELS }
+}
+
+/// Levels by which elements whose corners gather are split at contacts, for `error`.
+pub(super) fn gathering_contact_levels(error: f64) -> u32 {
+    if error > COARSE_CONTACTS_ABOVE { 1 } else { shooting_contact_levels(error) }
+}
+
+/// Times that all vertices gather, for `error`.
+pub(super) fn sweeps(error: f64) -> u32 {
+    if error > TWO_SWEEPS_UP_TO { 1 } else { 2 }
+}
+
+// ---- 2. The pilot ------------------------------------------------------------------------------
+
+/// Points that gather twice, to choose the number of rays by.
+pub const PILOT_POINTS: usize = 64;
+
+/// What sampling may take of the allowed error, beforehand: a quarter of its square.
+pub const SAMPLING_SHARE: f64 = 0.5;
+
+/// Rays a vertex that the pilot may choose.
+pub const RAYS: RangeInclusive<f64> = 128.0..=65536.0;
+
+/// Error of n rays ∝ n^−this: between Monte Carlo (0.5) and (0,2)-nets of smooth integrands (1).
+pub const RQMC_EXPONENT: f64 = 0.75;
+
+/// A vertex whose rays disagree by so many times the error allowed for sampling gets more of them.
+pub const OUTLIER_FACTOR: f64 = 3.0;
+
+/// Sweeps that only light the last one take so many times fewer rays: their noise is averaged over
+/// all that a vertex sees.
+pub const COARSE_RAY_DIVISOR: u32 = 4;
+
+// ---- 3. Rounds of refinement -------------------------------------------------------------------
+
+/// The estimate has to be below this share of the error asked for: both scatter, since
+/// they are of random points.
+pub const SAFETY: f64 = 0.75;
+
+/// Share of [`SAFETY`] that a round aims at, since errors follow the laws only roughly.
+pub const TARGET_FRACTION: f64 = 0.9;
+
+/// Rounds of refinement after the first estimate.
+pub const MAX_ROUNDS: u32 = 8;
+
+/// A setting is changed by this factor at least: less is not worth a round.
+pub const MIN_STEP: f64 = 1.25;
+
+/// Rays grow by this factor a round at most.
+pub const MAX_RAY_STEP: f64 = 8.0;
+
+/// The noise tolerance falls to this share a round at the lowest.
+pub const MIN_NOISE_STEP: f64 = 0.25;
+
+/// Bend, curve and smallest edge fall to this share a round at the lowest: elements that were split
+/// are not merged again.
+pub const MIN_MESH_STEP: f64 = 0.6;
+
+/// Share of the allowed squared error that is left to the parts that can be lowered, however large
+/// the one that cannot (unshot light).
+pub const MIN_BUDGET: f64 = 0.1;
+
+/// Nearest of `range` to `value`.
+pub(super) fn clamped(value: f64, range: RangeInclusive<f64>) -> f64 {
+    value.clamp(*range.start(), *range.end())
+}
+
+/// The error that a round aims at, for `target`.
+pub(super) fn allowed_error(target: f64) -> f64 {
+    TARGET_FRACTION * SAFETY * target
+}
+
+/// The highest that a part may be after refinement: the parts above it are lowered to it, the others
+/// stay, and all and the `fixed` part then add up, squared, to `allowed` squared. Infinite where they
+/// are below that already.
+///
+/// This solves min Σ ln(part_i / new_i) under Σ new_i² = allowed² − fixed² and new_i ≤ part_i: the
+/// least product of refinement factors. Its Lagrange condition, new_i equal for all that are lowered,
+/// is that of reverse water-filling (Cover and Thomas 2006, section 10.3.3).
+pub(super) fn water_filling_cap(mut parts: [f64; 3], fixed: f64, allowed: f64) -> f64 {
+    parts.sort_by(f64::total_cmp);
+    let mut budget = (allowed * allowed - fixed * fixed).max(MIN_BUDGET * allowed * allowed);
+    for (k, part) in parts.iter().enumerate() {
+        let cap = (budget / (parts.len() - k) as f64).sqrt();
+        if *part >= cap {
+            return cap;
+        }
+        budget -= part * part;
+    }
+    f64::INFINITY
+}
+
+/// By how much the rays have to be multiplied for sampling to fall from `error` to `allowed`.
+pub(super) fn ray_factor(error: f64, allowed: f64) -> f64 {
+    (error / allowed).powf(1.0 / RQMC_EXPONENT)
+}
+
+/// By how much the rays are multiplied in a round for sampling to fall from `error` to `cap`.
+pub(super) fn ray_step(error: f64, cap: f64) -> f64 {
+    ray_factor(error, cap).clamp(MIN_STEP, MAX_RAY_STEP)
+}
+
+/// By how much the noise tolerance is multiplied in a round for the same.
+pub(super) fn noise_step(error: f64, cap: f64) -> f64 {
+    (cap / error).clamp(MIN_NOISE_STEP, 1.0 / MIN_STEP)
+}
+
+/// By how much bend, curve and smallest edge are multiplied in a round for the error of the mesh to
+/// fall from `error` to `cap`: it is taken as proportional to them.
+pub(super) fn mesh_step(error: f64, cap: f64) -> f64 {
+    (cap / error).clamp(MIN_MESH_STEP, 1.0 / MIN_STEP)
+}
+
+// ---- 4. Bakes within a time --------------------------------------------------------------------
+
+/// The first error that is tried, which takes little.
+pub const INITIAL_ERROR: f64 = 0.2;
+
+/// Seconds ∝ error^−this.
+pub const COST_EXPONENT: f64 = 1.5;
+
+/// Share of the remaining time that the next error is chosen for: what it takes is a guess.
+pub const TIME_FRACTION: f64 = 0.5;
+
+/// A further bake has to be of an error smaller by this factor, as each starts from nothing.
+pub const MIN_IMPROVEMENT: f64 = 1.3;
+
+/// How many times smaller the next error may be that takes about [`TIME_FRACTION`] of `remaining`
+/// seconds, where this one took `taken`.
+pub(super) fn affordable_improvement(remaining: f64, taken: f64) -> f64 {
+    (TIME_FRACTION * remaining / taken).powf(1.0 / COST_EXPONENT)
+}
+
+// ---- Estimation of the error -------------------------------------------------------------------
+
+/// Random points that the estimate takes: at least, and at most.
+pub const SAMPLES: RangeInclusive<usize> = 192..=1024;
+
+/// The estimate takes one point for so many that vertices gathered at; each gathers three times, so
+/// that it costs about a sixteenth of them.
+pub const GATHERS_PER_SAMPLE: usize = 48;
+
+/// Random points for an estimate after `gathers` at vertices.
+pub(super) fn sample_count(gathers: u64) -> usize {
+    (gathers as usize / GATHERS_PER_SAMPLE).clamp(*SAMPLES.start(), *SAMPLES.end())
+}
+
+/// Rays a point where the elements' own light is estimated, which no vertex gathered.
+pub const ELEMENT_RAYS: u32 = 1024;
+
+/// Two gathers averaged have half the variance of one. Between three vertices of independent error,
+/// at random places in a triangle, half of one's variance is left too (∫ Σ λ_i² = 1/2).
+pub const HALF: f64 = 0.5;
+
+/// Share of the measured squared difference that is error, at least, however large the noise that is
+/// subtracted from it is estimated: a variance found by subtraction may come out negative.
+pub const MIN_ERROR_SHARE: f64 = 0.1;
+
+/// Share of the squared error that is called sampling, at most; the rest is called the mesh's, whose
+/// own error noise hides.
+pub const MAX_SAMPLING_SHARE: f64 = 0.7;
+
+/// The standard errors of vertices are multiplied by this, so that 95 % of them are off by no more
+/// than twice as much: errors have heavier tails than a normal distribution.
+pub const TAIL_FACTOR: f64 = 1.8;
+
+/// Errors of radiosity below this share of the mean reflected radiosity are relative to that.
+pub const RADIOSITY_FLOOR: f64 = 0.05;
+
+/// A point that is dim or behind surfaces and whose mean distance to what it sees is below this share
+/// of the scene's diagonal lies in a gap that nothing looks into. It is left out.
+pub const GAP: f64 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn water_filling_lowers_the_highest_parts_and_meets_the_budget() {
+        let square = |parts: [f64; 3]| parts.iter().map(|p| p * p).sum::<f64>();
+        let cases =
+            [([3.0, 4.0, 5.0], 0.0, 5.0), ([0.1, 4.0, 5.0], 1.0, 2.0), ([0.1, 0.2, 5.0], 0.1, 1.0)];
+        for (parts, fixed, allowed) in cases {
+            let cap = water_filling_cap(parts, fixed, allowed);
+            let lowered = parts.map(|p| p.min(cap));
+            let sum = square(lowered) + fixed * fixed;
+            assert!((sum - allowed * allowed).abs() < 1e-12, "{parts:?}: {cap}");
+            // Any other way to meet the budget lowers the parts by more in all: a share moved from
+            // one lowered part to another one.
+            let factors = |new: [f64; 3]| (0..3).map(|k| (parts[k] / new[k]).ln()).sum::<f64>();
+            for (from, to) in [(0, 1), (1, 2), (2, 1), (2, 0), (1, 0)] {
+                for share in [0.01, 0.3] {
+                    let mut other = lowered.map(|p| p * p);
+                    let moved = share * other[from];
+                    other[from] -= moved;
+                    other[to] += moved;
+                    let other = other.map(f64::sqrt);
+                    if other[to] <= parts[to] {
+                        assert!(factors(other) > factors(lowered), "{parts:?} {from} {to}");
+                    }
+                }
+            }
+        }
+        assert_eq!(water_filling_cap([1.0, 1.0, 1.0], 0.0, 2.0), f64::INFINITY);
+        // What cannot be lowered leaves a tenth of the budget to the others.
+        let cap = water_filling_cap([1.0, 1.0, 1.0], 9.0, 1.0);
+        assert!((cap - (MIN_BUDGET / 3.0).sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn laws_and_factors_invert_one_another() {
+        let law = SMALLEST_EDGE.times(7.0);
+        let finer = law.setting(0.01) / law.setting(0.04);
+        assert!((finer - 4f64.powf(-SMALLEST_EDGE.exponent)).abs() < 1e-15);
+        let factor = ray_factor(0.04, 0.01);
+        assert!((0.04 * factor.powf(-RQMC_EXPONENT) - 0.01).abs() < 1e-15);
+        let improvement = affordable_improvement(20.0, 1.0);
+        assert!((improvement.powf(COST_EXPONENT) - TIME_FRACTION * 20.0).abs() < 1e-12);
+    }
+}
