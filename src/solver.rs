@@ -1,18 +1,41 @@
-//! What a solver gives back and tells on its way: solution and progress.
+//! Solvers of the radiosity equation: from the light that a mesh emits to the radiosity of its
+//! elements.
+//!
+//! The equation is B_i = E_i + ρ_i Σ_j F_ij B_j. All methods work on flux (W) instead and keep the
+//! same state, what each element has received and what it has not passed on yet; they differ only
+//! in whose light is sent next:
+//!
+//! ```text
+//! Solver (settings) ── begin ──▶ SolveSession ── advance, advance … ──▶ Solution
+//!                                  │
+//!   FormFactors ──▶ RowCache ──▶ StepContext ──▶ method: shooting (through a PatchCut),
+//!                                  │              Jacobi or Gauss–Seidel, GMRES, direct
+//!                                  ▼
+//!                      FluxState: incident, unshot, Ledger
+//! ```
+//!
+//! After every batch of rows all light is accounted for, so a session can be looked at, saved and
+//! resumed, or given a scene whose materials or objects have changed.
 
 mod checkpoint;
 mod direct;
 mod flux_state;
+mod geometry_delta;
 mod gmres;
 mod incremental;
 mod ledger;
 mod method;
+mod method_state;
 mod patch_cut;
+mod patch_error;
 mod relaxation;
 mod row_cache;
+mod saved_state;
 mod session;
 mod settings;
 mod shooting;
+mod staleness;
+mod step;
 
 use std::time::Duration;
 
@@ -26,6 +49,7 @@ pub use settings::Solver;
 
 /// Radiosity of every element, and how the solver got there.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Solution {
     /// Radiosity B of each element: emitted plus reflected, W/m² per channel.
     pub radiosity: Vec<Rgb>,
@@ -33,10 +57,10 @@ pub struct Solution {
     pub ledger: Ledger,
     /// How it was solved.
     pub method: Method,
-    /// What was done, in the unit of its [`Method`]: shots, bounces, sweeps, products. Jacobi's are
+    /// What was done, in the unit of its [`Method`]: shots, bounces, sweeps, products. For Jacobi,
     /// the bounces that the radiosity has in full.
     pub steps: u64,
-    /// Rows that light was sent along, for patches or, in most methods, elements.
+    /// Rows that light was sent along, of patches or, in most methods, elements.
     pub shots: u64,
     /// Rows that had to be made; fewer than shots where rows were kept.
     pub rows_made: u64,
@@ -44,8 +68,9 @@ pub struct Solution {
     pub stop: StopReason,
 }
 
-/// How far a solver is, told after every shot or row.
+/// How far a solver is, reported after every shot or row.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Progress {
     /// Steps done so far, in the unit of the [`Method`].
     pub steps: u64,
@@ -53,21 +78,22 @@ pub struct Progress {
     pub shots: u64,
     /// Rows made so far.
     pub rows_made: u64,
-    /// Share of the emitted flux that is unshot or overshot, in the worst channel; with GMRES no more
-    /// than this is, and a direct solve has 1 until it is through.
+    /// Share of the emitted flux that is unshot or overshot, in the worst channel; with GMRES an
+    /// upper bound of it, and 1 until a direct solve is through.
     pub unshot_share: f64,
-    /// Time since the solver was set going.
+    /// Time since the solver was started.
     pub elapsed: Duration,
 }
 
 impl Solution {
-    /// Lights that were solved one by one, mixed: each of `parts`, of the same mesh, by its weight a
-    /// channel, none below 0. Radiosity is linear in what is emitted; so is the ledger. Rows and shots
-    /// are those of all, the stop that of the first which did not converge.
+    /// Σ weight × solution: lights that were solved one by one on the same mesh, combined. Weights
+    /// are per channel and not below 0. Radiosity is linear in what is emitted, and so is the
+    /// ledger. Steps, shots and rows are the sums of all; the stop reason is the first that is not
+    /// [`StopReason::Converged`].
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when there are no parts, they have different numbers of elements, or a
-    /// weight is below 0 or not finite.
+    /// [`ErrorKind::Setting`] when there are no parts, they have different numbers of elements, or
+    /// a weight is below 0 or not finite.
     pub fn linear_combination(parts: &[(Rgb, &Solution)]) -> Result<Solution, Error> {
         let wrong = |place: String, found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, place, found, remedy))
@@ -76,7 +102,7 @@ impl Solution {
             return wrong("lights".into(), "none".into(), "mix one or more");
         };
         let count = first.radiosity.len();
-        let mut mixed = Solution {
+        let mut combined = Solution {
             radiosity: vec![Rgb::ZERO; count],
             ledger: Ledger::default(),
             steps: 0,
@@ -94,15 +120,17 @@ impl Solution {
             if !weight.is_finite() || weight.min_element() < 0.0 {
                 return wrong(place, format!("a weight of {weight}"), "use 0 or more");
             }
-            mixed.radiosity.iter_mut().zip(&part.radiosity).for_each(|(m, b)| *m += weight * *b);
-            mixed.ledger.add(weight, &part.ledger);
-            mixed.steps += part.steps;
-            mixed.shots += part.shots;
-            mixed.rows_made += part.rows_made;
-            if mixed.stop == StopReason::Converged {
-                mixed.stop = part.stop;
+            for (sum, radiosity) in combined.radiosity.iter_mut().zip(&part.radiosity) {
+                *sum += weight * *radiosity;
+            }
+            combined.ledger.add(weight, &part.ledger);
+            combined.steps += part.steps;
+            combined.shots += part.shots;
+            combined.rows_made += part.rows_made;
+            if combined.stop == StopReason::Converged {
+                combined.stop = part.stop;
             }
         }
-        Ok(mixed)
+        Ok(combined)
     }
 }

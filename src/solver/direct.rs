@@ -1,81 +1,121 @@
-//! Gaussian elimination on the dense matrix: for small scenes, and to judge the other methods.
+//! Gaussian elimination on the dense matrix: for small scenes, and as a reference for the other
+//! methods.
 //!
-//! The columns of 1 − M are diagonally dominant, since no element sends out more than its light. So
-//! elimination needs no pivots, and no entry grows to more than twice the largest (Higham 2002,
-//! Theorem 9.9). Each entry is a channel triple: one elimination solves all three.
+//! The matrix is 1 − M, with M_ji = ρ_j F_ij. Its columns are diagonally dominant, since no element
+//! sends out more than its light. So elimination needs no pivoting, and no entry grows to more than
+//! twice the largest (Higham 2002, Theorem 9.9). Each entry is a channel triple: one elimination
+//! solves all three. It goes by panels: the rows of a panel are eliminated one by one, then all
+//! rows below in parallel. What the solution sends is then distributed along the rows, so that its
+//! rounding shows in the ledger.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::session::StepContext;
+use super::flux_state::Flux;
+use super::step::StepContext;
 use crate::error::Error;
 use crate::form_factor::Row;
+use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Pivot rows that are taken at once, as many as a cache holds beside the row that they are taken
-/// from.
-const PANEL: usize = 16;
+/// Rows of the matrix in a panel: as many as a cache holds beside the row that they are subtracted
+/// from. At [`DIRECT_MAX_ELEMENTS`](super::Solver::DIRECT_MAX_ELEMENTS) they take 1.6 MB.
+const PANEL_ROWS: usize = 16;
 
-/// Solves all at once. Keeps its rows whatever the budget; they take less than the matrix.
-pub(super) fn direct(batch: &mut StepContext) -> Result<StopReason, Error> {
-    if batch.has_converged()? {
+/// Solves in one step. Holds all rows whatever the budget; they take less than the matrix.
+pub(super) fn solve_directly(step: &mut StepContext) -> Result<StopReason, Error> {
+    if step.refresh_and_check_convergence()? {
         return Ok(StopReason::Converged);
     }
-    if batch.is_last_step() {
+    if step.has_done_all_steps() {
         return Ok(StopReason::Steps);
     }
-    let mesh = batch.state.mesh;
-    let count = mesh.element_count();
-    let mut rows: Vec<Arc<Row>> = vec![];
-    while rows.len() < count {
-        for (_, row) in batch.rows.next(mesh, batch.maker, rows.len()..count)? {
-            rows.push(row);
-            if batch.tell(1.0).is_break() {
-                return Ok(StopReason::Cancelled);
-            }
-        }
-    }
-    // Equation j: x_j − ρ_j Σ_i F_ij x_i = e_j, with e_j at its end.
-    let stride = count + 1;
-    let flux = &batch.state.flux;
-    let mut matrix = vec![Rgb::ZERO; count * stride];
-    for (i, row) in rows.iter().enumerate() {
-        (matrix[i * stride + i], matrix[i * stride + count]) = (Rgb::ONE, flux.unshot[i]);
-        for entry in &row.entries {
-            let j = entry.element as usize;
-            matrix[j * stride + i] -= flux.reflectance[j] * Row::form_factor(entry.share);
-        }
-    }
-    for first in (0..count).step_by(PANEL) {
-        let (done, below) = matrix.split_at_mut((first + PANEL).min(count) * stride);
-        let panel = &mut done[first * stride..];
-        for k in 1..panel.len() / stride {
-            let (above, rest) = panel.split_at_mut(k * stride);
-            eliminate(&mut rest[..stride], above, first);
-        }
-        below.par_chunks_mut(stride).for_each(|row| eliminate(row, panel, first));
-        if batch.tell(1.0).is_break() {
+    let mesh = step.state.mesh;
+    let Some(rows) = all_rows(step, mesh)? else { return Ok(StopReason::Cancelled) };
+    let mut system = LinearSystem::new(&rows, &step.state.flux);
+    for first in (0..system.count).step_by(PANEL_ROWS) {
+        system.eliminate_panel(first);
+        if step.report(1.0).is_break() {
             return Ok(StopReason::Cancelled);
         }
     }
-    let mut sent = vec![Rgb::ZERO; count];
-    for (i, row) in matrix.chunks_exact(stride).enumerate().rev() {
-        let known: Rgb = (i + 1..count).map(|j| row[j] * sent[j]).sum();
-        sent[i] = (row[count] - known) / row[i];
-    }
+    let sent = system.substitute_back();
     for (e, (flux, row)) in sent.into_iter().zip(rows).enumerate() {
-        batch.state.flux.unshot[e] -= flux;
-        batch.pass_on(flux, mesh.element(e), &row);
-        batch.done.shots += 1;
+        step.state.flux.unshot[e] -= flux;
+        step.distribute(flux, mesh.element(e), &row);
+        step.counters.shots += 1;
     }
-    batch.done.steps += 1;
+    step.counters.steps += 1;
     Ok(StopReason::Converged)
 }
 
-/// Takes the `pivots`, equations from number `first` on, off the equation `row`, so that it has none
-/// of their unknowns.
+/// The rows of all elements, or `None` when the callback stops the solver.
+fn all_rows(step: &mut StepContext, mesh: &Mesh) -> Result<Option<Vec<Arc<Row>>>, Error> {
+    let count = mesh.element_count();
+    let mut rows: Vec<Arc<Row>> = vec![];
+    while rows.len() < count {
+        let elements = rows.len()..count;
+        for (_, row) in step.rows.next_element_rows(mesh, step.row_source, elements)? {
+            rows.push(row);
+            if step.report(1.0).is_break() {
+                return Ok(None);
+            }
+        }
+    }
+    Ok(Some(rows))
+}
+
+/// Equation j: x_j − ρ_j Σ_i F_ij x_i = r_j, with x what each element sends and r what is unshot.
+struct LinearSystem {
+    count: usize,
+    /// Row-major, `count` + 1 columns; the right-hand side is the last.
+    matrix: Vec<Rgb>,
+}
+
+impl LinearSystem {
+    fn new(rows: &[Arc<Row>], flux: &Flux) -> LinearSystem {
+        let count = rows.len();
+        let stride = count + 1;
+        let mut matrix = vec![Rgb::ZERO; count * stride];
+        for (i, row) in rows.iter().enumerate() {
+            matrix[i * stride + i] = Rgb::ONE;
+            matrix[i * stride + count] = flux.unshot[i];
+            for entry in &row.entries {
+                let j = entry.element as usize;
+                matrix[j * stride + i] -= flux.reflectance[j] * Row::form_factor(entry.share);
+            }
+        }
+        LinearSystem { count, matrix }
+    }
+
+    /// Eliminates the unknowns from number `first` on, a panel of them, from all equations below.
+    fn eliminate_panel(&mut self, first: usize) {
+        let stride = self.count + 1;
+        let end = (first + PANEL_ROWS).min(self.count);
+        let (above, below) = self.matrix.split_at_mut(end * stride);
+        let panel = &mut above[first * stride..];
+        for k in 1..panel.len() / stride {
+            let (pivots, remaining) = panel.split_at_mut(k * stride);
+            eliminate(&mut remaining[..stride], pivots, first);
+        }
+        below.par_chunks_mut(stride).for_each(|row| eliminate(row, panel, first));
+    }
+
+    /// The unknowns, once all panels are eliminated.
+    fn substitute_back(&self) -> Vec<Rgb> {
+        let mut x = vec![Rgb::ZERO; self.count];
+        for (i, row) in self.matrix.chunks_exact(self.count + 1).enumerate().rev() {
+            let known: Rgb = (i + 1..self.count).map(|j| row[j] * x[j]).sum();
+            x[i] = (row[self.count] - known) / row[i];
+        }
+        x
+    }
+}
+
+/// Subtracts multiples of `pivots`, the equations from number `first` on, from the equation `row`,
+/// so that it has none of their unknowns.
 fn eliminate(row: &mut [Rgb], pivots: &[Rgb], first: usize) {
     for (k, pivot) in (first..).zip(pivots.chunks_exact(row.len())) {
         let factor = row[k] / pivot[k];

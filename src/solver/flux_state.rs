@@ -1,13 +1,14 @@
 //! Where the light is while a solver runs.
 //!
-//! The state is flux, not radiosity: who sends Φ along row i sends F_ij Φ to element j, which absorbs
-//! (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that is the textbook
-//! ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose energy.
+//! The state is flux, not radiosity: a patch that sends Φ along row i sends F_ij Φ to element j,
+//! which absorbs (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that is
+//! the textbook ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose
+//! energy.
 //!
 //! With s what was sent, e what is emitted and (Mx)_j = ρ_j Σ_i F_ij x_i, the unshot flux is the
-//! residual r = e − s + Ms of the radiosity equation, and what leaves is s + r = e + Ms. Solvers only
-//! differ in what they send next (Gortler, Cohen and Slusallek 1994): this, and the ledger, is theirs
-//! in common.
+//! residual r = e − s + Ms of the radiosity equation, and what leaves is s + r = e + Ms. Solvers
+//! only differ in what they send next (Gortler, Cohen and Slusallek 1994): this state, and the
+//! ledger, is common to all.
 
 use std::ops::Range;
 
@@ -36,6 +37,9 @@ pub(super) struct Flux {
 
 impl Flux {
     /// What `mesh` emits, all of it unshot.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when the emitted flux is not finite.
     pub fn emitted_by(mesh: &Mesh) -> Result<Flux, Error> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
         let emitted: Vec<Rgb> =
@@ -47,7 +51,8 @@ impl Flux {
             let found = format!("{total} W");
             return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
         }
-        let (incident, unshot) = (vec![Rgb::ZERO; emitted.len()], emitted.clone());
+        let incident = vec![Rgb::ZERO; emitted.len()];
+        let unshot = emitted.clone();
         Ok(Flux { total, emitted, reflectance, incident, unshot })
     }
 
@@ -63,25 +68,29 @@ impl Flux {
 
     /// What is unshot or overshot in `elements`, as a share of the emitted: the worst channel.
     pub fn unshot_share(&self, elements: &[Range<usize>]) -> f64 {
-        let all =
+        let sum_of =
             |run: &Range<usize>| self.unshot[run.clone()].iter().map(|u| u.abs()).sum::<Rgb>();
-        largest_share(elements.iter().map(all).sum(), self.total)
+        largest_share(elements.iter().map(sum_of).sum(), self.total)
     }
 
     /// What leaves `elements`, as a share of the emitted: the worst channel.
     pub fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
-        let all = |run: &Range<usize>| run.clone().map(|e| self.leaving(e)).sum::<Rgb>();
-        largest_share(elements.iter().map(all).sum(), self.total)
+        let sum_of = |run: &Range<usize>| run.clone().map(|e| self.leaving(e)).sum::<Rgb>();
+        largest_share(elements.iter().map(sum_of).sum(), self.total)
     }
 }
 
 /// What became of flux that was sent, W per channel.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Transfer {
+    /// By the fronts of elements.
     pub reflected: Rgb,
+    /// By the fronts of elements.
     pub absorbed: Rgb,
-    pub left: Rgb,
-    pub back: Rgb,
+    /// Met no surface.
+    pub escaped: Rgb,
+    /// Met the back of a surface and was lost there.
+    pub backface: Rgb,
 }
 
 impl Transfer {
@@ -89,13 +98,13 @@ impl Transfer {
     pub fn add(&mut self, scale: Rgb, other: Transfer) {
         self.reflected += scale * other.reflected;
         self.absorbed += scale * other.absorbed;
-        self.left += scale * other.left;
-        self.back += scale * other.back;
+        self.escaped += scale * other.escaped;
+        self.backface += scale * other.backface;
     }
 }
 
-/// Sends `flux` along `row`; `receive` gets what comes to each element, of which it reflects what
-/// `reflectance` says.
+/// Sends `flux` along `row`; `receive` is called with each element and the flux that it receives,
+/// of which it reflects the share `reflectance` gives.
 pub(super) fn send(
     flux: Rgb,
     row: &Row,
@@ -103,7 +112,8 @@ pub(super) fn send(
     mut receive: impl FnMut(usize, Rgb),
 ) -> Transfer {
     let per_share = flux / f64::from(Row::TOTAL);
-    let (mut absorbed, mut reflected) = (Rgb::ZERO, Rgb::ZERO);
+    let mut absorbed = Rgb::ZERO;
+    let mut reflected = Rgb::ZERO;
     for entry in &row.entries {
         let e = entry.element as usize;
         let incident = per_share * f64::from(entry.share);
@@ -112,8 +122,12 @@ pub(super) fn send(
         reflected += passed;
         absorbed += incident - passed;
     }
-    let (left, back) = (per_share * f64::from(row.escaped), per_share * f64::from(row.backface));
-    Transfer { reflected, absorbed, left, back }
+    Transfer {
+        reflected,
+        absorbed,
+        escaped: per_share * f64::from(row.escaped),
+        backface: per_share * f64::from(row.backface),
+    }
 }
 
 /// Flux of all elements, and the ledger of it.
@@ -124,10 +138,15 @@ pub(super) struct FluxState<'m> {
     pub ledger: Ledger,
 }
 
-/// The ledger must close to this after every batch: f64 sums of some 10⁹ terms stay far below.
-pub(super) const IMBALANCE: f64 = 1e-9;
+/// Largest difference between emitted and accounted flux, over the emitted, that passes as
+/// rounding. Sums of some 10⁹ terms in f64 stay far below.
+const MAX_ENERGY_IMBALANCE: f64 = 1e-9;
 
 impl<'m> FluxState<'m> {
+    /// What `mesh` emits, all of it unshot.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when the emitted flux is not finite.
     pub fn new(mesh: &'m Mesh) -> Result<FluxState<'m>, Error> {
         let flux = Flux::emitted_by(mesh)?;
         let ledger = Ledger { emitted: flux.total, unshot: flux.total, ..Default::default() };
@@ -135,44 +154,51 @@ impl<'m> FluxState<'m> {
     }
 
     /// Sends `flux`, which is no longer unshot anywhere, along `row`.
-    pub fn pass_on(&mut self, flux: Rgb, row: &Row) {
+    pub fn distribute(&mut self, flux: Rgb, row: &Row) {
         let Flux { reflectance, incident, unshot, .. } = &mut self.flux;
-        let sent = send(
+        let transfer = send(
             flux,
             row,
             |e| reflectance[e],
-            |e, came| {
-                incident[e] += came;
-                unshot[e] += reflectance[e] * came;
+            |e, received| {
+                incident[e] += received;
+                unshot[e] += reflectance[e] * received;
             },
         );
-        self.lose(sent);
-        self.ledger.unshot += sent.reflected - flux;
+        self.record_losses(transfer);
+        self.ledger.unshot += transfer.reflected - flux;
     }
 
-    /// Books what is lost of flux that was sent.
-    pub fn lose(&mut self, sent: Transfer) {
-        self.ledger.absorbed += sent.absorbed;
-        self.ledger.escaped += sent.left;
-        self.ledger.backface_loss += sent.back;
+    /// Enters what is lost of flux that was sent into the ledger.
+    pub fn record_losses(&mut self, transfer: Transfer) {
+        self.ledger.absorbed += transfer.absorbed;
+        self.ledger.escaped += transfer.escaped;
+        self.ledger.backface_loss += transfer.backface;
     }
 
-    /// Counts what is unshot anew and checks that the ledger closes.
-    pub fn settle(&mut self) -> Result<(), Error> {
+    /// Sums what is unshot anew, so that rounding does not add up, and verifies that emitted and
+    /// accounted flux are equal.
+    ///
+    /// # Errors
+    /// [`ErrorKind::FormFactor`] when they differ by more than [`MAX_ENERGY_IMBALANCE`].
+    pub fn recompute_and_verify_energy(&mut self) -> Result<(), Error> {
         self.ledger.unshot = self.flux.unshot.iter().map(|u| u.max(Rgb::ZERO)).sum();
         self.ledger.overshot = self.flux.unshot.iter().map(|u| (-*u).max(Rgb::ZERO)).sum();
         let imbalance = self.ledger.imbalance();
-        if imbalance <= IMBALANCE {
+        if imbalance <= MAX_ENERGY_IMBALANCE {
             return Ok(());
         }
         Err(Error::new(
             ErrorKind::FormFactor,
             "energy ledger",
             format!("emitted and accounted flux differ by {imbalance:e} of the emitted"),
-            format!("they must agree to {IMBALANCE:e}; rows that are not finite can do this"),
+            format!(
+                "they must agree to {MAX_ENERGY_IMBALANCE:e}; rows that are not finite can do this"
+            ),
         ))
     }
 
+    /// Radiosity of each element, W/m².
     pub fn radiosity(&self) -> Vec<Rgb> {
         let area = |e| self.mesh.area(self.mesh.element(e));
         (0..self.mesh.element_count()).map(|e| self.flux.leaving(e) / area(e)).collect()

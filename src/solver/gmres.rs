@@ -1,261 +1,356 @@
 //! GMRES, restarted (Saad and Schultz 1986), on the flux that is unshot.
 //!
-//! A cycle looks for what to send among the unshot flux r, Ar, A²r … with A = 1 − M, such that the
-//! least is unshot afterwards. Products with A of bounced light are all it asks for, so that it costs
-//! what Jacobi's bounces do; but however near one the reflectance is, light that fills a scene evenly
-//! is a single direction, and found in a step.
+//! A cycle looks for what to send in the Krylov space of the unshot flux r, Ar, A²r … with
+//! A = 1 − M, such that the least is unshot afterwards. All it needs are products with M, that is,
+//! light sent along all rows, so that a product costs what a bounce of Jacobi does; but however near
+//! one the reflectance is, light that fills a scene evenly is a single direction, and found in a
+//! step. One cycle:
 //!
-//! Every vector is kept with what became of its light when it was sent, lost parts included. All of
-//! it is linear, so the ledger of what a cycle sends is known without sending it, whenever it ends.
+//! 1. v₀ = r/|r|; product: w = A v_k by sending v_k along the rows of all elements;
+//! 2. modified Gram–Schmidt: w = Σ h_ik v_i + h_{k+1,k} v_{k+1}, a column of the Hessenberg matrix;
+//! 3. Givens rotations bring the Hessenberg matrix to the triangle R, and r to the vector g, whose
+//!    last component is the norm of what would be left unshot;
+//! 4. after the last product: R y = g, and Σ y_k v_k is what is sent.
+//!
+//! Every vector is kept with what became of its light when it was sent, losses included. All of it
+//! is linear, so the ledger of what a cycle sends is known without sending it, whenever it ends.
+
+use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
 
 use super::flux_state::{FluxState, Transfer, send};
 use super::ledger::largest_share;
 use super::row_cache::RowCache;
-use super::session::StepContext;
+use super::step::StepContext;
 use crate::error::Error;
+use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Cycles of products, each a step, until done.
+/// A full cycle that takes less than this share off what is unshot, in norm, stagnates: the next has
+/// twice the products. Chosen by hand; no measurement kept.
+const MIN_CYCLE_REDUCTION: f64 = 0.5;
+
+/// Cycles of products; a step is a product.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Gmres {
     /// Products in a cycle.
-    length: usize,
+    restart: usize,
     cycle: Option<Box<Cycle>>,
     product: Option<Product>,
 }
 
-/// A vector that is being sent.
+/// The product of M with the newest basis vector, in progress.
 #[derive(Clone, Serialize, Deserialize)]
 struct Product {
-    /// Received by each element.
+    /// Received by each element so far, W.
     incident: Vec<Rgb>,
-    /// What became of all that was sent.
-    sent: Transfer,
-    /// The element whose turn it is.
+    /// What became of all that was sent so far.
+    transfer: Transfer,
+    /// Elements below this have sent their part.
     element: usize,
 }
 
-/// A cycle that takes less than this share off what is unshot is followed by one of twice the length.
-const LEAST_GAIN: f64 = 0.5;
-
 impl Gmres {
-    /// With `restart` products in a cycle.
+    /// Before the first cycle, of `restart` products.
     pub fn new(restart: usize) -> Gmres {
-        Gmres { length: restart, cycle: None, product: None }
+        Gmres { restart, cycle: None, product: None }
     }
 
-    /// Whether it fits `count` elements, as one from a file may not.
-    pub fn fits(&self, count: usize) -> bool {
-        let all = |w: &[Rgb]| w.len() == count && w.iter().all(|w| w.is_finite());
-        let product = |p: &Product| all(&p.incident) && p.element <= count;
-        self.length > 0
-            && self.cycle.as_ref().is_none_or(|cycle| cycle.fits(all))
-            && self.product.as_ref().is_none_or(|p| self.cycle.is_some() && product(p))
+    /// Whether this can be a state over `count` elements; one that was read from a file may not be.
+    pub fn is_consistent(&self, count: usize) -> bool {
+        let is_vector = |w: &[Rgb]| w.len() == count && w.iter().all(|w| w.is_finite());
+        let cycle_fits = self.cycle.as_ref().is_none_or(|cycle| cycle.is_consistent(is_vector));
+        let product_fits = self.product.as_ref().is_none_or(|product| {
+            self.cycle.is_some() && is_vector(&product.incident) && product.element <= count
+        });
+        self.restart > 0 && cycle_fits && product_fits
     }
 
     /// Goes on by as many elements as one batch of rows reaches.
-    pub fn advance(&mut self, batch: &mut StepContext) -> Result<Option<StopReason>, Error> {
+    pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
         let Some(cycle) = &mut self.cycle else {
-            if batch.has_converged()? {
+            if step.refresh_and_check_convergence()? {
                 return Ok(Some(StopReason::Converged));
             }
-            self.cycle = Some(Box::new(Cycle::new(batch.state)));
+            self.cycle = Some(Box::new(Cycle::new(step.state)));
             return Ok(None);
         };
-        let Some(product) = &mut self.product else {
-            let made = cycle.sent.len();
-            if made >= self.length || made > 0 && cycle.unshot(batch.state) <= batch.unshot {
-                self.finish(batch.state, batch.rows);
-            } else if batch.is_last_step() {
-                return Ok(Some(StopReason::Steps));
-            } else {
-                let incident = vec![Rgb::ZERO; batch.state.flux.unshot.len()];
-                self.product = Some(Product { incident, sent: Transfer::default(), element: 0 });
-            }
-            return Ok(None);
-        };
-        let vector = &cycle.basis[cycle.sent.len()];
-        let lit = (product.element..vector.len()).filter(|&e| vector[e] != Rgb::ZERO);
-        let rows = batch.rows.next(batch.state.mesh, batch.maker, lit)?;
-        let (done, unshot_share) = (rows.is_empty(), cycle.unshot(batch.state));
-        for (e, row) in rows {
-            let (incident, reflectance) = (&mut product.incident, &batch.state.flux.reflectance);
-            let sent = send(vector[e], &row, |e| reflectance[e], |e, came| incident[e] += came);
-            product.sent.add(Rgb::ONE, sent);
-            product.element = e + 1;
-            batch.done.shots += 1;
-            if batch.tell(unshot_share) == ControlFlow::Break(()) {
+        if let Some(product) = &mut self.product {
+            let Some(is_complete) = cycle.advance_product(product, step)? else {
                 return Ok(Some(StopReason::Cancelled));
+            };
+            if is_complete && let Some(product) = self.product.take() {
+                cycle.extend(product, &step.state.flux.reflectance);
+                step.counters.steps += 1;
             }
+            return Ok(None);
         }
-        if done && let Some(Product { incident, sent, .. }) = self.product.take() {
-            cycle.extend(incident, sent, &batch.state.flux.reflectance);
-            batch.done.steps += 1;
+        let done = cycle.products();
+        if done >= self.restart || done > 0 && cycle.unshot_bound(step.state) <= step.unshot {
+            self.finish(step.state, step.rows);
+        } else if step.has_done_all_steps() {
+            return Ok(Some(StopReason::Steps));
+        } else {
+            self.product = Some(Product::new(step.state.flux.unshot.len()));
         }
         Ok(None)
     }
 
-    /// Sends what leaves least unshot, by the vectors so far, and begins anew.
+    /// Sends what leaves least unshot, by the products so far, and ends the cycle.
     pub fn finish(&mut self, state: &mut FluxState, rows: &mut RowCache) {
         self.product = None;
         if let Some(cycle) = self.cycle.take() {
-            // In as many products as there are elements it would be exact: no scene holds it up for ever.
-            if cycle.stalls() && cycle.sent.len() >= self.length {
-                self.length = self.length.saturating_mul(2);
+            // With as many products as elements a cycle is exact: no scene stagnates for ever.
+            if cycle.stagnates() && cycle.products() >= self.restart {
+                self.restart = self.restart.saturating_mul(2);
             }
             cycle.finish(state, rows);
         }
     }
 }
 
-/// One cycle, of all channels at once: as many systems that share rows. A channel that is through
+impl Product {
+    /// Nothing is sent yet.
+    fn new(count: usize) -> Product {
+        Product { incident: vec![Rgb::ZERO; count], transfer: Transfer::default(), element: 0 }
+    }
+}
+
+/// One cycle, of all channels at once: as many systems that share rows. A channel that has converged
 /// goes on with vectors of 0.
 #[derive(Clone, Serialize, Deserialize)]
 struct Cycle {
-    /// Σ A over A of each element. With these weights a vector's norm is no less than the sum of its
-    /// fluxes' magnitudes (Cauchy and Schwarz), and the product with M nearly symmetric (it is where
-    /// reflectance is one and rows are exact).
+    /// Weights of the inner product: Σ A over A of each element. With these a vector's norm is no
+    /// less than the sum of its fluxes' magnitudes (Cauchy and Schwarz), and the product with M
+    /// nearly symmetric (it is where reflectance is one and rows are exact).
     weights: Vec<f64>,
-    /// Orthonormal vectors, the first along what is unshot.
+    /// v: orthonormal vectors, the first along what is unshot.
     basis: Vec<Vec<Rgb>>,
-    /// What became of the light of each but the last, and what came to each element.
-    sent: Vec<Transfer>,
+    /// What became of the light of each basis vector but the last …
+    transfers: Vec<Transfer>,
+    /// … and what each element received of it.
     incident: Vec<Vec<Rgb>>,
-    /// A times each but the last, in terms of the basis: columns of the Hessenberg matrix.
-    columns: Vec<Vec<Rgb>>,
-    /// The same as an upper triangle, after these rotations (cosine and sine).
-    triangle: Vec<Vec<Rgb>>,
+    /// Columns of the Hessenberg matrix: A times each basis vector but the last, in the basis.
+    hessenberg: Vec<Vec<Rgb>>,
+    /// Columns of R: the Hessenberg matrix after the rotations.
+    r_factor: Vec<Vec<Rgb>>,
+    /// Cosine and sine of each Givens rotation.
     rotations: Vec<[Rgb; 2]>,
-    /// Norm of what was unshot.
-    norm: Rgb,
-    /// The unshot flux, rotated likewise; the norm of what cannot be sent away comes last.
-    rest: Vec<Rgb>,
+    /// Norm of what was unshot when the cycle began.
+    initial_norm: Rgb,
+    /// g: what was unshot, in the basis, after the rotations. The last is the norm of the residual.
+    rotated_residual: Vec<Rgb>,
 }
 
 impl Cycle {
     fn new(state: &FluxState) -> Cycle {
-        let area = |e: usize| state.mesh.area(state.mesh.element(e));
-        let count = state.flux.unshot.len();
-        let whole: f64 = (0..count).map(area).sum();
-        let weights: Vec<f64> = (0..count).map(|e| whole / area(e)).collect();
+        let weights = inner_product_weights(state.mesh);
         // In parts of the largest, so that squares of it neither overflow nor vanish.
-        let largest = state.flux.unshot.iter().fold(Rgb::ZERO, |most, u| most.max(u.abs()));
+        let largest = state.flux.unshot.iter().fold(Rgb::ZERO, |max, u| max.max(u.abs()));
         let mut first = state.flux.unshot.clone();
-        first.iter_mut().for_each(|u| *u = ratio(*u, largest));
-        let norm = dot(&weights, &first, &first).map(f64::sqrt);
-        first.iter_mut().for_each(|u| *u = ratio(*u, norm));
-        let (sent, incident) = (vec![], vec![]);
-        let (columns, triangle, rotations) = (vec![], vec![], vec![]);
-        let (basis, norm) = (vec![first], norm * largest);
-        let rest = vec![norm];
-        Cycle { weights, basis, sent, incident, columns, triangle, rotations, norm, rest }
+        for u in &mut first {
+            *u = ratio(*u, largest);
+        }
+        let norm = norm(&weights, &first);
+        for u in &mut first {
+            *u = ratio(*u, norm);
+        }
+        let initial_norm = norm * largest;
+        Cycle {
+            weights,
+            basis: vec![first],
+            transfers: vec![],
+            incident: vec![],
+            hessenberg: vec![],
+            r_factor: vec![],
+            rotations: vec![],
+            initial_norm,
+            rotated_residual: vec![initial_norm],
+        }
     }
 
-    /// Takes in what came of the newest vector, and adds the direction that is new in what is
-    /// reflected of that.
-    fn extend(&mut self, incident: Vec<Rgb>, sent: Transfer, reflectance: &[Rgb]) {
-        let k = self.sent.len();
+    /// Products done so far.
+    fn products(&self) -> usize {
+        self.transfers.len()
+    }
+
+    /// Sends the newest basis vector from as many elements as one batch of rows reaches. Answers
+    /// whether all have sent theirs, or `None` when the callback stops the solver.
+    fn advance_product(
+        &self,
+        product: &mut Product,
+        step: &mut StepContext,
+    ) -> Result<Option<bool>, Error> {
+        let vector = &self.basis[self.products()];
+        let elements = (product.element..vector.len()).filter(|&e| vector[e] != Rgb::ZERO);
+        let rows = step.rows.next_element_rows(step.state.mesh, step.row_source, elements)?;
+        let is_complete = rows.is_empty();
+        let unshot_share = self.unshot_bound(step.state);
+        for (e, row) in rows {
+            let Product { incident, transfer, element } = &mut *product;
+            let reflectance = &step.state.flux.reflectance;
+            let sent = send(
+                vector[e],
+                &row,
+                |receiver| reflectance[receiver],
+                |receiver, received| incident[receiver] += received,
+            );
+            transfer.add(Rgb::ONE, sent);
+            *element = e + 1;
+            step.counters.shots += 1;
+            if step.report(unshot_share) == ControlFlow::Break(()) {
+                return Ok(None);
+            }
+        }
+        Ok(Some(is_complete))
+    }
+
+    /// Takes in the product with the newest basis vector, and adds to the basis the direction that
+    /// is new in it.
+    fn extend(&mut self, product: Product, reflectance: &[Rgb]) {
+        let Product { incident, transfer, .. } = product;
+        let k = self.products();
         let reflected = incident.iter().zip(reflectance).map(|(&h, &rho)| rho * h);
         let mut new: Vec<Rgb> = self.basis[k].iter().zip(reflected).map(|(&v, m)| v - m).collect();
         // Modified Gram–Schmidt, enough for GMRES (Paige, Rozložník and Strakoš 2006).
         let mut column = vec![];
         for v in &self.basis {
             let along = dot(&self.weights, v, &new);
-            new.iter_mut().zip(v).for_each(|(w, v)| *w -= along * v);
+            for (w, v) in new.iter_mut().zip(v) {
+                *w -= along * v;
+            }
             column.push(along);
         }
-        let norm = dot(&self.weights, &new, &new).map(f64::sqrt);
+        let norm = norm(&self.weights, &new);
         column.push(norm);
-        self.columns.push(column.clone());
-        for (i, &[c, s]) in self.rotations.iter().enumerate() {
-            let (a, b) = (column[i], column[i + 1]);
-            (column[i], column[i + 1]) = (c * a + s * b, c * b - s * a);
+        self.hessenberg.push(column.clone());
+        self.rotate(column);
+        for w in &mut new {
+            *w = ratio(*w, norm);
         }
-        let radius = (column[k] * column[k] + norm * norm).map(f64::sqrt);
-        let [c, s] = [ratio(column[k], radius), ratio(norm, radius)];
-        let rest = self.rest[k];
-        let last = -s * rest;
-        self.rest[k] = c * rest;
-        self.rest.push(last);
-        column[k] = radius;
-        column.pop();
-        self.triangle.push(column);
-        self.rotations.push([c, s]);
-        new.iter_mut().for_each(|w| *w = ratio(*w, norm));
         self.basis.push(new);
-        self.sent.push(sent);
+        self.transfers.push(transfer);
         self.incident.push(incident);
     }
 
-    /// Norm of what would be unshot after the vectors so far.
-    fn last(&self) -> Rgb {
-        self.rest.last().map_or(Rgb::ZERO, |r| r.abs())
+    /// Applies the rotations so far to the newest `column` of the Hessenberg matrix, and a new one
+    /// that makes its last entry 0.
+    fn rotate(&mut self, mut column: Vec<Rgb>) {
+        let k = self.products();
+        for (i, &[c, s]) in self.rotations.iter().enumerate() {
+            let (a, b) = (column[i], column[i + 1]);
+            column[i] = c * a + s * b;
+            column[i + 1] = c * b - s * a;
+        }
+        let norm = column[k + 1];
+        let radius = (column[k] * column[k] + norm * norm).map(f64::sqrt);
+        let [c, s] = [ratio(column[k], radius), ratio(norm, radius)];
+        let residual = self.rotated_residual[k];
+        self.rotated_residual[k] = c * residual;
+        self.rotated_residual.push(-s * residual);
+        column[k] = radius;
+        column.pop();
+        self.r_factor.push(column);
+        self.rotations.push([c, s]);
     }
 
-    /// The most that would be unshot, as a share of the emitted: the worst channel.
-    fn unshot(&self, state: &FluxState) -> f64 {
-        largest_share(self.last(), state.ledger.emitted)
+    /// Norm of what would be unshot after the products so far.
+    fn residual_norm(&self) -> Rgb {
+        self.rotated_residual.last().map_or(Rgb::ZERO, |r| r.abs())
     }
 
-    /// Whether less than [`LEAST_GAIN`] of what was unshot is gone in some channel.
-    fn stalls(&self) -> bool {
-        largest_share(self.last(), self.norm) > 1.0 - LEAST_GAIN
+    /// Upper bound of what would be unshot, as a share of the emitted: the worst channel.
+    fn unshot_bound(&self, state: &FluxState) -> f64 {
+        largest_share(self.residual_norm(), state.ledger.emitted)
+    }
+
+    /// Whether less than [`MIN_CYCLE_REDUCTION`] of what was unshot is gone in some channel.
+    fn stagnates(&self) -> bool {
+        largest_share(self.residual_norm(), self.initial_norm) > 1.0 - MIN_CYCLE_REDUCTION
+    }
+
+    /// y: how much of each basis vector leaves least unshot.
+    fn coefficients(&self) -> Vec<Rgb> {
+        let count = self.r_factor.len();
+        let mut y = vec![Rgb::ZERO; count];
+        for i in (0..count).rev() {
+            let known: Rgb = (i + 1..count).map(|k| self.r_factor[k][i] * y[k]).sum();
+            y[i] = ratio(self.rotated_residual[i] - known, self.r_factor[i][i]);
+        }
+        y
     }
 
     /// Sends what leaves least unshot.
     fn finish(self, state: &mut FluxState, rows: &mut RowCache) {
-        let count = self.triangle.len();
-        let mut parts = vec![Rgb::ZERO; count];
-        for i in (0..count).rev() {
-            let known: Rgb = (i + 1..count).map(|k| self.triangle[k][i] * parts[k]).sum();
-            parts[i] = ratio(self.rest[i] - known, self.triangle[i][i]);
-        }
-        // A times what is sent, by the basis: that much is no longer unshot.
+        let coefficients = self.coefficients();
+        // A times what is sent, in the basis: that much is no longer unshot.
         let mut shot = vec![Rgb::ZERO; self.basis.len()];
-        for (column, &part) in self.columns.iter().zip(&parts) {
-            shot.iter_mut().zip(column).for_each(|(s, &h)| *s += h * part);
+        for (column, &y) in self.hessenberg.iter().zip(&coefficients) {
+            for (sum, &h) in shot.iter_mut().zip(column) {
+                *sum += h * y;
+            }
         }
         for (v, &shot) in self.basis.iter().zip(&shot) {
-            state.flux.unshot.iter_mut().zip(v).for_each(|(r, v)| *r -= shot * *v);
+            for (unshot, v) in state.flux.unshot.iter_mut().zip(v) {
+                *unshot -= shot * *v;
+            }
         }
         let mut sent = vec![Rgb::ZERO; state.flux.unshot.len()];
-        for (k, &part) in parts.iter().enumerate() {
-            sent.iter_mut().zip(&self.basis[k]).for_each(|(s, v)| *s += part * *v);
-            let incident = state.flux.incident.iter_mut();
-            incident.zip(&self.incident[k]).for_each(|(h, came)| *h += part * *came);
+        for (k, &y) in coefficients.iter().enumerate() {
+            for (sum, v) in sent.iter_mut().zip(&self.basis[k]) {
+                *sum += y * *v;
+            }
+            for (sum, received) in state.flux.incident.iter_mut().zip(&self.incident[k]) {
+                *sum += y * *received;
+            }
         }
         for (e, flux) in sent.into_iter().enumerate().filter(|(_, flux)| *flux != Rgb::ZERO) {
-            rows.sent(state.mesh.element(e), flux);
+            rows.record_sent(state.mesh.element(e), flux);
         }
-        let mut all = Transfer::default();
-        parts.iter().zip(&self.sent).for_each(|(&part, &sent)| all.add(part, sent));
-        state.lose(all);
+        let mut transfer = Transfer::default();
+        for (&y, &of_vector) in coefficients.iter().zip(&self.transfers) {
+            transfer.add(y, of_vector);
+        }
+        state.record_losses(transfer);
     }
 
-    /// Whether all vectors satisfy `fits` and are as many as they should be.
-    fn fits(&self, fits: impl Fn(&[Rgb]) -> bool) -> bool {
-        let made = self.sent.len();
-        let columns = |columns: &[Vec<Rgb>], more: usize| {
-            columns.len() == made && columns.iter().enumerate().all(|(k, c)| c.len() == k + more)
+    /// Whether all vectors satisfy `is_vector` and are as many as they should be.
+    fn is_consistent(&self, is_vector: impl Fn(&[Rgb]) -> bool) -> bool {
+        let count = self.products();
+        // Column k has k + 1 entries, and those below the diagonal.
+        let are_columns = |columns: &[Vec<Rgb>], below: usize| {
+            let lengths = columns.iter().map(Vec::len);
+            columns.len() == count && lengths.enumerate().all(|(k, len)| len == k + 1 + below)
         };
-        self.basis.len() == made + 1
-            && self.incident.len() == made
-            && self.rotations.len() == made
-            && self.rest.len() == made + 1
-            && columns(&self.columns, 2)
-            && columns(&self.triangle, 1)
-            && self.basis.iter().chain(&self.incident).all(|v| fits(v))
+        self.basis.len() == count + 1
+            && self.incident.len() == count
+            && self.rotations.len() == count
+            && self.rotated_residual.len() == count + 1
+            && are_columns(&self.hessenberg, 1)
+            && are_columns(&self.r_factor, 0)
+            && self.basis.iter().chain(&self.incident).all(|v| is_vector(v))
             && self.weights.len() == self.basis[0].len()
     }
 }
 
-/// Sum of products over the elements.
+/// Σ A over A of each element of `mesh`.
+fn inner_product_weights(mesh: &Mesh) -> Vec<f64> {
+    let area = |e: usize| mesh.area(mesh.element(e));
+    let count = mesh.element_count();
+    let total: f64 = (0..count).map(area).sum();
+    (0..count).map(|e| total / area(e)).collect()
+}
+
+/// Σ weight a b over the elements, by channel.
 fn dot(weights: &[f64], a: &[Rgb], b: &[Rgb]) -> Rgb {
     weights.iter().zip(a).zip(b).map(|((&w, a), b)| w * *a * *b).sum()
+}
+
+/// √ Σ weight a² over the elements, by channel.
+fn norm(weights: &[f64], a: &[Rgb]) -> Rgb {
+    dot(weights, a, a).map(f64::sqrt)
 }
 
 /// `a` over `b`, and 0 where that is 0.

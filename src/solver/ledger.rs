@@ -1,4 +1,7 @@
-//! Where all emitted light has gone.
+//! The energy balance of a solve: where all emitted light has gone.
+//!
+//! emitted = absorbed + escaped + lost at back faces + unshot − overshot, per channel and at any
+//! time, up to rounding.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +21,7 @@ pub struct Ledger {
     pub backface_loss: Rgb,
     /// Received or emitted, not yet passed on.
     pub unshot: Rgb,
-    /// Passed on before it was received: 0 but for solvers that run ahead of the light (shooting
+    /// Passed on before it was received: 0 but for methods that send more than they have (shooting
     /// with overshoot, GMRES, a direct solve's rounding). What is unshot may yet make up for it.
     pub overshot: Rgb,
 }
@@ -43,8 +46,8 @@ impl Ledger {
 
     /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
     /// fell evenly on all surfaces, again and again: the ambient term of Cohen, Chen, Wallace and
-    /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing of
-    /// where that would have gone. Gives the ambient radiosity, per unit of reflectance.
+    /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing
+    /// of where that would have gone. Returns the ambient radiosity, W/m² per unit of reflectance.
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
         let ambient = self.ambient(mesh);
         for (e, b) in radiosity.iter_mut().enumerate() {
@@ -55,8 +58,8 @@ impl Ledger {
 
     /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell evenly.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
-        let lost = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
-        (self.unshot - self.overshot) / mesh.total_area() / lost
+        let absorptance = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
+        (self.unshot - self.overshot) / mesh.total_area() / absorptance
     }
 
     /// Share of the emitted flux that is unshot or overshot: the worst channel. 0 when nothing is
@@ -66,8 +69,8 @@ impl Ledger {
     }
 }
 
-/// Largest ratio part/whole over the channels in which the whole is above zero.
-pub(super) fn largest_share(part: Rgb, whole: Rgb) -> f64 {
-    let share = |(p, w): (f64, f64)| if w > 0.0 { p / w } else { 0.0 };
-    part.to_array().into_iter().zip(whole.to_array()).map(share).fold(0.0, f64::max)
+/// Largest ratio part/total over the channels in which the total is above zero.
+pub(super) fn largest_share(part: Rgb, total: Rgb) -> f64 {
+    let share = |(p, t): (f64, f64)| if t > 0.0 { p / t } else { 0.0 };
+    part.to_array().into_iter().zip(total.to_array()).map(share).fold(0.0, f64::max)
 }

@@ -1,12 +1,21 @@
-//! Who shoots: a cut through clusters, triangles and their quadtrees, finer where more is at stake.
+//! The patches that shoot: a cut through the hierarchy of clusters, triangles and their quadtrees,
+//! finer where more light is at stake.
 //!
-//! A shooter is a cluster of triangles, a triangle, or a node of its quadtree. It shoots for all
-//! elements below it along one row, seen from one place. That is off by how far its light is from
-//! that place, beside how far its receivers are: a share q of what it sends, by first and second
-//! moments of position, normal and brightness. With a share s of the emitted light, it adds s q²
-//! to the mean square of q over all light; where √s q is above the tolerance, its parts shoot. So
-//! effort follows flux, and is spread evenly (Hanrahan, Salzman and Aupperle 1991 refine by
-//! brightness likewise, there the links between two patches).
+//! A patch is a cluster of triangles, a triangle, or a node of its quadtree. It shoots for all
+//! elements below it along one row, seen from one viewpoint. The cut begins with the largest
+//! patches; before a patch shoots, its error √s q ([`patch_error`](super::patch_error)) is compared
+//! with the tolerance, and where it is above, its parts take its place:
+//!
+//! ```text
+//! clusters            ●                      ●
+//!                   ╱   ╲                  ╱   ╲
+//! triangles       ●───────●──── cut ──╮   ●     ●
+//!               ╱╱╲╲    ╱╱╲╲          ╰──●●●●──●●●●
+//! elements      ○○○○    ○○○○             ○○○○  ○○○○
+//! ```
+//!
+//! The cut only ever gets finer. A viewpoint whose row shows that it stands inside a solid is
+//! rejected, and another place of the patch is taken.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -16,67 +25,77 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::flux_state::Flux;
+use super::patch_error::{InverseDistanceMoments, misplaced_share};
 use crate::form_factor::Row;
 use crate::geometry::rounding::tie_stable_key;
 use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// The shooters. Together they cover every element once, and they only ever get smaller.
+/// Elements of emitters up to which all of these shoot by themselves. More are rooms that glow, not
+/// lamps. Chosen by hand; no measurement kept.
+const MAX_EMITTER_ELEMENTS: usize = 1024;
+
+/// A batch of shots ends where the unshot flux is below this share of its brightest patch. Chosen by
+/// hand; no measurement kept.
+const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
+
+/// Viewpoints of one patch that are rejected at most; the next one is taken as it is.
+const MAX_REJECTED_VIEWPOINTS: u32 = 4;
+
+/// An element is lit from this share of its patch's mean radiosity on.
+const MIN_LIT_SHARE: f64 = 0.5;
+
+/// The patches that shoot. Together they cover every element once.
 #[derive(Clone)]
 pub(super) struct PatchCut<'m> {
     mesh: &'m Mesh,
     clusters: &'m Clusters,
     /// Centroid of each element.
     centroids: Vec<DVec3>,
-    cut: Vec<ShootingPatch>,
-    /// Nodes that see mostly backs.
-    blind: HashSet<NodeId>,
-    /// Most that √s q may be.
+    patches: Vec<ShootingPatch>,
+    /// Nodes that see mostly back faces.
+    occluded_viewpoints: HashSet<NodeId>,
+    /// Highest √s q of a patch that shoots.
     tolerance: f64,
-    /// Quadtree levels above the elements that are not gone below.
-    level: u32,
+    /// Quadtree levels above the elements below which no patch is split.
+    min_level: u32,
 }
 
-/// One that shoots.
+/// A patch that shoots.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct ShootingPatch {
     source: Source,
+    /// The elements below it, as ranges that do not touch.
     #[serde(skip)]
     elements: Vec<Range<usize>>,
-    /// The node whose row this shoots along, once it has shot or is about to.
-    patch: Option<NodeId>,
-    near: InverseDistanceMoments,
-    /// Emits and has not shot yet.
-    fresh: bool,
-    /// Times that its patch saw mostly backs.
-    rejected: u32,
+    /// The node whose row it shoots along, once it has shot or is about to.
+    viewpoint: Option<NodeId>,
+    distances: InverseDistanceMoments,
+    /// Emits, and has not shot yet.
+    is_unshot_emitter: bool,
+    /// How many of its viewpoints saw mostly back faces.
+    rejected_viewpoints: u32,
 }
 
+/// Where in the hierarchy a patch is.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 enum Source {
     Cluster(u32),
     Node(NodeId),
 }
 
-/// Means of 1/r and 1/r² over what a patch sees, r from its centroid; 1/length unit, and squared.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-struct InverseDistanceMoments {
-    first: f64,
-    second: f64,
-}
-
-/// The shooters as they are saved.
+/// A cut as it is saved.
 #[derive(Serialize, Deserialize)]
 pub(super) struct CutSnapshot {
-    pub shooters: Vec<ShootingPatch>,
-    blind: Vec<NodeId>,
+    pub patches: Vec<ShootingPatch>,
+    occluded_viewpoints: Vec<NodeId>,
 }
 
 /// A shot to be taken.
 pub(super) struct Shot {
-    /// GatherPoint in the cut.
-    shooter: usize,
+    /// Index of the patch in the cut.
+    index: usize,
     /// The node whose row it goes along.
     pub patch: NodeId,
     /// The elements that are shot for.
@@ -84,297 +103,300 @@ pub(super) struct Shot {
 }
 
 impl<'m> PatchCut<'m> {
-    fn none(mesh: &'m Mesh, tolerance: f64, level: u32) -> PatchCut<'m> {
-        let (cut, blind, centroids) = (vec![], HashSet::new(), centroids(mesh));
-        PatchCut { mesh, clusters: mesh.clusters(), centroids, cut, blind, tolerance, level }
-    }
-
-    /// The largest there are; but emitters that are few shoot by their elements, since what is nearest
-    /// a lamp depends most on its shape.
-    pub fn new(mesh: &'m Mesh, tolerance: f64, level: u32) -> PatchCut<'m> {
-        let mut all = PatchCut::none(mesh, tolerance, level);
-        // As in the middle of a cube of that area.
-        let area: f64 = (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum();
-        let near = InverseDistanceMoments { first: (6.0 / area).sqrt(), second: 6.0 / area };
-        let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
-        let emitters = (0..mesh.scene().triangles().len()).filter(|&t| emits(t));
-        let few = emitters.map(|t| mesh.elements_of(mesh.root(t)).len()).sum::<usize>() <= FEW;
-        for &root in all.clusters.roots() {
-            let triangles = all.clusters.triangles(root);
-            let fresh = emits(triangles[0] as usize);
-            if !(fresh && few) {
-                let shooter = all.shooter(Source::Cluster(root), near);
-                all.cut.push(ShootingPatch { fresh, ..shooter });
-                continue;
-            }
-            let below = triangles.iter().flat_map(|&t| mesh.elements_of(mesh.root(t as usize)));
-            let one = |e| all.shooter(Source::Node(mesh.element(e)), near);
-            let emitters: Vec<ShootingPatch> =
-                below.map(|e| ShootingPatch { fresh, ..one(e) }).collect();
-            all.cut.extend(emitters);
+    fn empty(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
+        PatchCut {
+            mesh,
+            clusters: mesh.clusters(),
+            centroids: centroids(mesh),
+            patches: vec![],
+            occluded_viewpoints: HashSet::new(),
+            tolerance,
+            min_level,
         }
-        all
     }
 
-    /// What there is to be saved.
-    pub fn cut(&self) -> CutSnapshot {
-        let mut blind: Vec<NodeId> = self.blind.iter().copied().collect();
-        blind.sort_unstable();
-        CutSnapshot { shooters: self.cut.clone(), blind }
+    /// The largest patches there are; but emitters that are few shoot by their elements, since what
+    /// is nearest a lamp depends most on its shape.
+    pub fn new(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
+        let mut cut = PatchCut::empty(mesh, tolerance, min_level);
+        let triangles = 0..mesh.scene().triangles().len();
+        let area: f64 = triangles.clone().map(|t| mesh.scene().area(t)).sum();
+        let distances = InverseDistanceMoments::in_cube_of_area(area);
+        let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
+        let emitter_elements: usize =
+            triangles.filter(|&t| emits(t)).map(|t| mesh.elements_of(mesh.root(t)).len()).sum();
+        let emitters_are_few = emitter_elements <= MAX_EMITTER_ELEMENTS;
+        for &root in cut.clusters.roots() {
+            let triangles = cut.clusters.triangles(root);
+            // All triangles of a cluster have one material.
+            let is_emitter = emits(triangles[0] as usize);
+            let sources = if is_emitter && emitters_are_few {
+                let nodes = triangles.iter().map(|&t| mesh.root(t as usize));
+                let elements = nodes.flat_map(|root| mesh.elements_of(root));
+                elements.map(|e| Source::Node(mesh.element(e))).collect()
+            } else {
+                vec![Source::Cluster(root)]
+            };
+            for source in sources {
+                let mut patch = cut.patch(source, distances);
+                patch.is_unshot_emitter = is_emitter;
+                cut.patches.push(patch);
+            }
+        }
+        cut
     }
 
-    /// The shooters of a cut that was saved, if they are a cut through `mesh`.
-    pub fn from_cut(
+    /// What is saved of it.
+    pub fn snapshot(&self) -> CutSnapshot {
+        let mut occluded_viewpoints: Vec<NodeId> =
+            self.occluded_viewpoints.iter().copied().collect();
+        occluded_viewpoints.sort_unstable();
+        CutSnapshot { patches: self.patches.clone(), occluded_viewpoints }
+    }
+
+    /// The cut that was saved, if it is one through `mesh`.
+    pub fn from_snapshot(
         mesh: &'m Mesh,
         tolerance: f64,
-        level: u32,
-        cut: CutSnapshot,
+        min_level: u32,
+        saved: CutSnapshot,
     ) -> Option<PatchCut<'m>> {
-        let mut all = PatchCut::none(mesh, tolerance, level);
-        let node = |n: NodeId| mesh.contains(n);
-        let mut seen = vec![false; mesh.element_count()];
-        for saved in cut.shooters {
-            let known = match saved.source {
-                Source::Cluster(c) => (c as usize) < all.clusters.count(),
-                Source::Node(n) => node(n),
+        let mut cut = PatchCut::empty(mesh, tolerance, min_level);
+        let mut is_covered = vec![false; mesh.element_count()];
+        for patch in saved.patches {
+            let source_exists = match patch.source {
+                Source::Cluster(c) => (c as usize) < cut.clusters.count(),
+                Source::Node(node) => mesh.contains(node),
             };
-            let InverseDistanceMoments { first, second } = saved.near;
-            if !known || !saved.patch.is_none_or(node) || first.is_nan() || second.is_nan() {
+            let viewpoint_exists = patch.viewpoint.is_none_or(|node| mesh.contains(node));
+            if !source_exists || !viewpoint_exists || !patch.distances.is_consistent() {
                 return None;
             }
-            let elements = all.shooter(saved.source, saved.near).elements;
-            for e in self::all(&elements) {
-                if std::mem::replace(&mut seen[e], true) {
+            let elements = cut.patch(patch.source, patch.distances).elements;
+            for e in indices(&elements) {
+                if std::mem::replace(&mut is_covered[e], true) {
                     return None;
                 }
             }
-            all.cut.push(ShootingPatch { elements, ..saved });
+            cut.patches.push(ShootingPatch { elements, ..patch });
         }
-        all.blind = cut.blind.into_iter().collect();
-        (seen.into_iter().all(|s| s) && all.blind.iter().all(|&n| node(n))).then_some(all)
+        cut.occluded_viewpoints = saved.occluded_viewpoints.into_iter().collect();
+        let viewpoints_exist = cut.occluded_viewpoints.iter().all(|&node| mesh.contains(node));
+        (is_covered.into_iter().all(|c| c) && viewpoints_exist).then_some(cut)
     }
 
-    /// Shoots over `mesh` from now on, whose elements are the same.
-    pub fn change(&mut self, mesh: &'m Mesh) {
-        (self.mesh, self.clusters, self.centroids) = (mesh, mesh.clusters(), centroids(mesh));
+    /// Goes over to `mesh`, whose elements are the same.
+    pub fn set_mesh(&mut self, mesh: &'m Mesh) {
+        self.mesh = mesh;
+        self.clusters = mesh.clusters();
+        self.centroids = centroids(mesh);
     }
 
-    /// The elements of the shooter that shoots from `patch`, which sees too many backs by now, to be
-    /// shot for from elsewhere. None where there is no other place.
-    pub fn blinded(&mut self, patch: NodeId) -> Option<Vec<usize>> {
-        let shooter = self.cut.iter_mut().find(|s| s.patch == Some(patch))?;
-        let elements: Vec<usize> = all(&shooter.elements).collect();
+    /// Rejects the viewpoint `node`, which sees mostly back faces by now, so that its patch shoots
+    /// from elsewhere: returns the elements of that patch. None where there is no other place.
+    pub fn reject_viewpoint(&mut self, node: NodeId) -> Option<Vec<usize>> {
+        let patch = self.patches.iter_mut().find(|patch| patch.viewpoint == Some(node))?;
+        let elements: Vec<usize> = indices(&patch.elements).collect();
         if elements.len() == 1 {
             return None;
         }
-        shooter.patch = None;
-        self.blind.insert(patch);
+        patch.viewpoint = None;
+        self.occluded_viewpoints.insert(node);
         Some(elements)
     }
 
-    /// The next shots, by unshot flux, most first; emitters before all others. Ends at `rows`
-    /// patches whose row is missing, at `most` shots, or where the flux falls far below the first's,
-    /// so that no dim patch shoots before a bright one is lit.
-    pub fn brightest(
+    /// The next shots, by unshot flux, most first; emitters before all others. Ends at `max_rows`
+    /// patches for which `is_missing` says that the row must be made, at `max_shots`, or where the
+    /// flux falls far below the first's, so that no dim patch shoots before a bright one is lit.
+    pub fn next_shots(
         &mut self,
         flux: &Flux,
-        rows: usize,
-        most: u64,
-        missing: impl Fn(NodeId) -> bool,
+        max_rows: usize,
+        max_shots: u64,
+        is_missing: impl Fn(NodeId) -> bool,
     ) -> Vec<Shot> {
         // Of equals the first in the cut.
-        let entry = |s: &ShootingPatch, k: usize| {
-            let share = flux.unshot_share(&s.elements);
-            (share > 0.0).then(|| (s.fresh, tie_stable_key(share), Reverse(k)))
+        let entry = |patch: &ShootingPatch, k: usize| {
+            let share = flux.unshot_share(&patch.elements);
+            (share > 0.0).then(|| (patch.is_unshot_emitter, tie_stable_key(share), Reverse(k)))
         };
-        let mut bright: BinaryHeap<_> =
-            self.cut.iter().zip(0..).filter_map(|(s, k)| entry(s, k)).collect();
-        let (mut wanted, mut shots, mut floor) = (rows.max(1), Vec::<Shot>::new(), None);
-        while let Some((fresh, share, Reverse(k))) = bright.pop() {
-            let least = || tie_stable_key(flux.unshot_share(&self.cut[k].elements) * BATCH_FALL);
-            let (first, least) = *floor.get_or_insert_with(|| (fresh, least()));
-            if fresh != first || share < least || shots.len() as u64 >= most {
+        let mut queue: BinaryHeap<_> =
+            self.patches.iter().zip(0..).filter_map(|(patch, k)| entry(patch, k)).collect();
+        let mut rows_left = max_rows.max(1);
+        let mut shots: Vec<Shot> = vec![];
+        // Of the first shot: whether it is that of an emitter, and the least flux of the others.
+        let mut batch_limits = None;
+        while let Some((is_emitter, share, Reverse(k))) = queue.pop() {
+            let (emitters, min_share) = *batch_limits.get_or_insert_with(|| {
+                let share = flux.unshot_share(&self.patches[k].elements);
+                (is_emitter, tie_stable_key(share * MIN_BATCH_FLUX_SHARE))
+            });
+            let is_full = shots.len() as u64 >= max_shots;
+            if is_emitter != emitters || share < min_share || is_full {
                 break;
             }
-            let parts = self.cut.len();
+            let count = self.patches.len();
             if self.split(k, flux) {
-                let parts = [k].into_iter().chain(parts..self.cut.len());
-                bright.extend(parts.filter_map(|k| entry(&self.cut[k], k)));
-                // The floor is that of a patch that shoots.
-                floor = floor.filter(|_| !shots.is_empty());
+                let parts = [k].into_iter().chain(count..self.patches.len());
+                queue.extend(parts.filter_map(|k| entry(&self.patches[k], k)));
+                // The limits are those of a patch that shoots.
+                batch_limits = batch_limits.filter(|_| !shots.is_empty());
                 continue;
             }
-            let patch = self.viewpoint(&self.cut[k], flux);
-            let draws = missing(patch);
-            if draws && wanted == 0 {
+            let patch = self.viewpoint(&self.patches[k], flux);
+            let needs_row = is_missing(patch);
+            if needs_row && rows_left == 0 {
                 break;
             }
-            // A patch that stands for two shooters is drawn for one of them first.
-            if draws && shots.iter().any(|s| s.patch == patch) {
+            // A viewpoint that two patches share gets its row for one of them first.
+            if needs_row && shots.iter().any(|shot| shot.patch == patch) {
                 continue;
             }
-            wanted -= usize::from(draws);
-            let shooter = &mut self.cut[k];
-            shooter.patch = Some(patch);
-            shots.push(Shot { shooter: k, patch, elements: shooter.elements.clone() });
+            rows_left -= usize::from(needs_row);
+            self.patches[k].viewpoint = Some(patch);
+            shots.push(Shot { index: k, patch, elements: self.patches[k].elements.clone() });
         }
         shots
     }
 
-    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is to be
-    /// taken still; if not, the shooter has been split, or shoots from elsewhere.
-    pub fn confirm(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
+    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is still to be
+    /// taken; if not, the patch has been split, or shoots from elsewhere.
+    pub fn accept_or_split(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
         let eye = self.mesh.centroid(shot.patch);
-        let mut near = InverseDistanceMoments { first: 0.0, second: 0.0 };
-        for entry in &row.entries {
-            let factor = Row::form_factor(entry.share);
-            let distance = self.centroids[entry.element as usize].distance(eye);
-            near.first += factor / distance;
-            near.second += factor / (distance * distance);
-        }
-        let shooter = &mut self.cut[shot.shooter];
-        shooter.near = near;
-        let alone = all(&shooter.elements).nth(1).is_none();
-        if Row::form_factor(row.backface) > buried::VIEWPOINT
-            && shooter.rejected < ATTEMPTS
-            && !alone
-        {
-            shooter.rejected += 1;
-            shooter.patch = None;
-            self.blind.insert(shot.patch);
+        let patch = &mut self.patches[shot.index];
+        patch.distances = InverseDistanceMoments::of_row(row, eye, &self.centroids);
+        let is_inside = Row::form_factor(row.backface) > buried::VIEWPOINT;
+        let is_one_element = indices(&patch.elements).nth(1).is_none();
+        if is_inside && patch.rejected_viewpoints < MAX_REJECTED_VIEWPOINTS && !is_one_element {
+            patch.rejected_viewpoints += 1;
+            patch.viewpoint = None;
+            self.occluded_viewpoints.insert(shot.patch);
             return false;
         }
-        !self.split(shot.shooter, flux)
+        !self.split(shot.index, flux)
     }
 
     /// Notes that `shot` was taken.
-    pub fn shot(&mut self, shot: &Shot) {
-        self.cut[shot.shooter].fresh = false;
+    pub fn mark_shot(&mut self, shot: &Shot) {
+        self.patches[shot.index].is_unshot_emitter = false;
     }
 
-    /// Replaces shooter `k` by its parts where it is too coarse, and these by theirs. Parts take on
-    /// what is known of their whole.
+    /// Replaces patch `k` by its parts where it is too coarse, and these by theirs; the first part
+    /// takes its index. Answers whether it did.
     fn split(&mut self, k: usize, flux: &Flux) -> bool {
-        let mut open = vec![k];
-        let mut split = false;
-        while let Some(k) = open.pop() {
-            let ShootingPatch { source, near, .. } = self.cut[k];
+        let mut unchecked = vec![k];
+        let mut has_split = false;
+        while let Some(k) = unchecked.pop() {
+            let ShootingPatch { source, distances, .. } = self.patches[k];
             let parts = self.parts(source);
-            if parts.is_empty() || self.error(&self.cut[k], flux) < self.tolerance {
+            if parts.is_empty() || self.error(&self.patches[k], flux) < self.tolerance {
                 continue;
             }
-            split = true;
-            let mut parts = parts.into_iter().map(|part| self.shooter(part, near));
-            let first = parts.next();
-            let rest: Vec<ShootingPatch> = parts.collect();
-            open.push(k);
-            open.extend(self.cut.len()..self.cut.len() + rest.len());
-            self.cut.extend(rest);
-            first.into_iter().for_each(|part| self.cut[k] = part);
+            has_split = true;
+            unchecked.push(k);
+            for (n, part) in parts.into_iter().enumerate() {
+                let part = self.patch(part, distances);
+                if n == 0 {
+                    self.patches[k] = part;
+                } else {
+                    unchecked.push(self.patches.len());
+                    self.patches.push(part);
+                }
+            }
         }
-        split
+        has_split
     }
 
-    /// √s q of a shooter.
-    fn error(&self, shooter: &ShootingPatch, flux: &Flux) -> f64 {
-        let mesh = self.mesh;
-        let share = flux.leaving_share(&shooter.elements);
+    /// √s q of a patch.
+    fn error(&self, patch: &ShootingPatch, flux: &Flux) -> f64 {
+        let share = flux.leaving_share(&patch.elements);
         if share == 0.0 {
             return 0.0;
         }
-        let patch = self.viewpoint(shooter, flux);
-        let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
-        let (mut whole, mut area) = (0.0, 0.0);
-        let (mut place, mut extent) = (DVec3::ZERO, 0.0);
-        let (mut turn, mut bend) = (DVec3::ZERO, 0.0);
-        for e in all(&shooter.elements) {
-            let node = mesh.element(e);
-            let (off, turned) = (self.centroids[e] - eye, mesh.normal(node) - normal);
-            let light = flux.leaving(e).element_sum();
-            whole += light;
-            area += mesh.area(node);
-            place += light * off;
-            extent += light * off.length_squared();
-            turn += light * turned;
-            bend += light * turned.length_squared();
-        }
-        let even = |e: usize| whole / area * mesh.area(mesh.element(e));
-        let uneven = |e: usize| (flux.leaving(e).element_sum() - even(e)).abs();
-        let uneven = all(&shooter.elements).map(uneven).sum::<f64>() / whole;
-        if whole <= 0.0 {
-            return 0.0;
-        }
-        let InverseDistanceMoments { first, second } = shooter.near;
-        // The angle that the patch is seen under, squared.
-        let wide = extent / whole * second;
-        let off = place.length() / whole * first + wide + UNEVEN * uneven * wide.sqrt();
-        share.sqrt() * (off + (turn.length() + bend) / whole).min(1.0)
+        let ShootingPatch { elements, distances, .. } = patch;
+        let viewpoint = self.viewpoint(patch, flux);
+        let misplaced =
+            misplaced_share(self.mesh, &self.centroids, elements, viewpoint, *distances, flux);
+        share.sqrt() * misplaced
     }
 
-    /// The node whose row `shooter` is to shoot along: itself, where its middle is lit; else, as
-    /// for a cluster, the lit element nearest to where its light is. What no light comes to may lie
-    /// in other geometry, such as the floor under a block.
-    fn viewpoint(&self, shooter: &ShootingPatch, flux: &Flux) -> NodeId {
+    /// The node whose row `patch` is to shoot along: itself, where its middle is lit; else, as for a
+    /// cluster, the lit element nearest to where its light is. What no light comes to may lie in
+    /// other geometry, such as the floor under a block.
+    fn viewpoint(&self, patch: &ShootingPatch, flux: &Flux) -> NodeId {
         let mesh = self.mesh;
-        if let Some(patch) = shooter.patch {
-            return patch;
+        if let Some(viewpoint) = patch.viewpoint {
+            return viewpoint;
         }
         let area = |e: usize| mesh.area(mesh.element(e));
         let light = |e: usize| flux.leaving(e).element_sum();
-        let elements = || all(&shooter.elements);
-        let whole: f64 = elements().map(light).sum();
-        let mean = whole / elements().map(area).sum::<f64>();
-        let lit = |&e: &usize| light(e) >= LIT * mean * area(e);
-        if let Source::Node(node) = shooter.source
-            && !self.blind.contains(&node)
+        let elements = || indices(&patch.elements);
+        let total: f64 = elements().map(light).sum();
+        let mean = total / elements().map(area).sum::<f64>();
+        let is_lit = |&e: &usize| light(e) >= MIN_LIT_SHARE * mean * area(e);
+        if let Source::Node(node) = patch.source
+            && !self.occluded_viewpoints.contains(&node)
+            && mesh.elements_of(self.middle(node)).all(|e| is_lit(&e))
         {
-            let mut middle = node;
-            while let Some([.., part]) = mesh.children(middle) {
-                middle = part;
-            }
-            if mesh.elements_of(middle).all(|e| lit(&e)) {
-                return node;
-            }
+            return node;
         }
-        let middle = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / whole;
-        let off = |e: &usize| self.centroids[*e].distance_squared(middle);
-        let sees = |e: &usize| !self.blind.contains(&mesh.element(*e));
-        let nearest = elements().filter(lit).filter(sees).min_by_key(|e| tie_stable_key(off(e)));
-        mesh.element(nearest.unwrap_or(shooter.elements[0].start))
+        let centre = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / total;
+        let nearest = elements()
+            .filter(is_lit)
+            .filter(|&e| !self.occluded_viewpoints.contains(&mesh.element(e)))
+            .min_by_key(|&e| tie_stable_key(self.centroids[e].distance_squared(centre)));
+        mesh.element(nearest.unwrap_or(patch.elements[0].start))
     }
 
-    fn shooter(&self, source: Source, near: InverseDistanceMoments) -> ShootingPatch {
+    /// The deepest node that has the centroid of `node`: the middle one of the middle children.
+    fn middle(&self, node: NodeId) -> NodeId {
+        let mut middle = node;
+        while let Some([.., child]) = self.mesh.children(middle) {
+            middle = child;
+        }
+        middle
+    }
+
+    /// The patch at `source`, which has not shot; a cluster of one triangle is that triangle.
+    fn patch(&self, source: Source, distances: InverseDistanceMoments) -> ShootingPatch {
         let mesh = self.mesh;
-        let (source, triangles) = match source {
+        let (source, mut elements) = match source {
             Source::Cluster(c) if self.clusters.parts(c).is_some() => {
-                (source, self.clusters.triangles(c))
+                let triangles = self.clusters.triangles(c);
+                let roots = triangles.iter().map(|&t| mesh.root(t as usize));
+                (source, roots.map(|root| mesh.elements_of(root)).collect())
             }
-            Source::Cluster(t) => (Source::Node(mesh.root(t as usize)), vec![]),
-            Source::Node(_) => (source, vec![]),
-        };
-        let mut elements = match source {
-            Source::Node(node) => vec![mesh.elements_of(node)],
-            Source::Cluster(_) => {
-                triangles.iter().map(|&t| mesh.elements_of(mesh.root(t as usize))).collect()
+            Source::Cluster(t) => {
+                let root = mesh.root(t as usize);
+                (Source::Node(root), vec![mesh.elements_of(root)])
             }
+            Source::Node(node) => (source, vec![mesh.elements_of(node)]),
         };
         elements.dedup_by(|next, run| {
-            let joins = run.end == next.start;
-            if joins {
+            let touches = run.end == next.start;
+            if touches {
                 run.end = next.end;
             }
-            joins
+            touches
         });
-        ShootingPatch { source, elements, patch: None, near, fresh: false, rejected: 0 }
+        ShootingPatch {
+            source,
+            elements,
+            viewpoint: None,
+            distances,
+            is_unshot_emitter: false,
+            rejected_viewpoints: 0,
+        }
     }
 
+    /// What a patch is split into; nothing where it is as small as patches may be.
     fn parts(&self, source: Source) -> Vec<Source> {
         match source {
             Source::Cluster(c) => {
                 self.clusters.parts(c).into_iter().flatten().map(Source::Cluster).collect()
             }
             Source::Node(node) => match self.mesh.children(node) {
-                Some(children) if height(self.mesh, node) > self.level => {
+                Some(children) if height(self.mesh, node) > self.min_level => {
                     children.map(Source::Node).to_vec()
                 }
                 _ => vec![],
@@ -383,30 +405,16 @@ impl<'m> PatchCut<'m> {
     }
 }
 
-/// Elements of emitters that all shoot by themselves. More are rooms that glow, not lamps.
-const FEW: usize = 1024;
-
-/// A batch ends where the flux is below this share of its brightest patch.
-const BATCH_FALL: f64 = 0.25;
-
-/// Viewpoints of a patch that are tried until one does not see too many backs.
-const ATTEMPTS: u32 = 4;
-
-/// An element is lit from this share of its shooter's mean radiosity.
-const LIT: f64 = 0.5;
-
-/// Weight of uneven light: a corner of the patch sends to what is next to it, not to the mean.
-const UNEVEN: f64 = 3.0;
-
-fn all(elements: &[Range<usize>]) -> impl Iterator<Item = usize> {
-    elements.iter().cloned().flatten()
+/// The indices in `ranges`.
+fn indices(ranges: &[Range<usize>]) -> impl Iterator<Item = usize> {
+    ranges.iter().cloned().flatten()
 }
 
 fn centroids(mesh: &Mesh) -> Vec<DVec3> {
     (0..mesh.element_count()).map(|e| mesh.centroid(mesh.element(e))).collect()
 }
 
-/// Levels below `node`, at most.
+/// Quadtree levels below `node`, at most.
 fn height(mesh: &Mesh, node: NodeId) -> u32 {
     mesh.children(node).map_or(0, |c| 1 + c.iter().map(|&k| height(mesh, k)).max().unwrap_or(0))
 }

@@ -1,105 +1,120 @@
 //! Sweeps over all elements: Jacobi and Gauss–Seidel.
 //!
-//! To relax an element is to pass on what it has unshot, so that its residual is 0. Gauss–Seidel
-//! relaxes one element after another; Jacobi all at once, which makes a sweep a bounce of light;
-//! always the one with most to pass on, Southwell's way, is shooting (Gortler, Cohen and Slusallek
-//! 1994).
+//! To relax an element is to pass on what it has unshot, so that its residual is 0. A sweep relaxes
+//! every element once, emitters first, then all others, each by ascending index:
+//!
+//! - **Jacobi** sets all unshot flux aside when a sweep begins and passes on that: what comes in
+//!   meanwhile waits for the next sweep, so that a sweep is a bounce of light. After k sweeps what
+//!   leaves is e + Me + … + Mᵏe.
+//! - **Gauss–Seidel** passes on what an element has when the sweep reaches it.
+//!
+//! To relax always the element with most unshot flux, Southwell's way, is shooting (Gortler, Cohen
+//! and Slusallek 1994).
 
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
+use serde::{Deserialize, Serialize};
+
 use super::flux_state::FluxState;
-use super::session::StepContext;
+use super::step::StepContext;
 use crate::error::Error;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Sweeps until done; a step is a sweep. After k sweeps of Jacobi what leaves is e + Me + … + Mᵏe.
+/// A sweep in progress; a step is a sweep.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Relaxation {
-    /// What the elements had when the sweep began and have not passed on yet, if that is what they are
-    /// to pass on: Jacobi's way. With none they pass on what they have when their turn comes.
-    held: Option<Vec<Rgb>>,
-    /// Whose turn it is: elements that emit have theirs first.
-    turn: Turn,
+    /// With Jacobi, what each element had when the sweep began and has not passed on yet, W.
+    jacobi_snapshot: Option<Vec<Rgb>>,
+    cursor: SweepCursor,
 }
 
-/// A place in a sweep.
+/// A position in a sweep.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-struct Turn {
-    sources: bool,
+struct SweepCursor {
+    /// In the first half, that of emitters.
+    emitters: bool,
+    /// Elements below this are done in that half.
     element: usize,
 }
 
-/// Where a sweep begins.
-const FIRST: Turn = Turn { sources: true, element: 0 };
+impl SweepCursor {
+    /// Where a sweep begins.
+    const START: SweepCursor = SweepCursor { emitters: true, element: 0 };
+}
 
 impl Relaxation {
-    /// Jacobi's way.
+    /// Before the first sweep of Jacobi over `count` elements.
     pub fn jacobi(count: usize) -> Relaxation {
-        Relaxation { held: Some(vec![Rgb::ZERO; count]), turn: FIRST }
+        Relaxation { jacobi_snapshot: Some(vec![Rgb::ZERO; count]), cursor: SweepCursor::START }
     }
 
-    /// Gauss–Seidel's.
+    /// Before the first sweep of Gauss–Seidel.
     pub fn gauss_seidel() -> Relaxation {
-        Relaxation { held: None, turn: FIRST }
+        Relaxation { jacobi_snapshot: None, cursor: SweepCursor::START }
     }
 
-    /// Whether it fits `count` elements and that way, as one from a file may not.
-    pub fn fits(&self, count: usize, jacobi: bool) -> bool {
-        let all = |h: &Vec<Rgb>| h.len() == count && h.iter().all(|w| w.is_finite());
-        self.turn.element <= count && self.held.as_ref().map_or(!jacobi, |h| jacobi && all(h))
+    /// Whether this can be a state over `count` elements of Jacobi or else Gauss–Seidel; one that
+    /// was read from a file may not be.
+    pub fn is_consistent(&self, count: usize, jacobi: bool) -> bool {
+        let snapshot_fits = match &self.jacobi_snapshot {
+            Some(flux) => jacobi && flux.len() == count && flux.iter().all(|w| w.is_finite()),
+            None => !jacobi,
+        };
+        self.cursor.element <= count && snapshot_fits
     }
 
     /// Goes on by as many elements as one batch of rows reaches.
-    pub fn advance(&mut self, batch: &mut StepContext) -> Result<Option<StopReason>, Error> {
-        let count = batch.state.flux.unshot.len();
-        let begins = self.turn.sources && self.turn.element == 0;
-        if begins {
-            if batch.has_converged()? {
+    pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
+        let at_start = self.cursor.emitters && self.cursor.element == 0;
+        if at_start {
+            if step.refresh_and_check_convergence()? {
                 return Ok(Some(StopReason::Converged));
             }
-            if batch.is_last_step() {
+            if step.has_done_all_steps() {
                 return Ok(Some(StopReason::Steps));
             }
-            if let Some(held) = &mut self.held {
-                std::mem::swap(held, &mut batch.state.flux.unshot);
+            if let Some(snapshot) = &mut self.jacobi_snapshot {
+                std::mem::swap(snapshot, &mut step.state.flux.unshot);
             }
         }
-        let sources = self.turn.sources;
-        let flux = &batch.state.flux;
-        let due = |e: &usize| match &self.held {
-            Some(held) => held[*e] != Rgb::ZERO,
+        let SweepCursor { emitters, element } = self.cursor;
+        let flux = &step.state.flux;
+        let emits = |e: &usize| flux.emitted[*e] != Rgb::ZERO;
+        let may_have_light = |e: &usize| match &self.jacobi_snapshot {
+            Some(snapshot) => snapshot[*e] != Rgb::ZERO,
             // What is black never has anything to pass on, unless it emits less than it did.
             None => flux.reflectance[*e] != Rgb::ZERO || flux.unshot[*e] != Rgb::ZERO,
         };
-        let emits = |e: &usize| flux.emitted[*e] != Rgb::ZERO;
-        let these = (self.turn.element..count).filter(|e| emits(e) == sources).filter(due);
-        let rows = batch.rows.next(batch.state.mesh, batch.maker, these)?;
+        let elements =
+            (element..flux.unshot.len()).filter(|e| emits(e) == emitters).filter(may_have_light);
+        let rows = step.rows.next_element_rows(step.state.mesh, step.row_source, elements)?;
         if rows.is_empty() {
-            self.turn = Turn { sources: !sources, element: 0 };
-            batch.done.steps += u64::from(!sources);
+            self.cursor = SweepCursor { emitters: !emitters, element: 0 };
+            step.counters.steps += u64::from(!emitters);
         }
         for (e, row) in rows {
-            let from = self.held.as_mut().unwrap_or(&mut batch.state.flux.unshot);
-            let flux = std::mem::take(&mut from[e]);
-            self.turn.element = e + 1;
+            let unshot = self.jacobi_snapshot.as_mut().unwrap_or(&mut step.state.flux.unshot);
+            let flux = std::mem::take(&mut unshot[e]);
+            self.cursor.element = e + 1;
             if flux != Rgb::ZERO {
-                batch.pass_on(flux, batch.state.mesh.element(e), &row);
-                batch.done.shots += 1;
+                step.distribute(flux, step.state.mesh.element(e), &row);
+                step.counters.shots += 1;
             }
-            let unshot_share = batch.state.ledger.unshot_share();
-            if batch.tell(unshot_share) == ControlFlow::Break(()) {
+            let unshot_share = step.state.ledger.unshot_share();
+            if step.report(unshot_share) == ControlFlow::Break(()) {
                 return Ok(Some(StopReason::Cancelled));
             }
         }
         Ok(None)
     }
 
-    /// Hands back what is held, and begins anew.
+    /// Returns what was set aside to `state`, and begins a new sweep.
     pub fn finish(&mut self, state: &mut FluxState) {
-        let held = self.held.iter_mut().flatten();
-        state.flux.unshot.iter_mut().zip(held).for_each(|(u, h)| *u += std::mem::take(h));
-        self.turn = FIRST;
+        let snapshot = self.jacobi_snapshot.iter_mut().flatten();
+        for (unshot, flux) in state.flux.unshot.iter_mut().zip(snapshot) {
+            *unshot += std::mem::take(flux);
+        }
+        self.cursor = SweepCursor::START;
     }
 }

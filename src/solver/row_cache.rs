@@ -1,4 +1,12 @@
-//! RowCache for a solver: kept within a memory budget, made again beyond it.
+//! Rows for a solver: cached within a memory budget, made again beyond it.
+//!
+//! Rows are never evicted to make room. Shooting takes the brightest patches first, and those are
+//! the ones that shoot again; the other methods visit all rows cyclically, for which least recently
+//! used has a hit rate of zero. So the first rows that fit stay.
+//!
+//! A row that is cached may be missing from memory, after a session was read from a file: it is
+//! rebuilt when it is asked for, with the same importance and so with the same bits. What is done
+//! with rows does not depend on whether they are missing.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -11,22 +19,20 @@ use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
-/// RowCache by patch. Once the budget is full, nothing more is kept and nothing is given up: shooting
-/// takes the brightest patches first, and those are the ones that shoot again; and who goes through
-/// all rows in the same order again and again finds a part of them each time, which giving up the
-/// oldest would spoil.
-///
-/// A row that is kept may be missing, after a solve was read from a file: then it is made again as it
-/// was made before. What is done with rows does not depend on whether they are missing.
+/// Importance of the rows of elements, which all methods but shooting use again in every step: the
+/// same for all, whatever light they carry, so that the equations do not change between steps.
+const ELEMENT_IMPORTANCE: f64 = 1.0;
+
+/// Rows by patch, and what went along each.
 #[derive(Clone)]
 pub(super) struct RowCache {
     rows: HashMap<NodeId, Arc<Row>>,
-    /// In an order, so that sums over them are the same on every run.
-    pub trails: BTreeMap<NodeId, PatchHistory>,
-    /// Bytes that are left for more.
-    free: usize,
-    /// RowCache made so far.
-    pub made: u64,
+    /// Ordered, so that sums over them are the same on every run.
+    pub histories: BTreeMap<NodeId, PatchHistory>,
+    /// Bytes of the budget that no row takes.
+    free_bytes: usize,
+    /// Rows made so far.
+    pub rows_made: u64,
 }
 
 /// What is known of a patch that has sent light.
@@ -34,148 +40,167 @@ pub(super) struct RowCache {
 pub(super) struct PatchHistory {
     /// All the flux that went along its row, W.
     pub sent: Rgb,
-    /// The share of the light that its row was last made for.
-    pub share: f64,
-    /// Whether its row is kept.
-    pub kept: bool,
-    /// The share of its light, at most, that its row is wrong about since objects were moved. Only as
-    /// it is kept can such a row be had.
-    pub doubt: f64,
+    /// The importance that its row was last made for: see [`FormFactors::rows`].
+    pub importance: f64,
+    /// Whether its row is cached, in memory or missing.
+    pub cached: bool,
+    /// Upper bound of the share of its light that its row misplaces, since objects have moved. Such
+    /// a row cannot be made again.
+    pub stale_fraction: f64,
 }
 
 impl RowCache {
-    /// None yet, of which `budget` bytes are kept.
+    /// An empty cache for rows of `budget` bytes.
     pub fn new(budget: usize) -> RowCache {
-        RowCache { rows: HashMap::new(), trails: BTreeMap::new(), free: budget, made: 0 }
+        RowCache {
+            rows: HashMap::new(),
+            histories: BTreeMap::new(),
+            free_bytes: budget,
+            rows_made: 0,
+        }
     }
 
-    /// Bytes that are left for more.
-    pub fn free(&self) -> usize {
-        self.free
+    /// Bytes of the budget that no row takes.
+    pub fn free_bytes(&self) -> usize {
+        self.free_bytes
     }
 
-    /// As it was, the rows missing.
-    pub fn restore(&mut self, trails: BTreeMap<NodeId, PatchHistory>, made: u64, free: usize) {
-        (self.trails, self.made, self.free) = (trails, made, free.min(self.free));
+    /// Puts back what was saved; the rows are missing.
+    pub fn restore(
+        &mut self,
+        histories: BTreeMap<NodeId, PatchHistory>,
+        rows_made: u64,
+        free_bytes: usize,
+    ) {
+        self.histories = histories;
+        self.rows_made = rows_made;
+        self.free_bytes = free_bytes.min(self.free_bytes);
     }
 
-    /// A row that is kept is there again.
+    /// Puts back a cached row.
     pub fn restore_row(&mut self, patch: NodeId, row: Row) {
         self.rows.insert(patch, Arc::new(row));
     }
 
-    /// Whether there is no need to make the row of `patch`.
-    pub fn keeps(&self, patch: NodeId) -> bool {
-        self.trails.get(&patch).is_some_and(|trail| trail.kept)
+    /// Whether the row of `patch` is cached, in memory or missing.
+    pub fn contains(&self, patch: NodeId) -> bool {
+        self.histories.get(&patch).is_some_and(|history| history.cached)
     }
 
+    /// The row of `patch`, if it is in memory.
     pub fn get(&self, patch: NodeId) -> Option<&Arc<Row>> {
         self.rows.get(&patch)
     }
 
-    /// Keeps `row`, made for a share of the light, if it fits.
-    pub fn keep(&mut self, patch: NodeId, row: impl Into<Arc<Row>>, share: f64) {
+    /// Caches `row`, made for `importance`, if it fits.
+    pub fn insert(&mut self, patch: NodeId, row: impl Into<Arc<Row>>, importance: f64) {
         let row = row.into();
-        let trail = self.trails.entry(patch).or_default();
-        trail.share = share;
-        if let Some(free) = self.free.checked_sub(row.bytes()) {
-            (self.free, trail.kept) = (free, true);
+        let history = self.histories.entry(patch).or_default();
+        history.importance = importance;
+        if let Some(free_bytes) = self.free_bytes.checked_sub(row.bytes()) {
+            self.free_bytes = free_bytes;
+            history.cached = true;
             self.rows.insert(patch, row);
         }
     }
 
-    /// Keeps the row of `patch` no longer.
-    pub fn forget(&mut self, patch: NodeId) {
+    /// Removes the row of `patch`.
+    pub fn evict(&mut self, patch: NodeId) {
         let row = self.rows.remove(&patch);
-        self.free += row.map_or(0, |row| row.bytes());
-        self.trails.entry(patch).or_default().kept = false;
+        self.free_bytes += row.map_or(0, |row| row.bytes());
+        self.histories.entry(patch).or_default().cached = false;
     }
 
-    /// Notes that `flux` went along the row of `patch`.
-    pub fn sent(&mut self, patch: NodeId, flux: Rgb) {
-        self.trails.entry(patch).or_default().sent += flux;
+    /// Notes that `flux` (W) went along the row of `patch`.
+    pub fn record_sent(&mut self, patch: NodeId, flux: Rgb) {
+        self.histories.entry(patch).or_default().sent += flux;
     }
 
-    /// The share of the `emitted` light that went where its row is wrong about it, at most.
-    pub fn doubt(&self, emitted: Rgb) -> f64 {
-        let doubtful = self.trails.values().filter(|trail| trail.doubt > 0.0);
-        largest_share(doubtful.map(|t| t.sent.abs() * t.doubt).sum(), emitted)
+    /// Upper bound of the flux that stale rows have misplaced, as a share of `emitted`: the worst
+    /// channel.
+    pub fn stale_flux_bound(&self, emitted: Rgb) -> f64 {
+        let stale = self.histories.values().filter(|history| history.stale_fraction > 0.0);
+        let misplaced = stale.map(|history| history.sent.abs() * history.stale_fraction);
+        largest_share(misplaced.sum(), emitted)
     }
 
-    /// Makes the rows of `patches`, of which the most that one is about to shoot is `share`.
+    /// Makes the rows of `patches`, checked, without caching them.
     pub fn make(
         &mut self,
         mesh: &Mesh,
-        maker: &mut dyn FormFactors,
+        row_source: &mut dyn FormFactors,
         patches: &[NodeId],
-        share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let made = checked_rows(maker, mesh, patches, share)?;
-        self.made += made.len() as u64;
-        Ok(made)
+        let rows = checked_rows(row_source, mesh, patches, importance)?;
+        self.rows_made += rows.len() as u64;
+        Ok(rows)
     }
 
-    /// Makes what is missing of the rows of `patches` that are kept, one batch of `maker`'s at a time.
-    /// Each is as it was, since it is made for the same share of the light.
-    pub fn recall(
+    /// Makes those rows of `patches` that are cached but missing from memory, in the batches that
+    /// `row_source` prefers. Each is as it was, since it is made for the same importance.
+    pub fn rebuild_missing(
         &mut self,
         mesh: &Mesh,
-        maker: &mut dyn FormFactors,
+        row_source: &mut dyn FormFactors,
         patches: impl IntoIterator<Item = NodeId>,
     ) -> Result<(), Error> {
-        let missing = |p: &NodeId| self.keeps(*p) && !self.rows.contains_key(p);
-        let mut missing: Vec<NodeId> = patches.into_iter().filter(missing).collect();
-        let share = |p: &NodeId| self.trails[p].share;
-        missing.sort_by(|a, b| share(a).total_cmp(&share(b)).then(a.cmp(b)));
+        let is_missing = |p: &NodeId| self.contains(*p) && !self.rows.contains_key(p);
+        let importance = |p: &NodeId| self.histories[p].importance;
+        let mut missing: Vec<NodeId> = patches.into_iter().filter(is_missing).collect();
+        missing.sort_by(|a, b| importance(a).total_cmp(&importance(b)).then(a.cmp(b)));
         missing.dedup();
-        let alike: Vec<(f64, Vec<NodeId>)> = missing
-            .chunk_by(|a, b| share(a) == share(b))
-            .map(|run| (share(&run[0]), run.to_vec()))
+        let by_importance: Vec<(f64, Vec<NodeId>)> = missing
+            .chunk_by(|a, b| importance(a) == importance(b))
+            .map(|run| (importance(&run[0]), run.to_vec()))
             .collect();
-        for (share, patches) in alike {
-            for batch in patches.chunks(maker.preferred_batch_len().max(1)) {
-                let made = self.make(mesh, maker, batch, share)?;
-                self.rows.extend(batch.iter().copied().zip(made.into_iter().map(Arc::new)));
+        for (importance, patches) in by_importance {
+            for batch in patches.chunks(row_source.preferred_batch_len().max(1)) {
+                let rows = self.make(mesh, row_source, batch, importance)?;
+                self.rows.extend(batch.iter().copied().zip(rows.into_iter().map(Arc::new)));
             }
         }
         Ok(())
     }
 
-    /// The rows of the first of `elements`, in their order: as far as one batch of rows made reaches,
-    /// and of one element at least. All with the same trouble taken, whatever light they carry, so
-    /// that the equations stay what they are from one sweep to the next.
-    pub fn next(
+    /// The rows of the first of `elements`, in their order: as many as are cached or fit in one
+    /// batch of new rows, and at least one.
+    pub fn next_element_rows(
         &mut self,
         mesh: &Mesh,
-        maker: &mut dyn FormFactors,
+        row_source: &mut dyn FormFactors,
         elements: impl IntoIterator<Item = usize>,
     ) -> Result<Vec<(usize, Arc<Row>)>, Error> {
-        let (mut missing, batch) = (vec![], maker.preferred_batch_len().max(1));
+        let batch_len = row_source.preferred_batch_len().max(1);
+        let mut uncached = vec![];
         let reached: Vec<(usize, NodeId)> = elements
             .into_iter()
             .map(|e| (e, mesh.element(e)))
             .take_while(|(_, patch)| {
-                if !self.keeps(*patch) {
-                    missing.push(*patch);
+                if !self.contains(*patch) {
+                    uncached.push(*patch);
                 }
-                missing.len() <= batch
+                uncached.len() <= batch_len
             })
             .collect();
-        missing.truncate(batch);
-        self.recall(mesh, maker, reached.iter().map(|&(_, patch)| patch))?;
-        let mut made = match missing.is_empty() {
-            true => vec![],
-            false => self.make(mesh, maker, &missing, 1.0)?,
-        }
-        .into_iter();
-        let row = |(e, patch): (usize, NodeId)| match self.get(patch) {
-            Some(row) => Some((e, row.clone())),
-            None => {
-                let row = Arc::new(made.next()?);
-                self.keep(patch, row.clone(), 1.0);
-                Some((e, row))
-            }
+        uncached.truncate(batch_len);
+        self.rebuild_missing(mesh, row_source, reached.iter().map(|&(_, patch)| patch))?;
+        let new_rows = if uncached.is_empty() {
+            vec![]
+        } else {
+            self.make(mesh, row_source, &uncached, ELEMENT_IMPORTANCE)?
         };
-        Ok(reached.into_iter().filter_map(row).collect())
+        let mut new_rows = new_rows.into_iter();
+        let mut rows = Vec::with_capacity(reached.len());
+        for (e, patch) in reached {
+            if let Some(row) = self.get(patch) {
+                rows.push((e, row.clone()));
+            } else if let Some(row) = new_rows.next() {
+                let row = Arc::new(row);
+                self.insert(patch, row.clone(), ELEMENT_IMPORTANCE);
+                rows.push((e, row));
+            }
+        }
+        Ok(rows)
     }
 }

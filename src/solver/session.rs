@@ -1,30 +1,26 @@
-//! A solve under way: what there is between one batch of rows and the next.
+//! A solve in progress: the state between one batch of rows and the next.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
-
-use super::direct::direct;
 use super::flux_state::FluxState;
-use super::gmres::Gmres;
-use super::patch_cut::PatchCut;
-use super::relaxation::Relaxation;
+use super::method_state::MethodState;
 use super::row_cache::RowCache;
-use super::shooting::shoot_batch;
-use super::{Ledger, Method, Progress, Solution, Solver};
+use super::staleness::tightened_unshot;
+use super::step::{Counters, MIN_UNSHOT_SHARE, StepContext};
+use super::{Ledger, Progress, Solution, Solver};
 use crate::error::Error;
-use crate::form_factor::{FormFactors, Row};
-use crate::mesh::{Mesh, NodeId};
+use crate::form_factor::FormFactors;
+use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::scene::Rgb;
 
 /// A solve that goes on by batches of rows: [`Solver::begin`] makes it.
 ///
-/// Between batches it can be looked at, [saved](SolveSession::save), given a scene that has
-/// [changed](SolveSession::relight), or other rows; it does not matter who makes them, as long as they are
-/// rows of its mesh. An error takes nothing from it: after a device failed it is where it was before
-/// the batch, and goes on with another.
+/// Between batches it can be looked at, [saved](SolveSession::save), given a scene whose
+/// [materials](SolveSession::update_materials) or [objects](SolveSession::update_geometry) have
+/// changed, or rows from another source; any will do that makes rows of its mesh. An error takes
+/// nothing from it: after a device failed it is where it was before the batch, and goes on with
+/// another.
 ///
 /// ```
 /// # use radiosity::*;
@@ -51,64 +47,23 @@ pub struct SolveSession<'m> {
     pub(super) solver: Solver,
     pub(super) state: FluxState<'m>,
     pub(super) rows: RowCache,
-    pub(super) course: MethodState<'m>,
-    pub(super) done: Counters,
+    pub(super) method: MethodState<'m>,
+    pub(super) counters: Counters,
     pub(super) stop: Option<StopReason>,
-    /// Settings of whoever made the last rows.
-    pub(super) made_by: String,
-}
-
-/// What a method has in hand between batches.
-#[derive(Clone)]
-pub(super) enum MethodState<'m> {
-    Shooting(PatchCut<'m>),
-    Relaxation(Relaxation),
-    Gmres(Gmres),
-    Direct,
-}
-
-/// What was done.
-#[derive(Clone, Copy, Default, Serialize, Deserialize)]
-pub(super) struct Counters {
-    pub steps: u64,
-    /// RowCache sent along.
-    pub shots: u64,
-}
-
-impl Counters {
-    /// What there is to be told, of a solve that was set going at `start`.
-    pub fn progress(self, rows_made: u64, unshot_share: f64, start: Instant) -> Progress {
-        let Counters { steps, shots } = self;
-        Progress { steps, shots, rows_made, unshot_share, elapsed: start.elapsed() }
-    }
-}
-
-impl<'m> MethodState<'m> {
-    pub fn new(solver: &Solver, mesh: &'m Mesh) -> MethodState<'m> {
-        match solver.method {
-            Method::Shooting { .. } => MethodState::Shooting(PatchCut::new(
-                mesh,
-                solver.patch_tolerance,
-                solver.min_patch_level,
-            )),
-            Method::Jacobi => MethodState::Relaxation(Relaxation::jacobi(mesh.element_count())),
-            Method::GaussSeidel => MethodState::Relaxation(Relaxation::gauss_seidel()),
-            Method::Gmres { restart } => MethodState::Gmres(Gmres::new(restart)),
-            Method::Direct => MethodState::Direct,
-        }
-    }
+    /// [`FormFactors::fingerprint`] of the source of the last rows.
+    pub(super) row_source: String,
 }
 
 impl<'m> SolveSession<'m> {
-    /// Nothing is shot yet.
+    /// Nothing is shot yet. The settings are checked already.
     pub(super) fn new(solver: Solver, mesh: &'m Mesh) -> Result<SolveSession<'m>, Error> {
         Ok(SolveSession {
             state: FluxState::new(mesh)?,
             rows: RowCache::new(solver.row_memory),
-            course: MethodState::new(&solver, mesh),
-            done: Counters::default(),
+            method: MethodState::new(&solver, mesh),
+            counters: Counters::default(),
             stop: None,
-            made_by: String::new(),
+            row_source: String::new(),
             solver,
         })
     }
@@ -116,12 +71,12 @@ impl<'m> SolveSession<'m> {
     /// Goes on by one batch of rows, or as far as kept rows go; answers why it stops, if it does. A
     /// direct solve is one batch.
     ///
-    /// `progress` is told of every row that light is sent along, or that is made in vain, and may
-    /// stop the solver, which can go on all the same.
+    /// `progress` is called for every row that light is sent along, or that is made in vain, and
+    /// may stop the solver, which can go on all the same.
     ///
     /// # Errors
-    /// [`ErrorKind::FormFactor`](crate::ErrorKind::FormFactor) when a row breaks its contract; whatever
-    /// `form_factors` fails with.
+    /// [`ErrorKind::FormFactor`](crate::ErrorKind::FormFactor) when a row breaks its contract; all
+    /// errors of `form_factors`.
     pub fn advance(
         &mut self,
         form_factors: &mut dyn FormFactors,
@@ -149,38 +104,30 @@ impl<'m> SolveSession<'m> {
 
     fn step(
         &mut self,
-        maker: &mut dyn FormFactors,
+        row_source: &mut dyn FormFactors,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
         start: Instant,
     ) -> Result<Option<StopReason>, Error> {
-        self.made_by = maker.fingerprint();
-        let SolveSession { solver, state, rows, course, done, .. } = self;
-        // The rest is for rows that may be wrong since objects were moved, and are by a part of that.
-        let doubt = rows.doubt(state.ledger.emitted) / 4.0;
-        let unshot = (solver.unshot - doubt).max(solver.unshot / 2.0);
-        let unshot = unshot.max(LEAST_UNSHOT);
-        let steps = solver.max_steps;
-        let mut batch = StepContext { state, rows, maker, done, progress, start, unshot, steps };
-        self.stop = match course {
-            MethodState::Shooting(shooters) => {
-                let overshoot = matches!(solver.method, Method::Shooting { overshoot: true });
-                shoot_batch(&mut batch, shooters, overshoot)?
-            }
-            MethodState::Relaxation(relaxation) => relaxation.advance(&mut batch)?,
-            MethodState::Gmres(gmres) => gmres.advance(&mut batch)?,
-            MethodState::Direct => Some(direct(&mut batch)?),
+        self.row_source = row_source.fingerprint();
+        let unshot = tightened_unshot(self.solver.unshot, self.stale_flux_bound());
+        let mut step = StepContext {
+            state: &mut self.state,
+            rows: &mut self.rows,
+            row_source,
+            counters: &mut self.counters,
+            progress,
+            start,
+            unshot: unshot.max(MIN_UNSHOT_SHARE),
+            max_steps: self.solver.max_steps,
         };
+        self.stop = self.method.advance(&mut step)?;
         Ok(self.stop)
     }
 
-    /// Ends what the method has in hand, so that all light is accounted for.
+    /// Takes back what the method has in hand, so that all light is accounted for.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
-        match &mut self.course {
-            MethodState::Relaxation(relaxation) => relaxation.finish(&mut self.state),
-            MethodState::Gmres(gmres) => gmres.finish(&mut self.state, &mut self.rows),
-            MethodState::Shooting(_) | MethodState::Direct => {}
-        }
-        self.state.settle()
+        self.method.finish(&mut self.state, &mut self.rows);
+        self.state.recompute_and_verify_energy()
     }
 
     /// What was reached.
@@ -193,9 +140,9 @@ impl<'m> SolveSession<'m> {
             radiosity: self.state.radiosity(),
             ledger: self.state.ledger,
             method: self.solver.method,
-            steps: self.done.steps,
-            shots: self.done.shots,
-            rows_made: self.rows.made,
+            steps: self.counters.steps,
+            shots: self.counters.shots,
+            rows_made: self.rows.rows_made,
             stop: self.stop.unwrap_or(StopReason::Cancelled),
         })
     }
@@ -218,9 +165,15 @@ impl<'m> SolveSession<'m> {
         self.state.mesh
     }
 
-    /// Method and stop rules; the rules can be changed between batches by [`SolveSession::set_limits`].
+    /// The settings; [`SolveSession::set_limits`] changes those that may change between batches.
     pub fn solver(&self) -> &Solver {
         &self.solver
+    }
+
+    /// The most flux that may have gone the wrong way since objects were moved, along rows made
+    /// before: a share of the emitted flux, of the worst channel.
+    pub fn stale_flux_bound(&self) -> f64 {
+        self.rows.stale_flux_bound(self.state.ledger.emitted)
     }
 
     /// From now on stops at this unshot share, and after this many steps in all.
@@ -232,46 +185,5 @@ impl<'m> SolveSession<'m> {
         solver.check()?;
         self.solver = solver;
         Ok(())
-    }
-}
-
-/// What a method works on, in one batch.
-pub(super) struct StepContext<'a, 'm> {
-    pub state: &'a mut FluxState<'m>,
-    pub rows: &'a mut RowCache,
-    pub maker: &'a mut dyn FormFactors,
-    pub done: &'a mut Counters,
-    progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    start: Instant,
-    /// Converged when no channel has more than this share of its emitted flux unshot.
-    pub unshot: f64,
-    pub steps: Option<u64>,
-}
-
-/// Less than this share unshot cannot change a radiosity in f64, not even in a room whose lamps emit
-/// 1e-12 of what others do: asking for 0 ends here.
-const LEAST_UNSHOT: f64 = 1e-28;
-
-impl StepContext<'_, '_> {
-    /// Counts and checks what there is; whether that is enough.
-    pub fn has_converged(&mut self) -> Result<bool, Error> {
-        self.state.settle()?;
-        Ok(self.state.ledger.unshot_share() <= self.unshot)
-    }
-
-    /// Whether no further step was asked for.
-    pub fn is_last_step(&self) -> bool {
-        self.steps.is_some_and(|most| self.done.steps >= most)
-    }
-
-    /// Sends `flux`, which is no longer unshot anywhere, along the row of `patch`.
-    pub fn pass_on(&mut self, flux: Rgb, patch: NodeId, row: &Row) {
-        self.state.pass_on(flux, row);
-        self.rows.sent(patch, flux);
-    }
-
-    /// Tells where the solve is; whether to go on.
-    pub fn tell(&mut self, unshot_share: f64) -> ControlFlow<()> {
-        (self.progress)(&self.done.progress(self.rows.made, unshot_share, self.start))
     }
 }

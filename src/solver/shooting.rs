@@ -1,105 +1,183 @@
-//! Progressive shooting (Cohen, Chen, Wallace, Greenberg 1988) in f64: the patch with most unshot
-//! flux first, which is Southwell's relaxation.
+//! Progressive shooting (Cohen, Chen, Wallace and Greenberg 1988) in f64.
+//!
+//! The patch with most unshot flux sends it along its row, again and again: Southwell's relaxation
+//! (Gortler, Cohen and Slusallek 1994). One step here:
+//!
+//! 1. the [`PatchCut`] names the next shots, as many as need one batch of new rows;
+//! 2. the rows that are missing are made, all of a batch at once;
+//! 3. each patch whose new row shows that it is too large for its light, or stands inside a solid,
+//!    is split or moved instead of shot;
+//! 4. each other patch shoots: its unshot flux is distributed along its row.
+//!
+//! With overshoot (Feda and Purgathofer 1992) a patch also sends light that it is yet to receive.
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::Solver;
 use super::flux_state::FluxState;
-use super::patch_cut::{PatchCut, Shot};
-use super::session::StepContext;
+use super::patch_cut::{CutSnapshot, PatchCut, Shot};
+use super::step::StepContext;
 use crate::error::Error;
-use crate::mesh::NodeId;
+use crate::form_factor::Row;
+use crate::mesh::{Mesh, NodeId};
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
 /// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order
 /// where ω < 2, since exchange areas are symmetric (Ostrowski 1954).
-const MOST_OVERSHOOT: f64 = 0.8;
+const MAX_OVERSHOOT: f64 = 0.8;
 
-/// Takes the next shots, if there is any to be taken.
-pub(super) fn shoot_batch(
-    batch: &mut StepContext,
-    shooters: &mut PatchCut,
+/// The patches that shoot.
+#[derive(Clone)]
+pub(super) struct Shooting<'m> {
+    pub cut: PatchCut<'m>,
     overshoot: bool,
-) -> Result<Option<StopReason>, Error> {
-    if batch.has_converged()? {
-        return Ok(Some(StopReason::Converged));
+}
+
+impl<'m> Shooting<'m> {
+    /// The first patches of `mesh`.
+    pub fn new(solver: &Solver, overshoot: bool, mesh: &'m Mesh) -> Shooting<'m> {
+        let Solver { patch_tolerance, min_patch_level, .. } = *solver;
+        Shooting { cut: PatchCut::new(mesh, patch_tolerance, min_patch_level), overshoot }
     }
-    let left = batch.steps.map_or(u64::MAX, |most| most.saturating_sub(batch.done.shots));
-    if left == 0 {
-        return Ok(Some(StopReason::Shots));
+
+    /// The patches that were saved, if they are a cut through `mesh`.
+    pub fn from_snapshot(
+        solver: &Solver,
+        overshoot: bool,
+        mesh: &'m Mesh,
+        saved: CutSnapshot,
+    ) -> Option<Shooting<'m>> {
+        let Solver { patch_tolerance, min_patch_level, .. } = *solver;
+        let cut = PatchCut::from_snapshot(mesh, patch_tolerance, min_patch_level, saved)?;
+        Some(Shooting { cut, overshoot })
     }
-    let mesh = batch.state.mesh;
-    let ahead = match overshoot {
-        true => batch.state.ledger.ambient(mesh).max(Rgb::ZERO),
-        false => Rgb::ZERO,
-    };
-    let missing = |patch| !batch.rows.keeps(patch);
-    let wanted = batch.maker.preferred_batch_len().max(1);
-    let shots = shooters.brightest(&batch.state.flux, wanted, left, missing);
-    let draws: Vec<&Shot> = shots.iter().filter(|s| missing(s.patch)).collect();
-    let share = |s: &&Shot| batch.state.flux.unshot_share(&s.elements);
-    let share = draws.iter().map(share).fold(0.0, f64::max).min(1.0);
-    let draws: Vec<NodeId> = draws.iter().map(|s| s.patch).collect();
-    batch.rows.recall(mesh, batch.maker, shots.iter().map(|s| s.patch))?;
-    let mut made = match draws.is_empty() {
-        true => vec![],
-        false => batch.rows.make(mesh, batch.maker, &draws, share)?,
-    }
-    .into_iter();
-    for shot in shots {
-        let row = match batch.rows.get(shot.patch) {
-            Some(row) => Some(row.clone()),
-            None => {
-                let Some(row) = made.next() else { break };
-                // Else the patch is too large, and its parts shoot.
-                let taken = shooters.confirm(&shot, &row, &batch.state.flux);
-                taken.then(|| {
-                    let row = Arc::new(row);
-                    batch.rows.keep(shot.patch, row.clone(), share);
-                    row
-                })
-            }
+
+    /// Takes the next shots, if there is any to be taken.
+    pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
+        if step.refresh_and_check_convergence()? {
+            return Ok(Some(StopReason::Converged));
+        }
+        let max_shots =
+            step.max_steps.map_or(u64::MAX, |max| max.saturating_sub(step.counters.shots));
+        if max_shots == 0 {
+            return Ok(Some(StopReason::Shots));
+        }
+        let ambient_overshoot = if self.overshoot {
+            step.state.ledger.ambient(step.state.mesh).max(Rgb::ZERO)
+        } else {
+            Rgb::ZERO
         };
-        if let Some(row) = row {
-            let flux = batch.state.take(&shot.elements, ahead);
-            batch.pass_on(flux.0, shot.patch, &row);
-            batch.state.book(flux.1);
-            batch.done.shots += 1;
-            shooters.shot(&shot);
-        }
-        batch.done.steps = batch.done.shots;
-        let unshot_share = batch.state.ledger.unshot_share();
-        if batch.tell(unshot_share).is_break() {
-            return Ok(Some(StopReason::Cancelled));
-        }
+        let shots = self.cut.next_shots(
+            &step.state.flux,
+            step.row_source.preferred_batch_len().max(1),
+            max_shots,
+            |patch| !step.rows.contains(patch),
+        );
+        let new_rows = NewRows::make(step, &shots)?;
+        self.shoot(step, shots, new_rows, ambient_overshoot)
     }
-    Ok(None)
+
+    /// Takes `shots` in order, each along its cached row or the next of `new_rows`.
+    fn shoot(
+        &mut self,
+        step: &mut StepContext,
+        shots: Vec<Shot>,
+        new_rows: NewRows,
+        ambient_overshoot: Rgb,
+    ) -> Result<Option<StopReason>, Error> {
+        let NewRows { rows, importance } = new_rows;
+        let mut rows = rows.into_iter();
+        for shot in shots {
+            let row = match step.rows.get(shot.patch) {
+                Some(row) => Some(row.clone()),
+                None => {
+                    let Some(row) = rows.next() else { break };
+                    self.cut.accept_or_split(&shot, &row, &step.state.flux).then(|| {
+                        let row = Arc::new(row);
+                        step.rows.insert(shot.patch, row.clone(), importance);
+                        row
+                    })
+                }
+            };
+            if let Some(row) = row {
+                let taken = step.state.take(&shot.elements, ambient_overshoot);
+                step.distribute(taken.flux, shot.patch, &row);
+                step.state.record_overshoot(taken.overshot);
+                step.counters.shots += 1;
+                self.cut.mark_shot(&shot);
+            }
+            step.counters.steps = step.counters.shots;
+            let unshot_share = step.state.ledger.unshot_share();
+            if step.report(unshot_share).is_break() {
+                return Ok(Some(StopReason::Cancelled));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Rows of a batch of shots that were not cached, in their order.
+struct NewRows {
+    rows: Vec<Row>,
+    /// What they were made for: the largest unshot share of a patch among them.
+    importance: f64,
+}
+
+impl NewRows {
+    fn make(step: &mut StepContext, shots: &[Shot]) -> Result<NewRows, Error> {
+        let mesh = step.state.mesh;
+        let missing: Vec<&Shot> =
+            shots.iter().filter(|shot| !step.rows.contains(shot.patch)).collect();
+        let importance = missing
+            .iter()
+            .map(|shot| step.state.flux.unshot_share(&shot.elements))
+            .fold(0.0, f64::max)
+            .min(1.0);
+        let patches: Vec<NodeId> = missing.iter().map(|shot| shot.patch).collect();
+        step.rows.rebuild_missing(mesh, step.row_source, shots.iter().map(|shot| shot.patch))?;
+        let rows = if patches.is_empty() {
+            vec![]
+        } else {
+            step.rows.make(mesh, step.row_source, &patches, importance)?
+        };
+        Ok(NewRows { rows, importance })
+    }
+}
+
+/// Flux that a patch sends, W per channel.
+struct TakenFlux {
+    flux: Rgb,
+    /// The part of it that was passed on before it was received, less what makes up for earlier
+    /// overshoot.
+    overshot: Rgb,
 }
 
 impl FluxState<'_> {
-    /// Takes the unshot flux of `from`, and `ahead`, W/m² per unit of reflectance, beyond it: all that
-    /// is to be passed on, and what of it is overshot.
-    fn take(&mut self, from: &[Range<usize>], ahead: Rgb) -> (Rgb, Rgb) {
-        let (mut flux, mut overshot) = (Rgb::ZERO, Rgb::ZERO);
-        for e in from.iter().cloned().flatten() {
+    /// Takes the unshot flux of `elements`, and beyond it what `ambient_overshoot` (W/m² per unit of
+    /// reflectance) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
+    fn take(&mut self, elements: &[Range<usize>], ambient_overshoot: Rgb) -> TakenFlux {
+        let mut flux = Rgb::ZERO;
+        let mut overshot = Rgb::ZERO;
+        for e in elements.iter().cloned().flatten() {
             let unshot = std::mem::take(&mut self.flux.unshot[e]);
             flux += unshot;
             overshot += unshot.min(Rgb::ZERO);
-            if ahead != Rgb::ZERO {
+            if ambient_overshoot != Rgb::ZERO {
                 let area = self.mesh.area(self.mesh.element(e));
-                let most = MOST_OVERSHOOT * unshot.max(Rgb::ZERO);
-                let over = (self.flux.reflectance[e] * area * ahead).min(most);
+                let limit = MAX_OVERSHOOT * unshot.max(Rgb::ZERO);
+                let over = (self.flux.reflectance[e] * area * ambient_overshoot).min(limit);
                 self.flux.unshot[e] -= over;
                 flux += over;
                 overshot += over;
             }
         }
-        (flux, overshot)
+        TakenFlux { flux, overshot }
     }
 
-    /// Books flux that was passed on and is overshot.
-    fn book(&mut self, overshot: Rgb) {
+    /// Enters flux that was overshot into the ledger.
+    fn record_overshoot(&mut self, overshot: Rgb) {
         self.ledger.unshot += overshot;
         self.ledger.overshot += overshot;
     }

@@ -159,10 +159,8 @@ fn separate_lights_combine_linearly() {
         println!("{method}: off {off:.1e}");
         assert!(off < SAME, "{method}: {off:e}");
     }
-    let few = Solution {
-        radiosity: vec![],
-        ..Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), keep_going).unwrap()
-    };
+    let mut few = Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), keep_going).unwrap();
+    few.radiosity.clear();
     let whole = Solver::new(Method::Jacobi).solve(&one, &mut rays(&mesh), keep_going).unwrap();
     let e = Solution::linear_combination(&[(Rgb::ONE, &whole), (Rgb::ONE, &few)]).unwrap_err();
     assert!(e.kind() == ErrorKind::Setting && e.to_string().contains("0 elements"), "{e}");
@@ -333,7 +331,7 @@ fn rejects_unfit_changes_and_keeps_state() {
     let moved = shifted(&mesh, "short_block", [0.0, 0.0, 10.0]);
     let finer = cornell_box(150.0);
     let bright = painted(&mesh, |m| m.exitance = Rgb::splat(1e305));
-    for (mesh, says) in [(&moved, "rearrange"), (&finer, "with_scene"), (&bright, "finite")] {
+    for (mesh, says) in [(&moved, "update_geometry"), (&finer, "with_scene"), (&bright, "finite")] {
         let e = solve.update_materials(mesh).unwrap_err();
         assert!(e.kind() == ErrorKind::Scene && e.to_string().contains(says), "{e}");
         assert!(solve.to_bytes() == before);

@@ -1,0 +1,124 @@
+//! What has moved between two scenes of the same triangles, and how much of a row that concerns.
+//!
+//! The triangles that moved are enclosed in two boxes a group: where they were and where they are.
+//! A row of a patch that did not move itself is wrong at most about
+//!
+//! - what it sent to where they were: the row's own entries on them, or the form factor of the old
+//!   boxes, whichever is less;
+//! - what it sends to where they are: the form factor of each new box × the part of that box that a
+//!   few rays find open to the patch.
+
+use glam::DVec3;
+
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::Row;
+use crate::form_factor::closed_form::point_to_polygon;
+use crate::geometry::aabb::Aabb;
+use crate::mesh::{Mesh, NodeId};
+use crate::visibility::offset;
+use crate::visibility::ray_scene::{Hit, RayScene};
+
+/// What has moved from one mesh to another.
+pub(super) struct GeometryDelta {
+    /// Whether each triangle has moved.
+    has_moved: Vec<bool>,
+    /// Boxes about the moved triangles of each group that has any.
+    groups: Vec<MovedBox>,
+    /// The scene as it is now; none where nothing has moved.
+    rays: Option<RayScene>,
+}
+
+/// A box about triangles, where they were and where they are.
+struct MovedBox {
+    before: Aabb,
+    after: Aabb,
+}
+
+impl GeometryDelta {
+    /// What has moved from `old` to `new`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when the elements of the two are not the same.
+    pub fn between(old: &Mesh, new: &Mesh) -> Result<GeometryDelta, Error> {
+        if !old.has_elements_of(new) {
+            let found = format!("{} elements, for {}", new.element_count(), old.element_count());
+            let remedy = "make it of the mesh before by Mesh::with_scene";
+            return Err(Error::new(ErrorKind::Scene, "changed mesh", found, remedy));
+        }
+        let (before, after) = (old.scene(), new.scene());
+        let count = before.triangles().len();
+        let has_moved: Vec<bool> =
+            (0..count).map(|t| before.corners(t) != after.corners(t)).collect();
+        let mut groups: Vec<MovedBox> = (0..before.groups().len())
+            .map(|_| MovedBox { before: Aabb::EMPTY, after: Aabb::EMPTY })
+            .collect();
+        for t in (0..count).filter(|&t| has_moved[t]) {
+            let group = &mut groups[before.triangles()[t].group as usize];
+            group.before = group.before.union(Aabb::from_points(before.corners(t)));
+            group.after = group.after.union(Aabb::from_points(after.corners(t)));
+        }
+        groups.retain(|group| group.before.low.is_finite());
+        let rays = (!groups.is_empty()).then(|| RayScene::of_scene(after));
+        Ok(GeometryDelta { has_moved, groups, rays })
+    }
+
+    /// Whether nothing has moved.
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// Upper bound of the share of the light of `patch` that goes elsewhere than along its `row` of
+    /// before, if that is known; `mesh` is the one of before.
+    pub fn affected_fraction(&self, mesh: &Mesh, patch: NodeId, row: Option<&Row>) -> f64 {
+        if self.has_moved[mesh.triangle(patch)] {
+            return 1.0;
+        }
+        let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
+        let sent_before = row.map_or(1.0, |row| self.share_on_moved(mesh, row));
+        let boxes_before: f64 =
+            self.groups.iter().map(|g| form_factor_to(&g.before, eye, normal)).sum();
+        let boxes_after: f64 = self
+            .groups
+            .iter()
+            .map(|group| match form_factor_to(&group.after, eye, normal) {
+                0.0 => 0.0,
+                factor => factor * self.visible_fraction(eye, group.after),
+            })
+            .sum();
+        (sent_before.min(boxes_before) + boxes_after).min(1.0)
+    }
+
+    /// The share of `row` on fronts of triangles that moved, and on any backs, which may be theirs.
+    fn share_on_moved(&self, mesh: &Mesh, row: &Row) -> f64 {
+        let is_moved = |e: u32| self.has_moved[mesh.triangle(mesh.element(e as usize))];
+        let entries = row.entries.iter().filter(|entry| is_moved(entry.element));
+        entries.map(|entry| Row::form_factor(entry.share)).sum::<f64>()
+            + Row::form_factor(row.backface)
+    }
+
+    /// The part of `bounds` that what has not moved leaves open to `eye`, by rays to the middle and
+    /// half-way to the corners. (open + 1)/(rays + 1), never 0, since rays may miss a gap.
+    fn visible_fraction(&self, eye: DVec3, bounds: Aabb) -> f64 {
+        let Some(rays) = &self.rays else { return 1.0 };
+        let middle = bounds.centre();
+        let corners = bounds.corners().map(|corner| middle + (corner - middle) / 2.0);
+        let targets = || corners.iter().chain([&middle]);
+        let blocks = |hit: &Hit| !self.has_moved[hit.triangle];
+        let is_open = |target: &&DVec3| {
+            !rays.occluded(eye, **target - eye, offset::SEGMENT_START..1.0, blocks)
+        };
+        (targets().filter(is_open).count() + 1) as f64 / (targets().count() + 1) as f64
+    }
+}
+
+/// The form factor to `bounds` from a point `eye` with that `normal`, as if nothing were in between;
+/// 1 from inside.
+fn form_factor_to(bounds: &Aabb, eye: DVec3, normal: DVec3) -> f64 {
+    if bounds.contains(eye) {
+        return 1.0;
+    }
+    let corners = bounds.corners();
+    let to_face = |face: &[usize; 4]| point_to_polygon(eye, normal, &face.map(|k| corners[k]));
+    // Faces that are turned away have none.
+    Aabb::FACES.iter().map(to_face).sum::<f64>().min(1.0)
+}

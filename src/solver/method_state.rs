@@ -1,0 +1,59 @@
+//! The one place that knows all methods: what a method has in hand between steps, and the dispatch
+//! to it.
+
+use super::direct::solve_directly;
+use super::flux_state::FluxState;
+use super::gmres::Gmres;
+use super::relaxation::Relaxation;
+use super::row_cache::RowCache;
+use super::shooting::Shooting;
+use super::step::StepContext;
+use super::{Method, Solver};
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::progress::StopReason;
+
+/// What a method has in hand between steps.
+#[derive(Clone)]
+pub(super) enum MethodState<'m> {
+    Shooting(Shooting<'m>),
+    Relaxation(Relaxation),
+    Gmres(Gmres),
+    /// A direct solve is one step, with nothing in hand before or after.
+    Direct,
+}
+
+impl<'m> MethodState<'m> {
+    /// Nothing in hand yet.
+    pub fn new(solver: &Solver, mesh: &'m Mesh) -> MethodState<'m> {
+        match solver.method {
+            Method::Shooting { overshoot } => {
+                MethodState::Shooting(Shooting::new(solver, overshoot, mesh))
+            }
+            Method::Jacobi => MethodState::Relaxation(Relaxation::jacobi(mesh.element_count())),
+            Method::GaussSeidel => MethodState::Relaxation(Relaxation::gauss_seidel()),
+            Method::Gmres { restart } => MethodState::Gmres(Gmres::new(restart)),
+            Method::Direct => MethodState::Direct,
+        }
+    }
+
+    /// Goes on by one batch of rows; answers why it stops, if it does.
+    pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
+        match self {
+            MethodState::Shooting(shooting) => shooting.advance(step),
+            MethodState::Relaxation(relaxation) => relaxation.advance(step),
+            MethodState::Gmres(gmres) => gmres.advance(step),
+            MethodState::Direct => solve_directly(step).map(Some),
+        }
+    }
+
+    /// Returns what is in hand to `state`, so that all light is accounted for. The method can go
+    /// on afterwards.
+    pub fn finish(&mut self, state: &mut FluxState, rows: &mut RowCache) {
+        match self {
+            MethodState::Relaxation(relaxation) => relaxation.finish(state),
+            MethodState::Gmres(gmres) => gmres.finish(state, rows),
+            MethodState::Shooting(_) | MethodState::Direct => {}
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! What a method works on during one step of a session: the flux, the rows, the counters, the stop
+//! rules and the progress callback.
+//!
+//! A method takes rows from the cache, sends flux along them with [`StepContext::distribute`],
+//! counts what it did and calls [`StepContext::report`] after each row. It knows nothing of the
+//! session that called it.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::Progress;
+use super::flux_state::FluxState;
+use super::row_cache::RowCache;
+use crate::error::Error;
+use crate::form_factor::{FormFactors, Row};
+use crate::mesh::NodeId;
+use crate::scene::Rgb;
+
+/// The lowest unshot share that is asked for, even where 0 is set. Less cannot change a radiosity
+/// in f64, not even in a room whose lamps emit 1e-12 of what others do.
+pub(super) const MIN_UNSHOT_SHARE: f64 = 1e-28;
+
+/// What was done.
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+pub(super) struct Counters {
+    /// In the unit of the method.
+    pub steps: u64,
+    /// Rows that light was sent along.
+    pub shots: u64,
+}
+
+impl Counters {
+    /// The progress of a solve that was started at `start`.
+    pub fn progress(self, rows_made: u64, unshot_share: f64, start: Instant) -> Progress {
+        let Counters { steps, shots } = self;
+        Progress { steps, shots, rows_made, unshot_share, elapsed: start.elapsed() }
+    }
+}
+
+/// What a method works on during one step.
+pub(super) struct StepContext<'a, 'm> {
+    pub state: &'a mut FluxState<'m>,
+    pub rows: &'a mut RowCache,
+    /// Makes the rows that are not cached.
+    pub row_source: &'a mut dyn FormFactors,
+    pub counters: &'a mut Counters,
+    pub progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    pub start: Instant,
+    /// Converged when no channel has more than this share of its emitted flux unshot.
+    pub unshot: f64,
+    /// See [`Solver::max_steps`](super::Solver::max_steps).
+    pub max_steps: Option<u64>,
+}
+
+impl StepContext<'_, '_> {
+    /// Recomputes what is unshot, verifies the ledger, and answers whether the unshot share is as
+    /// low as asked for.
+    ///
+    /// # Errors
+    /// Those of [`FluxState::recompute_and_verify_energy`].
+    pub fn refresh_and_check_convergence(&mut self) -> Result<bool, Error> {
+        self.state.recompute_and_verify_energy()?;
+        Ok(self.state.ledger.unshot_share() <= self.unshot)
+    }
+
+    /// Whether as many steps are done as were asked for.
+    pub fn has_done_all_steps(&self) -> bool {
+        self.max_steps.is_some_and(|max| self.counters.steps >= max)
+    }
+
+    /// Sends `flux` (W), which is no longer unshot anywhere, along the row of `patch`.
+    pub fn distribute(&mut self, flux: Rgb, patch: NodeId, row: &Row) {
+        self.state.distribute(flux, row);
+        self.rows.record_sent(patch, flux);
+    }
+
+    /// Reports progress; answers whether to go on.
+    pub fn report(&mut self, unshot_share: f64) -> ControlFlow<()> {
+        (self.progress)(&self.counters.progress(self.rows.rows_made, unshot_share, self.start))
+    }
+}
