@@ -1,6 +1,7 @@
 //! Geometry that knows nothing of light.
 
 pub(crate) mod aabb;
+pub(crate) mod bvh;
 pub(crate) mod plane;
 pub(crate) mod polygon;
 pub(crate) mod quadrature;

@@ -1,109 +1,109 @@
-//! Which boxes overlap: a tree of boxes, halved again and again.
+//! Which axis-aligned boxes overlap, in time that stays linear where thousands lie in one place.
+//!
+//! Each box asks a tree of boxes for its partners, and stops asking once it has more than
+//! [`MAX_OVERLAPS`]: it is *crowded* then. Boxes that are not crowded know all of their partners,
+//! and tell those that are. Among crowded boxes only the highest-ranked are paired:
+//!
+//! ```text
+//!                      partner not crowded   partner crowded
+//! box not crowded      complete              complete
+//! box crowded          complete              if one of both is among the
+//!                                            MAX_OVERLAPS highest-ranked
+//! ```
 
-use std::ops::Range;
+use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
 use crate::geometry::aabb::Aabb;
+use crate::geometry::bvh::Bvh;
 
-/// A box that overlaps with more others than this is in a crowd: thousands of faces in one place.
-const CROWD: usize = 256;
+/// A box that overlaps more others than this is crowded: thousands of faces in one place. Chosen by
+/// hand, well above what meets in one place of an ordinary mesh; no measurement was kept.
+const MAX_OVERLAPS: usize = 256;
 
-/// For each box, the others that it overlaps with, in no order that means anything. Two in crowds
-/// are told of each other if there are at most [`CROWD`] such boxes, or if one of them is among the
-/// first so many by `rank`: time and memory go with the number of boxes, not with its square.
-pub(super) fn overlaps(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
-    let tree = Tree::new(boxes);
-    let others = |k: usize| {
-        let mut others = vec![];
-        tree.visit(boxes[k], &mut |other| {
-            if other as usize != k {
-                others.push(other);
-            }
-            others.len() <= CROWD
-        });
-        others
-    };
-    let mut out: Vec<Vec<u32>> = (0..boxes.len()).into_par_iter().map(others).collect();
-    let crowded: Vec<bool> = out.iter().map(|others| others.len() > CROWD).collect();
-    // Those not in crowds have found all; those in crowds hear of them, and of the first in crowds.
-    let mut crowd: Vec<u32> = (0..boxes.len() as u32).filter(|&k| crowded[k as usize]).collect();
-    crowd.sort_by(|&a, &b| rank(b as usize).total_cmp(&rank(a as usize)));
-    let first = &crowd[..crowd.len().min(CROWD)];
-    let mut is_first = vec![false; boxes.len()];
-    first.iter().for_each(|&k| is_first[k as usize] = true);
-    crowd.iter().for_each(|&k| out[k as usize].clear());
+/// Boxes in a leaf of the tree, at most. Chosen by hand; no measurement was kept.
+const LEAF_SIZE: usize = 4;
+
+/// For each box, the others that it overlaps, in no particular order. Pairs are complete unless
+/// both boxes have more than [`MAX_OVERLAPS`] partners; of those, only pairs are given in which one
+/// is among the [`MAX_OVERLAPS`] of highest `rank`. Time and memory are O(n · [`MAX_OVERLAPS`]), but
+/// for the tree's O(n log n).
+pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
+    let tree = tree(boxes);
+    let first_partners = |k: usize| first_partners(&tree, boxes, k);
+    let mut partners: Vec<Vec<u32>> =
+        (0..boxes.len()).into_par_iter().map(first_partners).collect();
+    let crowded: Vec<bool> = partners.iter().map(|found| found.len() > MAX_OVERLAPS).collect();
+    let mut ranked: Vec<u32> = (0..boxes.len() as u32).filter(|&k| crowded[k as usize]).collect();
+    for &k in &ranked {
+        partners[k as usize].clear();
+    }
+    ranked.sort_by(|&a, &b| rank(b as usize).total_cmp(&rank(a as usize)));
+    ranked.truncate(MAX_OVERLAPS);
+    let mut is_ranked = vec![false; boxes.len()];
+    for &k in &ranked {
+        is_ranked[k as usize] = true;
+    }
     for k in 0..boxes.len() {
-        if !crowded[k] {
-            let heard: Vec<u32> = out[k].iter().copied().filter(|&c| crowded[c as usize]).collect();
-            heard.into_iter().for_each(|c| out[c as usize].push(k as u32));
-            continue;
-        }
-        for c in first.iter().map(|&c| c as usize) {
-            if c != k && boxes[k].overlaps(&boxes[c]) {
-                out[k].push(c as u32);
-                if !is_first[k] {
-                    out[c].push(k as u32);
-                }
-            }
+        if crowded[k] {
+            pair_with_ranked(k, boxes, &ranked, &is_ranked, &mut partners);
+        } else {
+            tell_crowded(k, &crowded, &mut partners);
         }
     }
-    out
+    partners
 }
 
-/// Boxes by halves along the longest axis of their middles. The parts of node k are nodes 2k + 1
-/// and 2k + 2.
-struct Tree<'a> {
-    boxes: &'a [Aabb],
-    order: Vec<u32>,
-    bounds: Vec<Aabb>,
-}
-
-/// Boxes in a leaf, at most.
-const LEAF: usize = 4;
-
-impl Tree<'_> {
-    fn new(boxes: &[Aabb]) -> Tree<'_> {
-        let order = (0..boxes.len() as u32).collect();
-        let bounds = vec![Aabb::EMPTY; 2 * boxes.len().next_power_of_two()];
-        let mut tree = Tree { boxes, order, bounds };
-        tree.build(0, 0..boxes.len());
-        tree
-    }
-
-    fn build(&mut self, node: usize, range: Range<usize>) {
-        let part = &mut self.order[range.clone()];
-        let boxes = part.iter().map(|&k| self.boxes[k as usize]);
-        self.bounds[node] = boxes.fold(Aabb::EMPTY, Aabb::union);
-        if range.len() <= LEAF {
-            return;
-        }
-        let middle = |k: u32| self.boxes[k as usize].centre();
-        let axis = Aabb::from_points(part.iter().map(|&k| middle(k))).longest_axis();
+/// Boxes halved along the axis on which their centres reach furthest.
+fn tree(boxes: &[Aabb]) -> Bvh {
+    let centre = |&k: &u32| boxes[k as usize].centre();
+    Bvh::new(boxes, LEAF_SIZE, |part, _| {
+        let axis = Aabb::from_points(part.iter().map(centre)).longest_axis();
         let half = part.len() / 2;
-        part.select_nth_unstable_by(half, |&a, &b| middle(a)[axis].total_cmp(&middle(b)[axis]));
-        let half = range.start + half;
-        self.build(2 * node + 1, range.start..half);
-        self.build(2 * node + 2, half..range.end);
-    }
+        part.select_nth_unstable_by(half, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+    })
+}
 
-    /// Calls `visit` with every box that overlaps with `with`, until it says no.
-    fn visit(&self, with: Aabb, visit: &mut impl FnMut(u32) -> bool) {
-        let mut open = vec![(0, 0..self.order.len())];
-        while let Some((node, range)) = open.pop() {
-            if !self.bounds[node].overlaps(&with) {
-                continue;
-            }
-            if range.len() > LEAF {
-                let half = range.start + range.len() / 2;
-                open.push((2 * node + 1, range.start..half));
-                open.push((2 * node + 2, half..range.end));
-                continue;
-            }
-            let mut here =
-                self.order[range].iter().filter(|&&k| self.boxes[k as usize].overlaps(&with));
-            if !here.all(|&k| visit(k)) {
-                return;
+/// Boxes that box `k` overlaps, up to one more than [`MAX_OVERLAPS`].
+fn first_partners(tree: &Bvh, boxes: &[Aabb], k: usize) -> Vec<u32> {
+    let mut partners = vec![];
+    let visit = |other: u32| {
+        if other as usize != k && boxes[other as usize].overlaps(&boxes[k]) {
+            partners.push(other);
+        }
+        if partners.len() > MAX_OVERLAPS {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    tree.visit(|bounds| bounds.overlaps(&boxes[k]), visit);
+    partners
+}
+
+/// Adds box `k`, which is not crowded and knows all of its partners, to those that are crowded.
+fn tell_crowded(k: usize, crowded: &[bool], partners: &mut [Vec<u32>]) {
+    let to_tell: Vec<u32> =
+        partners[k].iter().copied().filter(|&other| crowded[other as usize]).collect();
+    for other in to_tell {
+        partners[other as usize].push(k as u32);
+    }
+}
+
+/// Pairs the crowded box `k` with the crowded boxes of highest rank.
+fn pair_with_ranked(
+    k: usize,
+    boxes: &[Aabb],
+    ranked: &[u32],
+    is_ranked: &[bool],
+    partners: &mut [Vec<u32>],
+) {
+    for other in ranked.iter().map(|&other| other as usize) {
+        if other != k && boxes[k].overlaps(&boxes[other]) {
+            partners[k].push(other as u32);
+            if !is_ranked[k] {
+                partners[other].push(k as u32);
             }
         }
     }
@@ -126,13 +126,13 @@ mod tests {
     }
 
     fn sorted(boxes: &[Aabb]) -> Vec<Vec<u32>> {
-        let mut all = overlaps(boxes, |k| -(k as f64));
+        let mut all = overlapping_pairs(boxes, |k| -(k as f64));
         all.iter_mut().for_each(|others| others.sort_unstable());
         all
     }
 
     /// Every box against every other.
-    fn plainly(boxes: &[Aabb]) -> Vec<Vec<u32>> {
+    fn brute_force(boxes: &[Aabb]) -> Vec<Vec<u32>> {
         let others = |k: usize| {
             let touches = |&m: &usize| m != k && boxes[m].overlaps(&boxes[k]);
             (0..boxes.len()).filter(touches).map(|m| m as u32).collect()
@@ -141,29 +141,29 @@ mod tests {
     }
 
     #[test]
-    fn all_that_overlaps_is_found() {
+    fn finds_all_overlaps() {
         for (count, size) in [(0, 0.1), (1, 0.1), (2, 2.0), (4, 0.5), (5, 0.5), (3000, 0.05)] {
             let boxes = cubes(count, size);
-            assert!(sorted(&boxes) == plainly(&boxes), "{count}");
+            assert!(sorted(&boxes) == brute_force(&boxes), "{count}");
         }
     }
 
     #[test]
-    fn what_many_stand_on_hears_of_all_of_them() {
+    fn crowded_boxes_learn_of_all_that_are_not() {
         // Some floors, each below all the cubes, are in crowds; the cubes are not.
         let mut boxes = cubes(3000, 0.02);
         boxes.extend([UNIT; 3]);
         let all = sorted(&boxes);
-        assert!(all == plainly(&boxes));
-        assert!(all[3000].len() > 10 * CROWD);
+        assert!(all == brute_force(&boxes));
+        assert!(all[3000].len() > 10 * MAX_OVERLAPS);
     }
 
     #[test]
-    fn a_crowd_takes_no_square() {
+    fn is_linear_in_crowds() {
         const N: usize = 20_000;
         let all = sorted(&[UNIT; N]);
-        // Each hears of the first 256, which hear of each.
-        let expected = |k: usize| if k < CROWD { N - 1 } else { CROWD };
+        // Each is paired with the 256 of highest rank, and these with all.
+        let expected = |k: usize| if k < MAX_OVERLAPS { N - 1 } else { MAX_OVERLAPS };
         assert!((0..N).all(|k| all[k].len() == expected(k)));
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
-use super::box_overlap::overlaps;
+use super::box_overlap::overlapping_pairs;
 use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
@@ -45,7 +45,7 @@ impl Mesh {
         let slack: Vec<f64> =
             (0..self.depths.len()).map(|t| self.reach(t, self.depth(t))).collect();
         let boxes = boxes(self.scene(), &slack);
-        let touching = overlaps(&boxes, |t| self.scene.area(t));
+        let touching = overlapping_pairs(&boxes, |t| self.scene.area(t));
         let rims = rims(self.scene());
         let parted = |t: usize| {
             let plane = Plane::of(self.scene(), t, slack[t]);

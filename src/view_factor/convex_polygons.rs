@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
+use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::area_vector;
 use crate::geometry::weld::Weld;
 use crate::scene::Scene;
@@ -33,6 +34,11 @@ impl ConvexPolygon {
         let area = vector.length();
         let normal = vector.normalize_or_zero();
         (normal != DVec3::ZERO).then_some(ConvexPolygon { corners, normal, area, group })
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::from_points(self.corners.iter().copied())
     }
 
     /// The same polygon with its front on the other side.

@@ -1,9 +1,12 @@
 //! Who can stand between two polygons.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 
 use super::convex_polygons::ConvexPolygon;
 use crate::geometry::aabb::Aabb;
+use crate::geometry::bvh::Bvh;
 use crate::geometry::plane::Plane;
 use crate::geometry::polygon::{clip, merge_close_corners, polygon_area, polygon_difference};
 
@@ -23,8 +26,8 @@ const SLIVER: f64 = 4.0 * CONTACT;
 /// uncertain to cut by.
 pub(super) const ONE: f64 = 1e-9;
 
-/// Pieces in one leaf of the tree.
-const LEAF: usize = 4;
+/// Pieces in one leaf of the tree, at most. Chosen by hand; no measurement was kept.
+const LEAF_SIZE: usize = 4;
 
 /// The convex hull of two polygons that are all before one another: every segment between them.
 pub(super) struct Shaft {
@@ -150,59 +153,29 @@ fn lies_on(piece: &ConvexPolygon, other: &ConvexPolygon) -> bool {
 /// Pieces in a tree of boxes.
 pub(super) struct Tree {
     pieces: Vec<ConvexPolygon>,
-    /// The root is the last.
-    nodes: Vec<Node>,
-}
-
-struct Node {
-    bounds: Aabb,
-    kind: Kind,
-}
-
-enum Kind {
-    Inner(usize, usize),
-    /// Range of pieces.
-    Leaf(usize, usize),
+    bvh: Bvh,
 }
 
 impl Tree {
+    /// Halves pieces at the median along the longest side of their box.
     pub fn new(pieces: Vec<ConvexPolygon>) -> Tree {
-        let mut tree = Tree { pieces, nodes: Vec::new() };
-        let count = tree.pieces.len();
-        if count > 0 {
-            tree.build(0, count);
-        }
-        tree
-    }
-
-    /// Halves a range of pieces at the median along the longest side of their box.
-    fn build(&mut self, start: usize, end: usize) -> usize {
-        let pieces = &mut self.pieces[start..end];
-        let bounds = Aabb::from_points(pieces.iter().flat_map(|piece| &piece.corners).copied());
-        let kind = if pieces.len() <= LEAF {
-            Kind::Leaf(start, end)
-        } else {
+        let boxes: Vec<Aabb> = pieces.iter().map(ConvexPolygon::bounds).collect();
+        let bvh = Bvh::new(&boxes, LEAF_SIZE, |part, bounds| {
             let axis = bounds.longest_axis();
-            let key = |piece: &ConvexPolygon| {
-                let b = Aabb::from_points(piece.corners.iter().copied());
-                (b.low + b.high)[axis]
-            };
-            pieces.sort_by(|p, q| key(p).total_cmp(&key(q)));
-            let middle = start + pieces.len() / 2;
-            Kind::Inner(self.build(start, middle), self.build(middle, end))
-        };
-        self.nodes.push(Node { bounds, kind });
-        self.nodes.len() - 1
+            let twice_centre = |&k: &u32| (boxes[k as usize].low + boxes[k as usize].high)[axis];
+            part.sort_by(|a, b| twice_centre(a).total_cmp(&twice_centre(b)));
+        });
+        Tree { pieces, bvh }
     }
 
     /// The backs of all pieces, less what is hidden right there by a piece of `fronts` that lies on
     /// it: such a plate has two fronts.
     pub fn backs(&self, fronts: &Tree) -> Vec<ConvexPolygon> {
         let mut backs = Vec::new();
-        for piece in &self.pieces {
+        for piece in self.bvh.order().iter().map(|&k| &self.pieces[k as usize]) {
             let back = piece.reversed();
             let mut parts = vec![back.corners.clone()];
-            for front in fronts.nearby(&Aabb::from_points(piece.corners.iter().copied())) {
+            for front in fronts.nearby(&piece.bounds()) {
                 if lies_on(front, &back) {
                     parts = parts
                         .iter()
@@ -216,40 +189,31 @@ impl Tree {
         backs
     }
 
-    /// The pieces in boxes of the tree that meet `bounds`, and perhaps some more.
-    fn nearby(&self, bounds: &Aabb) -> impl Iterator<Item = &ConvexPolygon> {
-        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
-        let mut ranges = Vec::new();
-        while let Some(node) = open.pop() {
-            match self.nodes[node].kind {
-                _ if !self.nodes[node].bounds.overlaps(bounds) => {}
-                Kind::Inner(a, b) => open.extend([b, a]),
-                Kind::Leaf(start, end) => ranges.push(start..end),
-            }
-        }
-        ranges.into_iter().flat_map(|range| &self.pieces[range])
+    /// The pieces in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.
+    fn nearby(&self, bounds: &Aabb) -> Vec<&ConvexPolygon> {
+        let mut found = Vec::new();
+        self.bvh.visit(
+            |node| node.overlaps(bounds),
+            |k| {
+                found.push(&self.pieces[k as usize]);
+                ControlFlow::Continue(())
+            },
+        );
+        found
     }
 
     /// What of the pieces is strictly within `shaft`.
     pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
         let mut found = Vec::new();
-        let mut open: Vec<usize> = self.nodes.len().checked_sub(1).into_iter().collect();
-        while let Some(node) = open.pop() {
-            let Node { bounds, kind } = &self.nodes[node];
-            if !shaft.meets(bounds) {
-                continue;
-            }
-            match *kind {
-                Kind::Inner(a, b) => open.extend([b, a]),
-                Kind::Leaf(start, end) => {
-                    let pieces = &self.pieces[start..end];
-                    found.extend(pieces.iter().filter_map(|piece| {
-                        let corners = shaft.clip(&piece.corners)?;
-                        Some(Blocker { corners, normal: piece.normal })
-                    }));
-                }
-            }
-        }
+        self.bvh.visit(
+            |node| shaft.meets(node),
+            |k| {
+                let piece = &self.pieces[k as usize];
+                let clipped = shaft.clip(&piece.corners);
+                found.extend(clipped.map(|corners| Blocker { corners, normal: piece.normal }));
+                ControlFlow::Continue(())
+            },
+        );
         found
     }
 }

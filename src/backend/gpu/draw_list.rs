@@ -12,6 +12,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
+use crate::geometry::bvh::Bvh;
 use crate::hemicube::Face;
 use crate::scene::Scene;
 
@@ -45,19 +46,18 @@ impl DrawList {
     pub fn new(scene: &Scene) -> DrawList {
         let middle = |t: usize| scene.corners(t).iter().sum::<DVec3>() / 3.0;
         let middles: Vec<DVec3> = (0..scene.triangles().len()).map(middle).collect();
-        let mut order: Vec<u32> = (0..middles.len() as u32).collect();
-        let mut runs = vec![];
-        halve(&mut order, 0, &middles, &mut runs);
+        let boxes: Vec<Aabb> =
+            (0..middles.len()).map(|t| Aabb::from_points(scene.corners(t))).collect();
+        let bvh = Bvh::new(&boxes, MAX_TRIANGLES_PER_CHUNK, |part, _| halve(part, &middles));
         // The device rounds to 32 bits: boxes grow by a few steps of its coordinates.
         let margin = scene.bounds().longest_side() * 8.0 * f64::from(f32::EPSILON);
-        let around = |positions: Range<u32>| {
-            let triangles = order[positions.start as usize..positions.end as usize].iter();
-            let corners = triangles.flat_map(|&t| scene.corners(t as usize));
-            let bounds = Aabb::from_points(corners);
+        let chunk = |(leaf, bounds): (Range<usize>, &Aabb)| {
+            let positions = leaf.start as u32..leaf.end as u32;
             let centre = bounds.low.midpoint(bounds.high);
             Chunk { positions, centre, half: bounds.size() / 2.0 + margin }
         };
-        let chunks = runs.into_iter().map(around).collect();
+        let chunks = bvh.leaves().map(chunk).collect();
+        let order = bvh.order().to_vec();
         let mut position_of = vec![0; order.len()];
         for (position, &t) in (0..).zip(&order) {
             position_of[t as usize] = position;
@@ -89,19 +89,12 @@ impl DrawList {
     }
 }
 
-fn halve(order: &mut [u32], start: u32, middles: &[DVec3], runs: &mut Vec<Range<u32>>) {
-    if order.len() <= MAX_TRIANGLES_PER_CHUNK {
-        runs.push(start..start + order.len() as u32);
-        return;
-    }
+/// Sorts triangles along the axis on which their centroids, `middles`, reach furthest.
+fn halve(order: &mut [u32], middles: &[DVec3]) {
     let axis = Aabb::from_points(order.iter().map(|&t| middles[t as usize])).longest_axis();
     let along = |t: &u32| middles[*t as usize][axis];
     // Ties by index: the same order on every run.
     order.sort_unstable_by(|a, b| along(a).total_cmp(&along(b)).then(a.cmp(b)));
-    let (left, right) = order.split_at_mut(order.len() / 2);
-    let middle = start + left.len() as u32;
-    halve(left, start, middles, runs);
-    halve(right, middle, middles, runs);
 }
 
 #[cfg(test)]
