@@ -4,8 +4,16 @@
 //! may: greedy merging along the edges of the dual graph (Garland, Willmott and Heckbert 2001),
 //! which is how the face clusters of Willmott, Heckbert and Garland (1999) are made. Only a surface
 //! of one group and one material is merged, and no normal in a cluster is further than
-//! [`SPREAD_DEGREES`] from its axis: what a cluster sends out is much like what one flat patch does.
-//! Smoothing groups have no say: they are about what is seen of a surface, not about what it sends.
+//! [`MAX_NORMAL_DEVIATION_DEGREES`] from its axis: what a cluster sends out is much like what one flat patch does.
+//! Smoothing groups are ignored: they are about the shading of a surface, not about what it sends.
+//!
+//! ```text
+//! roots              7              6
+//!                ╭───┴───╮        ╭─┴─╮      Clusters 0 to 4 are the five triangles; each
+//!                5       │        │   │      pair that merges makes the next number.
+//!              ╭─┴─╮     │        │   │
+//! triangles    0   1     2        3   4
+//! ```
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -16,8 +24,9 @@ use super::SurfaceTopology;
 use crate::geometry::rounding::tie_stable_key;
 use crate::scene::Scene;
 
-/// No triangle's normal is further than this from its cluster's axis, degrees.
-pub(crate) const SPREAD_DEGREES: f64 = 35.0;
+/// No triangle's normal is further than this from its cluster's axis, degrees. Chosen by hand; no
+/// measurement was kept.
+pub(crate) const MAX_NORMAL_DEVIATION_DEGREES: f64 = 35.0;
 
 /// Binary trees over the triangles of a scene. Cluster `t` is triangle `t` alone, for all triangles;
 /// the clusters of two parts follow.
@@ -35,14 +44,14 @@ pub(crate) struct Clusters {
 struct Cluster {
     area: f64,
     centroid: DVec3,
-    /// Integral of the squared distance from the centroid, length unit⁴.
-    spread: f64,
+    /// Integral over the area of the squared distance from the centroid, length unit⁴.
+    second_moment: f64,
     /// Area-weighted mean normal, of unit length.
     axis: DVec3,
-    /// Area-weighted sum of normals.
-    vector: DVec3,
-    /// No normal is further from the axis, radians.
-    angle: f64,
+    /// Integral over the area of the unit normal, length unit².
+    area_vector: DVec3,
+    /// Bound of the angle between the axis and any normal, radians.
+    max_deviation: f64,
 }
 
 impl Clusters {
@@ -52,7 +61,8 @@ impl Clusters {
         let mut clusters: Vec<Cluster> = (0..count).map(|t| Cluster::of(scene, t)).collect();
         let mut parts: Vec<[u32; 2]> = vec![];
         let mut beside = neighbours(scene);
-        let mut whole = vec![true; count];
+        // Clusters that are not yet part of another.
+        let mut active = vec![true; count];
         let mut queue = BinaryHeap::new();
         for (a, others) in (0u32..).zip(&beside) {
             for &b in others.range(a + 1..) {
@@ -60,29 +70,29 @@ impl Clusters {
             }
         }
         while let Some(Reverse((_, a, b))) = queue.pop() {
-            if !(whole[a as usize] && whole[b as usize]) {
+            if !(active[a as usize] && active[b as usize]) {
                 continue;
             }
             let merged = clusters.len() as u32;
-            clusters.push(clusters[a as usize].with(&clusters[b as usize]));
+            clusters.push(clusters[a as usize].merged(&clusters[b as usize]));
             parts.push([a, b]);
-            whole.push(true);
+            active.push(true);
             let mut others = BTreeSet::new();
             for part in [a, b] {
-                whole[part as usize] = false;
+                active[part as usize] = false;
                 others.append(&mut beside[part as usize]);
             }
             others.retain(|&o| o != a && o != b);
             for &o in &others {
-                let its = &mut beside[o as usize];
-                its.remove(&a);
-                its.remove(&b);
-                its.insert(merged);
+                let neighbours = &mut beside[o as usize];
+                neighbours.remove(&a);
+                neighbours.remove(&b);
+                neighbours.insert(merged);
                 queue.extend(candidate(&clusters, o, merged));
             }
             beside.push(others);
         }
-        let roots = (0..clusters.len() as u32).filter(|&c| whole[c as usize]).collect();
+        let roots = (0..clusters.len() as u32).filter(|&c| active[c as usize]).collect();
         Clusters { clusters, parts, roots }
     }
 
@@ -128,38 +138,50 @@ impl Cluster {
         let centroid = a + ((b - a) + (c - a)) / 3.0;
         // The three corners and the centroid, as a rule for integrals of degree two.
         let square: f64 = [a, b, c].iter().map(|p| p.distance_squared(centroid)).sum();
-        let spread = area * square / 12.0;
-        Cluster { area, centroid, spread, axis, vector: axis * area, angle: 0.0 }
+        let second_moment = area * square / 12.0;
+        let area_vector = axis * area;
+        Cluster { area, centroid, second_moment, axis, area_vector, max_deviation: 0.0 }
     }
 
-    fn with(&self, other: &Cluster) -> Cluster {
+    /// Both as one.
+    fn merged(&self, other: &Cluster) -> Cluster {
         let area = self.area + other.area;
         let share = other.area / area;
         let centroid = self.centroid + (other.centroid - self.centroid) * share;
-        let apart = self.centroid.distance_squared(other.centroid);
-        let spread = self.spread + other.spread + self.area * share * apart;
-        let vector = self.vector + other.vector;
-        let axis = vector.normalize_or_zero();
-        let reach = |c: &Cluster| axis.dot(c.axis).clamp(-1.0, 1.0).acos() + c.angle;
-        Cluster { area, centroid, spread, axis, vector, angle: reach(self).max(reach(other)) }
+        // The parallel axis theorem, for two.
+        let distance_squared = self.centroid.distance_squared(other.centroid);
+        let second_moment =
+            self.second_moment + other.second_moment + self.area * share * distance_squared;
+        let area_vector = self.area_vector + other.area_vector;
+        let axis = area_vector.normalize_or_zero();
+        let deviation =
+            |part: &Cluster| axis.dot(part.axis).clamp(-1.0, 1.0).acos() + part.max_deviation;
+        let max_deviation = deviation(self).max(deviation(other));
+        Cluster { area, centroid, second_moment, axis, area_vector, max_deviation }
     }
 }
 
-/// A pair that may merge, by what it costs: small and compact clusters first, flat before bent.
+/// A pair of clusters that may merge, with its cost as the key of the queue: small and compact
+/// clusters come first, and flat before bent. `None` if the normals would deviate too far.
+///
+/// The cost is the second moment ∫|x − c|² dA plus A² (1 − |n̄|²), both length unit⁴, where n̄ is the
+/// mean of the unit normals: 1 − |n̄|² is their variance.
 fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, u32)>> {
-    let merged = clusters[a as usize].with(&clusters[b as usize]);
-    let flat = merged.vector.length() / merged.area;
-    // In units of the fourth power of length: the extent, and as much again for a spread of normals
-    // of one (1 − flat² is their variance).
-    let cost = merged.spread + merged.area * merged.area * (1.0 - flat * flat).max(0.0);
-    (merged.angle <= SPREAD_DEGREES.to_radians()).then(|| Reverse((tie_stable_key(cost), a, b)))
+    let merged = clusters[a as usize].merged(&clusters[b as usize]);
+    if merged.max_deviation > MAX_NORMAL_DEVIATION_DEGREES.to_radians() {
+        return None;
+    }
+    let mean_normal = merged.area_vector.length() / merged.area;
+    let normal_variance = (1.0 - mean_normal * mean_normal).max(0.0);
+    let cost = merged.second_moment + merged.area * merged.area * normal_variance;
+    Some(Reverse((tie_stable_key(cost), a, b)))
 }
 
-/// For each triangle those across a side where the surface goes on without a sharp fold.
+/// For each triangle its neighbours across sides that are no crease.
 fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
-    let smooth = SurfaceTopology::by_angle(scene);
-    let mut beside = vec![BTreeSet::new(); smooth.sides.len()];
-    for [(s, _), (t, _)] in smooth.joins() {
+    let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
+    let mut beside = vec![BTreeSet::new(); topology.sides.len()];
+    for [(s, _), (t, _)] in topology.shared_edges() {
         beside[s].insert(t as u32);
         beside[t].insert(s as u32);
     }
@@ -262,7 +284,11 @@ mod tests {
             }
             // An angle from an arc cosine of 1 − ε is off by √(2ε).
             let widest = widest.to_degrees();
-            assert!(widest <= SPREAD_DEGREES + 1e-5 && widest > SPREAD_DEGREES / 3.0, "{widest}");
+            assert!(
+                widest <= MAX_NORMAL_DEVIATION_DEGREES + 1e-5
+                    && widest > MAX_NORMAL_DEVIATION_DEGREES / 3.0,
+                "{widest}"
+            );
         }
     }
 

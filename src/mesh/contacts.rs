@@ -1,4 +1,18 @@
-//! Where surfaces touch: elements there are cut small, since the light on them jumps.
+//! Where surfaces touch: elements there are split further, since the light on them jumps.
+//!
+//! ```text
+//!          │ wall                 An element that straddles the wall's foot is lit on one
+//!   lit    │   in shadow          side and dark on the other. The foot is a *contact segment*
+//!  ────────┴─────────── floor     on the floor's triangle: along it, another triangle's outer
+//!  ┌───┬─┬─┼─┬─┬───┐              edge comes near the plane, or the triangle crosses it.
+//!  │   ├─┼─┼─┼─┤   │              Elements that a segment separates are split, level by level.
+//!  └───┴─┴─┴─┴─┴───┘
+//! ```
+//!
+//! 1. Boxes of triangles, expanded by the contact distance, give the pairs to look at.
+//! 2. For each pair, the segments on the one triangle that the other makes are found, in
+//!    barycentric coordinates.
+//! 3. The quadtree of each triangle is descended along its segments.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -9,32 +23,35 @@ use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Of a cell's size (the square root of its area): what comes this close to its plane touches it.
-const TOUCH: f64 = 0.15;
+/// What comes nearer to a cell's plane than this touches it, in units of the cell's size (the square
+/// root of its area). Chosen by hand; no measurement was kept.
+const CONTACT_DISTANCE: f64 = 0.15;
 
-/// Of an element's size: lines have to come this far into it to part it.
-const INSIDE: f64 = 0.02;
+/// A segment has to come this far into an element to separate it, as a barycentric weight: one along
+/// the element's edge does not. Chosen by hand; no measurement was kept.
+const MIN_PENETRATION: f64 = 0.02;
 
-/// Of a cell's size: lines that part some element in the cell come this far into it, since elements
-/// are at most [`Mesh::MAX_DEPTH`] levels smaller.
-const LEAST: f64 = INSIDE / (1u32 << Mesh::MAX_DEPTH) as f64;
+/// A segment that separates some element in a cell comes at least this far into the cell, as a
+/// barycentric weight, since elements are at most [`Mesh::MAX_DEPTH`] levels smaller.
+const MIN_CELL_PENETRATION: f64 = MIN_PENETRATION / (1u32 << Mesh::MAX_DEPTH) as f64;
 
-/// Cosine of the angle between triangles in one plane, at least: 1e-5 radians.
-const FLAT: f64 = 1.0 - 5e-11;
+/// Triangles lie in one plane if the cosine between their normals is above this: 1e-5 radians.
+const COPLANAR_COSINE: f64 = 1.0 - 5e-11;
 
 /// A line on a triangle along which another triangle touches or crosses it.
 #[derive(Clone, Copy, Debug)]
 struct ContactSegment {
-    /// From where to where, by barycentric weights of the second and third corner.
+    /// Both ends, by barycentric weights of the second and third corner.
     ends: [DVec2; 2],
-    /// How near the other comes, scene unit.
+    /// Distance from the plane to the other triangle, scene unit.
     gap: f64,
 }
 
 impl Mesh {
-    /// The same mesh with elements that others' edges or faces touch within split further, `levels`
-    /// times: an element that straddles a wall's foot is light on one side and hidden on the other
-    /// (the discontinuities of order zero of Heckbert, "Discontinuity meshing for radiosity", 1992).
+    /// The same mesh with elements split further, `levels` times, that edges or faces of other
+    /// triangles touch within: an element that straddles a wall's foot is light on one side and
+    /// hidden on the other (the discontinuities of order zero of Heckbert, "Discontinuity meshing
+    /// for radiosity", 1992).
     ///
     /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
     /// would go beyond [`Mesh::MAX_DEPTH`] are left out.
@@ -42,185 +59,197 @@ impl Mesh {
     /// Where more than 256 triangles have more than 256 others about them each, only the largest 256
     /// touch the rest of these: thousands of faces in one place are not worth the time.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
-        let slack: Vec<f64> =
-            (0..self.depths.len()).map(|t| self.reach(t, self.depth(t))).collect();
-        let boxes = boxes(self.scene(), &slack);
-        let touching = overlapping_pairs(&boxes, |t| self.scene.area(t));
-        let rims = rims(self.scene());
-        let parted = |t: usize| {
-            let plane = Plane::of(self.scene(), t, slack[t]);
-            let mut lines = vec![];
-            for s in touching[t].iter().map(|&s| s as usize) {
-                plane.touch(&self.scene.corners(s), &rims[s], &boxes[t], &mut lines);
+        let count = self.depths.len();
+        let tolerances: Vec<f64> =
+            (0..count).map(|t| self.contact_distance(t, self.depth(t))).collect();
+        let boxes: Vec<Aabb> = (0..count)
+            .map(|t| Aabb::from_points(self.scene.corners(t)).expanded(tolerances[t]))
+            .collect();
+        let nearby = overlapping_pairs(&boxes, |t| self.scene.area(t));
+        let outer_edges = outer_edges(self.scene());
+        let separated_in = |t: usize| {
+            let plane = TrianglePlane::new(self.scene(), t, tolerances[t]);
+            let mut segments = vec![];
+            for s in nearby[t].iter().map(|&s| s as usize) {
+                let corners = self.scene.corners(s);
+                plane.add_contacts(&corners, &outer_edges[s], &boxes[t], &mut segments);
             }
-            let mut out = vec![];
-            self.part(t, Cell::ROOT, &lines, levels, &mut out);
-            out
+            let mut separated = vec![];
+            self.collect_separated(t, Cell::ROOT, &segments, levels, &mut separated);
+            separated
         };
-        let parted: FxHashSet<(usize, Cell)> =
-            (0..slack.len()).into_par_iter().flat_map_iter(parted).collect();
+        let separated: FxHashSet<(usize, Cell)> =
+            (0..count).into_par_iter().flat_map_iter(separated_in).collect();
         let deeper = |t: usize, cell: Cell| {
-            cell.level < self.level_at(t, cell) || parted.contains(&(t, cell))
+            cell.level < self.level_at(t, cell) || separated.contains(&(t, cell))
         };
         Mesh::refined_where(self.scene.clone(), deeper)
     }
 
-    /// Adds to `out` the elements in `cell` of triangle `t`, and parts of them, that `lines` part.
-    fn part(
+    /// Adds to `separated` the elements within `cell` of triangle `t`, and parts of them down to
+    /// `levels` further levels, that `segments` separate.
+    fn collect_separated(
         &self,
         t: usize,
         cell: Cell,
-        lines: &[ContactSegment],
+        segments: &[ContactSegment],
         levels: u32,
-        out: &mut Vec<(usize, Cell)>,
+        separated: &mut Vec<(usize, Cell)>,
     ) {
-        let lines: Vec<ContactSegment> =
-            lines.iter().filter(|l| parts(l, cell, LEAST)).copied().collect();
-        if lines.is_empty() {
+        let segments: Vec<ContactSegment> = segments
+            .iter()
+            .filter(|segment| segment.separates(cell, MIN_CELL_PENETRATION))
+            .copied()
+            .collect();
+        if segments.is_empty() {
             return;
         }
-        let base = self.level_at(t, cell);
-        if cell.level >= base {
-            let reach = self.reach(t, cell.level);
-            let split = cell.level < (base + levels).min(Mesh::MAX_DEPTH)
-                && lines.iter().any(|l| l.gap <= reach && parts(l, cell, INSIDE));
-            if !split {
+        let element_level = self.level_at(t, cell);
+        if cell.level >= element_level {
+            let distance = self.contact_distance(t, cell.level);
+            let touches = |segment: &ContactSegment| {
+                segment.gap <= distance && segment.separates(cell, MIN_PENETRATION)
+            };
+            let deepest = (element_level + levels).min(Mesh::MAX_DEPTH);
+            if cell.level >= deepest || !segments.iter().any(touches) {
                 return;
             }
-            out.push((t, cell));
+            separated.push((t, cell));
         }
-        cell.children().into_iter().for_each(|c| self.part(t, c, &lines, levels, out));
+        for child in cell.children() {
+            self.collect_separated(t, child, &segments, levels, separated);
+        }
     }
 
-    /// How near to a cell of triangle `t` something has to come to touch it, scene unit.
-    fn reach(&self, t: usize, level: u32) -> f64 {
-        TOUCH * (self.scene.area(t) / f64::from(1u32 << (2 * level))).sqrt()
+    /// Distance from its plane below which something touches a cell of `level` in triangle `t`,
+    /// scene unit.
+    fn contact_distance(&self, t: usize, level: u32) -> f64 {
+        CONTACT_DISTANCE * (self.scene.area(t) / f64::from(1u32 << (2 * level))).sqrt()
     }
 
-    /// Level of this mesh's elements at the middle of `cell` of triangle `t`.
+    /// Level of this mesh's element at the centroid of `cell` of triangle `t`.
     fn level_at(&self, t: usize, cell: Cell) -> u32 {
-        let c = cell.corners();
-        let middle = |k: usize| (c[0][k] + c[1][k] + c[2][k]) / 3.0;
-        self.cell(self.element(self.element_at(t, middle(0), middle(1)).0)).level
+        let corners = cell.corners();
+        let mean = |k: usize| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0;
+        self.cell(self.element(self.element_at(t, mean(0), mean(1)).0)).level
     }
 }
 
-/// Whether `line` comes into `cell`, by more than `margin`, a share of its size.
-fn parts(line: &ContactSegment, cell: Cell, margin: f64) -> bool {
-    // In the cell's own weights; all three are at least `margin` well within.
-    let [a, b] = line.ends.map(|p| {
-        let [u, v] = cell.local(p.x, p.y);
-        [1.0 - u - v, u, v]
-    });
-    let (mut from, mut to) = (0.0f64, 1.0f64);
-    for k in 0..3 {
-        let (start, end) = (a[k] - margin, b[k] - margin);
-        if start < 0.0 && end < 0.0 {
-            return false;
+impl ContactSegment {
+    /// Whether the segment comes into `cell` by more than `margin`, a barycentric weight of the cell:
+    /// whether it meets the triangle in which all three weights are at least that.
+    fn separates(&self, cell: Cell, margin: f64) -> bool {
+        let [start, end] = self.ends.map(|p| {
+            let [u, v] = cell.local(p.x, p.y);
+            [1.0 - u - v, u, v]
+        });
+        // Clipped against the three sides one by one (Liang and Barsky 1984).
+        let (mut from, mut to) = (0.0f64, 1.0f64);
+        for k in 0..3 {
+            let (start, end) = (start[k] - margin, end[k] - margin);
+            if start < 0.0 && end < 0.0 {
+                return false;
+            }
+            let crossing = start / (start - end);
+            if start < 0.0 {
+                from = from.max(crossing);
+            } else if end < 0.0 {
+                to = to.min(crossing);
+            }
         }
-        let at = start / (start - end);
-        if start < 0.0 {
-            from = from.max(at);
-        } else if end < 0.0 {
-            to = to.min(at);
+        from < to
+    }
+}
+
+/// Per triangle, which of its sides end its plane: the diagonals of a flat polygon do not, and
+/// separate nothing.
+fn outer_edges(scene: &Scene) -> Vec<[bool; 3]> {
+    let topology = SurfaceTopology::new(scene);
+    let mut outer = vec![[true; 3]; topology.sides.len()];
+    for [(s, l), (t, k)] in topology.shared_edges() {
+        if scene.normal(s).dot(scene.normal(t)) > COPLANAR_COSINE {
+            outer[t][k] = false;
+            outer[s][l] = false;
         }
     }
-    from < to
+    outer
 }
 
-/// The box around each triangle, grown by its `slack`.
-fn boxes(scene: &Scene, slack: &[f64]) -> Vec<Aabb> {
-    let grown = |(t, &slack): (usize, &f64)| Aabb::from_points(scene.corners(t)).expanded(slack);
-    slack.iter().enumerate().map(grown).collect()
-}
-
-/// Per triangle, which of its sides do not go on in its own plane: the diagonals of a polygon part
-/// nothing.
-fn rims(scene: &Scene) -> Vec<[bool; 3]> {
-    let smooth = SurfaceTopology::new(scene);
-    let mut out = vec![[true; 3]; smooth.sides.len()];
-    for [(s, l), (t, k)] in smooth.joins() {
-        if scene.normal(s).dot(scene.normal(t)) > FLAT {
-            (out[t][k], out[s][l]) = (false, false);
-        }
-    }
-    out
-}
-
-/// The plane of a triangle, on which others draw lines.
-struct Plane {
+/// The plane of a triangle, on which other triangles make contact segments.
+struct TrianglePlane {
     corner: DVec3,
     edges: [DVec3; 2],
     normal: DVec3,
-    /// How near to the plane others touch it, scene unit.
-    slack: f64,
+    /// Distance from the plane below which others touch it, scene unit.
+    tolerance: f64,
 }
 
-impl Plane {
-    fn of(scene: &Scene, t: usize, slack: f64) -> Plane {
-        let ([a, b, c], normal) = (scene.corners(t), scene.normal(t));
-        Plane { corner: a, edges: [b - a, c - a], normal, slack }
+impl TrianglePlane {
+    fn new(scene: &Scene, t: usize, tolerance: f64) -> TrianglePlane {
+        let [a, b, c] = scene.corners(t);
+        TrianglePlane { corner: a, edges: [b - a, c - a], normal: scene.normal(t), tolerance }
     }
 
-    /// Barycentric position of `p` in the triangle, seen along its normal.
-    fn flat(&self, p: DVec3) -> DVec2 {
+    /// Barycentric position of `p`, projected along the normal.
+    fn barycentric(&self, p: DVec3) -> DVec2 {
         let [e1, e2] = self.edges;
         let n = e1.cross(e2);
         let d = p - self.corner;
         DVec2::new(d.cross(e2).dot(n), e1.cross(d).dot(n)) / n.length_squared()
     }
 
-    /// Adds the lines along which a triangle of these `corners` touches or crosses this one, whose box
-    /// with slack is `within`: the parts of its sides `rim` that lie within `slack` of the plane, and its
-    /// cut with that plane.
-    fn touch(
+    /// Adds the segments along which the triangle with these `corners` touches or crosses this one,
+    /// whose expanded box is `within`: the parts of its `outer` sides that lie within the tolerance
+    /// of the plane, and its cut with the plane.
+    fn add_contacts(
         &self,
         corners: &[DVec3; 3],
-        rim: &[bool; 3],
+        outer: &[bool; 3],
         within: &Aabb,
-        lines: &mut Vec<ContactSegment>,
+        segments: &mut Vec<ContactSegment>,
     ) {
-        let slack = self.slack;
+        let tolerance = self.tolerance;
         let height = corners.map(|p| self.normal.dot(p - self.corner));
-        if height.iter().all(|&h| h > slack) || height.iter().all(|&h| h < -slack) {
+        if height.iter().all(|&h| h > tolerance) || height.iter().all(|&h| h < -tolerance) {
             return;
         }
         if !Aabb::from_points(*corners).overlaps(within) {
             return;
         }
-        let flat = |p: DVec3| self.flat(p);
-        let at = |k: usize, l: usize, h: f64| {
+        let point_at_height = |k: usize, l: usize, h: f64| {
             let share = (h - height[k]) / (height[l] - height[k]);
             corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
         };
         let mut cut = vec![];
         for (k, l) in [(0, 1), (1, 2), (2, 0)] {
             let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
-            if rim[k] && low <= slack && high >= -slack {
-                let within = |k: usize, l: usize| {
-                    if height[k].abs() <= slack {
+            let crosses = low < 0.0 && high > 0.0;
+            if outer[k] && low <= tolerance && high >= -tolerance {
+                // The end at corner k of what lies within the tolerance.
+                let end = |k: usize, l: usize| {
+                    if height[k].abs() <= tolerance {
                         corners[k]
                     } else {
-                        at(k, l, slack * height[k].signum())
+                        point_at_height(k, l, tolerance * height[k].signum())
                     }
                 };
-                let ends = [within(k, l), within(l, k)].map(flat);
-                let crosses = low < 0.0 && high > 0.0;
+                let ends = [end(k, l), end(l, k)].map(|p| self.barycentric(p));
                 let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
                 if ends[0] != ends[1] {
-                    lines.push(ContactSegment { ends, gap });
+                    segments.push(ContactSegment { ends, gap });
                 }
             }
-            if low < 0.0 && high > 0.0 {
-                cut.push(flat(at(k, l, 0.0)));
+            if crosses {
+                cut.push(self.barycentric(point_at_height(k, l, 0.0)));
             }
         }
         if cut.len() == 1 {
             // The cut goes through the corner opposite.
-            cut.extend((0..3).find(|&k| height[k] == 0.0).map(|k| flat(corners[k])));
+            let corner = (0..3).find(|&k| height[k] == 0.0);
+            cut.extend(corner.map(|k| self.barycentric(corners[k])));
         }
         if let [p, q] = cut[..] {
-            lines.push(ContactSegment { ends: [p, q], gap: 0.0 });
+            segments.push(ContactSegment { ends: [p, q], gap: 0.0 });
         }
     }
 }

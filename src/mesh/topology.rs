@@ -1,4 +1,20 @@
 //! Which corners and sides of scene triangles belong to one smooth surface.
+//!
+//! Corners at one position are welded; two triangles that share a side between the same two
+//! positions continue one another across it, unless the side is a crease:
+//!
+//! ```text
+//!        b                    The surface continues from t to s across side ab if
+//!       ╱│╲                   - no third triangle has that side,
+//!      ╱ │ ╲                  - t runs along it from a to b, and s from b to a,
+//!     ╱ t│s ╲                 - both are of one group and one material, and
+//!     ╲  │  ╱                 - their normals differ by at most the crease angle.
+//!      ╲ │ ╱                  Then t and s share the side's identity, and the corners at a
+//!        a                    and at b.
+//! ```
+//!
+//! A corner's identity is shared by all triangles that are connected across such sides around it,
+//! so that one position has a vertex for each smooth surface that meets there.
 
 use rustc_hash::FxHashMap;
 
@@ -22,90 +38,128 @@ pub(crate) struct SurfaceTopology {
 /// A side of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Side {
-    /// Same for both triangles where the surface goes on smoothly, else unique.
+    /// Same for both triangles where the surface continues smoothly, else unique: three times the
+    /// first triangle, plus the side's number there.
     pub id: u32,
-    /// Whether this triangle runs along it against its own direction.
+    /// Whether this triangle runs along it from the higher to the lower of the welded positions.
     pub reversed: bool,
 }
 
+/// A triangle, and the number of one of its sides.
+type TriangleSide = (usize, usize);
+
 impl SurfaceTopology {
-    /// What goes on smoothly by the scene's smoothing groups and by angles.
+    /// Surfaces that continue by the scene's smoothing groups and by angles: up to
+    /// [`Mesh::CREASE_DEGREES`] within one smoothing group or where none is known, else up to
+    /// [`Mesh::COPLANAR_DEGREES`].
     pub fn new(scene: &Scene) -> SurfaceTopology {
-        let together =
-            |a: &Triangle, b: &Triangle| a.smoothing == b.smoothing && a.smoothing != Some(0);
-        SurfaceTopology::up_to(scene, |a, b| {
-            if together(a, b) { Mesh::CREASE_DEGREES } else { Mesh::COPLANAR_DEGREES }
+        SurfaceTopology::with_crease_angle(scene, |a, b| {
+            if a.smoothing == b.smoothing && a.smoothing != Some(0) {
+                Mesh::CREASE_DEGREES
+            } else {
+                Mesh::COPLANAR_DEGREES
+            }
         })
     }
 
-    /// What would go on smoothly if nothing were known of smoothing groups.
-    pub fn by_angle(scene: &Scene) -> SurfaceTopology {
-        SurfaceTopology::up_to(scene, |_, _| Mesh::CREASE_DEGREES)
+    /// Surfaces that continue by angles up to [`Mesh::CREASE_DEGREES`] alone.
+    pub fn ignoring_smoothing_groups(scene: &Scene) -> SurfaceTopology {
+        SurfaceTopology::with_crease_angle(scene, |_, _| Mesh::CREASE_DEGREES)
     }
 
-    /// What goes on smoothly where two neighbours' normals may differ by as many degrees as `most`
-    /// says.
-    fn up_to(scene: &Scene, most: impl Fn(&Triangle, &Triangle) -> f64) -> SurfaceTopology {
+    /// Surfaces that continue across a shared side if the normals of its two triangles differ by at
+    /// most `crease_angle` of both, degrees.
+    fn with_crease_angle(
+        scene: &Scene,
+        crease_angle: impl Fn(&Triangle, &Triangle) -> f64,
+    ) -> SurfaceTopology {
         let count = scene.triangles().len();
-        let mut weld = Weld::default();
-        let welded: Vec<[u32; 3]> =
-            (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
-        let mut by_ends: FxHashMap<(u32, u32), Vec<(usize, usize)>> = FxHashMap::default();
-        let ends = |t: usize, k: usize| (welded[t][k], welded[t][(k + 1) % 3]);
-        for t in 0..count {
-            for k in 0..3 {
-                let (a, b) = ends(t, k);
+        let ends = side_ends(scene);
+        let mut by_ends: FxHashMap<(u32, u32), Vec<TriangleSide>> = FxHashMap::default();
+        for (t, sides) in ends.iter().enumerate() {
+            for (k, &(a, b)) in sides.iter().enumerate() {
                 by_ends.entry((a.min(b), a.max(b))).or_default().push((t, k));
             }
         }
-        let own = |t: usize, k: usize| {
-            let (a, b) = ends(t, k);
-            Side { id: (3 * t + k) as u32, reversed: a > b }
-        };
-        let mut sides: Vec<[Side; 3]> = (0..count).map(|t| [0, 1, 2].map(|k| own(t, k))).collect();
-        let mut joined = UnionFind::new(3 * count);
+        let mut sides: Vec<[Side; 3]> = (0..count)
+            .map(|t| {
+                [0, 1, 2].map(|k| {
+                    let (a, b) = ends[t][k];
+                    Side { id: (3 * t + k) as u32, reversed: a > b }
+                })
+            })
+            .collect();
+        let mut corners = UnionFind::new(3 * count);
         let mut edges = vec![[0; 3]; count];
-        for pair in by_ends.values() {
+        // No two of these have a side in common, so that their order does not matter.
+        for sharing in by_ends.values() {
             // In the order of the triangles: the first is the lowest.
-            pair.iter().for_each(|&(t, k)| edges[t][k] = (3 * pair[0].0 + pair[0].1) as u32);
+            let edge = (3 * sharing[0].0 + sharing[0].1) as u32;
+            for &(t, k) in sharing {
+                edges[t][k] = edge;
+            }
             // More than two triangles at a side have no one surface to continue.
-            let &[(t, k), (s, l)] = pair.as_slice() else { continue };
+            let &[(t, k), (s, l)] = sharing.as_slice() else { continue };
             let opposite = sides[t][k].reversed != sides[s][l].reversed;
-            let (a, b) = (&scene.triangles()[t], &scene.triangles()[s]);
-            let alike = a.group == b.group && a.material == b.material;
-            let least = most(a, b).to_radians().cos();
-            if !opposite || !alike || scene.normal(t).dot(scene.normal(s)) < least {
+            if !opposite || !continues(scene, t, s, &crease_angle) {
                 continue;
             }
             let id = sides[t][k].id.min(sides[s][l].id);
-            (sides[t][k].id, sides[s][l].id) = (id, id);
+            sides[t][k].id = id;
+            sides[s][l].id = id;
             // Opposite windings: where one side starts, the other ends.
-            joined.join(3 * t + k, 3 * s + (l + 1) % 3);
-            joined.join(3 * t + (k + 1) % 3, 3 * s + l);
+            corners.join(3 * t + k, 3 * s + (l + 1) % 3);
+            corners.join(3 * t + (k + 1) % 3, 3 * s + l);
         }
         let corners =
-            (0..count).map(|t| [0, 1, 2].map(|k| joined.find(3 * t + k) as u32)).collect();
+            (0..count).map(|t| [0, 1, 2].map(|k| corners.find(3 * t + k) as u32)).collect();
         SurfaceTopology { corners, sides, edges }
     }
 
-    /// The sides across which the surface goes on smoothly to another triangle: each once, as the two
-    /// triangles that share it and which of their sides it is.
-    pub fn joins(&self) -> impl Iterator<Item = [(usize, usize); 2]> {
+    /// The sides across which the surface continues smoothly to another triangle: each once, as the
+    /// two triangles that share it and which of their sides it is.
+    pub fn shared_edges(&self) -> impl Iterator<Item = [TriangleSide; 2]> {
         let all = (0..self.sides.len()).flat_map(|t| [(t, 0), (t, 1), (t, 2)]);
-        // A side's identity is its place with the first of the triangles that share it.
-        let shared = all.map(|(t, k)| {
+        let with_first = all.map(|(t, k)| {
             let id = self.sides[t][k].id as usize;
             [(id / 3, id % 3), (t, k)]
         });
-        shared.filter(|[(s, _), (t, _)]| s != t)
+        with_first.filter(|[(s, _), (t, _)]| s != t)
     }
 
     /// Per triangle, the smooth surface that it is a part of: the number of its first triangle.
     pub fn surfaces(&self) -> Vec<u32> {
-        let mut joined = UnionFind::new(self.sides.len());
-        self.joins().for_each(|[(s, _), (t, _)]| joined.join(s, t));
-        (0..self.sides.len()).map(|t| joined.find(t) as u32).collect()
+        let mut surfaces = UnionFind::new(self.sides.len());
+        for [(s, _), (t, _)] in self.shared_edges() {
+            surfaces.join(s, t);
+        }
+        (0..self.sides.len()).map(|t| surfaces.find(t) as u32).collect()
     }
+}
+
+/// Per triangle and side, the welded positions that it runs from and to.
+fn side_ends(scene: &Scene) -> Vec<[(u32, u32); 3]> {
+    let mut weld = Weld::default();
+    let ends = |t: usize| {
+        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
+        [(a, b), (b, c), (c, a)]
+    };
+    (0..scene.triangles().len()).map(ends).collect()
+}
+
+/// Whether triangles `t` and `s`, which share a side, are of one group and material and differ by no
+/// more than the crease angle, degrees.
+fn continues(
+    scene: &Scene,
+    t: usize,
+    s: usize,
+    crease_angle: impl Fn(&Triangle, &Triangle) -> f64,
+) -> bool {
+    let (a, b) = (&scene.triangles()[t], &scene.triangles()[s]);
+    let min_cosine = crease_angle(a, b).to_radians().cos();
+    a.group == b.group
+        && a.material == b.material
+        && scene.normal(t).dot(scene.normal(s)) >= min_cosine
 }
 
 #[cfg(test)]
@@ -130,7 +184,7 @@ mod tests {
         [[Some(0), Some(0)], [Some(3), Some(4)], [Some(3), Some(0)], [Some(3), None]];
 
     #[test]
-    fn smoothing_groups_part_what_is_not_flat_and_join_what_is_not_sharp() {
+    fn smoothing_groups_separate_up_to_coplanar_and_join_up_to_crease() {
         for (degrees, same, others) in [
             (0.0, true, true),
             (Mesh::COPLANAR_DEGREES - 0.1, true, true),
@@ -150,10 +204,18 @@ mod tests {
     }
 
     #[test]
-    fn by_angle_no_smoothing_group_counts() {
+    fn angles_alone_decide_where_smoothing_groups_are_ignored() {
         for pair in [SAME.as_slice(), &NOT_THE_SAME].concat() {
-            assert_eq!(SurfaceTopology::by_angle(&fold(20.0, pair)).surfaces(), [0, 0], "{pair:?}");
-            assert_eq!(SurfaceTopology::by_angle(&fold(60.0, pair)).surfaces(), [0, 1], "{pair:?}");
+            assert_eq!(
+                SurfaceTopology::ignoring_smoothing_groups(&fold(20.0, pair)).surfaces(),
+                [0, 0],
+                "{pair:?}"
+            );
+            assert_eq!(
+                SurfaceTopology::ignoring_smoothing_groups(&fold(60.0, pair)).surfaces(),
+                [0, 1],
+                "{pair:?}"
+            );
         }
     }
 }

@@ -69,7 +69,7 @@ impl<'a> AdaptiveGather<'a> {
         let edge = |e| mesh.longest_edge(mesh.element(e));
         let largest = (0..mesh.element_count()).map(edge).fold(0.0, f64::max);
         let (covered, dim) = (vec![false; reflected.len()], DIM * flux / area);
-        let joined = smooth.joins().map(|[(t, k), _]| smooth.sides[t][k].id).collect();
+        let joined = smooth.shared_edges().map(|[(t, k), _]| smooth.sides[t][k].id).collect();
         let (light, sweep, level, gathers) = (Cow::Borrowed(light), 0, 0, 0);
         AdaptiveGather {
             light,
