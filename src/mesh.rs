@@ -2,7 +2,19 @@
 //!
 //! Every scene triangle carries a quadtree of midpoint splits. Its leaves are *elements*; any node
 //! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
-//! a patch is one contiguous range of elements, however unequal the depths below it.
+//! a patch is one contiguous range of elements, however unequal the depths below it:
+//!
+//! ```text
+//!          ╱╲                 triangle: a patch of elements 0 to 6
+//!         ╱5 ╲                ├─ part at the first corner: a patch of elements 0 to 3
+//!        ╱────╲               │  └─ elements 0 to 3
+//!       ╱╲ 6  ╱╲              ├─ element 4, at the second corner
+//!      ╱──╲  ╱  ╲             ├─ element 5, at the third corner
+//!     ╱_╲╱_╲╱__4_╲            └─ element 6, the middle part, which is turned over
+//! ```
+//!
+//! Above the triangle, neighbours that face much the same way form clusters (`mesh/clusters.rs`).
+//! Nodes are numbered: first the roots, one a triangle, then four consecutive children at a time.
 
 mod box_overlap;
 mod clusters;
@@ -19,7 +31,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Material, Rgb, Scene};
+use crate::scene::{Material, Rgb, Scene, longest_edge};
 pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
 pub(crate) use topology::{Side, SurfaceTopology};
@@ -37,7 +49,16 @@ struct Node {
     /// First of four consecutive children, or `LEAF`.
     children: u32,
 }
+
+/// What an element has for [`Node::children`].
 const LEAF: u32 = u32::MAX;
+
+impl Node {
+    /// A node without children or elements yet.
+    fn leaf(triangle: u32, cell: Cell) -> Node {
+        Node { triangle, cell, first_element: 0, element_count: 0, children: LEAF }
+    }
+}
 
 /// A scene cut into elements.
 #[derive(Clone, Debug)]
@@ -88,10 +109,7 @@ impl Mesh {
             return Err(Error::new(ErrorKind::Setting, place(), "not above 0", remedy));
         }
         let triangles = 0..scene.triangles().len();
-        let longest = |t: usize| {
-            let [a, b, c] = scene.corners(t);
-            (b - a).length().max((c - b).length()).max((a - c).length())
-        };
+        let longest = |t: usize| longest_edge(scene.corners(t));
         let depths: Vec<u32> = triangles
             .clone()
             .map(|t| {
@@ -118,25 +136,22 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
-    /// Every triangle split wherever `deeper` says so of a triangle and a cell of it.
-    fn refined_where(scene: Arc<Scene>, deeper: impl Fn(usize, Cell) -> bool) -> Mesh {
+    /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell has
+    /// children.
+    fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
-        let normals = (0..count).map(|t| scene.normal(t)).collect();
-        let areas = (0..count).map(|t| scene.area(t)).collect();
-        let (nodes, elements, depths, clusters) = (vec![], vec![], vec![], Arc::default());
-        let mut mesh = Mesh { scene, nodes, elements, depths, normals, areas, clusters };
-        for triangle in 0..count as u32 {
-            let root = Node {
-                triangle,
-                cell: Cell::ROOT,
-                first_element: 0,
-                element_count: 0,
-                children: LEAF,
-            };
-            mesh.nodes.push(root);
+        let mut mesh = Mesh {
+            nodes: (0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)).collect(),
+            elements: vec![],
+            depths: vec![0; count],
+            normals: (0..count).map(|t| scene.normal(t)).collect(),
+            areas: (0..count).map(|t| scene.area(t)).collect(),
+            clusters: Arc::default(),
+            scene,
+        };
+        for root in 0..count {
+            mesh.build_subtree(root, &is_inner);
         }
-        mesh.depths = vec![0; count];
-        (0..count).for_each(|t| mesh.grow(t, &deeper));
         mesh
     }
 
@@ -162,26 +177,22 @@ impl Mesh {
         Ok(Mesh::refined_where(self.scene.clone(), |t, cell| inner.contains(&(t as u32, cell))))
     }
 
-    /// Builds the subtree of node `n` as far as `deeper` says, and numbers its elements.
-    fn grow(&mut self, n: usize, deeper: &impl Fn(usize, Cell) -> bool) {
+    /// Builds the subtree of node `n` as far as `is_inner` says, and numbers its elements.
+    fn build_subtree(&mut self, n: usize, is_inner: &impl Fn(usize, Cell) -> bool) {
         let Node { triangle, cell, .. } = self.nodes[n];
         let first_element = self.elements.len() as u32;
         self.nodes[n].first_element = first_element;
-        if !deeper(triangle as usize, cell) {
+        if is_inner(triangle as usize, cell) {
+            let children = self.nodes.len();
+            self.nodes[n].children = children as u32;
+            self.nodes.extend(cell.children().map(|child| Node::leaf(triangle, child)));
+            for child in children..children + 4 {
+                self.build_subtree(child, is_inner);
+            }
+        } else {
             let depth = &mut self.depths[triangle as usize];
             *depth = cell.level.max(*depth);
             self.elements.push(NodeId(n as u32));
-        } else {
-            let children = self.nodes.len();
-            self.nodes[n].children = children as u32;
-            for cell in cell.children() {
-                let node =
-                    Node { triangle, cell, first_element: 0, element_count: 0, children: LEAF };
-                self.nodes.push(node);
-            }
-            for k in children..children + 4 {
-                self.grow(k, deeper);
-            }
         }
         self.nodes[n].element_count = self.elements.len() as u32 - first_element;
     }
@@ -321,8 +332,7 @@ impl Mesh {
 
     /// Longest edge of `node`, scene unit.
     pub fn longest_edge(&self, node: NodeId) -> f64 {
-        let [a, b, c] = self.corners(node);
-        (b - a).length().max((c - b).length()).max((a - c).length())
+        longest_edge(self.corners(node))
     }
 
     /// Centroid of `node`.

@@ -1,4 +1,14 @@
-//! How much to do between two calls of a progress callback, and where the time went.
+//! Long work under way: why it stopped, how much to do between two reports, where the time went.
+//!
+//! Work that takes more than a second is done in batches. Between batches a progress callback is
+//! called with what is reached; it returns [`ControlFlow<()>`](std::ops::ControlFlow), and a break
+//! cancels the work: what was reached is returned with [`StopReason::Cancelled`].
+//!
+//! ```text
+//! items      ┌─┬──┬────┬────────┬────────┬────────┬───┐
+//!            └─┴──┴────┴────────┴────────┴────────┴───┘
+//! callback     ↑  ↑    ↑        ↑        ↑        ↑   ↑     some 250 ms apart
+//! ```
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -30,30 +40,42 @@ impl fmt::Display for StopReason {
     }
 }
 
-/// As much at once as takes about this long: progress is told several times a second.
-const PACE: Duration = Duration::from_millis(250);
+/// Batches grow or shrink towards this duration, so that progress is reported several times a
+/// second.
+const BATCH_DURATION: Duration = Duration::from_millis(250);
 
-/// A number of like things to do at once, which follows the clock. What comes out must not depend on it.
-pub(crate) struct BatchSizer(usize);
+/// Splits a list of like items into batches of similar duration. Results must not depend on where
+/// batches end, since that follows the clock.
+pub(crate) struct BatchSizer {
+    /// Items in the next batch.
+    size: usize,
+}
 
 impl BatchSizer {
-    /// Begins with `first` at once.
+    /// The first batch has `first` items.
     pub fn new(first: usize) -> BatchSizer {
-        BatchSizer(first)
+        BatchSizer { size: first }
     }
 
-    /// Takes what is to be done next off `left`, and does it.
-    pub fn next<'t, T, R>(&mut self, left: &mut &'t [T], work: impl FnOnce(&'t [T]) -> R) -> R {
-        let now;
-        (now, *left) = left.split_at(left.len().min(self.0));
-        let begun = Instant::now();
-        let done = work(now);
-        self.0 = match begun.elapsed() {
-            t if t > PACE => (self.0 / 2).max(1),
-            t if t < PACE / 3 && now.len() == self.0 => self.0 * 2,
-            _ => self.0,
-        };
-        done
+    /// Takes the next batch off the front of `remaining`, and gives what `work` makes of it. The
+    /// batch after one that took too long is half as large, after a full one that took less than a
+    /// third of the time twice as large.
+    pub fn next<'t, T, R>(
+        &mut self,
+        remaining: &mut &'t [T],
+        work: impl FnOnce(&'t [T]) -> R,
+    ) -> R {
+        let (batch, rest) = remaining.split_at(remaining.len().min(self.size));
+        *remaining = rest;
+        let start = Instant::now();
+        let result = work(batch);
+        let duration = start.elapsed();
+        if duration > BATCH_DURATION {
+            self.size = (self.size / 2).max(1);
+        } else if duration < BATCH_DURATION / 3 && batch.len() == self.size {
+            self.size *= 2;
+        }
+        result
     }
 }
 
@@ -109,12 +131,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_is_done_once_and_in_order() {
-        let all: Vec<u32> = (0..1000).collect();
-        let (mut left, mut pace, mut done) = (&all[..], BatchSizer::new(3), vec![]);
-        while !left.is_empty() {
-            pace.next(&mut left, |now| done.extend(now.iter().copied()));
+    fn batches_cover_all_items_once_in_order() {
+        let items: Vec<u32> = (0..1000).collect();
+        let (mut remaining, mut done) = (&items[..], vec![]);
+        let mut batches = BatchSizer::new(3);
+        while !remaining.is_empty() {
+            batches.next(&mut remaining, |batch| done.extend(batch.iter().copied()));
         }
-        assert_eq!(done, all);
+        assert_eq!(done, items);
     }
 }

@@ -1,4 +1,11 @@
-//! Triangles and materials as given, checked once, here.
+//! The scene: triangles and materials as given, checked once.
+//!
+//! [`Scene::new`] is the boundary. It rejects what has no meaning (numbers that are not finite,
+//! indices out of range, reflectances of 1 or more) and drops triangles without area. Everything
+//! after it relies on that and checks nothing again.
+//!
+//! A scene is immutable: changed materials or moved groups make another scene
+//! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
 use std::collections::HashMap;
 
@@ -45,13 +52,13 @@ pub struct Scene {
     groups: Vec<String>,
     materials: Vec<Material>,
     degenerate: usize,
-    /// See [`Scene::grain`].
-    grain: f64,
+    /// See [`Scene::coordinate_ulp`].
+    coordinate_ulp: f64,
     warnings: Vec<String>,
 }
 
 impl Scene {
-    /// MatrixChecks and takes a scene: `positions` in any length unit, `groups` by name.
+    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
@@ -91,7 +98,7 @@ impl Scene {
                     ));
                 }
             }
-            let (longest, cross) = measures(&positions, t);
+            let (longest, cross) = longest_edge_and_cross(&positions, t);
             if !(cross * cross).is_finite() || !(longest * longest).is_finite() {
                 return Err(bad(
                     format!("triangle {} of group {}", i + 1, quoted(&[&groups[t.group as usize]])),
@@ -102,7 +109,7 @@ impl Scene {
         }
         let given = triangles.len();
         triangles.retain(|t| {
-            let (longest, cross) = measures(&positions, t);
+            let (longest, cross) = longest_edge_and_cross(&positions, t);
             let corners = t.corners.map(|k| positions[k as usize].abs().max_element());
             let reach = corners.into_iter().fold(longest, f64::max);
             cross > 4.0 * f64::EPSILON * longest * reach && cross * cross >= f64::MIN_POSITIVE
@@ -117,10 +124,10 @@ impl Scene {
         }
         let corners = triangles.iter().flat_map(|t| t.corners).map(|k| positions[k as usize]);
         let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let grain = f64::EPSILON * largest;
+        let coordinate_ulp = f64::EPSILON * largest;
         let warnings = vec![];
         let mut scene =
-            Scene { positions, triangles, groups, materials, degenerate, grain, warnings };
+            Scene { positions, triangles, groups, materials, degenerate, coordinate_ulp, warnings };
         if degenerate > 0 {
             scene.warn(format!("{degenerate} triangles without area were dropped"));
         }
@@ -182,10 +189,10 @@ impl Scene {
         Aabb::from_points((0..self.triangles.len()).flat_map(|t| self.corners(t)))
     }
 
-    /// The step between 64-bit coordinates where the scene is, its own unit: what is said to be in one
-    /// plane may be off it by a few of these.
+    /// The step between 64-bit coordinates of the scene's largest size, scene unit: points of one plane
+    /// may be off it by a few of these.
     pub(crate) fn coordinate_ulp(&self) -> f64 {
-        self.grain
+        self.coordinate_ulp
     }
 
     /// Material of triangle `t`.
@@ -207,14 +214,14 @@ impl Scene {
         Ok(Scene { materials, ..self.clone() })
     }
 
-    /// The same scene with all triangles of `group` moved: turned, shifted, scaled. What they share
-    /// with other groups stays with these.
+    /// The same scene with all triangles of `group` transformed by `transform`. Vertices that they
+    /// share with other groups are copied, so that those stay where they are.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or finite
     /// coordinates.
-    pub fn with_transformed_group(&self, group: &str, by: DAffine3) -> Result<Scene, Error> {
-        let Some(moved) = self.groups.iter().position(|name| name == group) else {
+    pub fn with_transformed_group(&self, group: &str, transform: DAffine3) -> Result<Scene, Error> {
+        let Some(moved_group) = self.groups.iter().position(|name| name == group) else {
             let known = self.groups.join(", ");
             return Err(bad(
                 format!("group '{group}'"),
@@ -223,11 +230,11 @@ impl Scene {
             ));
         };
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
-        let mut places = HashMap::new();
-        for t in triangles.iter_mut().filter(|t| t.group as usize == moved) {
+        let mut copies = HashMap::new();
+        for t in triangles.iter_mut().filter(|t| t.group as usize == moved_group) {
             t.corners = t.corners.map(|corner| {
-                *places.entry(corner).or_insert_with(|| {
-                    positions.push(by.transform_point3(self.positions[corner as usize]));
+                *copies.entry(corner).or_insert_with(|| {
+                    positions.push(transform.transform_point3(self.positions[corner as usize]));
                     positions.len() as u32 - 1
                 })
             });
@@ -280,11 +287,15 @@ impl Material {
     }
 }
 
-/// Length of the longest edge of `t`, and twice its area.
-fn measures(positions: &[DVec3], t: &Triangle) -> (f64, f64) {
+/// Length of a triangle's longest edge.
+pub(crate) fn longest_edge([a, b, c]: [DVec3; 3]) -> f64 {
+    (b - a).length().max((c - b).length()).max((a - c).length())
+}
+
+/// Length of the longest edge of `t`, and of the cross product of two edges: twice its area.
+fn longest_edge_and_cross(positions: &[DVec3], t: &Triangle) -> (f64, f64) {
     let [a, b, c] = t.corners.map(|k| positions[k as usize]);
-    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    (longest, (b - a).cross(c - a).length())
+    (longest_edge([a, b, c]), (b - a).cross(c - a).length())
 }
 
 fn bad(place: impl Into<String>, found: impl Into<String>, remedy: impl Into<String>) -> Error {

@@ -1,4 +1,14 @@
-//! A fan of rays: directions over a hemisphere, as many as there is form factor.
+//! Cosine-weighted directions over a hemisphere.
+//!
+//! Malley's method: points spread evenly over a unit disc are projected up onto the hemisphere.
+//! Each direction then stands for the same form factor, so that a form factor is a count of rays.
+//!
+//! ```text
+//! unit square   →   unit disc                   →   hemisphere
+//! (x, y)            radius √x, azimuth 2π y         height √(1 − x) above the disc
+//! ```
+//!
+//! A rotation of the whole set about the normal adds to the azimuth.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -9,39 +19,40 @@ use crate::error::{Error, ErrorKind};
 use crate::sampling::low_discrepancy::{radical_inverse, sobol_02_point};
 
 /// Directions spread over a hemisphere in proportion to the cosine, so that each stands for the same
-/// form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on Hammersley's points.
+/// form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on low-discrepancy points.
 #[derive(Debug)]
 pub(crate) struct HemisphereSamples {
-    /// Along two tangents and the normal.
+    /// Unit vectors, by components along two tangents and the normal.
     directions: Vec<[f64; 3]>,
 }
 
-/// RayScene that a fan can have at most.
-pub(crate) const MOST: u32 = 1 << 20;
+/// Rays that a set can have at most: some 24 MiB of directions.
+pub(crate) const MAX_RAYS: u32 = 1 << 20;
 
 impl HemisphereSamples {
-    /// `count` rays.
+    /// `count` directions, on Hammersley's points.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
+    /// [`ErrorKind::Setting`] when `count` is 0 or above [`MAX_RAYS`].
     pub fn new(count: u32) -> Result<HemisphereSamples, Error> {
-        if count == 0 || count > MOST {
+        if count == 0 || count > MAX_RAYS {
             let place = format!("{count} rays");
-            let remedy = format!("use 1 to {MOST}");
+            let remedy = format!("use 1 to {MAX_RAYS}");
             return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
         }
-        Ok(HemisphereSamples::of(count, |k| {
+        Ok(HemisphereSamples::from_points(count, |k| {
             [(f64::from(k) + 0.5) / f64::from(count), radical_inverse(k)]
         }))
     }
 
-    /// As many rays, of which the first half, quarter and so on are fans of their own if `count` is a
-    /// power of two, and what they lack of the whole is too.
+    /// `count` directions, clamped to 1 to [`MAX_RAYS`], on Sobol's (0,2)-sequence: of a power of two,
+    /// the first half, quarter and so on are evenly spread sets of their own, and so is the second
+    /// half.
     pub fn progressive(count: u32) -> HemisphereSamples {
-        HemisphereSamples::of(count.clamp(1, MOST), sobol_02_point)
+        HemisphereSamples::from_points(count.clamp(1, MAX_RAYS), sobol_02_point)
     }
 
-    fn of(count: u32, point: impl Fn(u32) -> [f64; 2]) -> HemisphereSamples {
+    fn from_points(count: u32, point: impl Fn(u32) -> [f64; 2]) -> HemisphereSamples {
         let direction = |k: u32| {
             let [radius2, phi] = point(k);
             let (sin, cos) = (TAU * phi).sin_cos();
@@ -50,21 +61,21 @@ impl HemisphereSamples {
         HemisphereSamples { directions: (0..count).map(direction).collect() }
     }
 
-    /// Unit directions above a surface with unit `normal`, the fan turned about it by `turn` of a full
-    /// turn.
-    pub fn directions(&self, normal: DVec3, turn: f64) -> impl Iterator<Item = DVec3> + '_ {
-        self.directions_in(0..self.directions.len() as u32, normal, turn)
+    /// All unit directions above a surface with unit `normal`, rotated about it by `rotation`, in
+    /// turns.
+    pub fn directions(&self, normal: DVec3, rotation: f64) -> impl Iterator<Item = DVec3> + '_ {
+        self.directions_in(0..self.directions.len() as u32, normal, rotation)
     }
 
-    /// Some of those.
+    /// Those of [`HemisphereSamples::directions`] with the indices in `range`.
     pub fn directions_in(
         &self,
         range: Range<u32>,
         normal: DVec3,
-        turn: f64,
+        rotation: f64,
     ) -> impl Iterator<Item = DVec3> + '_ {
         let (x, y) = normal.any_orthonormal_pair();
-        let (sin, cos) = (TAU * turn).sin_cos();
+        let (sin, cos) = (TAU * rotation).sin_cos();
         let (x, y) = (x * cos + y * sin, y * cos - x * sin);
         let directions = &self.directions[range.start as usize..range.end as usize];
         directions.iter().map(move |d| x * d[0] + y * d[1] + normal * d[2])
@@ -76,22 +87,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fan_has_the_moments_of_a_cosine_however_it_is_turned() {
+    fn directions_have_the_moments_of_a_cosine_at_any_rotation() {
         // Means over a cosine-weighted hemisphere: n·d is 2/3, x² is 1/4, x is 0. Stratified points
         // are off by less than 2/√n here, and by far less in the first.
-        let fan = HemisphereSamples::new(4096).unwrap();
+        let samples = HemisphereSamples::new(4096).unwrap();
         let normal = DVec3::new(0.36, -0.48, 0.8);
         let x = normal.any_orthonormal_vector();
-        for turn in [0.0, 0.1, 0.77] {
+        for rotation in [0.0, 0.1, 0.77] {
             let mean = |f: &dyn Fn(DVec3) -> f64| {
-                fan.directions(normal, turn).map(f).sum::<f64>() / 4096.0
+                samples.directions(normal, rotation).map(f).sum::<f64>() / 4096.0
             };
             assert!((mean(&|d| d.length()) - 1.0).abs() < 1e-12);
             assert!((mean(&|d| d.dot(normal)) - 2.0 / 3.0).abs() < 1e-4);
             assert!((mean(&|d| d.dot(x).powi(2)) - 0.25).abs() < 1e-3);
             assert!(mean(&|d| d.dot(x)).abs() < 1e-3);
-            assert!(fan.directions(normal, turn).all(|d| d.dot(normal) > 0.0));
+            assert!(samples.directions(normal, rotation).all(|d| d.dot(normal) > 0.0));
         }
-        assert!(HemisphereSamples::new(0).is_err() && HemisphereSamples::new(MOST + 1).is_err());
+        assert!(
+            HemisphereSamples::new(0).is_err() && HemisphereSamples::new(MAX_RAYS + 1).is_err()
+        );
     }
 }

@@ -49,9 +49,9 @@ impl RayGather {
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        if count == 0 || count > hemisphere::MOST {
+        if count == 0 || count > hemisphere::MAX_RAYS {
             let place = format!("{count} rays a place");
-            let remedy = format!("use 1 to {}", hemisphere::MOST);
+            let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
             return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
         }
         let least = 1 << f64::from(count).log2().round().max(1.0) as u32;
@@ -66,8 +66,11 @@ impl RayGather {
     /// is as much; and so on, up to 16 times as many. That is for seldom places, such as those that see
     /// a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
-        let most =
-            if noise.is_finite() { (self.least * MORE).min(hemisphere::MOST) } else { self.least };
+        let most = if noise.is_finite() {
+            (self.least * MORE).min(hemisphere::MAX_RAYS)
+        } else {
+            self.least
+        };
         RayGather { fan: HemisphereSamples::progressive(most), most, noise, dim, ..self }
     }
 
