@@ -94,7 +94,7 @@ fn dial(c: &mut Criterion) {
                         baked.estimate.total,
                         baked.light.surface.positions.len(),
                         baked.hemicubes,
-                        baked.light.gathers
+                        baked.light.gather_count
                     );
                 }
             });

@@ -76,9 +76,9 @@ impl Bench {
             &[4.0, 2.0, 1.0, 0.5],
             |e| e.mesh,
             |gather, factor| {
-                gather.refinement.tolerance *= factor;
-                gather.refinement.smallest *= factor;
-                gather.refinement.curve *= factor;
+                gather.refinement.surplus_tolerance *= factor;
+                gather.refinement.min_edge *= factor;
+                gather.refinement.interpolation_tolerance *= factor;
                 gather.rays *= 4;
             },
         )?;
@@ -101,7 +101,7 @@ impl Bench {
             &[1.0, 2.0, 3.0],
             |e| e.truncation,
             |gather, sweeps| {
-                gather.refinement.sweeps = sweeps as u32;
+                gather.refinement.gather_passes = sweeps as u32;
             },
         )?;
         // A geometric series: the ratio of one sweep to the next.
@@ -146,8 +146,8 @@ impl Bench {
             seconds.push((error, start.elapsed().as_secs_f64()));
             let Some(gather) = baked.settings.gather else { continue };
             rays.push((error, f64::from(gather.rays)));
-            bend.push((error, gather.refinement.tolerance));
-            edge.push((error, gather.refinement.smallest / diagonal));
+            bend.push((error, gather.refinement.surplus_tolerance));
+            edge.push((error, gather.refinement.min_edge / diagonal));
         }
         row("seconds ~ error", &seconds, Some(-model::COST_EXPONENT));
         law("rays", &rays, model::RAYS_TIMES_ERROR, -1.0);
@@ -168,7 +168,7 @@ impl Bench {
             settings.solve.element_size *= factor;
             // What vertices gather shows what was shot; they are as good as they can be otherwise.
             settings.gather = BakeSettings::for_error(0.5 * BASE, &self.scene).gather;
-            settings.gather.iter_mut().for_each(|gather| gather.refinement.sweeps = 1);
+            settings.gather.iter_mut().for_each(|gather| gather.refinement.gather_passes = 1);
             let baked = self.bake(&settings)?;
             errors.push((factor, compare(&baked.light.surface, reference).error));
         }

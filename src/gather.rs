@@ -1,77 +1,122 @@
-//! The contract between whoever gathers the settled light at places and whoever uses it.
+//! Gathering: the irradiance that a known radiosity field causes at points.
+//!
+//! ```text
+//!   RadiosityField ──┐
+//!                    ├─ Gather ── IrradianceSample per point ── B = E + ρ · irradiance
+//!   GatherPoints ────┘
+//! ```
+//!
+//! The contract is [`Gather`]; hemicubes on a GPU and rays on the CPU implement it, and callers
+//! differ only in their list of points: vertices, pixels of an image, or places at which the error
+//! of a result is estimated. [`gather_at_vertices`] is the first of these, with refinement.
 
+pub(crate) mod adaptive;
+mod buried;
+pub(crate) mod gather_points;
+mod gathered_mesh;
+mod interpolated_refinement;
 pub(crate) mod light_projection;
 pub(crate) mod lights;
+mod progress;
+mod refinement_indicator;
+mod refinement_settings;
+mod sampled_mesh;
+mod surplus;
 
 use glam::DVec3;
 
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
+pub use adaptive::gather_at_vertices;
+pub use gathered_mesh::GatheredMesh;
+pub use progress::Progress;
+pub use refinement_settings::RefinementSettings;
 
-/// A place on a surface at which light is gathered.
+/// A point on a surface at which light is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherPoint {
-    /// Where, in the scene's unit: a little above the surface, so that nothing hides it.
+    /// Position, scene unit: a little above the surface, so that the surface does not hide
+    /// anything from it.
     pub position: DVec3,
-    /// Unit normal; what is above its plane is seen.
+    /// Unit normal; light arrives from the hemisphere around it.
     pub normal: DVec3,
-    /// Nothing nearer than this is seen, scene unit.
+    /// Near distance, scene unit: surfaces nearer than this are not seen.
     pub near: f64,
 }
 
 /// What arrives at a [`GatherPoint`].
+///
+/// All shares are form factors from the point: cosine-weighted and 1 for the whole hemisphere.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IrradianceSample {
-    /// Irradiance, W/m² per channel: Σ F_pj B_j over all that is seen.
+    /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
+    /// reflected.
     pub irradiance: Rgb,
-    /// The part of it that comes straight from lights which were looked at one by one.
+    /// The part of `irradiance` from the emission of lights that were sampled explicitly, W/m² per
+    /// channel. Emission that is seen like any other surface is not in it.
     pub direct: Rgb,
-    /// Share of the hemisphere's form factor in which nothing is seen.
+    /// Share of the hemisphere in which nothing is seen, in [0, 1].
     pub escaped: f64,
-    /// Share in which backs of surfaces are seen.
+    /// Share of the hemisphere in which backs of surfaces are seen, in [0, 1].
     pub backface: f64,
-    /// Mean of 1/distance over the hemisphere, weighted by form factor; what is open counts 0.
+    /// Mean of 1/distance over the hemisphere, 1/scene unit; directions that see nothing count 0.
     pub inverse_distance: f64,
 }
 
-/// The settled light: what every point of the scene's fronts reflects, interpolated linearly from
-/// the corners of the elements. What they emit is known from their materials.
+/// A known radiosity field: what every point on the front of the scene reflects, interpolated
+/// linearly between the corners of elements. Emission is not in it; materials have it.
 #[derive(Clone, Copy, Debug)]
 pub struct RadiosityField<'a> {
     /// The scene, cut into elements.
     pub mesh: &'a Mesh,
-    /// Per element, where its three corners' values are in `reflected`.
+    /// Per element, the indices of its three corners in `reflected`.
     pub corners: &'a [[u32; 3]],
     /// Reflected radiosity B − E, W/m² per channel.
     pub reflected: &'a [Rgb],
 }
 
-/// Someone who gathers: hemicubes on a GPU, rays on the CPU.
+/// A source of irradiance samples: hemicubes on a GPU, rays on the CPU, or a caller's own.
+///
+/// A gatherer is made for one scene and owns what that takes (a ray hierarchy, buffers on a
+/// device); the caller owns points and field, which may change from call to call. The field's mesh
+/// must be of that scene, and may be subdivided in any way.
+///
+/// What an implementation must do:
+/// - return one sample for each point, in the order of `points`;
+/// - treat each point by itself: the same gatherer, field and point give the same bits, whichever
+///   other points are in the call and however many calls were before;
+/// - see the same directions from a point whatever the field, so that the difference of two fields
+///   has no more noise than is in the difference;
+/// - count each front by emitted plus reflected radiosity, backs as black.
+///
+/// It is called with some hundred points at once or more, and should make use of all of the machine
+/// for a call. Progress and cancelling are the caller's business.
 pub trait Gather {
-    /// What arrives at each of `places`, in their order.
+    /// What arrives at each of `points` from `field`, in their order.
     ///
     /// # Errors
-    /// Whatever keeps the gatherer from it, [`crate::ErrorKind::Device`] above all.
+    /// Whatever keeps the implementation from it: [`crate::ErrorKind::Device`] above all.
     fn gather(
         &mut self,
-        sources: &RadiosityField,
-        places: &[GatherPoint],
+        field: &RadiosityField,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error>;
 }
 
 impl<G: Gather + ?Sized> Gather for Box<G> {
     fn gather(
         &mut self,
-        sources: &RadiosityField,
-        places: &[GatherPoint],
+        field: &RadiosityField,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        (**self).gather(sources, places)
+        (**self).gather(field, points)
     }
 }
 
 impl RadiosityField<'_> {
-    /// Reflected radiosity at barycentric position (`u`, `v`) of triangle `t`.
+    /// Reflected radiosity at barycentric position (`u`, `v`) of the scene's triangle `t`, W/m²
+    /// per channel: `u` and `v` are the weights of its second and third corner.
     pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
         let (element, [u, v]) = self.mesh.element_at(t, u, v);
         let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);

@@ -88,7 +88,10 @@ pub use error::{Error, ErrorKind};
 pub use form_factor::proximity::ProximityCorrection;
 pub use form_factor::viewpoints::AdaptiveViewpoints;
 pub use form_factor::{Entry, FormFactors, Row};
-pub use gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+pub use gather::{
+    Gather, GatherPoint, GatheredMesh, IrradianceSample, Progress as GatherProgress,
+    RadiosityField, RefinementSettings, gather_at_vertices,
+};
 pub use io::{
     ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
     write_view_factor_list, write_view_factors,
@@ -99,7 +102,6 @@ pub use progress::Timings;
 pub use scene::{Material, Rgb, Scene, Triangle};
 pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver};
 pub use vertex::VertexMesh;
-pub use vertex::gathering::{GatherProgress, GatheredMesh, RefinementSettings};
 pub use view_factor::{
     EnforcementReport, ErrorStats, Estimate, Factor, MatrixChecks, Missing, ViewFactors,
 };

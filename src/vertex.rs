@@ -1,14 +1,9 @@
 //! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
 
-pub(crate) mod adaptive;
 mod boundary_fit;
-mod buried;
 mod corner_singularity;
-pub(crate) mod gather_points;
-pub(crate) mod gathering;
-mod hanging_nodes;
-mod keys;
-mod surplus;
+pub(crate) mod hanging_nodes;
+pub(crate) mod keys;
 
 use glam::DVec3;
 
@@ -58,10 +53,13 @@ impl VertexMesh {
     }
 
     /// The same, and the vertices at the corners of each element.
-    fn with_corners(mesh: &Mesh, element_radiosity: &[Rgb]) -> (VertexMesh, Vec<[u32; 3]>) {
+    pub(crate) fn with_corners(
+        mesh: &Mesh,
+        element_radiosity: &[Rgb],
+    ) -> (VertexMesh, Vec<[u32; 3]>) {
         let smooth = SurfaceTopology::new(mesh.scene());
         let vertices = Vertices::new(mesh, &smooth);
-        let (positions, rims) = (&vertices.positions, &vertices.rims);
+        let (positions, rims) = (&vertices.positions, &vertices.outlines);
         let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
         let mut around = vec![0.0; positions.len()];
         rims.iter().for_each(|(e, rim)| rim.iter().for_each(|&v| around[v as usize] += areas[e]));
@@ -103,7 +101,7 @@ impl VertexMesh {
 
     /// Adds every element of `mesh` as a face, or as a fan where there are vertices on its sides;
     /// `middle` says what the fan has in its middle, W/m².
-    fn add_elements(
+    pub(crate) fn add_elements(
         &mut self,
         mesh: &Mesh,
         seams: &HangingNodes,

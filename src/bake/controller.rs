@@ -47,7 +47,7 @@ pub(super) enum Step {
 impl Step {
     /// What has to be done again where settings become `new`.
     pub fn between(old: &GatherSettings, new: &GatherSettings) -> Step {
-        let bounce = new.refinement.sweeps != old.refinement.sweeps;
+        let bounce = new.refinement.gather_passes != old.refinement.gather_passes;
         if (new.rays, new.noise_tolerance) != (old.rays, old.noise_tolerance) {
             Step::AllVertices { bounce }
         } else if bounce {
@@ -83,7 +83,7 @@ pub(super) fn refined(
     );
     let mut refined = gather.clone();
     if truncation > cap {
-        refined.refinement.sweeps += 1;
+        refined.refinement.gather_passes += 1;
     }
     if sampling > cap {
         refined.rays = (f64::from(gather.rays) * model::ray_step(sampling, cap)) as u32;
@@ -91,9 +91,9 @@ pub(super) fn refined(
     }
     if mesh > cap {
         let step = model::mesh_step(mesh, cap);
-        refined.refinement.tolerance *= step;
-        refined.refinement.smallest *= step;
-        refined.refinement.curve *= step;
+        refined.refinement.surplus_tolerance *= step;
+        refined.refinement.min_edge *= step;
+        refined.refinement.interpolation_tolerance *= step;
     }
     refined
 }
@@ -130,10 +130,13 @@ mod tests {
         for (estimate, step) in cases {
             let new = refined(&gather, &estimate, 0.02);
             assert_eq!(Step::between(&gather, &new), step, "{estimate:?}");
-            let finer = new.refinement.tolerance < gather.refinement.tolerance;
+            let finer = new.refinement.surplus_tolerance < gather.refinement.surplus_tolerance;
             assert_eq!(finer, estimate.mesh > 0.0);
             assert_eq!(new.rays > gather.rays, estimate.sampling > 0.0);
-            assert_eq!(new.refinement.sweeps > gather.refinement.sweeps, estimate.truncation > 0.0);
+            assert_eq!(
+                new.refinement.gather_passes > gather.refinement.gather_passes,
+                estimate.truncation > 0.0
+            );
         }
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
         assert_eq!(refined(&gather, &met, 0.02), gather, "0.0112 is below 0.9 · 0.75 · 0.02");

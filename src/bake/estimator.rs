@@ -14,6 +14,8 @@ use crate::bake::error_estimate::{
 };
 use crate::bake::model;
 use crate::error::Error;
+use crate::gather::GatheredMesh;
+use crate::gather::gather_points::{SurfaceOffset, is_buried};
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
@@ -21,8 +23,6 @@ use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Rgb;
 use crate::solver::Ledger;
-use crate::vertex::gather_points::{SurfaceOffset, is_covered};
-use crate::vertex::gathering::GatheredMesh;
 
 /// Points that are gathered at before progress is reported first: a bake that is stopped uses these.
 const FIRST_BATCH: usize = 16;
@@ -102,7 +102,7 @@ impl ErrorEstimator<'_> {
         let samples = self.samples(count);
         let points: Vec<GatherPoint> = samples.iter().map(|s| s.point).collect();
         let jittered: Vec<GatherPoint> = samples.iter().map(Sample::jittered).collect();
-        let sources = self.sources().sources();
+        let sources = self.sources().radiosity_field();
         let first = gatherer.gather(&sources, &points)?;
         let second = gatherer.gather(&sources, &jittered)?;
         let floor = radiosity_floor(samples.iter().map(|s| s.interpolated - s.emitted));
@@ -128,7 +128,7 @@ impl ErrorEstimator<'_> {
         gatherer: &mut dyn Gather,
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<Vec<Option<SampleGathers>>, Error> {
-        let sources = self.sources().sources();
+        let sources = self.sources().radiosity_field();
         let mut gathers = vec![None; samples.len()];
         let order = golden_ratio_order(samples.len());
         let mut remaining = &order[..];
@@ -141,7 +141,7 @@ impl ErrorEstimator<'_> {
                 let first = gatherer.gather(&sources, &points)?;
                 let second = gatherer.gather(&sources, &jittered)?;
                 let next = match self.lit_by {
-                    Some(_) => gatherer.gather(&self.light.sources(), &points)?,
+                    Some(_) => gatherer.gather(&self.light.radiosity_field(), &points)?,
                     None => first.clone(),
                 };
                 for (i, &k) in batch.iter().enumerate() {
@@ -159,7 +159,7 @@ impl ErrorEstimator<'_> {
 
     fn observation(&self, sample: &Sample, gathers: &SampleGathers) -> Observation {
         let SampleGathers { first, second, next } = gathers;
-        let buried = [first, second, next].iter().any(|g| is_covered(g, sample.size));
+        let buried = [first, second, next].iter().any(|g| is_buried(g, sample.size));
         Observation {
             interpolated: sample.interpolated,
             emitted: sample.emitted,
@@ -191,7 +191,7 @@ impl ErrorEstimator<'_> {
             let node = mesh.element(element);
             let material = mesh.material(node);
             let size = mesh.area(node).sqrt();
-            let point = above.place(mix(corners(face)), mesh.normal(node), size);
+            let point = above.gather_point(mix(corners(face)), mesh.normal(node), size);
             Sample {
                 element,
                 reflectance: material.reflectance,

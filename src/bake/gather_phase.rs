@@ -25,10 +25,10 @@ use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase::ShotLight;
 use crate::error::Error;
 use crate::gather::Gather;
+use crate::gather::adaptive::AdaptiveGather;
+use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::vertex::adaptive::AdaptiveGather;
-use crate::vertex::gathering::{GatherProgress, GatheredMesh};
 
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
@@ -63,8 +63,12 @@ impl<'a> GatherPhase<'a> {
     ) -> Result<GatherPhase<'a>, Error> {
         let (solve, gather) = settings;
         let state = AdaptiveGather::new(mesh, light);
-        let gatherer =
-            backend.gather(&shot.mesh, gather.rays, gather.noise_tolerance, state.dim())?;
+        let gatherer = backend.gather(
+            &shot.mesh,
+            gather.rays,
+            gather.noise_tolerance,
+            state.radiosity_floor(),
+        )?;
         let mut phase = GatherPhase { solve, gather, target, state, gatherer, backend, shot };
         if let Some(target) = target {
             phase.choose_rays(target)?;
@@ -97,7 +101,7 @@ impl<'a> GatherPhase<'a> {
     fn gatherer(&self, divisor: u32) -> Result<Box<dyn Gather + 'a>, Error> {
         let rays = self.gather.rays.div_ceil(divisor);
         let noise = self.gather.noise_tolerance * f64::from(divisor);
-        self.backend.gather(&self.shot.mesh, rays, noise, self.state.dim())
+        self.backend.gather(&self.shot.mesh, rays, noise, self.state.radiosity_floor())
     }
 
     /// Takes `step`, and says why it ended.
@@ -106,12 +110,12 @@ impl<'a> GatherPhase<'a> {
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
             Step::AllSweeps => {
-                let mut coarse = match refinement.sweeps {
+                let mut coarse = match refinement.gather_passes {
                     0 | 1 => None,
                     _ => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
                 };
-                refinement.settle(
-                    &mut self.state,
+                self.state.run_passes(
+                    &refinement,
                     &mut *self.gatherer,
                     coarse.as_mut().map(|coarse| &mut **coarse as &mut dyn Gather),
                     &mut progress,
@@ -119,13 +123,13 @@ impl<'a> GatherPhase<'a> {
             }
             Step::AllVertices { bounce } => {
                 if bounce {
-                    self.state.shine();
+                    self.state.promote_to_source();
                 }
-                self.state.sweep(&refinement, &mut *self.gatherer, &mut progress)
+                self.state.gather_pass(&refinement, &mut *self.gatherer, &mut progress)
             }
             Step::Bounce => {
                 let mut coarse = self.gatherer(model::COARSE_RAY_DIVISOR)?;
-                match self.state.settle(&mut *coarse, &mut progress)? {
+                match self.state.gather_difference(&mut *coarse, &mut progress)? {
                     StopReason::Converged => {
                         self.state.refine(&refinement, &mut *self.gatherer, &mut progress)
                     }
@@ -143,16 +147,16 @@ impl<'a> GatherPhase<'a> {
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Result<Estimated, Error> {
-        let (mut light, element_residual) = self.state.curved(&self.gather.refinement)?;
+        let (mut light, element_residual) = self.state.interpolated(&self.gather.refinement)?;
         clock.timings.vertices += clock.lap();
         let estimator = ErrorEstimator {
             light: &light,
-            lit_by: Some(self.state.light()),
+            lit_by: Some(self.state.source()),
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
-            sweeps: self.gather.refinement.sweeps,
+            sweeps: self.gather.refinement.gather_passes,
         };
-        let of = model::sample_count(light.gathers);
+        let of = model::sample_count(light.gather_count);
         let mut cancelled = stop == StopReason::Cancelled;
         let (estimate, vertex_error) =
             estimator.estimate(of, &mut *self.gatherer, &mut |samples| {
@@ -170,7 +174,7 @@ impl<'a> GatherPhase<'a> {
     /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points.
     fn choose_rays(&mut self, target: ErrorTarget) -> Result<(), Error> {
         let pilot = ErrorEstimator {
-            light: self.state.light(),
+            light: self.state.source(),
             lit_by: None,
             element_residual: &[],
             ledger: &self.shot.solution.ledger,

@@ -12,10 +12,10 @@ use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
 use crate::bake::shooting_phase;
 use crate::error::Error;
+use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Scene;
-use crate::vertex::gathering::GatheredMesh;
 
 impl BakeSettings {
     /// Bakes `scene` as far as these settings go, without regard to the estimated error.

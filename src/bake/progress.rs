@@ -6,9 +6,9 @@ use std::time::Instant;
 use crate::bake::error_estimate::ErrorEstimate;
 use crate::bake::fallback::ResilientBackend;
 use crate::error::Error;
+use crate::gather::Progress as GatherProgress;
 use crate::progress::{Timings, lap};
 use crate::solver::Progress;
-use crate::vertex::gathering::GatherProgress;
 
 /// The stage that a bake is at, reported several times a second.
 #[derive(Clone, Debug)]

@@ -3,10 +3,10 @@
 use crate::bake::error_estimate::ErrorEstimate;
 use crate::bake::settings::BakeSettings;
 use crate::error::Error;
+use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
 use crate::progress::Timings;
 use crate::solver::Solution;
-use crate::vertex::gathering::GatheredMesh;
 
 /// What comes out of a bake.
 #[derive(Clone, Debug)]

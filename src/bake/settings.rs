@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use crate::bake::model;
 use crate::error::Error;
+use crate::gather::RefinementSettings;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
 use crate::solver::{Method, Solver};
-use crate::vertex::gathering::RefinementSettings;
 
 /// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`] or
 /// [`BakeSettings::gathering`], and change what is to be different:
@@ -118,7 +118,7 @@ impl BakeSettings {
     pub fn gathering(scene: &Scene) -> BakeSettings {
         let mut settings = BakeSettings::for_error(0.008, scene);
         if let Some(gather) = &mut settings.gather {
-            gather.refinement.smallest /= 2.0;
+            gather.refinement.min_edge /= 2.0;
             gather.rays = 1500;
         }
         settings
@@ -150,9 +150,9 @@ impl BakeSettings {
             ambient: false,
         };
         let refinement = RefinementSettings {
-            tolerance: model::BEND.setting(e).min(model::MAX_BEND),
-            curve: model::CURVE.setting(e),
-            sweeps: model::sweeps(e),
+            surplus_tolerance: model::BEND.setting(e).min(model::MAX_BEND),
+            interpolation_tolerance: model::CURVE.setting(e),
+            gather_passes: model::sweeps(e),
             ..RefinementSettings::new(model::SMALLEST_EDGE.times(diagonal).setting(e))
         };
         let gather = GatherSettings {

@@ -23,11 +23,11 @@ use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::form_factor::viewpoints::AdaptiveViewpoints;
+use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Scene;
 use crate::solver::{Progress, Solution, Solver};
-use crate::vertex::gathering::GatheredMesh;
 
 /// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
 const CHECKPOINT_INTERVAL: u32 = 10;

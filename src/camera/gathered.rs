@@ -9,12 +9,12 @@ use rayon::prelude::*;
 
 use super::{Camera, PrimaryRays, RadianceImage};
 use crate::error::Error;
+use crate::gather::GatheredMesh;
+use crate::gather::gather_points::{SurfaceOffset, is_buried};
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::SurfaceTopology;
 use crate::progress::BatchSizer;
 use crate::scene::Rgb;
-use crate::vertex::gather_points::{SurfaceOffset, is_covered};
-use crate::vertex::gathering::GatheredMesh;
 use crate::visibility::ray_scene::Hit;
 
 /// Lines of sight that are cast at once.
@@ -61,7 +61,7 @@ impl Camera {
             while !left.is_empty() {
                 let done = pace.next(&mut left, |now| {
                     let places: Vec<GatherPoint> = now.iter().map(|part| part.place).collect();
-                    let found = gather.gather(&light.sources(), &places)?;
+                    let found = gather.gather(&light.radiosity_field(), &places)?;
                     for (part, found) in now.iter().zip(&found) {
                         pixels[part.pixel] += part.radiance(found);
                     }
@@ -97,7 +97,7 @@ struct Part {
 impl Part {
     /// What it adds to the pixel by what was gathered, W/(m² sr).
     fn radiance(&self, found: &IrradianceSample) -> Rgb {
-        if is_covered(found, self.size) {
+        if is_buried(found, self.size) {
             return self.known;
         }
         (self.exitance + self.reflectance * found.irradiance) * self.share / PI
@@ -163,7 +163,7 @@ impl View<'_> {
         let normal = self.sight.at(&hit, &surface.normals).normalize_or(mesh.normal(node));
         parts.push(Part {
             pixel,
-            place: self.above.place(self.sight.at(&hit, &surface.positions), normal, size),
+            place: self.above.gather_point(self.sight.at(&hit, &surface.positions), normal, size),
             size,
             share: self.sight.share * hits.len() as f64,
             exitance: material.exitance,

@@ -196,7 +196,7 @@ mod tests {
 
     /// The floor's value at the middle of the edge: as the plain fit has it, and mended.
     fn at_the_edge(mesh: &Mesh, values: &[Rgb]) -> [f64; 2] {
-        let Vertices { positions, rims, .. } =
+        let Vertices { positions, outlines: rims, .. } =
             Vertices::new(mesh, &SurfaceTopology::new(mesh.scene()));
         let on_floor = first_at(&positions, DVec3::new(0.0, 1.0, 0.0));
         let normals: Vec<DVec3> = normals(mesh, &rims, positions.len());
@@ -242,7 +242,7 @@ mod tests {
                 vec![Material::grey("fan", 0.5)],
             );
             let mesh = Mesh::new(scene.unwrap(), f64::INFINITY).unwrap();
-            let Vertices { positions, rims, .. } =
+            let Vertices { positions, outlines: rims, .. } =
                 Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
             let normals = normals(&mesh, &rims, positions.len());
             let ends = ends(&mesh, &rims, &positions, &normals);
@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn no_end_sees_more_than_everything() {
         let mesh = corner(0.8);
-        let Vertices { positions, rims, .. } =
+        let Vertices { positions, outlines: rims, .. } =
             Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
         let ends = ends(&mesh, &rims, &positions, &normals(&mesh, &rims, positions.len()));
         let middle = |p: &BoundaryVertex| p.position.distance(DVec3::Y) < 1e-9;
@@ -308,7 +308,7 @@ mod tests {
     fn the_bright_foot_of_a_wall_brings_nothing_below_zero() {
         let mesh = corner(0.8);
         let values = lit(&mesh, &|p| if p.z < SIDE { 0.0 } else { 1e6 });
-        let Vertices { positions, rims, .. } =
+        let Vertices { positions, outlines: rims, .. } =
             Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
         let normals = normals(&mesh, &rims, positions.len());
         let mut out = vec![Rgb::ZERO; positions.len()];

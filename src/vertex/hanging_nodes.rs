@@ -8,15 +8,15 @@ use super::keys::{ElementLoops, VertexKey, Vertices};
 use crate::mesh::{Mesh, SurfaceTopology};
 
 /// The vertices that creases ask for beside those of the smooth surfaces.
-pub(super) struct HangingNodes {
+pub(crate) struct HangingNodes {
     /// All around each element.
     pub rims: ElementLoops,
     /// Numbered after the vertices of the smooth surfaces, in this order.
-    pub vertices: Vec<Seam>,
+    pub vertices: Vec<HangingNode>,
 }
 
 /// A vertex half-way between two others: what it has is their mean, so the surface stays as it is.
-pub(super) struct Seam {
+pub(crate) struct HangingNode {
     pub between: [u32; 2],
     /// Scene unit; the same bits as on the other surfaces.
     pub position: DVec3,
@@ -35,7 +35,7 @@ impl HangingNodes {
             let mut add = |key: VertexKey, position: &dyn Fn() -> DVec3, between: [u32; 2]| {
                 let taken = on_edge(&key).is_some_and(|place| places.contains(&place));
                 taken.then(|| {
-                    seams.push(Seam { between, position: position() });
+                    seams.push(HangingNode { between, position: position() });
                     (vertices.positions.len() + seams.len() - 1) as u32
                 })
             };

@@ -11,32 +11,32 @@ const FINEST: u32 = 1 << Mesh::MAX_DEPTH;
 
 /// What makes a vertex: the same key, the same vertex, in all meshes of one scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum VertexKey {
+pub(crate) enum VertexKey {
     Corner(u32),
     Side { id: u32, step: u32 },
     Inside { triangle: u32, i: u32, j: u32 },
 }
 
 /// The vertices of a mesh.
-#[derive(Clone)]
-pub(super) struct Vertices {
+#[derive(Clone, Default)]
+pub(crate) struct Vertices {
     /// What each vertex is.
     pub keys: Vec<VertexKey>,
     /// Where it is, scene unit.
     pub positions: Vec<DVec3>,
     /// A triangle that each lies in, and its barycentric position there: weights of the second and
     /// third corner.
-    pub places: Vec<(usize, [f64; 2])>,
+    pub barycentric: Vec<(usize, [f64; 2])>,
     /// The three at the corners of each element.
     pub corners: Vec<[u32; 3]>,
     /// All around each element.
-    pub rims: ElementLoops,
-    numbers: FxHashMap<VertexKey, u32>,
+    pub outlines: ElementLoops,
+    index: FxHashMap<VertexKey, u32>,
 }
 
 /// The vertices around each element: its corners, and what finer neighbours put between them.
 #[derive(Clone, Default)]
-pub(super) struct ElementLoops {
+pub(crate) struct ElementLoops {
     ends: Vec<usize>,
     vertices: Vec<u32>,
 }
@@ -61,20 +61,19 @@ impl ElementLoops {
 impl Vertices {
     /// Those of `mesh`, whose scene's smooth surfaces are `smooth`.
     pub fn new(mesh: &Mesh, smooth: &SurfaceTopology) -> Vertices {
-        let (keys, positions, places, corners, rims, numbers) = Default::default();
-        let mut out = Vertices { keys, positions, places, corners, rims, numbers };
+        let mut out = Vertices::default();
         (0..mesh.element_count()).for_each(|e| out.add_corners(mesh, smooth, e));
         let mut rims = ElementLoops::default();
         for e in 0..mesh.element_count() {
             rims.push(|rim| out.outline(mesh, smooth, e, rim, &mut |_, _, _| None));
         }
-        out.rims = rims;
+        out.outlines = rims;
         out
     }
 
     /// The vertex with this key.
-    pub fn find(&self, key: &VertexKey) -> Option<u32> {
-        self.numbers.get(key).copied()
+    pub fn index_of(&self, key: &VertexKey) -> Option<u32> {
+        self.index.get(key).copied()
     }
 
     fn add_corners(&mut self, mesh: &Mesh, smooth: &SurfaceTopology, e: usize) {
@@ -82,10 +81,10 @@ impl Vertices {
         let t = mesh.triangle(node);
         self.corners.push(lattice(mesh.cell(node)).map(|place| {
             let key = key(smooth, t, place);
-            *self.numbers.entry(key).or_insert_with(|| {
+            *self.index.entry(key).or_insert_with(|| {
                 self.keys.push(key);
                 self.positions.push(position(mesh.scene(), smooth, t, place));
-                self.places.push((t, place.map(share)));
+                self.barycentric.push((t, place.map(share)));
                 self.positions.len() as u32 - 1
             })
         }));
@@ -114,7 +113,7 @@ impl Vertices {
                 let half = middle(a.0, b.0).and_then(|place| {
                     let key = key(smooth, t, place);
                     let at = || position(mesh.scene(), smooth, t, place);
-                    let vertex = self.find(&key).or_else(|| missing(key, &at, [a.1, b.1]));
+                    let vertex = self.index_of(&key).or_else(|| missing(key, &at, [a.1, b.1]));
                     vertex.map(|v| (place, v))
                 });
                 match half {
@@ -127,13 +126,17 @@ impl Vertices {
 }
 
 /// The vertices at the corners of a cell of triangle `t`.
-pub(super) fn corners(smooth: &SurfaceTopology, t: usize, cell: Cell) -> [VertexKey; 3] {
+pub(crate) fn corner_keys(smooth: &SurfaceTopology, t: usize, cell: Cell) -> [VertexKey; 3] {
     lattice(cell).map(|place| key(smooth, t, place))
 }
 
 /// The vertices that splitting a cell of triangle `t` makes: in the middle of the sides from its
 /// first to its second corner, and so on. None at the finest level.
-pub(super) fn middles(smooth: &SurfaceTopology, t: usize, cell: Cell) -> Option<[VertexKey; 3]> {
+pub(crate) fn midside_keys(
+    smooth: &SurfaceTopology,
+    t: usize,
+    cell: Cell,
+) -> Option<[VertexKey; 3]> {
     let [a, b, c] = lattice(cell);
     let at = |p, q| Some(key(smooth, t, middle(p, q)?));
     Some([at(a, b)?, at(b, c)?, at(c, a)?])

@@ -69,7 +69,8 @@ fn settings_made_by_hand_stay() {
         settings.solve.hemicube_resolution = 48;
         if let Some(gather) = &mut settings.gather {
             (gather.rays, gather.noise_tolerance) = (77, 0.05);
-            gather.refinement = RefinementSettings { sweeps: 1, ..RefinementSettings::new(60.0) };
+            gather.refinement =
+                RefinementSettings { gather_passes: 1, ..RefinementSettings::new(60.0) };
         }
     };
     let baked =
@@ -111,7 +112,7 @@ fn every_stage_can_be_cancelled() {
             .bake(cornell(), &Backend::Cpu, |stage| {
                 let stop = match stage {
                     BakeProgress::Shooting(_) => at == 0,
-                    BakeProgress::Gathering(p) => at == 1 && p.level > 0,
+                    BakeProgress::Gathering(p) => at == 1 && p.refinements > 0,
                     BakeProgress::Estimated(_) => {
                         judged += 1;
                         at == 2
@@ -166,7 +167,7 @@ fn rejects_targets_out_of_range() {
     assert_eq!(e.kind(), ErrorKind::Setting);
     let bad = |settings: &mut BakeSettings| {
         if let Some(gather) = &mut settings.gather {
-            gather.refinement.tolerance = 0.0;
+            gather.refinement.surplus_tolerance = 0.0;
         }
     };
     let e =

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use radiosity::{
-    ErrorKind, GatheredMesh, Mesh, RayGather, RefinementSettings, Rgb, VertexMesh, load_obj,
-    read_obj,
+    ErrorKind, GatheredMesh, Mesh, RayGather, RefinementSettings, Rgb, VertexMesh,
+    gather_at_vertices, load_obj, read_obj,
 };
 use tempfile::TempDir;
 
@@ -263,9 +263,10 @@ fn smoothing_groups_decide_creases() {
         let mesh = Mesh::new(obj(&text).unwrap(), f64::INFINITY).unwrap();
         let light = [Rgb::ONE; 2];
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        let fine = RefinementSettings::new(9.0).gather(
+        let fine = gather_at_vertices(
             &GatheredMesh::from_elements(&mesh, &light).unwrap(),
             &mesh,
+            &RefinementSettings::new(9.0),
             &mut rays,
             keep_going,
         );

@@ -8,6 +8,7 @@ use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
     Error, ErrorKind, Gather, GatherPoint, GatherProgress, GatheredMesh, IrradianceSample,
     Material, Mesh, RadiosityField, RayGather, RefinementSettings, Rgb, StopReason, VertexMesh,
+    gather_at_vertices,
 };
 
 use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};
@@ -73,8 +74,11 @@ fn unequal_depths_leave_no_cracks() {
         let mut spots = Known(|_: &RadiosityField, p: &GatherPoint| {
             1.0 + f64::from(random(p.position) < 0.04) * random(-p.position)
         });
-        let settings = RefinementSettings { tolerance: 0.05, ..RefinementSettings::new(0.08) };
-        let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut spots, keep_going).unwrap();
+        let settings =
+            RefinementSettings { surplus_tolerance: 0.05, ..RefinementSettings::new(0.08) };
+        let found =
+            gather_at_vertices(&shot(&mesh, &dark), &mesh, &settings, &mut spots, keep_going)
+                .unwrap();
         let (least, most) = sizes(&found.mesh);
         println!("{} elements from {least:.3} to {most:.3}", found.mesh.element_count());
         assert!(found.stop == StopReason::Converged && most / least > 7.9, "unequal depths");
@@ -95,9 +99,13 @@ fn cornell_box_is_as_watertight_as_scene() {
     let dark = vec![Rgb::ZERO; mesh.element_count()];
     assert_watertight(&mesh, &VertexMesh::new(&mesh, &dark));
     let mut even = Known(|_: &RadiosityField, p: &GatherPoint| 1.0 + random(p.position));
-    let settings =
-        RefinementSettings { tolerance: 0.2, elements: 40_000, ..RefinementSettings::new(3.0) };
-    let found = settings.gather(&shot(&mesh, &dark), &mesh, &mut even, keep_going).unwrap();
+    let settings = RefinementSettings {
+        surplus_tolerance: 0.2,
+        max_elements: 40_000,
+        ..RefinementSettings::new(3.0)
+    };
+    let found =
+        gather_at_vertices(&shot(&mesh, &dark), &mesh, &settings, &mut even, keep_going).unwrap();
     assert!(found.mesh.element_count() > 2 * mesh.element_count());
     assert_watertight(&found.mesh, &found.surface);
 }
@@ -135,7 +143,9 @@ fn furnace_is_a_fixed_point() {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
         let (exact, seen): (_, &mut dyn Gather) = (&mut Known(convex_room), &mut rays);
         for gather in [exact, seen] {
-            let found = settings.gather(&shot(&mesh, &settled), &mesh, gather, keep_going).unwrap();
+            let found =
+                gather_at_vertices(&shot(&mesh, &settled), &mesh, &settings, gather, keep_going)
+                    .unwrap();
             assert_eq!(found.stop, StopReason::Converged);
             // Walls are lights of their own here, which rays find by closed forms too, all of each
             // visible. Those are good to 1e-14 each, edge on too; they are as many as elements.
@@ -144,7 +154,7 @@ fn furnace_is_a_fixed_point() {
                 found.surface.radiosity.iter().map(|b| (b.x - even).abs()).fold(0.0, f64::max);
             assert!(off <= bound, "{off}");
             assert_eq!(found.mesh.element_count(), mesh.element_count(), "nothing to split for");
-            assert!(found.change <= bound / (even - 1.0), "{}", found.change);
+            assert!(found.relative_change <= bound / (even - 1.0), "{}", found.relative_change);
             // A gather creates no energy.
             let before = flux(&VertexMesh::new(&mesh, &settled));
             assert!((before - 6.0 * even).abs() < 6.0 * bound);
@@ -176,7 +186,7 @@ fn floor() -> (Mesh, Vec<Rgb>) {
 fn at_the_edge(settings: &RefinementSettings) -> GatheredMesh {
     let (mesh, light) = floor();
     let mut gather = Known(|_: &RadiosityField, p: &GatherPoint| half_hidden(p.position));
-    settings.gather(&shot(&mesh, &light), &mesh, &mut gather, keep_going).unwrap()
+    gather_at_vertices(&shot(&mesh, &light), &mesh, settings, &mut gather, keep_going).unwrap()
 }
 
 /// Interpolated radiosity at `p` of a floor, and the element it is in.
@@ -200,7 +210,8 @@ fn splits_only_at_the_shadow() {
     let largest = sizes(&base).1;
     let mut rms = vec![];
     for tolerance in [0.08, 0.01] {
-        let settings = RefinementSettings { tolerance, ..RefinementSettings::new(0.005) };
+        let settings =
+            RefinementSettings { surplus_tolerance: tolerance, ..RefinementSettings::new(0.005) };
         let found = at_the_edge(&settings);
         assert_eq!(found.stop, StopReason::Converged);
         for e in 0..found.mesh.element_count() {
@@ -256,13 +267,17 @@ fn interpolated_vertices_lie_on_parabola() {
             asked += 1;
             curved(belongs(place.position))
         });
-        let found = settings.gather(&light, &mesh, &mut known, keep_going).unwrap();
+        let found = gather_at_vertices(&light, &mesh, settings, &mut known, keep_going).unwrap();
         (found, asked)
     };
-    let plain =
-        RefinementSettings { tolerance: 1.0, everywhere: 2, ..RefinementSettings::new(1e-9) };
-    let (flat, looks) = gather(&RefinementSettings { curve: f64::INFINITY, ..plain.clone() });
-    let (found, others) = gather(&RefinementSettings { curve: 1e-12, ..plain });
+    let plain = RefinementSettings {
+        surplus_tolerance: 1.0,
+        initial_subdivisions: 2,
+        ..RefinementSettings::new(1e-9)
+    };
+    let (flat, looks) =
+        gather(&RefinementSettings { interpolation_tolerance: f64::INFINITY, ..plain.clone() });
+    let (found, others) = gather(&RefinementSettings { interpolation_tolerance: 1e-12, ..plain });
     assert_eq!(looks, others, "nobody looks for it");
     let ratio = found.mesh.element_count() as f64 / flat.mesh.element_count() as f64;
     assert!(ratio > 3.9, "all that gathers is split once more: {ratio}");
@@ -278,8 +293,8 @@ fn interpolated_vertices_lie_on_parabola() {
 fn settings_bound_count_and_size() {
     let (base, _) = floor();
     let fine = RefinementSettings {
-        tolerance: 0.001,
-        curve: f64::INFINITY,
+        surplus_tolerance: 0.001,
+        interpolation_tolerance: f64::INFINITY,
         ..RefinementSettings::new(0.02)
     };
     let (found, largest) = (at_the_edge(&fine), sizes(&base).1);
@@ -289,20 +304,26 @@ fn settings_bound_count_and_size() {
     assert!(most <= largest);
     // Each at least once; what was wrong or has grown stale, again.
     let all = places(&found);
-    assert!((all..2 * all).contains(&(found.gathers as usize)), "{} {all}", found.gathers);
-    let few =
-        at_the_edge(&RefinementSettings { elements: base.element_count() + 100, ..fine.clone() });
+    assert!(
+        (all..2 * all).contains(&(found.gather_count as usize)),
+        "{} {all}",
+        found.gather_count
+    );
+    let few = at_the_edge(&RefinementSettings {
+        max_elements: base.element_count() + 100,
+        ..fine.clone()
+    });
     assert_eq!(few.stop, StopReason::Elements);
     let count = few.mesh.element_count() - base.element_count();
     assert!(count <= 100 && count > 90, "{count}");
     assert_whole(&few.mesh, &few.surface);
     // No room at all.
-    let none = at_the_edge(&RefinementSettings { elements: 0, ..fine.clone() });
+    let none = at_the_edge(&RefinementSettings { max_elements: 0, ..fine.clone() });
     assert_eq!(
         (none.stop, none.mesh.element_count()),
         (StopReason::Elements, base.element_count())
     );
-    let all = RefinementSettings { tolerance: 1.0, everywhere: 1, ..fine };
+    let all = RefinementSettings { surplus_tolerance: 1.0, initial_subdivisions: 1, ..fine };
     let all = at_the_edge(&all);
     let quarters = 0..4 * base.element_count();
     assert_eq!(all.mesh.element_count(), quarters.len());
@@ -337,8 +358,10 @@ fn no_darkness_leaks_from_under_block() {
         let mesh = Mesh::new(quads(&all), 0.36).unwrap().split_at_contacts(3);
         let light = vec![Rgb::ZERO; mesh.element_count()];
         let mut rays = RayGather::new(&mesh, 256).unwrap();
-        let settings = RefinementSettings { elements: 3000, ..RefinementSettings::new(0.04) };
-        let found = settings.gather(&shot(&mesh, &light), &mesh, &mut rays, keep_going).unwrap();
+        let settings = RefinementSettings { max_elements: 3000, ..RefinementSettings::new(0.04) };
+        let found =
+            gather_at_vertices(&shot(&mesh, &light), &mesh, &settings, &mut rays, keep_going)
+                .unwrap();
         for k in 0..60 {
             // Before the wall that faces the lamp nothing hides it, and the light is even: on the
             // elements that the wall stands on, too, it is what is gathered at the point directly,
@@ -347,7 +370,7 @@ fn no_darkness_leaks_from_under_block() {
             let p = DVec3::new(FOOT[1] + away, -0.25 + 0.5 * along, 0.0);
             let arrives = point_to_polygon(p, DVec3::Z, &lamp_at.map(DVec3::from_array));
             let off = at(&found.surface, p).0 / (0.5 * arrives) - 1.0;
-            assert!(off.abs() < settings.tolerance, "height {height}: {off} at {p}");
+            assert!(off.abs() < settings.surplus_tolerance, "height {height}: {off} at {p}");
         }
     }
 }
@@ -362,9 +385,10 @@ fn sweeps_gather_from_previous_sweep() {
     for sweeps in [1, 2, 3] {
         let mut told = vec![];
         let mut gather = Known(|s: &RadiosityField, p: &GatherPoint| convex_room(s, p));
-        let settings = RefinementSettings { sweeps, ..RefinementSettings::new(0.01) };
-        let found = settings.gather(&light, &mesh, &mut gather, |p| {
-            told.push(p.sweep);
+        let settings =
+            RefinementSettings { gather_passes: sweeps, ..RefinementSettings::new(0.01) };
+        let found = gather_at_vertices(&light, &mesh, &settings, &mut gather, |p| {
+            told.push(p.pass);
             ControlFlow::Continue(())
         });
         let (found, want) = (found.unwrap(), 0.5f64.powi(sweeps as i32));
@@ -373,7 +397,7 @@ fn sweeps_gather_from_previous_sweep() {
         // Closed forms are good to 1e-14 each, and there are as many as elements.
         let off = found.surface.radiosity.iter().map(|b| (b.x - want).abs()).fold(0.0, f64::max);
         assert!(off < 1e-14 * fine.element_count() as f64, "{sweeps}: {off}");
-        assert!((found.change - 1.0).abs() < 1e-9, "half of it is as much as is left");
+        assert!((found.relative_change - 1.0).abs() < 1e-9, "half of it is as much as is left");
     }
 }
 
@@ -388,9 +412,14 @@ fn two_runs_give_the_same_bits() {
     let light = vec![Rgb::ONE; mesh.element_count()];
     let [one, two] = [0, 1].map(|_| {
         let mut rays = RayGather::new(&mesh, 64).unwrap();
-        RefinementSettings::new(0.1)
-            .gather(&shot(&mesh, &light), &mesh, &mut rays, keep_going)
-            .unwrap()
+        gather_at_vertices(
+            &shot(&mesh, &light),
+            &mesh,
+            &RefinementSettings::new(0.1),
+            &mut rays,
+            keep_going,
+        )
+        .unwrap()
     });
     assert!(one.mesh.element_count() > mesh.element_count());
     assert!(one.surface.radiosity == two.surface.radiosity);
@@ -399,7 +428,10 @@ fn two_runs_give_the_same_bits() {
     assert!(
         (&one.surface.faces, &one.surface.elements) == (&two.surface.faces, &two.surface.elements)
     );
-    assert_eq!((one.gathers, one.change, one.stop), (two.gathers, two.change, two.stop));
+    assert_eq!(
+        (one.gather_count, one.relative_change, one.stop),
+        (two.gather_count, two.relative_change, two.stop)
+    );
 }
 
 #[test]
@@ -408,19 +440,28 @@ fn cancelled_gather_keeps_what_was_reached() {
     for stop_at in [0, 1, 2] {
         let mut told: Vec<GatherProgress> = vec![];
         let mut gather = Known(|_: &RadiosityField, p: &GatherPoint| half_hidden(p.position));
-        let found =
-            RefinementSettings::new(0.01).gather(&shot(&mesh, &light), &mesh, &mut gather, |p| {
+        let found = gather_at_vertices(
+            &shot(&mesh, &light),
+            &mesh,
+            &RefinementSettings::new(0.01),
+            &mut gather,
+            |p| {
                 told.push(*p);
-                if p.level == stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
+                if p.refinements == stop_at {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        );
         let (found, last) = (found.unwrap(), told[told.len() - 1]);
         assert_eq!(
-            (found.stop, last.level, told.len() as u32),
+            (found.stop, last.refinements, told.len() as u32),
             (StopReason::Cancelled, stop_at, stop_at + 1)
         );
         assert_eq!(found.mesh.element_count(), last.elements);
-        assert!(told.iter().all(|p| p.gathered == p.of && p.of > 0), "one batch a level");
-        assert_eq!(found.gathers as usize, told.iter().map(|p| p.gathered).sum::<usize>());
+        assert!(told.iter().all(|p| p.gathered == p.total && p.total > 0), "one batch a level");
+        assert_eq!(found.gather_count as usize, told.iter().map(|p| p.gathered).sum::<usize>());
         assert_whole(&found.mesh, &found.surface);
     }
 }
@@ -431,15 +472,16 @@ fn rejects_settings_out_of_range() {
     let light = shot(&mesh, &values);
     let refused = |settings: RefinementSettings, light: &GatheredMesh| {
         let mut never = Known(|_: &RadiosityField, _: &GatherPoint| unreachable!());
-        let error = settings.gather(light, &mesh, &mut never, keep_going).unwrap_err();
+        let error =
+            gather_at_vertices(light, &mesh, &settings, &mut never, keep_going).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
     };
     let good = RefinementSettings::new(0.1);
     for tolerance in [0.0, -0.1, 1.1, f64::NAN] {
-        refused(RefinementSettings { tolerance, ..good.clone() }, &light);
+        refused(RefinementSettings { surplus_tolerance: tolerance, ..good.clone() }, &light);
     }
     for smallest in [0.0, -1.0, f64::NAN] {
-        refused(RefinementSettings { smallest, ..good.clone() }, &light);
+        refused(RefinementSettings { min_edge: smallest, ..good.clone() }, &light);
     }
     let elsewhere = Mesh::new(cube(&grey()), 1.0).unwrap();
     refused(good, &shot(&elsewhere, &vec![Rgb::ONE; elsewhere.element_count()]));

@@ -198,8 +198,8 @@ impl Bake {
         }
         self.adjustments.push(Box::new(move |settings| match (choice, &mut settings.gather) {
             (Gather::None, gather) => *gather = None,
-            (Gather::Needed, Some(gather)) => gather.refinement.everywhere = 0,
-            (Gather::All, Some(gather)) => gather.refinement.everywhere = 1,
+            (Gather::Needed, Some(gather)) => gather.refinement.initial_subdivisions = 0,
+            (Gather::All, Some(gather)) => gather.refinement.initial_subdivisions = 1,
             (_, None) => {}
         }));
     }

@@ -63,7 +63,14 @@ fn show(bar: &ProgressBar, progress: &BakeProgress) {
             ));
         }
         BakeProgress::Gathering(gather) => {
-            let GatherProgress { sweep, level, elements, gathered, of } = gather;
+            let GatherProgress {
+                pass: sweep,
+                refinements: level,
+                elements,
+                gathered,
+                total: of,
+                ..
+            } = gather;
             bar.set_position(share(*gathered, *of));
             bar.set_message(format!(
                 "gathering, sweep {}, split {level} times, {gathered} of {of} vertices, \

@@ -55,8 +55,8 @@ impl Report {
             "shots": baked.solution.shots,
             "hemicubes": baked.hemicubes,
             "hemicubes_by_resolution": by_resolution,
-            "gathers": baked.light.gathers,
-            "gather_change": baked.light.change,
+            "gathers": baked.light.gather_count,
+            "gather_change": baked.light.relative_change,
             "gather_stop": self.gather_stop(),
             "near_moved": baked.mean_near_correction,
             "stop": baked.solution.stop.to_string(),
@@ -108,9 +108,9 @@ impl Report {
             ),
             format!(
                 "gathering  {} places, {}, changed the vertices by {:.2} %",
-                light.gathers,
+                light.gather_count,
                 self.gather_stop(),
-                100.0 * light.change
+                100.0 * light.relative_change
             ),
             format!(
                 "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",

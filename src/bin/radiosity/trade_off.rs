@@ -215,7 +215,7 @@ fn finest_run(grid: &Grid, scene: &Arc<Scene>, device: &Backend) -> Result<Refer
     eprintln!("for reference: settings meant for {}", grid::percent(error));
     let mut settings = BakeSettings::for_error(error, scene);
     if let Some(gather) = &mut settings.gather {
-        gather.refinement.sweeps += 1;
+        gather.refinement.gather_passes += 1;
     }
     let baked = settings.bake(scene.clone(), device, go)?;
     Ok(Reference::Finest(SurfacePoints::new(&baked.light, device)?))

@@ -9,7 +9,7 @@ use radiosity::{
     Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, Fallback, FormFactors,
     Gather, GatherPoint, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
     IrradianceSample, Material, Mesh, Method, NodeId, RadiosityField, RayGather, RayRows,
-    RefinementSettings, Rgb, Row, Solver, StopReason,
+    RefinementSettings, Rgb, Row, Solver, StopReason, gather_at_vertices,
 };
 
 use crate::common::{cornell_box, cube, gpu, keep_going};
@@ -82,7 +82,7 @@ fn lost_device_is_an_error_everywhere() {
     let errors = [
         rows.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err(),
         rows.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err(),
-        gather.gather(&light.unwrap().sources(), &[place]).unwrap_err(),
+        gather.gather(&light.unwrap().radiosity_field(), &[place]).unwrap_err(),
         HemicubeRows::new(&gpu, &mesh, 64).unwrap_err(),
         HemicubeGather::new(&gpu, &mesh, 64).unwrap_err(),
         Backend::Gpu(gpu.clone()).rows(&mesh, 64, NonZeroU32::MIN).unwrap_err(),
@@ -151,7 +151,7 @@ fn fallback_passes_on_errors_of_no_device() {
     let mut spare = Some(gather);
     let mut relay = Fallback::new(Wrong, |_| Ok(spare.take().unwrap()));
     let light = GatheredMesh::from_elements(&other, &[Rgb::ONE; 12]).unwrap();
-    assert_eq!(relay.gather(&light.sources(), &[]).unwrap_err().kind(), ErrorKind::Setting);
+    assert_eq!(relay.gather(&light.radiosity_field(), &[]).unwrap_err().kind(), ErrorKind::Setting);
     assert!(relay.second().is_none());
 }
 
@@ -163,9 +163,14 @@ fn gathering_falls_back_to_rays() {
     let light =
         GatheredMesh::from_elements(&mesh, &vec![Rgb::splat(2.0); mesh.element_count()]).unwrap();
     // Nothing bends in a furnace: split it whatever the light says, so that there are two batches.
-    let settings =
-        RefinementSettings { everywhere: 1, curve: f64::INFINITY, ..RefinementSettings::new(1e-3) };
-    let by = |gather: &mut dyn Gather| settings.gather(&light, &mesh, gather, keep_going).unwrap();
+    let settings = RefinementSettings {
+        initial_subdivisions: 1,
+        interpolation_tolerance: f64::INFINITY,
+        ..RefinementSettings::new(1e-3)
+    };
+    let by = |gather: &mut dyn Gather| {
+        gather_at_vertices(&light, &mesh, &settings, gather, keep_going).unwrap()
+    };
     let hemicubes = by(&mut HemicubeGather::new(&gpu, &mesh, 64).unwrap());
     let rays = by(&mut RayGather::new(&mesh, 1024).unwrap());
     let inner = HemicubeGather::new(&gpu, &mesh, 64).unwrap();
@@ -273,7 +278,8 @@ fn little_memory_gathers_the_same_in_smaller_batches() {
         GatherPoint { position: mesh.centroid(node) + 0.01 * normal, normal, near: 1e-3 }
     };
     let places: Vec<GatherPoint> = (0..40).map(|e| place(7 * e)).collect();
-    let gather = |gpu: &Gpu| HemicubeGather::new(gpu, &mesh, 64)?.gather(&light.sources(), &places);
+    let gather =
+        |gpu: &Gpu| HemicubeGather::new(gpu, &mesh, 64)?.gather(&light.radiosity_field(), &places);
     let all = gather(&gpu).unwrap();
     // An image of 64 × 192 pixels, and some lines of tiles, of 16 bytes; 64 of them in a batch.
     let one: u64 = 64 * 192 * 16;

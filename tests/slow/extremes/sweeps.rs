@@ -7,7 +7,7 @@ use glam::DVec3;
 use radiosity::{
     AdaptiveViewpoints, Backend, BakeTarget, Error, Gather, GatherPoint, GatheredMesh,
     HemicubeGather, Mesh, Method, ProximityCorrection, RayGather, RefinementSettings, Rgb, Scene,
-    Solution, Solver, VertexMesh, ViewFactors, write_ply,
+    Solution, Solver, VertexMesh, ViewFactors, gather_at_vertices, write_ply,
 };
 
 use super::sweep::Sweep;
@@ -382,7 +382,7 @@ fn lamp(sweep: &mut Sweep, frame: Frame, side: f64, e: f64, ask: &Ask) -> Result
     let normal = (at(0.0) - at(1.0)).normalize();
     let near = 1e-6 * frame.scale;
     let place = GatherPoint { position: at(1.0) + normal * (4.0 * near), normal, near };
-    let found = ask.gatherer(&mesh)?.gather(&dark.sources(), &[place])?[0].irradiance;
+    let found = ask.gatherer(&mesh)?.gather(&dark.radiosity_field(), &[place])?[0].irradiance;
     let (x, r) = (side / 2.0, (1.0 + side * side / 4.0).sqrt());
     let known = 4.0 / PI * (x / r) * (x / r).atan();
     sweep.by("gathering");
@@ -420,12 +420,12 @@ fn exitance_next_door(ask: &Ask) -> Swept {
     sweep.by("gathering");
     for e in ask.exitances() {
         let mesh = Mesh::new(scenes::rooms(0.5, e, 0.0), f64::INFINITY)?;
-        let walls = GatheredMesh::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
-        let even = vec![Rgb::splat(1e-12 * e); walls.reflected.len()];
-        let light = GatheredMesh { reflected: even, ..walls };
+        let mut light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ZERO; mesh.element_count()])?;
+        let even = vec![Rgb::splat(1e-12 * e); light.reflected.len()];
+        light.reflected = even;
         let [p, q] = [0.4, 0.5].map(|z| DVec3::from_array(HERE.place([1.8, 0.6, z])));
         let place = GatherPoint { position: p, normal: (q - p).normalize(), near: 1e-3 };
-        let found = ask.gatherer(&mesh)?.gather(&light.sources(), &[place])?[0].irradiance;
+        let found = ask.gatherer(&mesh)?.gather(&light.radiosity_field(), &[place])?[0].irradiance;
         sweep.step(&channels(&[found], 1e-12 * e), &[1.0; 3]);
     }
     Ok(sweep)
@@ -445,9 +445,13 @@ fn areas(ask: &Ask) -> Swept {
         let areas = (0..mesh.element_count()).map(|k| mesh.area(mesh.element(k)));
         let leaving: f64 = s.radiosity.iter().zip(areas).map(|(b, a)| b.x * a).sum();
         let light = GatheredMesh::from_elements(&mesh, &s.radiosity)?;
-        let gathering =
-            RefinementSettings { elements: 0, sweeps: 3, ..RefinementSettings::new(1.0) };
-        let fine = gathering.gather(&light, &mesh, &mut *ask.gatherer(&mesh)?, keep_going)?;
+        let gathering = RefinementSettings {
+            max_elements: 0,
+            gather_passes: 3,
+            ..RefinementSettings::new(1.0)
+        };
+        let fine =
+            gather_at_vertices(&light, &mesh, &gathering, &mut *ask.gatherer(&mesh)?, keep_going)?;
         let mut found = channels(&fine.surface.radiosity, 1.0);
         found.push(leaving / 6.0);
         sweep.step(&found, &vec![2.0; found.len()]);

@@ -72,11 +72,11 @@ const SETTINGS: [Setting; 22] = [
     setting("gather-contacts", COUNT, |v| gather(v, |g, v| g.contact_levels = v)),
     setting("rays", COUNT, |v| gather(v, |g, v| g.rays = v)),
     setting("noise", NUMBER, |v| gather(v, |g, v| g.noise_tolerance = v)),
-    setting("bend", NUMBER, |v| gather(v, |g, v| g.refinement.tolerance = v)),
-    setting("curve", NUMBER, |v| gather(v, |g, v| g.refinement.curve = v)),
-    setting("smallest", NUMBER, |v| gather(v, |g, v| g.refinement.smallest = v)),
-    setting("max-elements", COUNT, |v| gather(v, |g, v| g.refinement.elements = v)),
-    setting("sweeps", COUNT, |v| gather(v, |g, v| g.refinement.sweeps = v)),
+    setting("bend", NUMBER, |v| gather(v, |g, v| g.refinement.surplus_tolerance = v)),
+    setting("curve", NUMBER, |v| gather(v, |g, v| g.refinement.interpolation_tolerance = v)),
+    setting("smallest", NUMBER, |v| gather(v, |g, v| g.refinement.min_edge = v)),
+    setting("max-elements", COUNT, |v| gather(v, |g, v| g.refinement.max_elements = v)),
+    setting("sweeps", COUNT, |v| gather(v, |g, v| g.refinement.gather_passes = v)),
 ];
 
 /// A setting of any bake.
@@ -125,8 +125,14 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
     });
     if let Some(gather) = &settings.gather {
         let GatherSettings { element_size, contact_levels, rays, noise_tolerance, .. } = gather;
-        let RefinementSettings { tolerance, smallest, curve, elements, everywhere, sweeps } =
-            &gather.refinement;
+        let RefinementSettings {
+            surplus_tolerance: tolerance,
+            min_edge: smallest,
+            interpolation_tolerance: curve,
+            max_elements: elements,
+            initial_subdivisions: everywhere,
+            gather_passes: sweeps,
+        } = &gather.refinement;
         report["gather_size"] = json!(element_size);
         report["gather_contacts"] = json!(contact_levels);
         report["rays"] = json!(rays);

@@ -98,7 +98,7 @@ impl Grid {
             e.solve.element_size *= f;
             if let Some(gather) = &mut e.gather {
                 gather.element_size *= f;
-                gather.refinement.smallest *= f;
+                gather.refinement.min_edge *= f;
             }
         });
         self.panel("Element size", "edge of those that shoot; others with it", [sizes]);
@@ -128,20 +128,23 @@ impl Grid {
             e.solve.element_size *= f;
             e.gather = None;
         });
-        let label =
-            |e: &BakeSettings| e.gather.as_ref().map_or(0, |g| g.refinement.sweeps).to_string();
+        let label = |e: &BakeSettings| {
+            e.gather.as_ref().map_or(0, |g| g.refinement.gather_passes).to_string()
+        };
         let sweeps = self.vary(base, "sweeps", "sweeps", &[1.0, 2.0, 3.0], label, |e, f| {
             if let Some(gather) = &mut e.gather {
-                gather.refinement.sweeps = f as u32;
+                gather.refinement.gather_passes = f as u32;
             }
         });
-        let label =
-            |e: &BakeSettings| percent(e.gather.as_ref().map_or(0.0, |g| g.refinement.tolerance));
+        let label = |e: &BakeSettings| {
+            percent(e.gather.as_ref().map_or(0.0, |g| g.refinement.surplus_tolerance))
+        };
         let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5, 0.25] };
         let bend = self.vary(base, "bend", "bend", steps, label, |e, f| {
             if let Some(gather) = &mut e.gather {
-                gather.refinement.tolerance = (f * gather.refinement.tolerance).min(1.0);
-                gather.refinement.curve *= f;
+                gather.refinement.surplus_tolerance =
+                    (f * gather.refinement.surplus_tolerance).min(1.0);
+                gather.refinement.interpolation_tolerance *= f;
             }
         });
         self.panel("Gather", "none; how often; how much a side may bend", [none, sweeps, bend]);

@@ -40,7 +40,7 @@ impl Measured {
             shot_elements: baked.mesh.element_count(),
             elements: baked.light.mesh.element_count(),
             hemicubes: baked.hemicubes,
-            gathers: baked.light.gathers,
+            gathers: baked.light.gather_count,
             settings: baked.settings.clone(),
         })
     }

@@ -74,7 +74,7 @@ impl SurfacePoints {
             near: offset / 4.0,
         };
         let above: Vec<GatherPoint> = points.iter().map(above).collect();
-        let samples = device.gather(&light.mesh, RAYS)?.gather(&light.sources(), &above)?;
+        let samples = device.gather(&light.mesh, RAYS)?.gather(&light.radiosity_field(), &above)?;
         let mut samples = samples.iter();
         points.retain(|point| {
             let sample = samples.next().expect("a sample for every point");

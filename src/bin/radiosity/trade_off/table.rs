@@ -26,8 +26,8 @@ impl Results {
             let gather = e.gather.as_ref().map_or("none,,,,,,,".to_string(), |g| {
                 let s = &g.refinement;
                 let (size, contacts, rays) = (g.element_size, g.contact_levels, g.rays);
-                let (bend, curve) = (s.tolerance, s.curve);
-                let (smallest, sweeps) = (s.smallest, s.sweeps);
+                let (bend, curve) = (s.surplus_tolerance, s.interpolation_tolerance);
+                let (smallest, sweeps) = (s.min_edge, s.gather_passes);
                 format!("needed,{size:.6},{contacts},{rays},{bend},{curve},{smallest:.6},{sweeps}")
             });
             let all = m.errors.all.map_or(String::new(), |all| format!("{all:.6}"));

@@ -1,0 +1,463 @@
+//! The adaptive gather: irradiance at the vertices of a mesh, refined where linear interpolation
+//! fails.
+//!
+//! ```text
+//!   for each pass:                               source light: the last pass's result
+//!     vertices ── gather points ── Gather ── irradiance E ── reflected = ρ E
+//!        │             └ buried in something? try another element around the vertex
+//!        │                └ buried everywhere: extrapolated from the neighbours
+//!     elements whose midside surplus is too large are split; new vertices gather; again
+//!   last: split once more onto the quadratic interpolant, no gather
+//! ```
+//!
+//! With the source light fixed, a pass is one Jacobi step of the radiosity equation at the vertices
+//! (a final gather). Each further pass adds a bounce. Coarser tolerances do for all passes but the
+//! last, since those only light the next.
+
+use std::borrow::Cow;
+use std::ops::ControlFlow;
+
+use super::buried::extrapolate_into_buried;
+use super::gather_points::VertexGatherPoints;
+use super::gathered_mesh::GatheredMesh;
+use super::interpolated_refinement::interpolated_refinement;
+use super::progress::Progress;
+use super::refinement_indicator::{ErrorScale, refinement_indicator};
+use super::refinement_settings::RefinementSettings;
+use super::sampled_mesh::SampledMesh;
+use super::surplus::mean_preserving;
+use super::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::progress::{BatchSizer, StopReason};
+use crate::scene::Rgb;
+
+/// Called with the progress after every batch; may stop the gather.
+pub(crate) type ProgressCallback<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// Vertices in the first batch; later ones follow the clock. Chosen by hand: results do not depend
+/// on it.
+const FIRST_BATCH: usize = 256;
+
+/// Surplus tolerance and smallest edge of a pass, over those of the next one: what a pass gets
+/// wrong is averaged over the hemisphere by the next. Chosen by hand; no measurement kept.
+const PASS_COARSENING: f64 = 3.0;
+
+/// Gathers `source` at the vertices of `mesh`, splits elements, gathers at the new vertices, and so
+/// on: B = E + ρ Σ F_vj B_j.
+///
+/// `source` is of the same scene, on any mesh: light that was shot on fine elements, which cost
+/// hemicubes nothing, is gathered at the corners of coarse ones.
+///
+/// Elements are split by their hierarchical surplus (Yserentant 1986): how far the value at a new
+/// vertex is from the mean of the two that it lies between. Vertices under something that touches
+/// their surface see no light; they get values extrapolated from their neighbours, so that no
+/// darkness leaks out. `progress` is called after every batch of vertices; where it breaks, what
+/// was reached so far is returned, with [`StopReason::Cancelled`].
+///
+/// # Errors
+/// [`ErrorKind::Setting`](crate::ErrorKind::Setting) for a setting out of range or a `source` of
+/// another scene; those of `gatherer`.
+pub fn gather_at_vertices(
+    source: &GatheredMesh,
+    mesh: &Mesh,
+    settings: &RefinementSettings,
+    gatherer: &mut dyn Gather,
+    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<GatheredMesh, Error> {
+    settings.check()?;
+    source.check_scene(mesh)?;
+    let mut state = AdaptiveGather::new(mesh.clone(), source);
+    let stop = state.run_passes(settings, gatherer, None, &mut progress)?;
+    let result = if stop == StopReason::Cancelled {
+        state.to_gathered_mesh()
+    } else {
+        state.interpolated(settings)?.0
+    };
+    Ok(GatheredMesh { stop, ..result })
+}
+
+/// State of an adaptive gather, which can go on with other settings.
+#[derive(Clone)]
+pub(crate) struct AdaptiveGather<'a> {
+    /// The light that vertices gather.
+    source: Cow<'a, GatheredMesh>,
+    samples: SampledMesh,
+    scale: ErrorScale,
+    /// Change of the values by the last pass, relative.
+    relative_change: f64,
+    /// Times that the result became the source.
+    pass: u32,
+    /// Times that elements have been split, over all passes.
+    refinements: u32,
+    /// Points at which light was gathered.
+    gather_count: u64,
+}
+
+/// A batch of vertices, and what was gathered at one point of each.
+struct Batch<'v> {
+    vertices: &'v [u32],
+    samples: Vec<IrradianceSample>,
+    /// The same from the previous source, with the same points; where only differences are wanted.
+    previous: Option<Vec<IrradianceSample>>,
+}
+
+impl<'a> AdaptiveGather<'a> {
+    /// Starts on `mesh` with the values that `source`, of the same scene, has at its vertices.
+    pub fn new(mesh: Mesh, source: &'a GatheredMesh) -> AdaptiveGather<'a> {
+        let field = source.radiosity_field();
+        let scale = ErrorScale::new(&mesh, &field);
+        AdaptiveGather {
+            samples: SampledMesh::new(mesh, &field),
+            source: Cow::Borrowed(source),
+            scale,
+            relative_change: 0.0,
+            pass: 0,
+            refinements: 0,
+            gather_count: 0,
+        }
+    }
+
+    /// The light that vertices gather.
+    pub fn source(&self) -> &GatheredMesh {
+        &self.source
+    }
+
+    /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
+    pub fn radiosity_floor(&self) -> f64 {
+        self.scale.radiosity_floor
+    }
+
+    /// What was reached so far.
+    pub fn to_gathered_mesh(&self) -> GatheredMesh {
+        self.gathered_mesh_of(&self.samples)
+    }
+
+    /// What was reached, with elements split onto the quadratic interpolant where it leaves them,
+    /// and an estimate of the error that remains in each element, W/m².
+    pub fn interpolated(
+        &self,
+        settings: &RefinementSettings,
+    ) -> Result<(GatheredMesh, Vec<f64>), Error> {
+        let source = self.source.radiosity_field();
+        let refined = interpolated_refinement(&self.samples, &source, &self.scale, settings)?;
+        Ok((self.gathered_mesh_of(&refined.samples), refined.residual_error))
+    }
+
+    fn gathered_mesh_of(&self, samples: &SampledMesh) -> GatheredMesh {
+        GatheredMesh {
+            mesh: samples.mesh.clone(),
+            surface: samples.vertex_mesh(),
+            corners: samples.corners().to_vec(),
+            reflected: mean_preserving(samples),
+            gather_count: self.gather_count,
+            relative_change: self.relative_change,
+            stop: StopReason::Converged,
+        }
+    }
+
+    /// Makes what was reached the light that vertices gather from now on.
+    pub fn promote_to_source(&mut self) {
+        self.source = Cow::Owned(self.to_gathered_mesh());
+        self.pass += 1;
+    }
+
+    /// All passes: those before the last with coarser tolerances and, if there is one, by the
+    /// `coarse_gatherer`.
+    pub fn run_passes(
+        &mut self,
+        settings: &RefinementSettings,
+        gatherer: &mut dyn Gather,
+        mut coarse_gatherer: Option<&mut dyn Gather>,
+        progress: &mut ProgressCallback,
+    ) -> Result<StopReason, Error> {
+        for remaining in (1..settings.gather_passes).rev() {
+            let coarsening = PASS_COARSENING.powi(remaining as i32);
+            let coarse = RefinementSettings {
+                surplus_tolerance: (settings.surplus_tolerance * coarsening).min(1.0),
+                min_edge: settings.min_edge * coarsening,
+                ..settings.clone()
+            };
+            let stop = match &mut coarse_gatherer {
+                Some(coarse_gatherer) => self.gather_pass(&coarse, *coarse_gatherer, progress)?,
+                None => self.gather_pass(&coarse, gatherer, progress)?,
+            };
+            if stop == StopReason::Cancelled {
+                return Ok(stop);
+            }
+            self.promote_to_source();
+        }
+        self.gather_pass(settings, gatherer, progress)
+    }
+
+    /// Gathers the source at all vertices, then refines.
+    pub fn gather_pass(
+        &mut self,
+        settings: &RefinementSettings,
+        gatherer: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<StopReason, Error> {
+        let before = self.samples.reflected.clone();
+        if self.gather(&self.all_vertices(), None, gatherer, progress)?.is_break() {
+            return Ok(StopReason::Cancelled);
+        }
+        self.relative_change = self.samples.relative_change(&before);
+        self.refine(settings, gatherer, progress)
+    }
+
+    /// The next bounce by differences: makes what was reached the source, gathers both it and the
+    /// source before at all vertices, and adds ρ (E_new − E_old). The same rays see both, so noise
+    /// is that of the small difference, and few rays do.
+    pub fn gather_difference(
+        &mut self,
+        gatherer: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<StopReason, Error> {
+        let before = self.samples.reflected.clone();
+        let next = Cow::Owned(self.to_gathered_mesh());
+        let previous = std::mem::replace(&mut self.source, next);
+        self.pass += 1;
+        let flow = self.gather(&self.all_vertices(), Some(&previous), gatherer, progress)?;
+        self.relative_change = self.samples.relative_change(&before);
+        Ok(if flow.is_break() { StopReason::Cancelled } else { StopReason::Converged })
+    }
+
+    /// Splits elements whose surplus is above what `settings` allow and gathers at the new
+    /// vertices, until there are no such elements.
+    pub fn refine(
+        &mut self,
+        settings: &RefinementSettings,
+        gatherer: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<StopReason, Error> {
+        let mut candidates = self.all_elements();
+        let mut is_limited = false;
+        loop {
+            let element_count = self.samples.mesh.element_count();
+            let mut marked = self.mark(&candidates, settings);
+            if marked.is_empty() && candidates.len() < element_count {
+                // Values at buried vertices may have changed with vertices that came later.
+                candidates = self.all_elements();
+                continue;
+            }
+            if marked.is_empty() {
+                let limited = StopReason::Elements;
+                return Ok(if is_limited { limited } else { StopReason::Converged });
+            }
+            // Each split adds three elements.
+            let room = settings.max_elements.saturating_sub(element_count) / 3;
+            if marked.len() > room {
+                is_limited = true;
+                marked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                marked.truncate(room);
+            }
+            if marked.is_empty() {
+                return Ok(StopReason::Elements);
+            }
+            let mut elements: Vec<usize> = marked.into_iter().map(|(_, e)| e).collect();
+            elements.sort_unstable();
+            let new = self.samples.split(&elements)?;
+            self.refinements += 1;
+            candidates = new.elements;
+            if self.gather(&new.vertices, None, gatherer, progress)?.is_break() {
+                return Ok(StopReason::Cancelled);
+            }
+        }
+    }
+
+    /// Those of `candidates` that are to be split, each with its refinement indicator.
+    fn mark(&self, candidates: &[usize], settings: &RefinementSettings) -> Vec<(f64, usize)> {
+        let candidates = candidates.iter().copied();
+        if self.refinements < settings.initial_subdivisions {
+            return candidates
+                .filter(|&e| self.samples.is_splittable(e))
+                .map(|e| (1.0, e))
+                .collect();
+        }
+        let source = self.source.radiosity_field();
+        candidates
+            .map(|e| (refinement_indicator(&self.samples, &source, &self.scale, settings, e), e))
+            .filter(|&(indicator, _)| indicator > 1.0)
+            .collect()
+    }
+
+    /// Gathers the source at `vertices`, and gives buried ones extrapolated values. With a
+    /// `previous` source, only the difference from that is added.
+    ///
+    /// A vertex whose gather point is buried is tried again in another element around it, after
+    /// all the others.
+    fn gather(
+        &mut self,
+        vertices: &[u32],
+        previous: Option<&GatheredMesh>,
+        gatherer: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<ControlFlow<()>, Error> {
+        let SampledMesh { mesh, vertices: mesh_vertices, reflected, buried, .. } =
+            &mut self.samples;
+        let points = VertexGatherPoints::new(mesh, mesh_vertices);
+        let source = self.source.radiosity_field();
+        let previous = previous.map(GatheredMesh::radiosity_field);
+        let mut pending = gathering_vertices(vertices, &points, buried, previous.is_some());
+        let total = pending.len();
+        let mut gathered = 0;
+        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
+        let mut attempt = 0;
+        while !pending.is_empty() {
+            let mut retries = vec![];
+            let mut queue = &pending[..];
+            while !queue.is_empty() {
+                let batch = batch_sizer.next(&mut queue, |vertices| {
+                    let places = vertices.iter().map(|&v| points.point(v, attempt)).collect();
+                    gather_batch(vertices, places, &source, previous.as_ref(), gatherer)
+                })?;
+                let unresolved = batch.unresolved(&points, attempt);
+                gathered += batch.vertices.len() - unresolved.len();
+                retries.extend(unresolved);
+                batch.apply(&points, reflected, buried);
+                self.gather_count += batch.vertices.len() as u64;
+                let report = Progress {
+                    pass: self.pass,
+                    refinements: self.refinements,
+                    elements: mesh.element_count(),
+                    gathered,
+                    total,
+                };
+                if progress(&report).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+            pending = retries;
+            attempt += 1;
+        }
+        extrapolate_into_buried(&mut self.samples);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn all_vertices(&self) -> Vec<u32> {
+        (0..self.samples.reflected.len() as u32).collect()
+    }
+
+    fn all_elements(&self) -> Vec<usize> {
+        (0..self.samples.mesh.element_count()).collect()
+    }
+}
+
+/// Those of `vertices` that have something to gather: not where nothing is reflected, nor, for
+/// differences, where a value is extrapolated.
+fn gathering_vertices(
+    vertices: &[u32],
+    points: &VertexGatherPoints,
+    buried: &[bool],
+    differences: bool,
+) -> Vec<u32> {
+    let gathers =
+        |v: u32| points.reflectance(v) != Rgb::ZERO && !(differences && buried[v as usize]);
+    vertices.iter().copied().filter(|&v| gathers(v)).collect()
+}
+
+/// Gathers one point for each of `vertices`.
+fn gather_batch<'v>(
+    vertices: &'v [u32],
+    places: Vec<GatherPoint>,
+    source: &RadiosityField,
+    previous: Option<&RadiosityField>,
+    gatherer: &mut dyn Gather,
+) -> Result<Batch<'v>, Error> {
+    let samples = gatherer.gather(source, &places)?;
+    let previous = match previous {
+        Some(previous) => Some(gatherer.gather(previous, &places)?),
+        None => None,
+    };
+    Ok(Batch { vertices, samples, previous })
+}
+
+impl Batch<'_> {
+    /// Vertices whose point of this attempt is buried and that have another one.
+    fn unresolved(&self, points: &VertexGatherPoints, attempt: usize) -> Vec<u32> {
+        let pairs = self.vertices.iter().zip(&self.samples);
+        pairs
+            .filter(|&(&v, sample)| points.is_buried(v, sample) && points.has_more(v, attempt))
+            .map(|(&v, _)| v)
+            .collect()
+    }
+
+    /// Writes what was gathered to the `reflected` radiosity of the vertices, and which of them are
+    /// `buried`.
+    fn apply(&self, points: &VertexGatherPoints, reflected: &mut [Rgb], buried: &mut [bool]) {
+        match &self.previous {
+            Some(previous) => self.apply_difference(previous, points, reflected),
+            None => self.apply_samples(points, reflected, buried),
+        }
+    }
+
+    /// ρ E where a vertex is not buried.
+    fn apply_samples(
+        &self,
+        points: &VertexGatherPoints,
+        reflected: &mut [Rgb],
+        buried: &mut [bool],
+    ) {
+        for (&v, sample) in self.vertices.iter().zip(&self.samples) {
+            let is_buried = points.is_buried(v, sample);
+            buried[v as usize] = is_buried;
+            if !is_buried {
+                reflected[v as usize] = points.reflectance(v) * sample.irradiance;
+            }
+        }
+    }
+
+    /// ρ (E − E_previous) added where a vertex is not buried; never below zero.
+    fn apply_difference(
+        &self,
+        previous: &[IrradianceSample],
+        points: &VertexGatherPoints,
+        reflected: &mut [Rgb],
+    ) {
+        for (k, (&v, sample)) in self.vertices.iter().zip(&self.samples).enumerate() {
+            if points.is_buried(v, sample) {
+                continue;
+            }
+            let difference = sample.irradiance - previous[k].irradiance;
+            let value = &mut reflected[v as usize];
+            *value = (*value + points.reflectance(v) * difference).max(Rgb::ZERO);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::RayGather;
+
+    #[test]
+    fn gather_difference_equals_full_gather_of_new_source() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let emitted = |e| mesh.material(mesh.element(e)).exitance;
+        let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(emitted).collect();
+        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        // Nothing is split: vertices keep their gather points.
+        let settings = RefinementSettings::new(1e9);
+        let mut rays = RayGather::new(&mesh, 256).unwrap();
+        let mut proceed = |_: &Progress| ControlFlow::Continue(());
+        let mut by_difference = AdaptiveGather::new(mesh, &light);
+        by_difference.gather_pass(&settings, &mut rays, &mut proceed).unwrap();
+        let first = by_difference.samples.reflected.clone();
+        let mut in_full = by_difference.clone();
+        by_difference.gather_difference(&mut rays, &mut proceed).unwrap();
+        in_full.promote_to_source();
+        let all = in_full.all_vertices();
+        let _ = in_full.gather(&all, None, &mut rays, &mut proceed).unwrap();
+        let brightest = first.iter().map(|b| b.length()).fold(0.0, f64::max);
+        let mut change = 0.0f64;
+        for (v, before) in first.iter().enumerate() {
+            let [a, b] = [&by_difference, &in_full].map(|state| state.samples.reflected[v]);
+            // Sums of 256 rays, rounded in another order; buried values follow from neighbours.
+            assert!(a.distance(b) < 1e-12 * brightest, "vertex {v}: {a} {b}");
+            change = change.max(a.distance(*before));
+        }
+        assert!(change > 0.05 * brightest, "a second bounce changes: {change} of {brightest}");
+        assert!(by_difference.relative_change > 0.05);
+    }
+}

@@ -1,0 +1,139 @@
+//! Gather points of vertices, and of other points on surfaces.
+//!
+//! A vertex lies where elements meet, often in an edge or corner of the scene, where what is seen
+//! is undefined. So it gathers from a point next to it: a small step towards the centroid of one of
+//! its elements, and a smaller one along the normal.
+//!
+//! ```text
+//!       ●  gather point: SURFACE_LIFT · size above the element
+//!       │
+//!   v───┼────── element ──────      │v → ·│ = CORNER_INSET · distance to the centroid
+//! ```
+
+use glam::DVec3;
+
+use super::{GatherPoint, IrradianceSample};
+use crate::mesh::Mesh;
+use crate::scene::{Rgb, Scene};
+use crate::vertex::keys::Vertices;
+use crate::visibility::{buried, offset};
+
+/// The elements around every vertex, and the gather points that follow from them.
+pub(super) struct VertexGatherPoints<'a> {
+    mesh: &'a Mesh,
+    vertices: &'a Vertices,
+    /// Elements with each vertex on their outline: those of vertex v from `first[v]` to
+    /// `first[v + 1]`.
+    around: Vec<u32>,
+    first: Vec<u32>,
+    /// Unit normals, weighted by area over the elements around a vertex.
+    normals: Vec<DVec3>,
+    /// Square root of the smallest element's area around each vertex, scene unit.
+    sizes: Vec<f64>,
+    offset: SurfaceOffset,
+}
+
+/// How far gather points of a scene lie above its surfaces.
+pub(crate) struct SurfaceOffset {
+    /// Least distance, scene unit: far above the rounding of coordinates.
+    min_offset: f64,
+}
+
+/// How far a vertex's gather point lies inside an element: a share of the way to its centroid. It
+/// keeps away from edges, whose two sides see different things. Chosen by hand; no measurement
+/// kept.
+const CORNER_INSET: f64 = 0.02;
+
+/// Elements around a vertex in which a gather point is tried, at most. Chosen by hand.
+const MAX_ATTEMPTS: usize = 6;
+
+impl<'a> VertexGatherPoints<'a> {
+    pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> VertexGatherPoints<'a> {
+        let count = vertices.positions.len();
+        let mut first = vec![0u32; count + 1];
+        for (_, outline) in vertices.outlines.iter() {
+            for &v in outline {
+                first[v as usize + 1] += 1;
+            }
+        }
+        for v in 0..count {
+            first[v + 1] += first[v];
+        }
+        let mut next = first.clone();
+        let mut around = vec![0; first[count] as usize];
+        let mut normals = vec![DVec3::ZERO; count];
+        let mut sizes = vec![f64::INFINITY; count];
+        for (e, outline) in vertices.outlines.iter() {
+            let node = mesh.element(e);
+            let area = mesh.area(node);
+            for v in outline.iter().map(|&v| v as usize) {
+                around[next[v] as usize] = e as u32;
+                next[v] += 1;
+                normals[v] += mesh.normal(node) * area;
+                sizes[v] = sizes[v].min(area.sqrt());
+            }
+        }
+        for normal in &mut normals {
+            *normal = normal.normalize_or(DVec3::Z);
+        }
+        let offset = SurfaceOffset::new(mesh.scene());
+        VertexGatherPoints { mesh, vertices, around, first, normals, sizes, offset }
+    }
+
+    fn around(&self, v: u32) -> &[u32] {
+        let v = v as usize;
+        &self.around[self.first[v] as usize..self.first[v + 1] as usize]
+    }
+
+    /// Reflectance of the surface that vertex `v` is on.
+    pub fn reflectance(&self, v: u32) -> Rgb {
+        self.mesh.material(self.mesh.element(self.around(v)[0] as usize)).reflectance
+    }
+
+    /// The gather point of vertex `v` at its `attempt`: in another element around it each time.
+    pub fn point(&self, v: u32, attempt: usize) -> GatherPoint {
+        let around = self.around(v);
+        let step = around.len().div_ceil(MAX_ATTEMPTS);
+        let element = self.mesh.element(around[attempt * step % around.len()] as usize);
+        let position = self.vertices.positions[v as usize];
+        let inset = (self.mesh.centroid(element) - position) * CORNER_INSET;
+        let size = self.sizes[v as usize];
+        self.offset.gather_point(position + inset, self.normals[v as usize], size)
+    }
+
+    /// Whether vertex `v` has another gather point after that of `attempt`.
+    pub fn has_more(&self, v: u32, attempt: usize) -> bool {
+        let around = self.around(v).len();
+        attempt + 1 < around.div_ceil(around.div_ceil(MAX_ATTEMPTS))
+    }
+
+    /// Whether `sample`, gathered for vertex `v`, is that of a buried point.
+    pub fn is_buried(&self, v: u32, sample: &IrradianceSample) -> bool {
+        is_buried(sample, self.sizes[v as usize])
+    }
+}
+
+impl SurfaceOffset {
+    pub fn new(scene: &Scene) -> SurfaceOffset {
+        SurfaceOffset { min_offset: offset::MIN_LIFT_ULPS * scene.coordinate_ulp() }
+    }
+
+    /// The gather point above `position` on a surface with elements of `size`: the square root of
+    /// their area, scene unit.
+    pub fn gather_point(&self, position: DVec3, normal: DVec3, size: f64) -> GatherPoint {
+        let height = (offset::SURFACE_LIFT * size).max(self.min_offset);
+        GatherPoint {
+            position: position + normal * height,
+            normal,
+            near: height * offset::NEAR_OF_LIFT,
+        }
+    }
+}
+
+/// Whether a point on an element of `size` (square root of its area, scene unit) lies inside
+/// something that touches the surface: it sees almost nothing but backs, and those nearer than the
+/// element is large; or nothing else at all.
+pub(crate) fn is_buried(sample: &IrradianceSample, size: f64) -> bool {
+    let is_near = sample.inverse_distance * size > 1.0;
+    sample.backface > buried::BURIED && (is_near || sample.backface > buried::INSIDE)
+}

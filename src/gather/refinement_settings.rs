@@ -1,0 +1,78 @@
+//! Settings of the adaptive gather, and what values they may have.
+
+use crate::error::{Error, ErrorKind};
+
+/// Settings of [`gather_at_vertices`](super::gather_at_vertices): where elements are split, how
+/// far, and how often all vertices gather.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefinementSettings {
+    /// An element is split where the value gathered in the middle of a side differs from the mean
+    /// of the side's ends by more than this share of the element's radiosity, in (0, 1]. Splitting
+    /// leaves about a quarter of that. The allowance grows towards small elements: 1.7 times for
+    /// every halving below the longest edge of the mesh given.
+    pub surplus_tolerance: f64,
+    /// Elements whose longest edge is at most this long are not split; scene unit, above 0.
+    pub min_edge: f64,
+    /// After the last pass, an element is split once more where the quadratic interpolant of the
+    /// gathered values differs from it by more than this share of its radiosity. The new vertices
+    /// get the interpolant's values and do not gather. Above 0; infinity for never.
+    pub interpolation_tolerance: f64,
+    /// Elements at most. Those with the largest surplus are split first.
+    pub max_elements: usize,
+    /// Uniform subdivisions of all elements before adaptive refinement starts.
+    pub initial_subdivisions: u32,
+    /// How often all vertices gather: in the first pass the light given, in each further one what
+    /// the pass before it found, so each adds a bounce. 0 counts as 1.
+    pub gather_passes: u32,
+}
+
+impl RefinementSettings {
+    /// Default of [`RefinementSettings::surplus_tolerance`]: a share of the radiosity, chosen by
+    /// hand; no measurement kept.
+    pub const DEFAULT_SURPLUS_TOLERANCE: f64 = 0.02;
+
+    /// Default of [`RefinementSettings::interpolation_tolerance`]: a share of the radiosity, chosen
+    /// by hand; no measurement kept.
+    pub const DEFAULT_INTERPOLATION_TOLERANCE: f64 = 0.0025;
+
+    /// Default of [`RefinementSettings::max_elements`], chosen by hand; no measurement kept.
+    pub const DEFAULT_MAX_ELEMENTS: usize = 1 << 19;
+
+    /// Refines down to elements with edges of `min_edge` (scene unit), with the default tolerances,
+    /// no uniform subdivision and one pass.
+    pub fn new(min_edge: f64) -> RefinementSettings {
+        RefinementSettings {
+            surplus_tolerance: RefinementSettings::DEFAULT_SURPLUS_TOLERANCE,
+            min_edge,
+            interpolation_tolerance: RefinementSettings::DEFAULT_INTERPOLATION_TOLERANCE,
+            max_elements: RefinementSettings::DEFAULT_MAX_ELEMENTS,
+            initial_subdivisions: 0,
+            gather_passes: 1,
+        }
+    }
+
+    /// Whether [`gather_at_vertices`](super::gather_at_vertices) accepts these settings: worth
+    /// asking before a long solve.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a surplus tolerance outside (0, 1], or a smallest edge or an
+    /// interpolation tolerance that is not above 0.
+    pub fn check(&self) -> Result<(), Error> {
+        let bad = |place: String, found: &str, remedy: &str| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        if !(self.surplus_tolerance > 0.0 && self.surplus_tolerance <= 1.0) {
+            let place = format!("surplus tolerance {}", self.surplus_tolerance);
+            return bad(place, "out of range", "use a share above 0 and up to 1");
+        }
+        if self.min_edge.is_nan() || self.min_edge <= 0.0 {
+            let place = format!("smallest element {}", self.min_edge);
+            return bad(place, "not above 0", "use a length in the scene's unit");
+        }
+        if self.interpolation_tolerance.is_nan() || self.interpolation_tolerance <= 0.0 {
+            let place = format!("interpolation tolerance {}", self.interpolation_tolerance);
+            return bad(place, "not above 0", "use a share above 0, or infinity for none");
+        }
+        Ok(())
+    }
+}

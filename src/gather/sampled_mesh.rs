@@ -1,0 +1,143 @@
+//! The mesh that an adaptive gather refines, with a value at every vertex.
+//!
+//! Elements are split into four by the midpoints of their sides. Vertices are known by keys that do
+//! not depend on the mesh (see `vertex::keys`), so values carry over from a mesh to the finer one.
+//! A new vertex starts with the mean of the two it lies between, until it gathers.
+
+use glam::DVec3;
+
+use super::RadiosityField;
+use crate::error::Error;
+use crate::mesh::{Mesh, SurfaceTopology};
+use crate::scene::Rgb;
+use crate::vertex::VertexMesh;
+use crate::vertex::hanging_nodes::HangingNodes;
+use crate::vertex::keys::Vertices;
+
+/// A mesh with reflected radiosity at its vertices.
+#[derive(Clone)]
+pub(crate) struct SampledMesh {
+    pub mesh: Mesh,
+    pub topology: SurfaceTopology,
+    pub vertices: Vertices,
+    /// Reflected radiosity B − E at the vertices, W/m² per channel.
+    pub reflected: Vec<Rgb>,
+    /// Whether a vertex is buried: all its gather points lie inside something that touches its
+    /// surface. Its value is extrapolated from its neighbours.
+    pub buried: Vec<bool>,
+}
+
+/// What splitting elements made.
+pub(super) struct NewParts {
+    /// Vertices that were not there before, ascending.
+    pub vertices: Vec<u32>,
+    /// The elements in the place of those split, ascending.
+    pub elements: Vec<usize>,
+}
+
+impl SampledMesh {
+    /// `mesh` with the values that `field`, of the same scene, has at its vertices.
+    pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
+        let topology = SurfaceTopology::new(mesh.scene());
+        let vertices = Vertices::new(&mesh, &topology);
+        let value = |&(t, [u, v]): &(usize, [f64; 2])| field.reflected_at(t, u, v);
+        let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
+        let buried = vec![false; reflected.len()];
+        SampledMesh { mesh, topology, vertices, reflected, buried }
+    }
+
+    /// The vertices at the corners of each element, by element.
+    pub fn corners(&self) -> &[[u32; 3]] {
+        &self.vertices.corners
+    }
+
+    /// Whether element `e` may be split: not at the finest level, and not where nothing is
+    /// reflected.
+    pub fn is_splittable(&self, e: usize) -> bool {
+        let node = self.mesh.element(e);
+        self.mesh.cell(node).level < Mesh::MAX_DEPTH
+            && self.mesh.material(node).reflectance != Rgb::ZERO
+    }
+
+    /// Splits `elements` (ascending) into four each. Values of old vertices are kept.
+    pub fn split(&mut self, elements: &[usize]) -> Result<NewParts, Error> {
+        let finer = self.mesh.split(elements)?;
+        let vertices = Vertices::new(&finer, &self.topology);
+        let count = vertices.positions.len();
+        let mut reflected = vec![Rgb::ZERO; count];
+        let mut buried = vec![false; count];
+        let mut is_new = vec![false; count];
+        for (v, key) in vertices.keys.iter().enumerate() {
+            match self.vertices.index_of(key) {
+                Some(old) => {
+                    reflected[v] = self.reflected[old as usize];
+                    buried[v] = self.buried[old as usize];
+                }
+                None => is_new[v] = true,
+            }
+        }
+        let mut new_elements = vec![];
+        for (k, &e) in elements.iter().enumerate() {
+            // Each split before this one has put four elements in the place of one.
+            let first_child = e + 3 * k;
+            new_elements.extend(first_child..first_child + 4);
+            let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
+            // The corners of the fourth child are the middles of the sides opposite a, b and c.
+            let midsides = vertices.corners[first_child + 3].map(|v| v as usize);
+            for (m, sum_of_ends) in midsides.into_iter().zip([b + c, c + a, a + b]) {
+                if is_new[m] {
+                    reflected[m] = sum_of_ends / 2.0;
+                }
+            }
+        }
+        self.mesh = finer;
+        self.vertices = vertices;
+        self.reflected = reflected;
+        self.buried = buried;
+        let new_vertices = (0..count as u32).filter(|&v| is_new[v as usize]).collect();
+        Ok(NewParts { vertices: new_vertices, elements: new_elements })
+    }
+
+    /// Root mean square over the elements of how far the values at their corners are from
+    /// `previous` (of the same mesh), over the root mean square of the values.
+    pub fn relative_change(&self, previous: &[Rgb]) -> f64 {
+        let mut difference = 0.0;
+        let mut total = 0.0;
+        for (e, corners) in self.corners().iter().enumerate() {
+            let area = self.mesh.area(self.mesh.element(e));
+            for v in corners.map(|v| v as usize) {
+                difference += area * (self.reflected[v] - previous[v]).length_squared();
+                total += area * self.reflected[v].length_squared();
+            }
+        }
+        if total > 0.0 { (difference / total).sqrt() } else { 0.0 }
+    }
+
+    /// The surface with what its vertices emit and reflect, without cracks.
+    pub fn vertex_mesh(&self) -> VertexMesh {
+        let count = self.vertices.positions.len();
+        let mut out = VertexMesh {
+            positions: self.vertices.positions.clone(),
+            normals: vec![DVec3::ZERO; count],
+            radiosity: vec![Rgb::ZERO; count],
+            ..Default::default()
+        };
+        for (e, outline) in self.vertices.outlines.iter() {
+            let node = self.mesh.element(e);
+            let emitted = self.mesh.material(node).exitance;
+            for v in outline.iter().map(|&v| v as usize) {
+                out.normals[v] += self.mesh.normal(node) * self.mesh.area(node);
+                out.radiosity[v] = emitted + self.reflected[v];
+            }
+        }
+        for normal in &mut out.normals {
+            *normal = normal.normalize_or_zero();
+        }
+        let hanging_nodes = HangingNodes::new(&self.mesh, &self.topology, &self.vertices);
+        out.add_elements(&self.mesh, &hanging_nodes, |out, e| {
+            let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
+            corners.iter().sum::<Rgb>() / 3.0
+        });
+        out
+    }
+}
