@@ -95,7 +95,7 @@ impl Row {
         Row { entries, escaped: open, backface: part(&mut rows.iter().map(|r| r.backface)) }
     }
 
-    /// MatrixChecks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
+    /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
     ///
     /// # Errors
     /// [`ErrorKind::FormFactor`] that names `patch` and what is off.

@@ -17,7 +17,7 @@ use crate::geometry::rounding::Apportion;
 /// Smallest and largest resolution of a hemicube's top face, in pixels along an edge.
 pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 2..=4096;
 
-/// MatrixChecks a hemicube resolution: even and within [`RESOLUTIONS`].
+/// Checks a hemicube resolution: even and within [`RESOLUTIONS`].
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] otherwise.

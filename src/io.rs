@@ -1,10 +1,21 @@
-//! Files in and out; nothing outside this room opens one.
+//! Files in and out. No other module of the library opens one, but for saved solver states.
+//!
+//! | format | function | content |
+//! |---|---|---|
+//! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`] | a scene |
+//! | PLY | [`write_ply`] | a mesh with radiosity at its vertices |
+//! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
+//! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
+//! | CSV, Matrix Market | [`write_view_factors`] and others | view factors between groups |
 
+#[cfg(feature = "exr")]
+mod exr;
 mod files;
-mod image;
 mod mtl;
 mod obj;
 mod ply;
+#[cfg(feature = "png")]
+mod png;
 mod text;
 mod tone;
 mod view_factor_tables;
@@ -15,7 +26,10 @@ use std::path::Path;
 
 use crate::error::{Error, ErrorKind};
 
-pub use image::{write_exr, write_png};
+#[cfg(feature = "exr")]
+pub use self::exr::write_exr;
+#[cfg(feature = "png")]
+pub use self::png::write_png;
 pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
 pub use tone::ToneCurve;

@@ -92,13 +92,16 @@ pub use gather::{
     Gather, GatherPoint, GatheredMesh, IrradianceSample, Progress as GatherProgress,
     RadiosityField, RefinementSettings, gather_at_vertices,
 };
+#[cfg(feature = "exr")]
+pub use io::write_exr;
+#[cfg(feature = "png")]
+pub use io::write_png;
 pub use io::{
-    ToneCurve, load_obj, read_obj, write_exr, write_matrix_market, write_ply, write_png,
-    write_view_factor_list, write_view_factors,
+    ToneCurve, load_obj, read_obj, write_matrix_market, write_ply, write_view_factor_list,
+    write_view_factors,
 };
 pub use mesh::{Mesh, NodeId};
-pub use progress::StopReason;
-pub use progress::Timings;
+pub use progress::{StopReason, Timings};
 pub use scene::{Material, Rgb, Scene, Triangle};
 pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver};
 pub use vertex::VertexMesh;

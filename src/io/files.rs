@@ -9,21 +9,21 @@ use crate::error::quoted;
 
 /// Bytes that an OBJ file may have, and all its libraries together: a corner takes at least two, so
 /// the sides of all triangles can be numbered in 32 bits.
-pub(super) const MOST_BYTES: u64 = 1 << 30;
+pub(super) const MAX_BYTES: u64 = 1 << 30;
 
 /// The files that `mtllib` lines can name, from the folder of the OBJ file.
-pub(super) enum Files<'a> {
+pub(super) enum LibrarySource<'a> {
     Folder(&'a Path),
     /// Name and content of each.
-    Given(&'a [(&'a str, &'a [u8])]),
+    Memory(&'a [(&'a str, &'a [u8])]),
 }
 
-impl Files<'_> {
+impl LibrarySource<'_> {
     /// `name` with the folder before it.
     pub fn path(&self, name: &str) -> PathBuf {
         match self {
-            Files::Folder(folder) => folder.join(name),
-            Files::Given(_) => name.into(),
+            LibrarySource::Folder(folder) => folder.join(name),
+            LibrarySource::Memory(_) => name.into(),
         }
     }
 
@@ -35,8 +35,8 @@ impl Files<'_> {
             return Err(io::Error::new(ErrorKind::PermissionDenied, found));
         }
         match self {
-            Files::Folder(_) => read(&self.path(name), most),
-            Files::Given(files) => {
+            LibrarySource::Folder(_) => read(&self.path(name), most),
+            LibrarySource::Memory(files) => {
                 let named = |file: &&(&str, _)| Path::new(file.0) == Path::new(name);
                 let file = files.iter().find(named).ok_or(ErrorKind::NotFound)?;
                 limited(file.1.into(), most)
@@ -47,7 +47,7 @@ impl Files<'_> {
     /// Which libraries there are.
     pub fn libraries(&self) -> String {
         let (place, mut names): (_, Vec<String>) = match self {
-            Files::Folder(folder) => {
+            LibrarySource::Folder(folder) => {
                 let folder = if *folder == Path::new("") { Path::new(".") } else { folder };
                 let files = fs::read_dir(folder).into_iter().flatten().flatten();
                 let libraries = files
@@ -56,7 +56,7 @@ impl Files<'_> {
                 let name = |f: PathBuf| Some(f.file_name()?.to_string_lossy().into_owned());
                 (format!("the folder '{}'", folder.display()), libraries.filter_map(name).collect())
             }
-            Files::Given(files) => {
+            LibrarySource::Memory(files) => {
                 ("what was given".into(), files.iter().map(|file| file.0.into()).collect())
             }
         };

@@ -1,11 +1,21 @@
-//! Materials of MTL files: `Kd` and `Ke`; what else could change the light is warned about.
+//! Materials of MTL files.
+//!
+//! | statement | meaning here |
+//! |---|---|
+//! | `newmtl` | begins a material |
+//! | `Kd` | diffuse reflectance ρ per channel, linear |
+//! | `Ke` | emitted radiance L per channel: exitance π L |
+//! | `d`, `Tr`, `map_d` | transparency: not modelled, warned about |
+//! | `map_Kd`, `map_Ke` | textures: not modelled, warned about |
+//!
+//! All others do not change diffuse light, and are skipped.
 
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
 use std::io;
 use std::path::PathBuf;
 
-use super::files::{Files, MOST_BYTES};
+use super::files::{LibrarySource, MAX_BYTES};
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Material, Rgb};
@@ -46,26 +56,27 @@ impl Library {
     }
 
     /// Loads the files that a `mtllib` line names: one name, which may contain spaces, or several.
-    pub fn load(&mut self, line: &Line, names: &str, files: &Files) -> Result<(), Error> {
+    pub fn load(&mut self, line: &Line, names: &str, files: &LibrarySource) -> Result<(), Error> {
         if names.is_empty() {
-            return Err(line.refuse("no file name", "write `mtllib FILE`"));
+            return Err(line.parse_error("no file name", "write `mtllib FILE`"));
         }
-        let whole = self.read(names, files);
-        if whole.is_ok() || names.split_whitespace().nth(1).is_none() {
-            return self.take(line, names, whole, files);
+        let as_one_name = self.read(names, files);
+        if as_one_name.is_ok() || names.split_whitespace().nth(1).is_none() {
+            return self.take(line, names, as_one_name, files);
         }
-        names.split_whitespace().try_for_each(|name| {
+        for name in names.split_whitespace() {
             let text = self.read(name, files);
-            self.take(line, name, text, files)
-        })
+            self.take(line, name, text, files)?;
+        }
+        Ok(())
     }
 
     /// The text of file `name`; nothing if it is loaded already.
-    fn read(&self, name: &str, files: &Files) -> io::Result<String> {
-        match self.files.contains(&files.path(name)) {
-            true => Ok(String::new()),
-            false => files.read(name, MOST_BYTES.saturating_sub(self.bytes)),
+    fn read(&self, name: &str, files: &LibrarySource) -> io::Result<String> {
+        if self.files.contains(&files.path(name)) {
+            return Ok(String::new());
         }
+        files.read(name, MAX_BYTES.saturating_sub(self.bytes))
     }
 
     /// Takes in the `text` of file `name`.
@@ -74,11 +85,11 @@ impl Library {
         line: &Line,
         name: &str,
         text: io::Result<String>,
-        files: &Files,
+        files: &LibrarySource,
     ) -> Result<(), Error> {
         let text = text.map_err(|e| {
             let found = format!("{} cannot be read: {e}", quoted(&[name]));
-            line.refuse_as(ErrorKind::File, found, files.libraries()).with_source(e)
+            line.parse_error_as(ErrorKind::File, found, files.libraries()).with_source(e)
         })?;
         self.bytes += text.len() as u64;
         let (path, start) = (files.path(name), self.entries.len());
@@ -97,7 +108,9 @@ impl Library {
             return Ok(());
         }
         let Some(entry) = self.entries.get_mut(start..).and_then(<[_]>::last_mut) else {
-            return Err(line.refuse(format!("`{keyword}` of no material"), "begin with `newmtl`"));
+            return Err(
+                line.parse_error(format!("`{keyword}` of no material"), "begin with `newmtl`")
+            );
         };
         match keyword {
             "Kd" => entry.reflectance = Some(reflectance(line, &entry.name, rest)?),
@@ -106,8 +119,9 @@ impl Library {
             "map_d" => entry.transparent = true,
             _ => {
                 let number = words(rest).last().and_then(finite);
-                let x = number.ok_or_else(|| refuse(line, &entry.name, "a finite number"))?;
-                // Files disagree about which end of `Tr` is opaque.
+                let x =
+                    number.ok_or_else(|| unusable_value(line, &entry.name, "a finite number"))?;
+                // LibrarySource disagree about which end of `Tr` is opaque.
                 entry.transparent |= x < 1.0 && (keyword == "d" || x > 0.0);
             }
         }
@@ -116,7 +130,7 @@ impl Library {
 
     fn begin(&mut self, line: &Line, name: &str) -> Result<(), Error> {
         if name.is_empty() {
-            return Err(line.refuse("a material without a name", "write `newmtl NAME`"));
+            return Err(line.parse_error("a material without a name", "write `newmtl NAME`"));
         }
         if self.by_name.insert(name.into(), self.entries.len() as u32).is_some() {
             self.redefined.push(name.into());
@@ -163,7 +177,7 @@ fn reflectance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
     let rho = colour(line, name, rest)?;
     if rho.to_array().iter().any(|x| !(0.0..1.0).contains(x)) {
         let right = "a diffuse reflectance of at least 0 and below 1 in each channel";
-        return Err(refuse(line, name, right));
+        return Err(unusable_value(line, name, right));
     }
     Ok(rho)
 }
@@ -172,7 +186,7 @@ fn reflectance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
 fn exitance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
     let exitance = PI * colour(line, name, rest)?;
     if !exitance.is_finite() || exitance.min_element() < 0.0 {
-        return Err(refuse(line, name, "a radiance of at least 0 in each channel"));
+        return Err(unusable_value(line, name, "a radiance of at least 0 in each channel"));
     }
     Ok(exitance)
 }
@@ -181,16 +195,19 @@ fn exitance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
 fn colour(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
     if let Some(form @ ("spectral" | "xyz")) = words(rest).next() {
         let found = format!("material {}: unsupported form `{form}`", quoted(&[name]));
-        return Err(line.refuse(found, "write linear r g b"));
+        return Err(line.parse_error(found, "write linear r g b"));
     }
     let numbers: Option<Vec<f64>> = words(rest).take(4).map(finite).collect();
     match numbers.as_deref() {
         Some(&[grey]) => Ok(Rgb::splat(grey)),
         Some(&[r, g, b]) => Ok(Rgb::new(r, g, b)),
-        _ => Err(refuse(line, name, "three finite numbers r g b, or one for all three")),
+        _ => Err(unusable_value(line, name, "three finite numbers r g b, or one for all three")),
     }
 }
 
-fn refuse(line: &Line, name: &str, right: &str) -> Error {
-    line.refuse(format!("material {}: unusable value", quoted(&[name])), format!("write {right}"))
+fn unusable_value(line: &Line, name: &str, right: &str) -> Error {
+    line.parse_error(
+        format!("material {}: unusable value", quoted(&[name])),
+        format!("write {right}"),
+    )
 }

@@ -1,4 +1,9 @@
 //! Scenes from Wavefront OBJ files and their MTL libraries.
+//!
+//! One pass over the lines collects positions, and faces with the group, material and smoothing
+//! group that are current at their line ([`ObjParser`]). All numbers are checked there, so that an
+//! error names its line. Then faces are cut into triangles and the scene is made, with a warning for
+//! each kind of thing that was skipped or replaced by a default.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -6,7 +11,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::files::{self, Files, MOST_BYTES};
+use super::files::{self, LibrarySource, MAX_BYTES};
 use super::mtl::Library;
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted};
@@ -25,16 +30,17 @@ const DEFAULT_GROUP: &str = "default";
 /// not used.
 ///
 /// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
-/// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced Visualizer 3.0,
-/// "Grouping"). In one group surfaces have creases at angles above [`crate::Mesh::CREASE_DEGREES`], else
-/// above [`crate::Mesh::COPLANAR_DEGREES`]. Faces before the first `s`, and after one that says nothing
-/// (`s` or `s on`, as some programs write), are as if in a group of their own.
+/// between; `s off` or `s 0` into none (Wavefront, "Object LibrarySource (.obj)", Advanced Visualizer 3.0,
+/// "Grouping"). In one group surfaces have creases at angles above
+/// [`crate::Mesh::CREASE_DEGREES`], else above [`crate::Mesh::COPLANAR_DEGREES`]. Faces before the
+/// first `s`, and after one without a group (`s` or `s on`, as some programs write), are as if in a
+/// group of their own.
 ///
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
 /// material reflect [`Material::DEFAULT_REFLECTANCE`].
 ///
-/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below:
+/// LibrarySource may come from anywhere. MTL files are read from the folder of the OBJ file or below:
 /// absolute names and `..` are refused, so that a scene cannot have other files of the machine (or
 /// of its network) opened. Only regular files are read, of at most 1 GiB, as are all MTL files of a
 /// scene together. Memory stays within forty times the size of the files.
@@ -49,8 +55,8 @@ const DEFAULT_GROUP: &str = "default";
 /// area.
 pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
-    let text = files::read(path, MOST_BYTES);
-    read_text(path, text, &Files::Folder(path.parent().unwrap_or(Path::new(""))))
+    let text = files::read(path, MAX_BYTES);
+    read_text(path, text, &LibrarySource::Folder(path.parent().unwrap_or(Path::new(""))))
 }
 
 /// [`load_obj`] from memory: an OBJ file of this name, for messages, and this content. `libraries`
@@ -63,20 +69,24 @@ pub fn read_obj(
     obj: &[u8],
     libraries: &[(&str, &[u8])],
 ) -> Result<Scene, Error> {
-    read_text(name.as_ref(), files::limited(obj.into(), MOST_BYTES), &Files::Given(libraries))
+    read_text(
+        name.as_ref(),
+        files::limited(obj.into(), MAX_BYTES),
+        &LibrarySource::Memory(libraries),
+    )
 }
 
-fn read_text(path: &Path, text: io::Result<String>, files: &Files) -> Result<Scene, Error> {
+fn read_text(path: &Path, text: io::Result<String>, files: &LibrarySource) -> Result<Scene, Error> {
     let text = text.map_err(|e| {
         let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
         Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
     })?;
-    Scan::of(path, &text, files)?.into_scene(path)
+    ObjParser::parse(path, &text, files)?.into_scene(path)
 }
 
 /// What one pass over the lines finds. Every number is checked here, where its line is known.
 #[derive(Default)]
-struct Scan {
+struct ObjParser {
     positions: Vec<DVec3>,
     /// Of all faces, one after the other, as indices into the positions.
     corners: Vec<u32>,
@@ -108,22 +118,22 @@ struct Face {
     smoothing: Option<u32>,
 }
 
-impl Scan {
-    fn of(path: &Path, text: &str, files: &Files) -> Result<Scan, Error> {
-        let mut scan = Scan::default();
-        text::lines(path, text).try_for_each(|line| scan.line(&line, files))?;
-        if scan.faces.is_empty() {
-            let mut found = format!("no face, {} vertices", scan.positions.len());
-            if scan.unknown > 0 {
-                found += &format!(", {} lines that are not OBJ", scan.unknown);
+impl ObjParser {
+    fn parse(path: &Path, text: &str, files: &LibrarySource) -> Result<ObjParser, Error> {
+        let mut parser = ObjParser::default();
+        text::lines(path, text).try_for_each(|line| parser.line(&line, files))?;
+        if parser.faces.is_empty() {
+            let mut found = format!("no face, {} vertices", parser.positions.len());
+            if parser.unknown > 0 {
+                found += &format!(", {} lines that are not OBJ", parser.unknown);
             }
             let remedy = "give an OBJ file with `v` and `f` lines";
             return Err(Error::new(ErrorKind::Scene, path.display().to_string(), found, remedy));
         }
-        Ok(scan)
+        Ok(parser)
     }
 
-    fn line(&mut self, line: &Line, files: &Files) -> Result<(), Error> {
+    fn line(&mut self, line: &Line, files: &LibrarySource) -> Result<(), Error> {
         let (keyword, rest) = line.keyword();
         match keyword {
             "v" => self.vertex(line, rest)?,
@@ -151,20 +161,23 @@ impl Scan {
         let used = match words.len() {
             3 | 4 => &words[..],
             6 => &words[..3],
-            n => return Err(line.refuse(format!("{n} words after `v`"), "a vertex is `v x y z`")),
+            n => {
+                return Err(
+                    line.parse_error(format!("{n} words after `v`"), "a vertex is `v x y z`")
+                );
+            }
         };
         let mut numbers = [0.0, 0.0, 0.0, 1.0];
         for (number, word) in numbers.iter_mut().zip(used) {
-            let refuse = || {
+            *number = finite(word).ok_or_else(|| {
                 let found = format!("coordinate {}", quoted(&[word]));
-                line.refuse(found, "coordinates must be finite numbers")
-            };
-            *number = finite(word).ok_or_else(refuse)?;
+                line.parse_error(found, "coordinates must be finite numbers")
+            })?;
         }
         let [x, y, z, w] = numbers;
         let position = DVec3::new(x, y, z) / w;
         if !position.is_finite() {
-            return Err(line.refuse(format!("weight {w}"), "leave the fourth number out"));
+            return Err(line.parse_error(format!("weight {w}"), "leave the fourth number out"));
         }
         self.positions.push(position);
         Ok(())
@@ -173,7 +186,7 @@ impl Scan {
     /// `f` and its corners: `v`, `v/vt`, `v//vn` or `v/vt/vn` each.
     fn face(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
         if words(rest).next().is_none() {
-            return Err(line.refuse("a face without corners", "write `f` and three or more"));
+            return Err(line.parse_error("a face without corners", "write `f` and three or more"));
         }
         for word in words(rest) {
             self.corners.push(self.corner(line, word)?);
@@ -187,15 +200,15 @@ impl Scan {
     /// The vertex of a corner, which must exist.
     fn corner(&self, line: &Line, word: &str) -> Result<u32, Error> {
         let bad = |found: &str, remedy: String| {
-            Err(line.refuse(format!("corner {}, {found}", quoted(&[word])), remedy))
+            Err(line.parse_error(format!("corner {}, {found}", quoted(&[word])), remedy))
         };
         let mut parts = word.split('/');
         let vertex = parts.next().unwrap_or(word);
         let Ok(index) = vertex.parse::<i64>() else {
             return bad("not a vertex index", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
         };
-        let whole = |part: &str| part.is_empty() || part.parse::<i64>().is_ok();
-        if parts.clone().count() > 2 || !parts.all(whole) {
+        let is_integer_or_empty = |part: &str| part.is_empty() || part.parse::<i64>().is_ok();
+        if parts.clone().count() > 2 || !parts.all(is_integer_or_empty) {
             return bad("not whole numbers", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
         }
         if index == 0 {
@@ -239,7 +252,7 @@ impl Scan {
             }
             group => Some(group.parse().map_err(|_| {
                 let remedy = format!("write `s off`, or `s` and a whole number up to {}", u32::MAX);
-                line.refuse(format!("smoothing group {}", quoted(&[group])), remedy)
+                line.parse_error(format!("smoothing group {}", quoted(&[group])), remedy)
             })?),
         };
         Ok(())
@@ -247,11 +260,11 @@ impl Scan {
 
     fn use_material(&self, line: &Line, name: &str) -> Result<u32, Error> {
         if name.is_empty() {
-            return Err(line.refuse("no material name", self.library.remedy()));
+            return Err(line.parse_error("no material name", self.library.remedy()));
         }
         let unknown = || {
             let found = format!("unknown material {}", quoted(&[name]));
-            line.refuse(found, self.library.remedy())
+            line.parse_error(found, self.library.remedy())
         };
         self.library.find(name).ok_or_else(unknown)
     }

@@ -28,12 +28,12 @@ impl Line<'_> {
     }
 
     /// The error that `found` stands in this line where `remedy` would be right.
-    pub fn refuse(&self, found: impl Display, remedy: impl Into<String>) -> Error {
-        self.refuse_as(ErrorKind::Scene, found, remedy)
+    pub fn parse_error(&self, found: impl Display, remedy: impl Into<String>) -> Error {
+        self.parse_error_as(ErrorKind::Scene, found, remedy)
     }
 
     /// The same, as an error of `kind`.
-    pub fn refuse_as(
+    pub fn parse_error_as(
         &self,
         kind: ErrorKind,
         found: impl Display,

@@ -1,4 +1,14 @@
-//! RayScene against triangles: the nearest hit, on the CPU.
+//! Rays against triangles on the CPU: the closest hit, and whether a segment is occluded.
+//!
+//! ```text
+//!  ray ──► hierarchy of 32-bit boxes ──► candidate triangles ──► exact test in 64 bits ──► hit
+//!          (scaled to a fixed size,       in any order            ties: lower index
+//!           boxes grown by a margin)
+//! ```
+//!
+//! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is lost
+//! between it and the exact test. Of hits at equal distances the lowest triangle index wins, whatever
+//! the order of traversal, so that results do not depend on the hierarchy.
 
 use std::ops::Range;
 
@@ -17,9 +27,10 @@ use super::wide_bvh::hierarchy;
 #[derive(Debug)]
 pub(crate) struct RayScene {
     bvh: CwBvh,
-    /// See [`plane`].
-    triangles: Vec<[DVec3; 4]>,
+    triangles: Vec<TrianglePlane>,
+    /// Middle of the scene: the hierarchy's origin.
     origin: DVec3,
+    /// From the scene's unit to the hierarchy's.
     scale: f64,
 }
 
@@ -36,17 +47,17 @@ pub(crate) struct Hit {
     pub front: bool,
 }
 
-/// Size of the scene in the hierarchy's own unit. The traversal skips boxes that end nearer than
-/// 1e-4 units: 1e-9 of the scene at this size.
-const SPAN: f64 = 1e5;
+/// Longest side of the scene in the hierarchy's own unit. The traversal of `obvhs` skips boxes that
+/// end nearer than 1e-4 units: 1e-9 of the scene at this size.
+const HIERARCHY_SCENE_SIZE: f64 = 1e5;
 
-/// Boxes grow by this much, 1e-6 of the scene: several roundings of a 32-bit coordinate, so that
-/// no hit is lost between the hierarchy and the exact test.
-const MARGIN: f32 = 1e-6 * SPAN as f32;
+/// Boxes grow by this much on every side, in the hierarchy's unit: 1e-6 of the scene, several roundings
+/// of a 32-bit coordinate (6e-8 each).
+const BOX_MARGIN: f32 = 1e-6 * HIERARCHY_SCENE_SIZE as f32;
 
-/// Barycentric slack that closes the seam between neighbours: far above the rounding of the
-/// test (some 1e-15), far below anything visible.
-const SEAM: f64 = 1e-12;
+/// Barycentric weights down to minus this count as inside, which closes the seam between neighbours:
+/// far above the rounding of the test (some 1e-15), far below anything visible.
+const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
 
 impl RayScene {
     /// For triangles by their corners.
@@ -54,18 +65,18 @@ impl RayScene {
         let corners: Vec<[DVec3; 3]> = corners.collect();
         let bounds = Aabb::from_points(corners.iter().flatten().copied());
         let origin = bounds.centre();
-        let scale = SPAN / bounds.longest_side().max(f64::MIN_POSITIVE);
+        let scale = HIERARCHY_SCENE_SIZE / bounds.longest_side().max(f64::MIN_POSITIVE);
         let local = |p: DVec3| Vec3A::from(((p - origin) * scale).as_vec3());
         let boxes: Vec<Aabb32> = corners
             .iter()
             .map(|c| {
                 let [a, b, c] = c.map(local);
-                let margin = Vec3A::splat(MARGIN);
+                let margin = Vec3A::splat(BOX_MARGIN);
                 Aabb32 { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
             })
             .collect();
         let bvh = hierarchy(&boxes);
-        let triangles = corners.into_iter().map(plane).collect();
+        let triangles = corners.into_iter().map(TrianglePlane::new).collect();
         RayScene { bvh, triangles, origin, scale }
     }
 
@@ -101,7 +112,7 @@ impl RayScene {
             }
             best = Some(hit);
             // Only prunes: rounded up, so that an equal in 32 bits is still looked at.
-            (hit.distance * reach) as f32 * (1.0 + 4.0 * f32::EPSILON) + MARGIN
+            (hit.distance * reach) as f32 * (1.0 + 4.0 * f32::EPSILON) + BOX_MARGIN
         });
         best
     }
@@ -116,7 +127,7 @@ impl RayScene {
         counts: impl Fn(&Hit) -> bool,
     ) -> bool {
         let (mut ray, length) = self.ray(from, direction);
-        ray.tmax = (reach.end * length) as f32 * (1.0 + 4.0 * f32::EPSILON) + MARGIN;
+        ray.tmax = (reach.end * length) as f32 * (1.0 + 4.0 * f32::EPSILON) + BOX_MARGIN;
         let mut blocked = false;
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
             let triangle = self.bvh.primitive_indices[id] as usize;
@@ -147,8 +158,8 @@ impl RayScene {
         direction: DVec3,
         reach: Range<f64>,
     ) -> Option<Hit> {
-        let [a, normal, second, third] = self.triangles[triangle];
-        let (facing, to) = (normal.dot(direction), a - from);
+        let TrianglePlane { corner, normal, gradients } = self.triangles[triangle];
+        let (facing, to) = (normal.dot(direction), corner - from);
         // Most are too far off or behind, which is told without a division. Written so that NaN is no
         // hit, as of a line in the plane.
         let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
@@ -157,23 +168,37 @@ impl RayScene {
         }
         let distance = rise / steep;
         let at = direction * distance - to;
-        let (u, v) = (at.dot(second), at.dot(third));
-        let inside = u >= -SEAM && v >= -SEAM && u + v <= 1.0 + SEAM;
+        let (u, v) = (at.dot(gradients[0]), at.dot(gradients[1]));
+        let inside = u >= -BARYCENTRIC_TOLERANCE
+            && v >= -BARYCENTRIC_TOLERANCE
+            && u + v <= 1.0 + BARYCENTRIC_TOLERANCE;
         inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
     }
 }
 
-/// First corner and normal (of any length) of a triangle, and the gradients of its barycentric
-/// weights: of its second and of its third corner.
-fn plane([a, b, c]: [DVec3; 3]) -> [DVec3; 4] {
-    let (u, v) = (b - a, c - a);
-    // A length of the order of one keeps squares of tiny and of huge triangles within range.
-    let size = u.length().max(v.length()).max(f64::MIN_POSITIVE);
-    let (u, v) = (u / size, v / size);
-    let normal = u.cross(v);
-    let square = normal.length_squared();
-    let gradient = |edge: DVec3| if square > 0.0 { edge / (square * size) } else { DVec3::ZERO };
-    [a, normal, gradient(v.cross(normal)), gradient(normal.cross(u))]
+/// A triangle, prepared for intersection.
+#[derive(Clone, Copy, Debug)]
+struct TrianglePlane {
+    corner: DVec3,
+    /// On the front; of any length.
+    normal: DVec3,
+    /// Gradients of the barycentric weights of the second and third corner.
+    gradients: [DVec3; 2],
+}
+
+impl TrianglePlane {
+    fn new([a, b, c]: [DVec3; 3]) -> TrianglePlane {
+        let (u, v) = (b - a, c - a);
+        // A length of the order of one keeps squares of tiny and of huge triangles within range.
+        let size = u.length().max(v.length()).max(f64::MIN_POSITIVE);
+        let (u, v) = (u / size, v / size);
+        let normal = u.cross(v);
+        let square = normal.length_squared();
+        let gradient =
+            |edge: DVec3| if square > 0.0 { edge / (square * size) } else { DVec3::ZERO };
+        let gradients = [gradient(v.cross(normal)), gradient(normal.cross(u))];
+        TrianglePlane { corner: a, normal, gradients }
+    }
 }
 
 #[cfg(test)]
@@ -181,7 +206,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_front_or_back_is_found_and_the_ignored_is_not() {
+    fn closest_hit_is_the_nearest_side_that_is_not_ignored() {
         let at = |z: f64| [DVec3::new(0., 0., z), DVec3::new(1., 0., z), DVec3::new(0., 1., z)];
         let rays = RayScene::new([at(2.0), at(1.0), at(1.0)].into_iter());
         let from = DVec3::new(0.2, 0.3, 0.0);
@@ -196,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn no_ray_slips_through_a_seam() {
+    fn rays_hit_along_seams() {
         // A fan of thin triangles tiles the square; every ray through it hits, also along seams.
         let rim = |k: usize| {
             let a = k as f64 / 100.0 * std::f64::consts::TAU;

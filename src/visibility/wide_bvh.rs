@@ -1,22 +1,31 @@
-//! A hierarchy of boxes for rays, shallow whatever the boxes are.
+//! The hierarchy of boxes for rays: eight-wide, and shallow whatever the boxes are.
+//!
+//! ```text
+//! boxes ──► binary tree by the surface area heuristic ──► eight-wide, compressed (obvhs' CwBvh)
+//!           at most 31 levels; halves where the heuristic
+//!           tells nothing apart or levels run out
+//! ```
+//!
+//! Merging neighbours from below takes quadratic time, and ends in a chain deeper than the stack,
+//! where thousands of boxes are the same or lie one in the other; so the binary tree is built here.
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 
-/// Levels below the root, at most. The traversal remembers 32 places to come back to, one a level,
-/// and forgets further ones without a word.
-const LEVELS: u32 = 31;
+/// Levels below the root, at most. The traversal's stack has 32 entries, one a level, and drops further
+/// ones silently.
+const MAX_LEVELS: u32 = 31;
 
-/// Slabs along an axis between which boxes are parted.
-const SLABS: usize = 32;
+/// Bins along an axis, between which a split may lie. Chosen by hand; no measurement was kept.
+const SAH_BINS: usize = 32;
 
-/// Boxes in a wide leaf, at most.
-const LEAF: u32 = 3;
+/// Boxes in a wide leaf, at most: what the format of `CwBvh` holds.
+const MAX_LEAF_SIZE: u32 = 3;
 
 /// A hierarchy of `boxes`.
 pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
-    bvh2_to_cwbvh(&binary(boxes), LEAF, true, false)
+    bvh2_to_cwbvh(&binary(boxes), MAX_LEAF_SIZE, true, false)
 }
 
 /// Parts boxes where rays are expected to meet the fewest of them (Wald 2007, "On fast Construction
@@ -26,7 +35,7 @@ pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
 fn binary(boxes: &[Aabb]) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let mut open = vec![(0, 0..boxes.len(), LEVELS)];
+    let mut open = vec![(0, 0..boxes.len(), MAX_LEVELS)];
     let mut next = 1;
     while let Some((node, range, levels)) = open.pop() {
         let part = &mut order[range.clone()];
@@ -57,15 +66,15 @@ fn split(boxes: &[Aabb], part: &mut [u32], levels: u32) -> usize {
     let centre = |k: u32| boxes[k as usize].center();
     let mut centres = Aabb::empty();
     part.iter().for_each(|&k| _ = centres.extend(centre(k)));
-    let scale = SLABS as f32 / centres.diagonal();
-    // Where all centres are at one place of an axis, NaN makes that slab 0.
-    let slab = |k: u32| ((centre(k) - centres.min) * scale).to_array().map(|x| x as usize);
-    let slab = |k: u32, axis: usize| slab(k)[axis].min(SLABS - 1);
-    match cheapest(boxes, part, slab, levels) {
+    let scale = SAH_BINS as f32 / centres.diagonal();
+    // Where all centres are at one place of an axis, NaN makes that bin 0.
+    let bin = |k: u32| ((centre(k) - centres.min) * scale).to_array().map(|x| x as usize);
+    let bin = |k: u32, axis: usize| bin(k)[axis].min(SAH_BINS - 1);
+    match best_sah_split(boxes, part, bin, levels) {
         Some((axis, end)) => {
             let mut middle = 0;
             for i in 0..part.len() {
-                if slab(part[i], axis) < end {
+                if bin(part[i], axis) < end {
                     part.swap(i, middle);
                     middle += 1;
                 }
@@ -81,25 +90,25 @@ fn split(boxes: &[Aabb], part: &mut [u32], levels: u32) -> usize {
     }
 }
 
-/// The axis, and the first slab of the second part, where a ray is expected to meet the fewest boxes.
-fn cheapest(
+/// The axis, and the first bin of the second part, for which a ray is expected to meet the fewest boxes.
+fn best_sah_split(
     boxes: &[Aabb],
     part: &[u32],
-    slab: impl Fn(u32, usize) -> usize,
+    bin: impl Fn(u32, usize) -> usize,
     levels: u32,
 ) -> Option<(usize, usize)> {
     let mut best = (f32::INFINITY, None);
     for axis in 0..3 {
-        let mut slabs = [SahBin::default(); SLABS];
-        part.iter().for_each(|&k| slabs[slab(k, axis)].add(1, &boxes[k as usize]));
-        let mut behind = slabs;
-        for k in (1..SLABS).rev() {
+        let mut bins = [SahBin::default(); SAH_BINS];
+        part.iter().for_each(|&k| bins[bin(k, axis)].add(1, &boxes[k as usize]));
+        let mut behind = bins;
+        for k in (1..SAH_BINS).rev() {
             let SahBin { count, bounds } = behind[k];
             behind[k - 1].add(count, &bounds);
         }
         let mut before = SahBin::default();
-        for end in 1..SLABS {
-            before.add(slabs[end - 1].count, &slabs[end - 1].bounds);
+        for end in 1..SAH_BINS {
+            before.add(bins[end - 1].count, &bins[end - 1].bounds);
             let cost = before.cost() + behind[end].cost();
             let within = |part: &SahBin| part.count > 0 && part.levels() <= levels;
             if within(&before) && within(&behind[end]) && cost < best.0 {
@@ -156,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn crowds_are_neither_deep_nor_slow() {
+    fn crowds_give_shallow_trees() {
         const N: usize = 100_000;
         let at = |low: Vec3A, size: f32| Aabb { min: low, max: low + size };
         let turned = |k: usize| vec3a((k as f32).cos(), (k as f32).sin(), 0.0);
@@ -175,7 +184,7 @@ mod tests {
             assert!(there.iter().copied().eq(0..N as u32), "{what}");
             let depth = depth(&tree);
             println!("{what}: {depth}");
-            assert!(depth <= LEVELS, "{what}: {depth} levels");
+            assert!(depth <= MAX_LEVELS, "{what}: {depth} levels");
         }
     }
 }

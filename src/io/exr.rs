@@ -1,4 +1,4 @@
-//! EXR and PNG out.
+//! OpenEXR out: linear radiance, one 32-bit float a channel.
 
 use std::path::Path;
 
@@ -7,7 +7,6 @@ use exr::prelude::WritableImage;
 use super::{cannot_write, write_file};
 use crate::camera::RadianceImage;
 use crate::error::{Error, ErrorKind};
-use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
 
 /// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
@@ -37,24 +36,4 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
     let mut bytes = std::io::Cursor::new(vec![]);
     encoded.write().to_buffered(&mut bytes).map_err(|e| cannot_write(path.as_ref(), e))?;
     write_file(path.as_ref(), |out| std::io::Write::write_all(out, bytes.get_ref()))
-}
-
-/// Writes the image through a tone curve as 8-bit sRGB PNG.
-///
-/// # Errors
-/// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_png(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    let tone = ToneCurve::fit(&image.pixels);
-    let bytes: Vec<u8> = image.pixels.iter().flat_map(|&c| tone.display(c)).collect();
-    let mut png = std::io::Cursor::new(vec![]);
-    image::write_buffer_with_format(
-        &mut png,
-        &bytes,
-        image.width,
-        image.height,
-        image::ExtendedColorType::Rgb8,
-        image::ImageFormat::Png,
-    )
-    .map_err(|e| cannot_write(path.as_ref(), e))?;
-    write_file(path.as_ref(), |out| std::io::Write::write_all(out, png.get_ref()))
 }
