@@ -1,5 +1,6 @@
 //! Tests of the library, module for module as in `src`. Slow ones are in `slow.rs`.
 
+mod api;
 mod backend;
 mod bake;
 mod camera;

@@ -5,6 +5,7 @@ mod common;
 mod slow {
     mod accuracy;
     mod extremes;
+    #[cfg(feature = "cli")]
     mod kill_and_resume;
     mod many_triangles;
     mod properties;

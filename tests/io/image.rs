@@ -1,27 +1,41 @@
 //! EXR and PNG files.
 
-use radiosity::{ErrorKind, RadianceImage, Rgb, write_exr, write_png};
+use radiosity::{ErrorKind, RadianceImage, Rgb, ToneCurve, write_exr, write_png};
+
+/// 4 × 3 pixels, all different, red from 0 to 11 and green even.
+fn image() -> RadianceImage {
+    let pixel = |k: u32| Rgb::new(f64::from(k), 0.25, 1e-3 * f64::from(k));
+    RadianceImage { width: 4, height: 3, pixels: (0..12).map(pixel).collect() }
+}
 
 #[test]
 fn exr_reads_back_bit_for_bit() {
-    let pixels = (0..12).map(|k| Rgb::new(f64::from(k), 0.25, 1e-3 * f64::from(k))).collect();
-    let image = RadianceImage { width: 4, height: 3, pixels };
-    let folder = tempfile::tempdir().unwrap();
-    let (exr, png) = (folder.path().join("i.exr"), folder.path().join("i.png"));
-    write_exr(&exr, &image).unwrap();
-    write_png(&png, &image).unwrap();
+    let (image, folder) = (image(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("i.exr");
+    write_exr(&path, &image).unwrap();
     let read = exr::prelude::read_first_rgba_layer_from_file(
-        &exr,
+        &path,
         |size, _| vec![[0f32; 3]; size.area()],
         |store, at, (r, g, b, _): (f32, f32, f32, f32)| store[at.y() * 4 + at.x()] = [r, g, b],
     )
     .unwrap();
     let want: Vec<[f32; 3]> = image.pixels.iter().map(|c| c.as_vec3().to_array()).collect();
     assert_eq!(read.layer_data.channel_data.pixels, want);
-    let read = image::open(&png).unwrap().into_rgb8();
+}
+
+#[test]
+fn png_has_every_pixel_through_the_tone_curve() {
+    let (image, folder) = (image(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("i.png");
+    write_png(&path, &image).unwrap();
+    let read = ::image::open(&path).unwrap();
+    assert_eq!(read.color(), ::image::ColorType::Rgb8);
+    let read = read.into_rgb8();
     assert_eq!(read.dimensions(), (4, 3));
-    // Brighter radiance, brighter pixel: red rises along the image, and is never past green first.
-    assert!(read.get_pixel(0, 0)[0] == 0 && read.get_pixel(3, 2)[0] > read.get_pixel(1, 0)[0]);
+    // Row after row from the top left.
+    let tone = ToneCurve::fit(&image.pixels);
+    let want: Vec<u8> = image.pixels.iter().flat_map(|&colour| tone.display(colour)).collect();
+    assert_eq!(read.into_raw(), want);
 }
 
 #[test]

@@ -1,0 +1,71 @@
+//! What holds of the public types whatever is in them.
+
+use radiosity::*;
+
+#[test]
+fn public_types_are_send_and_sync() {
+    fn check<T: Send + Sync>() {}
+    macro_rules! check_all { ($($type:ty),* $(,)?) => { $(check::<$type>();)* } }
+    check_all![
+        AdapterInfo,
+        AdaptiveViewpoints<RayRows>,
+        Backend,
+        BackendRows,
+        BakeProgress,
+        BakeResult,
+        BakeSettings,
+        BakeTarget,
+        Camera,
+        EnforcementReport,
+        Entry,
+        Error,
+        ErrorEstimate,
+        ErrorKind,
+        ErrorStats,
+        Estimate,
+        Factor,
+        GatherPoint,
+        GatherProgress,
+        GatherSettings,
+        GatheredMesh,
+        Gpu,
+        GpuLimits,
+        HemicubeGather,
+        HemicubeRows,
+        IrradianceSample,
+        Ledger,
+        Material,
+        MatrixChecks,
+        Mesh,
+        Method,
+        Missing,
+        NodeId,
+        Progress,
+        ProximityCorrection<RayRows>,
+        RadianceImage,
+        RadiosityField<'_>,
+        RayGather,
+        RayRows,
+        RefinementSettings,
+        Rgb,
+        Row,
+        Scene,
+        Solution,
+        SolveSession<'_>,
+        SolveSettings,
+        Solver,
+        StageSeconds,
+        StopReason,
+        Timings,
+        ToneCurve,
+        Triangle,
+        VertexMesh,
+        ViewFactors,
+    ];
+}
+
+#[test]
+fn errors_can_be_boxed_and_sent() {
+    fn check<T: std::error::Error + Send + Sync + 'static>() {}
+    check::<Error>();
+}
