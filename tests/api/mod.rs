@@ -54,7 +54,6 @@ fn public_types_are_send_and_sync() {
         SolveSession<'_>,
         SolveSettings,
         Solver,
-        StageSeconds,
         StopReason,
         Timings,
         ToneCurve,
