@@ -5,8 +5,8 @@
 //!
 //! Without scenes it takes scenes/cornell_box.obj. Rays on the CPU, so that it runs anywhere.
 //!
-//! - One setting at a time is varied around those for an error of 5 %, and the part of the estimated
-//!   error that follows it is fitted: part = scale · setting^exponent.
+//! - One setting at a time is varied around those for an error of 5 %, and the part of the
+//!   estimated error that follows it is fitted: part = scale · setting^exponent.
 //! - The scene is baked to several errors, and the settings and seconds that it came to are fitted.
 //! - The standard errors of vertices are compared with how far they are from a finer bake.
 //!
@@ -49,7 +49,7 @@ fn main() -> Result<(), Error> {
         let scene = Arc::new(load_obj(path)?);
         let name = Path::new(path).file_name().unwrap_or_default().display();
         println!("{name}: {} triangles, rays on the CPU", scene.triangles().len());
-        println!("{:24} {:>10} {:>10}   measured", "law", "fitted", "model");
+        println!("{:25} {:>10} {:>10}   measured", "law", "fitted", "model");
         let bench = Bench { scene };
         bench.parts()?;
         bench.targets()?;
@@ -79,13 +79,13 @@ impl Bench {
                 gather.refinement.surplus_tolerance *= factor;
                 gather.refinement.min_edge *= factor;
                 gather.refinement.interpolation_tolerance *= factor;
-                gather.rays *= 4;
+                gather.rays *= 2;
             },
         )?;
-        row("mesh ~ bend, edge", &mesh, Some(1.0));
+        row("mesh ~ tolerances, edge", &mesh, Some(1.0));
         let sampling = self.part(
             none,
-            &[0.25, 1.0, 4.0, 16.0],
+            &[0.25, 1.0, 4.0],
             |e| e.sampling,
             |gather, factor| {
                 gather.rays = (f64::from(gather.rays) * factor) as u32;
@@ -100,17 +100,17 @@ impl Bench {
             none,
             &[1.0, 2.0, 3.0],
             |e| e.truncation,
-            |gather, sweeps| {
-                gather.refinement.gather_passes = sweeps as u32;
+            |gather, passes| {
+                gather.refinement.gather_passes = passes as u32;
             },
         )?;
-        // A geometric series: the ratio of one sweep to the next.
+        // A geometric series: the ratio of one pass to the next.
         let ratios: Vec<f64> = truncation.windows(2).map(|pair| pair[1].1 / pair[0].1).collect();
         let ratio = ratios.iter().product::<f64>().powf(1.0 / ratios.len() as f64);
         let model = format!("x{:.2}", self.mean_reflectance());
         println!(
-            "{:24} {:>10} {model:>10}   {}",
-            "truncation a sweep",
+            "{:25} {:>10} {model:>10}   {}",
+            "truncation per pass",
             format!("x{ratio:.2}"),
             list(&truncation)
         );
@@ -138,7 +138,7 @@ impl Bench {
     /// What settings and seconds a bake to an error comes to, against the estimated error.
     fn targets(&self) -> Result<(), Error> {
         let diagonal = self.scene.bounds().diagonal();
-        let (mut seconds, mut rays, mut bend, mut edge) = (vec![], vec![], vec![], vec![]);
+        let (mut seconds, mut rays, mut surplus, mut edge) = (vec![], vec![], vec![], vec![]);
         for error in TARGETS {
             let start = Instant::now();
             let baked = BakeTarget::Error(error)
@@ -146,15 +146,15 @@ impl Bench {
             seconds.push((error, start.elapsed().as_secs_f64()));
             let Some(gather) = baked.settings.gather else { continue };
             rays.push((error, f64::from(gather.rays)));
-            bend.push((error, gather.refinement.surplus_tolerance));
+            surplus.push((error, gather.refinement.surplus_tolerance));
             edge.push((error, gather.refinement.min_edge / diagonal));
         }
         row("seconds ~ error", &seconds, Some(-model::COST_EXPONENT));
         law("rays", &rays, model::RAYS_TIMES_ERROR, -1.0);
-        let PowerLaw { scale, exponent, .. } = model::BEND;
-        law("bend", &bend, scale, exponent);
-        let PowerLaw { scale, exponent, .. } = model::SMALLEST_EDGE;
-        law("smallest edge", &edge, scale, exponent);
+        let PowerLaw { scale, exponent, .. } = model::SURPLUS_TOLERANCE;
+        law("surplus tolerance", &surplus, scale, exponent);
+        let PowerLaw { scale, exponent, .. } = model::MIN_EDGE;
+        law("shortest edge", &edge, scale, exponent);
         Ok(())
     }
 
@@ -178,7 +178,7 @@ impl Bench {
                 .bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))?;
             let compared = compare(&baked.light.surface, reference);
             println!(
-                "{:24} {:>10} {:>10}   asked {error}, estimated {:.4}, off by {:.4}; {:.0} % of \
+                "{:25} {:>10} {:>10}   asked {error}, estimated {:.4}, off by {:.4}; {:.0} % of \
                  points within 2 standard errors",
                 "tail factor",
                 format!("{:.2}", compared.tail_factor),
@@ -256,7 +256,7 @@ fn compare(surface: &VertexMesh, reference: &VertexMesh) -> Comparison {
 fn law(name: &str, points: &[(f64, f64)], scale: f64, exponent: f64) {
     let (fitted_scale, fitted_exponent) = fit(points);
     println!(
-        "{name:24} {:>10} {:>10}   {}",
+        "{name:25} {:>10} {:>10}   {}",
         format!("{fitted_scale:.2} e^{fitted_exponent:.2}"),
         format!("{scale:.2} e^{exponent:.2}"),
         list(points)
@@ -267,7 +267,7 @@ fn law(name: &str, points: &[(f64, f64)], scale: f64, exponent: f64) {
 fn row(name: &str, points: &[(f64, f64)], exponent: Option<f64>) {
     let model = exponent.map_or(String::new(), |exponent| format!("^{exponent:.2}"));
     let fitted = format!("^{:.2}", fit(points).1);
-    println!("{name:24} {fitted:>10} {model:>10}   {}", list(points));
+    println!("{name:25} {fitted:>10} {model:>10}   {}", list(points));
 }
 
 fn list(points: &[(f64, f64)]) -> String {

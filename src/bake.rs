@@ -14,7 +14,7 @@
 //!                error estimate               │   random points gather twice, and are compared
 //!                      │                      │   with what the vertices interpolate to
 //!                      ├─ too large ──────────┘   more of what the largest parts of the error
-//!                      ▼                          follow: rays, sweeps, smaller elements
+//!                      ▼                          follow: rays, passes, smaller elements
 //!                  BakeResult
 //! ```
 //!

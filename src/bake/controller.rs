@@ -32,8 +32,8 @@ impl ErrorTarget<'_> {
 /// What has to be done for vertices to be as the settings say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
-    /// All sweeps, from the light that was shot on.
-    AllSweeps,
+    /// All gather passes, from the light that was shot.
+    AllPasses,
     /// All vertices gather once more, after a `bounce` what they gathered themselves; then elements
     /// are split.
     AllVertices { bounce: bool },

@@ -1,9 +1,9 @@
 //! Random points that observe how far off a result is.
 //!
 //! Points are spread evenly over the area of the result's faces. Each gathers twice what lit the
-//! result, the second time from a hair beside, where rays and hemicubes are rotated otherwise; and once
-//! the result itself. The [statistics](super::error_estimate) of that are the estimate; the share of
-//! each vertex follows the residuals of the elements around it.
+//! result, the second time from a hair beside, where rays and hemicubes are rotated otherwise; and
+//! once the result itself. The [statistics](super::error_estimate) of that are the estimate; the
+//! share of each vertex follows the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 
@@ -24,7 +24,8 @@ use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Rgb;
 use crate::solver::Ledger;
 
-/// Points that are gathered at before progress is reported first: a bake that is stopped uses these.
+/// Points that are gathered at before progress is reported first: a bake that is stopped uses
+/// these.
 const FIRST_BATCH: usize = 16;
 
 /// How far beside a point it gathers again, in units of the element's size; up to 1.5 times as far.
@@ -41,7 +42,7 @@ pub(super) struct ErrorEstimator<'a> {
     pub element_residual: &'a [f64],
     pub ledger: &'a Ledger,
     /// Times that all vertices have gathered.
-    pub sweeps: u32,
+    pub gather_passes: u32,
 }
 
 /// A random point of the surface.
@@ -67,8 +68,9 @@ struct SampleGathers {
 }
 
 impl ErrorEstimator<'_> {
-    /// Gathers at `count` random points, and gives the estimate and the standard error of each vertex,
-    /// W/m². `progress` is told how many points are done, and may stop: they are enough then.
+    /// Gathers at `count` random points, and gives the estimate and the standard error of each
+    /// vertex, W/m². `progress` is told how many points are done, and may stop: they are enough
+    /// then.
     pub fn estimate(
         &self,
         count: usize,
@@ -88,7 +90,7 @@ impl ErrorEstimator<'_> {
             radiosity_floor,
             gap: model::GAP * self.light.mesh.scene().bounds().diagonal(),
             mean_reflectance: self.light.mesh.mean_reflectance().max_element(),
-            sweeps: self.lit_by.map(|_| self.sweeps),
+            gather_passes: self.lit_by.map(|_| self.gather_passes),
             ambient,
             unshot_bound,
         };
@@ -96,8 +98,8 @@ impl ErrorEstimator<'_> {
         Ok((estimate, self.vertex_errors(spread)))
     }
 
-    /// Root mean square error, relative, of what vertices interpolate to because `gatherer` casts so
-    /// many rays and not more; by `count` points.
+    /// Root mean square error, relative, of what vertices interpolate to because `gatherer` casts
+    /// so many rays and not more; by `count` points.
     pub fn sampling_error(&self, count: usize, gatherer: &mut dyn Gather) -> Result<f64, Error> {
         let samples = self.samples(count);
         let points: Vec<GatherPoint> = samples.iter().map(|s| s.point).collect();
@@ -120,8 +122,8 @@ impl ErrorEstimator<'_> {
         self.lit_by.unwrap_or(self.light)
     }
 
-    /// Gathers at `samples` in an order whose first few are spread over all; none for those that are
-    /// not reached.
+    /// Gathers at `samples` in an order whose first few are spread over all; none for those that
+    /// are not reached.
     fn gather(
         &self,
         samples: &[Sample],
@@ -205,8 +207,8 @@ impl ErrorEstimator<'_> {
         AreaSampler::new(surface.faces.iter().map(area)).spread(count, 0.5).map(sample).collect()
     }
 
-    /// Root mean square of the ambient term over the radiosity, or over `floor` (W/m²) where that is
-    /// more; and the bound of [`ErrorEstimate::unshot_bound`].
+    /// Root mean square of the ambient term over the radiosity, or over `floor` (W/m²) where that
+    /// is more; and the bound of [`ErrorEstimate::unshot_bound`].
     fn unshot(&self, floor: f64) -> (f64, f64) {
         let sources = self.sources();
         let mesh = &sources.mesh;

@@ -1,7 +1,7 @@
 //! A device with the CPU behind it: what a bake has solved stays, whatever the device does.
 //!
-//! Rows and gathers come from the device until it fails; from the next batch on rays on the CPU make
-//! them. The failure is kept here until the bake asks for it, which is at its next report.
+//! Rows and gathers come from the device until it fails; from the next batch on rays on the CPU
+//! make them. The failure is kept here until the bake asks for it, which is at its next report.
 
 use std::cell::{Cell, OnceCell};
 
@@ -46,8 +46,8 @@ impl<'a> ResilientBackend<'a> {
         let _ = self.failure.set(error);
     }
 
-    /// A source of rows as `settings` ask for. What keeps the device from starting is an error, since
-    /// nothing is lost then.
+    /// A source of rows as `settings` ask for. What keeps the device from starting is an error,
+    /// since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
         mesh: &'m Mesh,

@@ -76,14 +76,14 @@ impl<'a> GatherPhase<'a> {
         Ok(phase)
     }
 
-    /// Gathers as the settings say and, given a target, refines until the estimated error meets it or
-    /// nothing is left to be refined.
+    /// Gathers as the settings say and, given a target, refines until the estimated error meets it
+    /// or nothing is left to be refined.
     pub fn run(
         mut self,
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Result<BakedLight, Error> {
-        let mut step = Step::AllSweeps;
+        let mut step = Step::AllPasses;
         let mut rounds = 0;
         loop {
             let stop = self.gather(step, reporter)?;
@@ -109,7 +109,7 @@ impl<'a> GatherPhase<'a> {
         let refinement = self.gather.refinement.clone();
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
-            Step::AllSweeps => {
+            Step::AllPasses => {
                 let mut coarse = match refinement.gather_passes {
                     0 | 1 => None,
                     _ => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
@@ -154,7 +154,7 @@ impl<'a> GatherPhase<'a> {
             lit_by: Some(self.state.source()),
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
-            sweeps: self.gather.refinement.gather_passes,
+            gather_passes: self.gather.refinement.gather_passes,
         };
         let of = model::sample_count(light.gather_count);
         let mut cancelled = stop == StopReason::Cancelled;
@@ -178,7 +178,7 @@ impl<'a> GatherPhase<'a> {
             lit_by: None,
             element_residual: &[],
             ledger: &self.shot.solution.ledger,
-            sweeps: 0,
+            gather_passes: 0,
         };
         // Rays are not doubled where they disagree: that is for what these few points do not show.
         let rays = self.gather.rays;
@@ -194,8 +194,9 @@ impl<'a> GatherPhase<'a> {
         Ok(())
     }
 
-    /// Refines the settings where `estimate` is too large for the target, and says what is to be done
-    /// again; nothing if there is no target, it is met, or overrides keep all settings as they are.
+    /// Refines the settings where `estimate` is too large for the target, and says what is to be
+    /// done again; nothing if there is no target, it is met, or overrides keep all settings as they
+    /// are.
     fn refine_settings(&mut self, estimate: &ErrorEstimate) -> Result<Option<Step>, Error> {
         let Some(target) = self.target.filter(|target| !target.is_met(estimate)) else {
             return Ok(None);

@@ -27,8 +27,8 @@ pub enum BakeProgress {
     },
     /// The error was estimated.
     Estimated(ErrorEstimate),
-    /// The graphics device failed. Nothing is lost: rays on the CPU go on from here, more slowly; or,
-    /// if the callback stops the bake, what was reached is returned.
+    /// The graphics device failed. Nothing is lost: rays on the CPU go on from here, more slowly;
+    /// or, if the callback stops the bake, what was reached is returned.
     DeviceFailed(Error),
 }
 

@@ -10,8 +10,8 @@ use crate::mesh::Mesh;
 use crate::scene::Scene;
 use crate::solver::{Method, Solver};
 
-/// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`] or
-/// [`BakeSettings::gathering`], and change what is to be different:
+/// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`]
+/// or [`BakeSettings::gathering`], and change what is to be different:
 ///
 /// ```
 /// # fn settings(scene: &radiosity::Scene) {
@@ -24,8 +24,8 @@ use crate::solver::{Method, Solver};
 pub struct BakeSettings {
     /// How light is spread on the elements of a first mesh.
     pub solve: SolveSettings,
-    /// How the vertices of a second mesh gather that light; with none, the vertices of the first get
-    /// the mean of the elements around them.
+    /// How the vertices of a second mesh gather that light; with none, the vertices of the first
+    /// get the mean of the elements around them.
     pub gather: Option<GatherSettings>,
 }
 
@@ -37,8 +37,9 @@ pub struct SolveSettings {
     pub element_size: f64,
     /// Quadtree levels by which elements are split that other surfaces touch.
     pub contact_levels: u32,
-    /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a half
-    /// or a quarter of them for dimmer ones. Where rays are cast, the square root of their number.
+    /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a
+    /// half or a quarter of them for dimmer ones. Where rays are cast, the square root of their
+    /// number.
     pub hemicube_resolution: u32,
     /// A patch that shoots at least this share of the emitted light gets the full resolution; 0 for
     /// all patches; with none, the backend's own.
@@ -48,9 +49,9 @@ pub struct SolveSettings {
     /// Receivers within this many patch diameters get closed-form factors
     /// ([`crate::ProximityCorrection`]); below 0 none.
     pub near_reach: f64,
-    /// Patches of whose light more than this share lands on other elements when it is sent from their
-    /// parts are seen from those ([`crate::AdaptiveViewpoints`]); with none, each from its centroid
-    /// alone.
+    /// Patches of whose light more than this share lands on other elements when it is sent from
+    /// their parts are seen from those ([`crate::AdaptiveViewpoints`]); with none, each from its
+    /// centroid alone.
     pub viewpoint_tolerance: Option<f64>,
     /// How light is spread, how far, and from how large patches.
     pub solver: Solver,
@@ -58,10 +59,11 @@ pub struct SolveSettings {
     /// chooses it.
     pub gmres_if_bright: bool,
     /// A file that the state of the solve is written to, every few batches and at its end; if it is
-    /// there, the solve goes on from it: see [`Solver::resume`]. A bake that is killed loses the last
-    /// batches at most: writing takes about a tenth of the time.
+    /// there, the solve goes on from it: see [`Solver::resume`]. A bake that is killed loses the
+    /// last batches at most: writing takes about a tenth of the time.
     pub checkpoint: Option<PathBuf>,
-    /// Whether the light not yet shot is added, spread evenly (the ambient term of Cohen et al. 1988).
+    /// Whether the light not yet shot is added, spread evenly (the ambient term of Cohen et al.
+    /// 1988).
     pub ambient: bool,
 }
 
@@ -95,14 +97,14 @@ impl SolveSettings {
 }
 
 impl BakeSettings {
-    /// Whether a bake would take these settings of gathering: worth asking before a long solve. What
-    /// comes before that is checked where it is used.
+    /// Whether a bake would take these settings of gathering: worth asking before a long solve.
+    /// What comes before that is checked where it is used.
     pub(super) fn check(&self) -> Result<(), Error> {
         self.gather.as_ref().map_or(Ok(()), |gather| gather.refinement.check())
     }
 
-    /// Settings for previews: elements of a 32nd of the scene's diagonal, 1e-4 unshot, and no vertex
-    /// gathers.
+    /// Settings for previews: elements of a 32nd of the scene's diagonal, 1e-4 unshot, and no
+    /// vertex gathers.
     pub fn elements_only(scene: &Scene) -> BakeSettings {
         let mut settings = BakeSettings::for_error(0.02, scene);
         settings.solve.element_size = scene.bounds().diagonal() / 32.0;
@@ -113,8 +115,9 @@ impl BakeSettings {
         settings
     }
 
-    /// Settings for vertices that gather where no error is asked for: those of an error of 0.8 %, with
-    /// elements half as large where light bends most, so that contact shadows are sharp, and 1500 rays.
+    /// Settings for vertices that gather where no error is asked for: those of an error of 0.8 %,
+    /// with elements half as large where light bends most, so that contact shadows are sharp, and
+    /// 1500 rays.
     pub fn gathering(scene: &Scene) -> BakeSettings {
         let mut settings = BakeSettings::for_error(0.008, scene);
         if let Some(gather) = &mut settings.gather {
@@ -124,9 +127,9 @@ impl BakeSettings {
         settings
     }
 
-    /// What the [model](crate::bake::model) of error and cost says it takes for vertices of `scene` to
-    /// be off by `error`: a share of their radiosity, root mean square over the area. Below 1e-4 and
-    /// above 0.3 they are those of the nearest of these.
+    /// What the [model](crate::bake::model) of error and cost says it takes for vertices of `scene`
+    /// to be off by `error`: a share of their radiosity, root mean square over the area. Below 1e-4
+    /// and above 0.3 they are those of the nearest of these.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
         let e = model::clamped(error, model::ERRORS);
         let diagonal = scene.bounds().diagonal();
@@ -150,10 +153,12 @@ impl BakeSettings {
             ambient: false,
         };
         let refinement = RefinementSettings {
-            surplus_tolerance: model::BEND.setting(e).min(model::MAX_BEND),
-            interpolation_tolerance: model::CURVE.setting(e),
-            gather_passes: model::sweeps(e),
-            ..RefinementSettings::new(model::SMALLEST_EDGE.times(diagonal).setting(e))
+            surplus_tolerance: model::SURPLUS_TOLERANCE
+                .setting(e)
+                .min(model::MAX_SURPLUS_TOLERANCE),
+            interpolation_tolerance: model::INTERPOLATION_TOLERANCE.setting(e),
+            gather_passes: model::gather_passes(e),
+            ..RefinementSettings::new(model::MIN_EDGE.times(diagonal).setting(e))
         };
         let gather = GatherSettings {
             element_size: model::GATHER_EDGE.times(diagonal).setting(e),

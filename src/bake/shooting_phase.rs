@@ -1,8 +1,9 @@
 //! The first phase of a bake: light is shot on elements.
 //!
 //! The scene is cut into elements, more finely where surfaces touch. Rows of form factors come from
-//! the backend, are corrected for near receivers and, if asked for, averaged over several viewpoints
-//! of a patch; a solver sends light along them. Given a checkpoint file the solve goes on from it.
+//! the backend, are corrected for near receivers and, if asked for, averaged over several
+//! viewpoints of a patch; a solver sends light along them. Given a checkpoint file the solve goes
+//! on from it.
 //!
 //! ```text
 //! backend ─► ProximityCorrection ─► AdaptiveViewpoints ─► Solver ─► radiosity of elements
@@ -134,7 +135,7 @@ pub(super) fn estimate_elements(
         lit_by: None,
         element_residual: &corner_spread(&light),
         ledger: &shot.solution.ledger,
-        sweeps: 0,
+        gather_passes: 0,
     };
     let of = *model::SAMPLES.start();
     let mut cancelled = shot.solution.stop == StopReason::Cancelled;
@@ -150,8 +151,8 @@ pub(super) fn estimate_elements(
     Ok(BakedLight { light, estimate, settings: settings.clone() })
 }
 
-/// A quarter of the largest difference between the corners of each element, W/m²: what its middle may
-/// be off by, up to a factor that is the same for all.
+/// A quarter of the largest difference between the corners of each element, W/m²: what its middle
+/// may be off by, up to a factor that is the same for all.
 fn corner_spread(light: &GatheredMesh) -> Vec<f64> {
     let spread = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|v| light.reflected[v as usize]);

@@ -28,13 +28,13 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BakeTarget {
-    /// Root mean square error of vertex radiosity over the area, as a share of it, in (0, 1). The bake
-    /// ends when the estimated error is well below, or where it will not fall any further: see
+    /// Root mean square error of vertex radiosity over the area, as a share of it, in (0, 1). The
+    /// bake ends when the estimated error is well below, or where it will not fall any further: see
     /// [`BakeResult::estimate`].
     Error(f64),
-    /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long the
-    /// one before took, for as long as another fits in. What is not done in time is stopped, and the
-    /// last that was done is returned; if none was, what was reached.
+    /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long
+    /// the one before took, for as long as another fits in. What is not done in time is stopped,
+    /// and the last that was done is returned; if none was, what was reached.
     Time(Duration),
 }
 
@@ -51,8 +51,8 @@ impl BakeTarget {
         }
     }
 
-    /// Bakes `scene` until the target is met. `progress` may stop it at any time: what was reached is
-    /// returned.
+    /// Bakes `scene` until the target is met. `progress` may stop it at any time: what was reached
+    /// is returned.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an error outside (0, 1) or a time of 0; [`ErrorKind::Device`] and
@@ -69,15 +69,15 @@ impl BakeTarget {
 
     /// As [`BakeTarget::bake`], with some settings made by hand.
     ///
-    /// `overrides` is called with all settings whenever the bake has chosen some: once at the start of
-    /// a bake to an error, with those of [`BakeSettings::for_error`]; once when the number of rays was
-    /// chosen by what a few of them find; and after every estimate above the target, with those of the
-    /// next round. Within a time, that is repeated for each error that is tried. It may change any
-    /// setting, and must set the same ones to the same values at every call: what it sets stays, and
-    /// the bake changes the others. Settings of the solve count at the first call only, since light is
-    /// shot once; [`BakeSettings::gather`] may be taken away at the first call and not later; within a
-    /// time [`checkpoint`](crate::bake::SolveSettings::checkpoint) has no effect, since it would be
-    /// that of many solves.
+    /// `overrides` is called with all settings whenever the bake has chosen some: once at the start
+    /// of a bake to an error, with those of [`BakeSettings::for_error`]; once when the number of
+    /// rays was chosen by what a few of them find; and after every estimate above the target, with
+    /// those of the next round. Within a time, that is repeated for each error that is tried. It
+    /// may change any setting, and must set the same ones to the same values at every call: what it
+    /// sets stays, and the bake changes the others. Settings of the solve count at the first call
+    /// only, since light is shot once; [`BakeSettings::gather`] may be taken away at the first call
+    /// and not later; within a time [`checkpoint`](crate::bake::SolveSettings::checkpoint) has no
+    /// effect, since it would be that of many solves.
     ///
     /// # Errors
     /// Those of [`BakeTarget::bake`], and [`ErrorKind::Setting`] for a setting out of range.

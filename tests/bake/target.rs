@@ -1,5 +1,5 @@
-//! One dial, and what it says of itself. No GPU needed: rays see, and truth is path-traced or has a
-//! closed form.
+//! Bakes to an error and within a time, with rays on the CPU; truth is path-traced or has a closed
+//! form.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -15,7 +15,7 @@ fn cornell() -> Scene {
     cornell_box(f64::INFINITY).scene().clone()
 }
 
-fn dial(scene: Scene, error: f64) -> BakeResult {
+fn bake_to_error(scene: Scene, error: f64) -> BakeResult {
     BakeTarget::Error(error).bake(scene, &Backend::Cpu, keep_going).unwrap()
 }
 
@@ -26,7 +26,7 @@ fn furnace(reflectance: f64) -> Scene {
 
 #[test]
 fn furnace_is_exact_and_estimated_so() {
-    let baked = dial(furnace(0.5), 0.02);
+    let baked = bake_to_error(furnace(0.5), 0.02);
     // Most of what is left is what was not shot, e/40 = 5e-4 of what is emitted, of which half returns,
     // and what few looks into corners miss.
     let all = &baked.light.surface.radiosity;
@@ -36,7 +36,7 @@ fn furnace_is_exact_and_estimated_so() {
     assert!(baked.estimate.total < 5e-3, "{:?}", baked.estimate);
 }
 
-/// Light that is wrong by a known share, and what is said of it: shooting stopped early.
+/// Light that is wrong by a known share, and its estimate: shooting stopped early.
 #[test]
 fn estimate_covers_unshot_light() {
     for reflectance in [0.5, 0.8] {
@@ -56,16 +56,19 @@ fn estimate_covers_unshot_light() {
             let share = missing / (1.0 - missing);
             let bound = baked.estimate.unshot_bound;
             assert!((bound / share - 1.0).abs() < 1e-6, "exact here: {bound} {share}");
-            let said = baked.estimate.total;
-            println!("{reflectance} {unshot}: missing {missing:.4}, told {:?}", baked.estimate);
-            assert!(said > 0.5 * missing && said < 3.0 * missing);
+            let estimated = baked.estimate.total;
+            println!(
+                "{reflectance} {unshot}: missing {missing:.4}, estimated {:?}",
+                baked.estimate
+            );
+            assert!(estimated > 0.5 * missing && estimated < 3.0 * missing);
         }
     }
 }
 
 #[test]
 fn settings_made_by_hand_stay() {
-    let adjust = |settings: &mut BakeSettings| {
+    let overrides = |settings: &mut BakeSettings| {
         settings.solve.hemicube_resolution = 48;
         if let Some(gather) = &mut settings.gather {
             (gather.rays, gather.noise_tolerance) = (77, 0.05);
@@ -74,16 +77,16 @@ fn settings_made_by_hand_stay() {
         }
     };
     let baked =
-        BakeTarget::Error(0.01).bake_with(cornell(), &Backend::Cpu, adjust, keep_going).unwrap();
+        BakeTarget::Error(0.01).bake_with(cornell(), &Backend::Cpu, overrides, keep_going).unwrap();
     let mut want = BakeSettings::for_error(0.01, &cornell());
-    adjust(&mut want);
+    overrides(&mut want);
     assert_eq!(baked.settings, want);
     assert!(baked.estimate.total > 0.01, "and it says that it fell short");
 }
 
 #[test]
 fn two_runs_give_the_same_bits() {
-    let [one, two] = [0, 1].map(|_| dial(cornell(), 0.1));
+    let [one, two] = [0, 1].map(|_| bake_to_error(cornell(), 0.1));
     assert!(one.light.surface.radiosity == two.light.surface.radiosity);
     assert!(one.light.surface.error == two.light.surface.error);
     assert_eq!(one.estimate, two.estimate);
@@ -107,14 +110,14 @@ fn more_time_lowers_the_estimate() {
 #[test]
 fn every_stage_can_be_cancelled() {
     for at in 0..3 {
-        let mut judged = 0;
+        let mut estimates = 0;
         let baked = BakeTarget::Error(0.05)
             .bake(cornell(), &Backend::Cpu, |stage| {
                 let stop = match stage {
                     BakeProgress::Shooting(_) => at == 0,
                     BakeProgress::Gathering(p) => at == 1 && p.refinements > 0,
                     BakeProgress::Estimated(_) => {
-                        judged += 1;
+                        estimates += 1;
                         at == 2
                     }
                     BakeProgress::Estimating { samples, of } => {
@@ -127,7 +130,7 @@ fn every_stage_can_be_cancelled() {
                 if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
             .unwrap();
-        assert_eq!(judged, 1, "what was reached is judged, once");
+        assert_eq!(estimates, 1, "the error of what was reached is estimated, once");
         match at {
             0 => assert_eq!(baked.solution.stop, StopReason::Cancelled),
             1 => assert_eq!(baked.light.stop, StopReason::Cancelled),
@@ -142,7 +145,7 @@ fn dark_and_black_scenes_are_exact() {
     let up = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     let lamp = Material { exitance: Rgb::ONE, ..Material::grey("lamp", 0.0) };
     for material in [Material::grey("dark", 0.5), Material::grey("black", 0.0), lamp] {
-        let baked = dial(quads(&[(up, material.clone())]), 0.01);
+        let baked = bake_to_error(quads(&[(up, material.clone())]), 0.01);
         assert_eq!(baked.estimate.total, 0.0, "{:?}", baked.estimate);
         // Means over elements are rounded.
         let off = |b: &Rgb| b.distance(material.exitance);

@@ -10,14 +10,14 @@ fn cornell() -> Scene {
     cornell_box(f64::INFINITY).scene().clone()
 }
 
-fn dial(scene: Scene, error: f64) -> BakeResult {
+fn bake_to_error(scene: Scene, error: f64) -> BakeResult {
     BakeTarget::Error(error).bake(scene, &Backend::Cpu, keep_going).unwrap()
 }
 
 #[test]
 fn error_target_is_reached_and_estimated() {
     for error in [0.1, 0.05, 0.02] {
-        let baked = dial(cornell(), error);
+        let baked = bake_to_error(cornell(), error);
         let (surface, said) = (&baked.light.surface, baked.estimate);
         let points = truth::points(TRUTH).unwrap();
         let found = points.iter().map(|p| truth::at(surface, p.position, p.normal).unwrap());
@@ -32,7 +32,7 @@ fn error_target_is_reached_and_estimated() {
             said.total,
             points.len()
         );
-        // What the dial is for: no worse than asked, and the estimate between half of it and thrice.
+        // What a target is for: no worse than asked, and the estimate between half of it and thrice.
         assert!(rms <= error && said.total <= error);
         assert!(said.total > 0.5 * rms && said.total < 3.0 * rms);
         // 95 % would be what two standard errors of a normal distribution hold; 198 points of a

@@ -1,6 +1,6 @@
-//! The dial, from scene to certificate, at three accuracies on three scenes: the Cornell box, a room
-//! that is lit from the next one, and one full of small boxes. The device is opened, and pipelines are
-//! warm, before anything is timed. Prints the adapter, and what the certificate said.
+//! Whole bakes to three errors of three scenes: the Cornell box, a room that is lit from the next one,
+//! and one full of small boxes. The device is opened, and pipelines are warm, before anything is
+//! timed. Prints the adapter, and the estimated errors.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -67,12 +67,12 @@ fn clutter() -> Scene {
     scene(&quads)
 }
 
-fn dial(c: &mut Criterion) {
+fn bake_to_error(c: &mut Criterion) {
     let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     let device = Backend::gpu(None).expect("a graphics adapter");
     let AdapterInfo { name, kind, driver } = device.adapter();
     eprintln!("adapter: {name} ({kind}), {driver}");
-    let mut group = c.benchmark_group("dial");
+    let mut group = c.benchmark_group("bake_to_error");
     for (name, scene) in [
         ("cornell_box", load_obj(cornell).expect("the scene")),
         ("next_door", next_door()),
@@ -84,13 +84,13 @@ fn dial(c: &mut Criterion) {
                     .bake(scene.clone(), &device, |_| ControlFlow::Continue(()))
                     .expect("a solution")
             };
-            let mut told = false;
+            let mut printed = false;
             group.bench_function(BenchmarkId::new(name, error), |b| {
                 let mut last = None;
                 b.iter(|| last = Some(bake()));
-                if let Some(baked) = last.filter(|_| !std::mem::replace(&mut told, true)) {
+                if let Some(baked) = last.filter(|_| !std::mem::replace(&mut printed, true)) {
                     eprintln!(
-                        "{name}, asked {error}: told {:.4}, {} vertices, {} hemicubes, {} gathers",
+                        "{name}, asked {error}: estimated {:.4}, {} vertices, {} hemicubes, {} gathers",
                         baked.estimate.total,
                         baked.light.surface.positions.len(),
                         baked.hemicubes,
@@ -109,6 +109,6 @@ criterion_group! {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(1))
         .measurement_time(Duration::from_secs(2));
-    targets = dial
+    targets = bake_to_error
 }
 criterion_main!(benches);
