@@ -6,19 +6,32 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use radiosity::{Backend, BakeTarget, Camera, Error, load_obj, write_exr, write_ply, write_png};
+use radiosity::{
+    Backend, BakeProgress, BakeTarget, Camera, load_obj, write_exr, write_ply, write_png,
+};
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), radiosity::Error> {
     let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
-    let device = Backend::gpu(None)?; // or Backend::Cpu
-    let baked = BakeTarget::Error(0.02).bake(scene, &device, |_| ControlFlow::Continue(()))?;
-    write_ply("cornell_box.ply", &baked.light.surface)?;
+    let backend = Backend::gpu(None)?; // the best adapter; Backend::Cpu does without one
+    eprintln!("baking on {}", backend.adapter().name);
+    let baked = BakeTarget::Error(0.015).bake(scene, &backend, |stage| {
+        match stage {
+            BakeProgress::Shooting(p) => eprint!("\r{:7.3} % unshot ", 100.0 * p.unshot_share),
+            BakeProgress::Gathering(p) => eprint!("\r{} of {} vertices   ", p.gathered, p.of),
+            BakeProgress::Estimating { samples, of } => eprint!("\r{samples} of {of} points      "),
+            _ => {}
+        }
+        ControlFlow::Continue(()) // Break(()) stops with what there is
+    })?;
+    let surface = &baked.light.surface; // positions, faces, radiosity
+    eprintln!("\nerror about {:.1} %", 100.0 * baked.estimate.total);
+    write_ply("cornell_box.ply", surface)?;
     let camera = Camera {
-        eye: DVec3::new(278.0, 273.0, -800.0),
+        eye: DVec3::new(278.0, 273.0, -800.0), // millimetres, as the scene
         target: DVec3::new(278.0, 273.0, 0.0),
         vertical_fov: 39.3077, // degrees
     };
-    let image = camera.image(&baked.light.surface, 512, 512, 4)?;
-    write_exr("cornell_box.exr", &image)?; // radiance, W/(m² sr)
-    write_png("cornell_box.png", &image) // to look at
+    let image = camera.image(surface, 512, 512, 4)?; // 4 × 4 rays a pixel
+    write_exr("cornell_box.exr", &image)?; // linear radiance, W/(m² sr)
+    write_png("cornell_box.png", &image) // tone mapped
 }
