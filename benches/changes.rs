@@ -12,7 +12,7 @@ mod common;
 use std::num::NonZeroU32;
 use std::time::Instant;
 
-use common::go;
+use common::keep_going;
 use glam::{DAffine3, DVec3};
 use radiosity::{
     Backend, BackendRows, Error, Mesh, ProximityCorrection, Rgb, Scene, Solution, SolveSession,
@@ -37,11 +37,10 @@ const SHIFT: DVec3 = DVec3::new(30.0, 0.0, 0.0);
 const SETTLED: f64 = 1e-3;
 
 fn main() -> Result<(), Error> {
-    if !common::full() {
-        println!("changes: left out; RADIOSITY_BENCH=full cargo bench --bench changes runs it");
+    if !common::asked_for("changes") {
         return Ok(());
     }
-    let device = common::gpu();
+    let device = Backend::Gpu(common::gpu());
     let scene = common::cornell_box();
     let dimmed = dimmed(&scene)?;
     let moved = dimmed.with_transformed_group("short_block", DAffine3::from_translation(SHIFT))?;
@@ -59,20 +58,20 @@ fn main() -> Result<(), Error> {
     let start = Instant::now();
     let mut old_rows = rows(&device, &before)?;
     let mut session = solver.begin(&before)?;
-    session.run(&mut old_rows, go)?;
+    session.run(&mut old_rows, keep_going)?;
     table.line("as it was", &session.solution()?, start, None);
 
     let settled = start_over(&device, &dimmed, "dimmed: starting over")?;
     let start = Instant::now();
     session.update_materials(&dimmed)?;
-    session.run(&mut old_rows, go)?;
+    session.run(&mut old_rows, keep_going)?;
     table.line("dimmed: going on", &session.solution()?, start, Some((&dimmed, &settled)));
 
     let settled = start_over(&device, &moved, "moved: starting over")?;
     let start = Instant::now();
     let mut new_rows = rows(&device, &moved)?;
     move_block(&mut session, &moved, &mut old_rows, &mut new_rows)?;
-    session.run(&mut new_rows, go)?;
+    session.run(&mut new_rows, keep_going)?;
     table.line("moved: going on", &session.solution()?, start, Some((&moved, &settled)));
     Ok(())
 }
@@ -98,7 +97,7 @@ fn move_block<'a>(
     new_rows: &mut Rows,
 ) -> Result<(), Error> {
     let made = session.solution()?.rows_made;
-    session.update_geometry(mesh, old_rows, new_rows, go)?;
+    session.update_geometry(mesh, old_rows, new_rows, keep_going)?;
     let remade = session.solution()?.rows_made - made;
     println!("    {remade} drawn again, {:.1e} in doubt", session.stale_flux_bound());
     Ok(())
@@ -109,10 +108,10 @@ fn start_over(device: &Backend, mesh: &Mesh, name: &str) -> Result<Solution, Err
     let (solver, start) = (Solver::default(), Instant::now());
     let mut rows = rows(device, mesh)?;
     let mut session = solver.begin(mesh)?;
-    session.run(&mut rows, go)?;
+    session.run(&mut rows, keep_going)?;
     let (solution, seconds) = (session.solution()?, start.elapsed());
     session.set_limits(SETTLED * solver.unshot, None)?;
-    session.run(&mut rows, go)?;
+    session.run(&mut rows, keep_going)?;
     let settled = session.into_solution()?;
     Table::default().line(name, &solution, Instant::now() - seconds, Some((mesh, &settled)));
     Ok(settled)

@@ -1,9 +1,10 @@
 //! Measures the model of error and cost that bakes are steered by (`radiosity::bake::model`), and
 //! prints each law beside the model's number.
 //!
-//!     cargo bench --bench error_model [-- SCENE.obj …]
+//!     RADIOSITY_BENCH=full cargo bench --bench error_model [-- SCENE.obj …]
 //!
-//! Without scenes it takes scenes/cornell_box.obj. Rays on the CPU, so that it runs anywhere.
+//! In full only. Without scenes it takes scenes/cornell_box.obj. Rays on the CPU, so that it runs
+//! anywhere.
 //!
 //! - One setting at a time is varied around those for an error of 5 %, and the part of the
 //!   estimated error that follows it is fitted: part = scale · setting^exponent.
@@ -12,14 +13,13 @@
 //!
 //! Fits are by least squares of the logarithms. A part below 1e-6 is left out of its fit.
 
-#[path = "../tests/common/truth.rs"]
-mod truth;
+mod common;
 
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use common::{keep_going, truth};
 use radiosity::bake::model::{self, PowerLaw};
 use radiosity::{
     Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, GatherSettings, Scene,
@@ -39,6 +39,9 @@ const REFERENCE: f64 = 0.015;
 const POINTS: usize = 400;
 
 fn main() -> Result<(), Error> {
+    if !common::asked_for("error_model") {
+        return Ok(());
+    }
     let arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
     let mut scenes: Vec<String> = arguments.collect();
     if scenes.is_empty() {
@@ -65,7 +68,7 @@ struct Bench {
 
 impl Bench {
     fn bake(&self, settings: &BakeSettings) -> Result<BakeResult, Error> {
-        settings.bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))
+        settings.bake(self.scene.clone(), &Backend::Cpu, keep_going)
     }
 
     /// Each part of the error against the setting that it follows.
@@ -141,8 +144,8 @@ impl Bench {
         let (mut seconds, mut rays, mut surplus, mut edge) = (vec![], vec![], vec![], vec![]);
         for error in TARGETS {
             let start = Instant::now();
-            let baked = BakeTarget::Error(error)
-                .bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))?;
+            let baked =
+                BakeTarget::Error(error).bake(self.scene.clone(), &Backend::Cpu, keep_going)?;
             seconds.push((error, start.elapsed().as_secs_f64()));
             let Some(gather) = baked.settings.gather else { continue };
             rays.push((error, f64::from(gather.rays)));
@@ -174,8 +177,8 @@ impl Bench {
         }
         row("error ~ shooting edge", &errors, Some(1.0 / model::SHOOTING_EDGE.exponent));
         for error in [0.1, BASE] {
-            let baked = BakeTarget::Error(error)
-                .bake(self.scene.clone(), &Backend::Cpu, |_| ControlFlow::Continue(()))?;
+            let baked =
+                BakeTarget::Error(error).bake(self.scene.clone(), &Backend::Cpu, keep_going)?;
             let compared = compare(&baked.light.surface, reference);
             println!(
                 "{:25} {:>10} {:>10}   asked {error}, estimated {:.4}, off by {:.4}; {:.0} % of \

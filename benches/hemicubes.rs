@@ -4,20 +4,29 @@
 //! Criterion's own figure, `all`, is wall time from asking to rows. `draw` and `reduce` are the
 //! device's timestamps of the very same hemicubes, and `readback` the rest. Throughput is in
 //! hemicubes. Every iteration draws a full batch of other patches; nothing is kept.
+//!
+//! By default elements of 30 mm and 64 to 256 pixels, some 20 s on two cores with lavapipe. In full
+//! also elements of 60 and 15 mm and 512 pixels, some three minutes:
+//!
+//!     RADIOSITY_BENCH=full cargo bench --bench hemicubes
+
+mod common;
 
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, Timings, load_obj};
+use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, Timings};
 
 fn stages(c: &mut Criterion) {
-    let gpu = Gpu::new(None).expect("a graphics adapter");
-    let adapter = gpu.adapter();
-    println!("adapter: {} ({}), {}", adapter.name, adapter.kind, adapter.driver);
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    for size in [60.0, 30.0, 15.0] {
-        let mesh = Mesh::new(load_obj(path).expect("the scene"), size).expect("a mesh");
-        for resolution in [64, 128, 256, 512] {
+    let gpu = common::gpu();
+    let (sizes, resolutions): (&[f64], &[u32]) = if common::full() {
+        (&[60.0, 30.0, 15.0], &[64, 128, 256, 512])
+    } else {
+        (&[30.0], &[64, 128, 256])
+    };
+    for &size in sizes {
+        let mesh = Mesh::new(common::cornell_box(), size).expect("a mesh");
+        for &resolution in resolutions {
             measure(c, &gpu, &mesh, resolution);
         }
     }
@@ -62,12 +71,5 @@ fn measure(c: &mut Criterion, gpu: &Gpu, mesh: &Mesh, resolution: u32) {
     group.finish();
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(300))
-        .measurement_time(Duration::from_secs(1));
-    targets = stages
-}
+criterion_group! { name = benches; config = common::criterion(); targets = stages }
 criterion_main!(benches);

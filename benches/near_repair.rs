@@ -8,15 +8,12 @@
 //! points of path-traced truth.
 
 mod common;
-#[path = "../tests/common/truth.rs"]
-mod truth;
 
 use std::time::Instant;
 
-use common::go;
+use common::{keep_going, truth};
 use radiosity::{
-    Backend, Error, FormFactors, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver,
-    VertexMesh,
+    Error, FormFactors, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver, VertexMesh,
 };
 
 const TRUTH: &str = include_str!("../tests/data/cornell_box.truth.json");
@@ -28,12 +25,11 @@ const ELEMENT_SIZE: f64 = 30.0;
 const HEMICUBE: u32 = 128;
 
 fn main() -> Result<(), Error> {
-    if !common::full() {
-        println!("near_repair: left out; RADIOSITY_BENCH=full cargo bench --bench near_repair");
+    if !common::asked_for("near_repair") {
         return Ok(());
     }
-    let mesh = common::cornell_mesh(ELEMENT_SIZE);
-    let Backend::Gpu(gpu) = common::gpu() else { unreachable!("a graphics adapter was asked for") };
+    let mesh = Mesh::new(common::cornell_box(), ELEMENT_SIZE)?;
+    let gpu = common::gpu();
     println!("Cornell box, {} elements, hemicube {HEMICUBE}", mesh.element_count());
     println!(
         "{:14} {:>9} {:>9} {:>9} | {:>8} {:>6} | {:>7} {:>7} {:>7} {:>7}",
@@ -47,7 +43,7 @@ fn main() -> Result<(), Error> {
 
         let start = Instant::now();
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
-        let solution = Solver::default().solve(&mesh, &mut rows, go)?;
+        let solution = Solver::default().solve(&mesh, &mut rows, keep_going)?;
         let surface = VertexMesh::new(&mesh, &solution.radiosity);
         let seconds = start.elapsed().as_secs_f64();
         let errors = truth::compare(&surface, TRUTH);

@@ -4,12 +4,12 @@
 //! Throughput is in shots. Every iteration is a whole solve from the emitted light to 0.1 %
 //! unshot; what it asks for is handed out of memory.
 
+mod common;
+
 use std::collections::HashMap;
-use std::ops::ControlFlow;
-use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Solver, VertexMesh, load_obj};
+use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Solver, VertexMesh};
 
 /// Hands out rows that were made before.
 struct Stored<'a>(&'a HashMap<NodeId, Row>);
@@ -45,19 +45,20 @@ impl FormFactors for Recording {
 }
 
 fn shooting(c: &mut Criterion) {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = load_obj(path).expect("the scene");
+    let scene = common::cornell_box();
     let mut group = c.benchmark_group("cornell_box");
     for size in [120.0, 60.0] {
         let mesh = Mesh::new(scene.clone(), size).expect("a mesh");
         let rays = RayRows::new(&mesh, 1 << 14).expect("rays");
         let mut recording = Recording(rays, HashMap::new());
-        let go = |_: &_| ControlFlow::Continue(());
-        let solution = Solver::default().solve(&mesh, &mut recording, go).expect("a solution");
+        let solution =
+            Solver::default().solve(&mesh, &mut recording, common::keep_going).expect("a solution");
         let elements = mesh.element_count();
         group.throughput(Throughput::Elements(solution.shots));
         group.bench_function(BenchmarkId::new("shoot to 0.1 %", elements), |b| {
-            b.iter(|| Solver::default().solve(&mesh, &mut Stored(&recording.1), go));
+            b.iter(|| {
+                Solver::default().solve(&mesh, &mut Stored(&recording.1), common::keep_going)
+            });
         });
         group.throughput(Throughput::Elements(elements as u64));
         group.bench_function(BenchmarkId::new("elements to vertices", elements), |b| {
@@ -67,12 +68,5 @@ fn shooting(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(300))
-        .measurement_time(Duration::from_secs(2));
-    targets = shooting
-}
+criterion_group! { name = benches; config = common::criterion(); targets = shooting }
 criterion_main!(benches);

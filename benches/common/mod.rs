@@ -1,10 +1,18 @@
-//! What the benches share: the scene, the adapter, and which benches were asked for.
-// Each bench uses a part of it.
-#![allow(dead_code)]
+//! What the benches share: scenes, the adapter, and which benches were asked for.
+//!
+//! `cargo bench` runs what takes seconds; `RADIOSITY_BENCH=full cargo bench --bench NAME` all of one.
+#![allow(dead_code)] // each bench uses a part of it
+
+#[path = "../../tests/common/scenes.rs"]
+pub mod scenes;
+#[path = "../../tests/common/truth.rs"]
+pub mod truth;
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
-use radiosity::{AdapterInfo, Backend, Mesh, Scene, load_obj};
+use criterion::Criterion;
+use radiosity::{AdapterInfo, Gpu, Scene, load_obj};
 
 /// The Cornell box that ships with the crate; its unit is the millimetre.
 pub fn cornell_box() -> Scene {
@@ -12,25 +20,36 @@ pub fn cornell_box() -> Scene {
     load_obj(path).expect("the scene loads")
 }
 
-/// The Cornell box in elements of at most `size` millimetres.
-pub fn cornell_mesh(size: f64) -> Mesh {
-    Mesh::new(cornell_box(), size).expect("a good size")
-}
-
-/// The graphics adapter, whose name is printed: no number means anything without it.
-pub fn gpu() -> Backend {
-    let backend = Backend::gpu(None).expect("a graphics adapter");
-    let AdapterInfo { name, kind, driver } = backend.adapter();
+/// The graphics adapter. Its name is printed: times mean nothing without it.
+pub fn gpu() -> Gpu {
+    let gpu = Gpu::new(None).expect("a graphics adapter");
+    let AdapterInfo { name, kind, driver } = gpu.adapter();
     eprintln!("adapter: {name} ({kind}), {driver}");
-    backend
+    gpu
 }
 
-/// Progress that never stops the work.
-pub fn go<T>(_: &T) -> ControlFlow<()> {
+/// A progress callback that never stops the work.
+pub fn keep_going<T>(_: &T) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Whether all of a bench is to run: `RADIOSITY_BENCH=full cargo bench --bench NAME`.
+/// Ten samples, each of a few milliseconds or one iteration: enough for 5 %.
+pub fn criterion() -> Criterion {
+    Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(1))
+}
+
+/// Whether all of a bench was asked for.
 pub fn full() -> bool {
     std::env::var("RADIOSITY_BENCH").is_ok_and(|which| which == "full")
+}
+
+/// Whether a bench that runs in full only was asked for; says so if not.
+pub fn asked_for(name: &str) -> bool {
+    if !full() {
+        println!("{name}: left out; RADIOSITY_BENCH=full cargo bench --bench {name} runs it");
+    }
+    full()
 }

@@ -1,30 +1,54 @@
-//! The whole range of every quantity: its ends and its middle, on hemicubes and on rays. The example
-//! `extremes` goes all steps of the same sweeps.
+//! Quantities over their whole ranges against what is known exactly, on hemicubes and on rays: the
+//! ends and the middle of every range. All steps, as tables (many minutes with lavapipe):
+//!
+//!     cargo test --release --test slow -- --ignored --nocapture in_all_steps
 
 mod sweep;
 mod sweeps;
 
-use radiosity::Backend;
+use radiosity::{AdapterInfo, Backend};
 
-/// Goes all sweeps, and names those that do not hold.
-fn sweep_with(device: &Backend) {
-    let ask = sweeps::Ask { device, all: false };
-    let swept: Vec<_> = sweeps::ALL.iter().map(|sweep| sweep(&ask).unwrap()).collect();
-    swept.iter().for_each(|s| println!("{s:?}"));
-    let broken: Vec<_> = swept.iter().filter(|s| !s.holds()).collect();
+const HEADER: &str = "\
+| quantity | range | steps | compared with | off | may be | NaN, ∞ | ledger | by |
+|---|---|---|---|---|---|---|---|---|";
+
+/// Goes through every sweep and prints a table; fails with the sweeps that do not hold.
+fn sweep_with(device: &Backend, all: bool) {
+    let AdapterInfo { name, kind, driver } = device.adapter();
+    println!("{name}, {kind}, {driver}\n{HEADER}");
+    let ask = sweeps::Ask { device, all };
+    let mut broken = vec![];
+    for sweep in sweeps::ALL {
+        let swept = sweep(&ask).unwrap();
+        println!("{swept}");
+        if !swept.holds() {
+            broken.push(swept);
+        }
+    }
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
 #[test]
 fn rays_hold_over_all_ranges() {
-    sweep_with(&Backend::Cpu);
+    sweep_with(&Backend::Cpu, false);
 }
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn hemicubes_hold_over_all_ranges() {
-    let gpu = crate::common::gpu();
-    sweep_with(&Backend::Gpu(gpu));
+    sweep_with(&Backend::Gpu(crate::common::gpu()), false);
+}
+
+#[test]
+#[ignore = "goes through all steps, in many minutes"]
+fn rays_hold_in_all_steps() {
+    sweep_with(&Backend::Cpu, true);
+}
+
+#[test]
+#[ignore = "goes through all steps, in many minutes"]
+fn hemicubes_hold_in_all_steps() {
+    sweep_with(&Backend::Gpu(crate::common::gpu()), true);
 }
 
 #[test]

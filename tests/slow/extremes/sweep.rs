@@ -1,10 +1,11 @@
 //! What came of a sweep: one quantity over its whole range, against what is known.
 
+use std::fmt;
+
 use radiosity::Solution;
 
 /// A row of the table.
 #[derive(Clone, Debug)]
-#[allow(dead_code)] // the test only prints some of it
 pub struct Sweep {
     pub quantity: &'static str,
     pub range: &'static str,
@@ -66,5 +67,19 @@ impl Sweep {
     /// Whether all is as it should be.
     pub fn holds(&self) -> bool {
         self.off <= self.within && self.not_finite == 0 && self.ledger.unwrap_or(0.0) <= 1e-9
+    }
+}
+
+/// As a row of a Markdown table.
+impl fmt::Display for Sweep {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let ledger = self.ledger.map_or("–".into(), |ledger| format!("{ledger:.0e}"));
+        write!(f, "| {} | {} | {} ", self.quantity, self.range, self.steps)?;
+        write!(f, "| {} | {:.0e} | {:.0e} ", self.known, self.off, self.within)?;
+        write!(f, "| {} | {ledger} | {}", self.not_finite, self.by)?;
+        if self.most > 0 {
+            write!(f, ", {} steps at most", self.most)?;
+        }
+        write!(f, " |")
     }
 }
