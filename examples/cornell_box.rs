@@ -17,7 +17,7 @@ fn main() -> Result<(), radiosity::Error> {
     let baked = BakeTarget::Error(0.015).bake(scene, &backend, |stage| {
         match stage {
             BakeProgress::Shooting(p) => eprint!("\r{:7.3} % unshot ", 100.0 * p.unshot_share),
-            BakeProgress::Gathering(p) => eprint!("\r{} of {} vertices   ", p.gathered, p.of),
+            BakeProgress::Gathering(p) => eprint!("\r{} of {} vertices   ", p.gathered, p.total),
             BakeProgress::Estimating { samples, of } => eprint!("\r{samples} of {of} points      "),
             _ => {}
         }

@@ -33,7 +33,8 @@ fn main() -> Result<(), Error> {
     let coarse = Mesh::new(load_obj(path)?, 150.0)?.split_at_contacts(2);
     let mut gather = RayGather::new(&coarse, 1024)?; // or HemicubeGather, or your own `Gather`
     let refinement = RefinementSettings::new(5.0); // no element below 5 mm is split
-    let fine = refinement.gather(&light, &coarse, &mut gather, |_| ControlFlow::Continue(()))?;
+    let go = |_: &_| ControlFlow::Continue(());
+    let fine = gather_at_vertices(&light, &coarse, &refinement, &mut gather, go)?;
     println!("{} vertices", fine.surface.positions.len());
     write_ply("own_pipeline.ply", &fine.surface)
 }
