@@ -136,8 +136,8 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
-    /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell has
-    /// children.
+    /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell
+    /// has children.
     fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
         let mut mesh = Mesh {
@@ -158,8 +158,8 @@ impl Mesh {
     /// The same scene with each of `elements` split into four more.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when one of them is [`Mesh::MAX_DEPTH`] levels deep, or when there would be
-    /// more than [`Mesh::MAX_ELEMENTS`].
+    /// [`ErrorKind::Setting`] when one of them is [`Mesh::MAX_DEPTH`] levels deep, or when there
+    /// would be more than [`Mesh::MAX_ELEMENTS`].
     pub fn split(&self, elements: &[usize]) -> Result<Mesh, Error> {
         let wanted = self.element_count() + 3 * elements.len();
         let deep = |&&e: &&usize| self.cell(self.element(e)).level >= Mesh::MAX_DEPTH;

@@ -37,8 +37,8 @@ pub struct Triangle {
     pub group: u32,
     /// Index into the materials.
     pub material: u32,
-    /// Smoothing group: says with angles where a surface has creases ([`crate::Mesh::CREASE_DEGREES`]).
-    /// `Some(0)` is in none; `None` means that nothing is known.
+    /// Smoothing group: says with angles where a surface has creases
+    /// ([`crate::Mesh::CREASE_DEGREES`]). `Some(0)` is in none; `None` means that nothing is known.
     pub smoothing: Option<u32>,
 }
 
@@ -62,8 +62,8 @@ impl Scene {
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest
-    /// edge, times that edge again or the largest coordinate of its corners, if that is more; or when
-    /// its square underflows.
+    /// edge, times that edge again or the largest coordinate of its corners, if that is more; or
+    /// when its square underflows.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
@@ -189,8 +189,8 @@ impl Scene {
         Aabb::from_points((0..self.triangles.len()).flat_map(|t| self.corners(t)))
     }
 
-    /// The step between 64-bit coordinates of the scene's largest size, scene unit: points of one plane
-    /// may be off it by a few of these.
+    /// The step between 64-bit coordinates of the scene's largest size, scene unit: points of one
+    /// plane may be off it by a few of these.
     pub(crate) fn coordinate_ulp(&self) -> f64 {
         self.coordinate_ulp
     }
@@ -218,8 +218,8 @@ impl Scene {
     /// share with other groups are copied, so that those stay where they are.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or finite
-    /// coordinates.
+    /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or
+    /// finite coordinates.
     pub fn with_transformed_group(&self, group: &str, transform: DAffine3) -> Result<Scene, Error> {
         let Some(moved_group) = self.groups.iter().position(|name| name == group) else {
             let known = self.groups.join(", ");

@@ -121,7 +121,7 @@ impl Library {
                 let number = words(rest).last().and_then(finite);
                 let x =
                     number.ok_or_else(|| unusable_value(line, &entry.name, "a finite number"))?;
-                // LibrarySource disagree about which end of `Tr` is opaque.
+                // Files disagree about which end of `Tr` is opaque.
                 entry.transparent |= x < 1.0 && (keyword == "d" || x > 0.0);
             }
         }

@@ -2,8 +2,8 @@
 //!
 //! One pass over the lines collects positions, and faces with the group, material and smoothing
 //! group that are current at their line ([`ObjParser`]). All numbers are checked there, so that an
-//! error names its line. Then faces are cut into triangles and the scene is made, with a warning for
-//! each kind of thing that was skipped or replaced by a default.
+//! error names its line. Then faces are cut into triangles and the scene is made, with a warning
+//! for each kind of thing that was skipped or replaced by a default.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -30,8 +30,8 @@ const DEFAULT_GROUP: &str = "default";
 /// not used.
 ///
 /// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
-/// between; `s off` or `s 0` into none (Wavefront, "Object LibrarySource (.obj)", Advanced Visualizer 3.0,
-/// "Grouping"). In one group surfaces have creases at angles above
+/// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced
+/// Visualizer 3.0, "Grouping"). In one group surfaces have creases at angles above
 /// [`crate::Mesh::CREASE_DEGREES`], else above [`crate::Mesh::COPLANAR_DEGREES`]. Faces before the
 /// first `s`, and after one without a group (`s` or `s on`, as some programs write), are as if in a
 /// group of their own.
@@ -40,10 +40,10 @@ const DEFAULT_GROUP: &str = "default";
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
 /// material reflect [`Material::DEFAULT_REFLECTANCE`].
 ///
-/// LibrarySource may come from anywhere. MTL files are read from the folder of the OBJ file or below:
-/// absolute names and `..` are refused, so that a scene cannot have other files of the machine (or
-/// of its network) opened. Only regular files are read, of at most 1 GiB, as are all MTL files of a
-/// scene together. Memory stays within forty times the size of the files.
+/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or
+/// below: absolute names and `..` are refused, so that a scene cannot have other files of the
+/// machine (or of its network) opened. Only regular files are read, of at most 1 GiB, as are all
+/// MTL files of a scene together. Memory stays within forty times the size of the files.
 ///
 /// What is read but not modelled, or replaced by a default, is in [`Scene::warnings`].
 ///

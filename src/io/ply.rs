@@ -14,12 +14,12 @@ use crate::vertex::VertexMesh;
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
 /// (float, W/m² per channel, linear), `red green blue` (uchar, tone-mapped for viewers), and, where
-/// it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the channels). Faces:
-/// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
-/// header.
+/// it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the
+/// channels). Faces: `vertex_indices`, triangles, counter-clockwise from the front. The surface's
+/// comments are in the header.
 ///
-/// Where 32 bits do not do, numbers are double: `x y z` of a mesh more than 16 of its sizes from the
-/// origin, and the radiosity and its error if the largest is above 3.4e38 or below 1e-30 W/m².
+/// Where 32 bits do not do, numbers are double: `x y z` of a mesh more than 16 of its sizes from
+/// the origin, and the radiosity and its error if the largest is above 3.4e38 or below 1e-30 W/m².
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.

@@ -9,8 +9,8 @@ use crate::view_factor::{Estimate, Missing, ViewFactors};
 
 /// Writes the matrix as CSV: a header row and a first column of names, row leaves, column receives;
 /// then `open`, what leaves the scene, `back`, what meets the backs of surfaces, and the `area` of
-/// each row's group. Values have nine decimals; below 1e-5, five digits. Zero is `0`; what is merely
-/// not seen is left empty.
+/// each row's group. Values have nine decimals; below 1e-5, five digits. Zero is `0`; what is
+/// merely not seen is left empty.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.

@@ -27,8 +27,8 @@ const LEAF_SIZE: usize = 4;
 
 /// For each box, the others that it overlaps, in no particular order. Pairs are complete unless
 /// both boxes have more than [`MAX_OVERLAPS`] partners; of those, only pairs are given in which one
-/// is among the [`MAX_OVERLAPS`] of highest `rank`. Time and memory are O(n · [`MAX_OVERLAPS`]), but
-/// for the tree's O(n log n).
+/// is among the [`MAX_OVERLAPS`] of highest `rank`. Time and memory are O(n · [`MAX_OVERLAPS`]),
+/// but for the tree's O(n log n).
 pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
     let tree = tree(boxes);
     let first_partners = |k: usize| first_partners(&tree, boxes, k);

@@ -4,8 +4,9 @@
 //! may: greedy merging along the edges of the dual graph (Garland, Willmott and Heckbert 2001),
 //! which is how the face clusters of Willmott, Heckbert and Garland (1999) are made. Only a surface
 //! of one group and one material is merged, and no normal in a cluster is further than
-//! [`MAX_NORMAL_DEVIATION_DEGREES`] from its axis: what a cluster sends out is much like what one flat patch does.
-//! Smoothing groups are ignored: they are about the shading of a surface, not about what it sends.
+//! [`MAX_NORMAL_DEVIATION_DEGREES`] from its axis: what a cluster sends out is much like what one
+//! flat patch does. Smoothing groups are ignored: they are about the shading of a surface, not
+//! about what it sends.
 //!
 //! ```text
 //! roots              7              6
@@ -28,8 +29,8 @@ use crate::scene::Scene;
 /// measurement was kept.
 pub(crate) const MAX_NORMAL_DEVIATION_DEGREES: f64 = 35.0;
 
-/// Binary trees over the triangles of a scene. Cluster `t` is triangle `t` alone, for all triangles;
-/// the clusters of two parts follow.
+/// Binary trees over the triangles of a scene. Cluster `t` is triangle `t` alone, for all
+/// triangles; the clusters of two parts follow.
 #[derive(Clone, Debug)]
 pub(crate) struct Clusters {
     clusters: Vec<Cluster>,
@@ -164,8 +165,8 @@ impl Cluster {
 /// A pair of clusters that may merge, with its cost as the key of the queue: small and compact
 /// clusters come first, and flat before bent. `None` if the normals would deviate too far.
 ///
-/// The cost is the second moment ∫|x − c|² dA plus A² (1 − |n̄|²), both length unit⁴, where n̄ is the
-/// mean of the unit normals: 1 − |n̄|² is their variance.
+/// The cost is the second moment ∫|x − c|² dA plus A² (1 − |n̄|²), both length unit⁴, where n̄ is
+/// the mean of the unit normals: 1 − |n̄|² is their variance.
 fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, u32)>> {
     let merged = clusters[a as usize].merged(&clusters[b as usize]);
     if merged.max_deviation > MAX_NORMAL_DEVIATION_DEGREES.to_radians() {
@@ -302,8 +303,8 @@ mod tests {
         let (around, ball) = (roots(&cylinder()), roots(&sphere()));
         println!("cylinder {around}, sphere {ball}");
         assert!((6..=24).contains(&around), "{around}");
-        // Caps of 35° hold 1.14 of 12.57 sr: twelve at least. Of half that angle 43, or 52 hexagons,
-        // which fill 83 % of their caps.
+        // Caps of 35° hold 1.14 of 12.57 sr: twelve at least. Of half that angle 43, or 52
+        // hexagons, which fill 83 % of their caps.
         assert!((12..=52).contains(&ball), "{ball}");
     }
 

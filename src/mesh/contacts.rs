@@ -23,12 +23,12 @@ use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// What comes nearer to a cell's plane than this touches it, in units of the cell's size (the square
-/// root of its area). Chosen by hand; no measurement was kept.
+/// What comes nearer to a cell's plane than this touches it, in units of the cell's size (the
+/// square root of its area). Chosen by hand; no measurement was kept.
 const CONTACT_DISTANCE: f64 = 0.15;
 
-/// A segment has to come this far into an element to separate it, as a barycentric weight: one along
-/// the element's edge does not. Chosen by hand; no measurement was kept.
+/// A segment has to come this far into an element to separate it, as a barycentric weight: one
+/// along the element's edge does not. Chosen by hand; no measurement was kept.
 const MIN_PENETRATION: f64 = 0.02;
 
 /// A segment that separates some element in a cell comes at least this far into the cell, as a
@@ -56,8 +56,8 @@ impl Mesh {
     /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
     /// would go beyond [`Mesh::MAX_DEPTH`] are left out.
     ///
-    /// Where more than 256 triangles have more than 256 others about them each, only the largest 256
-    /// touch the rest of these: thousands of faces in one place are not worth the time.
+    /// Where more than 256 triangles have more than 256 others about them each, only the largest
+    /// 256 touch the rest of these: thousands of faces in one place are not worth the time.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
         let count = self.depths.len();
         let tolerances: Vec<f64> =
@@ -136,8 +136,8 @@ impl Mesh {
 }
 
 impl ContactSegment {
-    /// Whether the segment comes into `cell` by more than `margin`, a barycentric weight of the cell:
-    /// whether it meets the triangle in which all three weights are at least that.
+    /// Whether the segment comes into `cell` by more than `margin`, a barycentric weight of the
+    /// cell: whether it meets the triangle in which all three weights are at least that.
     fn separates(&self, cell: Cell, margin: f64) -> bool {
         let [start, end] = self.ends.map(|p| {
             let [u, v] = cell.local(p.x, p.y);

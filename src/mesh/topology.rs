@@ -147,8 +147,8 @@ fn side_ends(scene: &Scene) -> Vec<[(u32, u32); 3]> {
     (0..scene.triangles().len()).map(ends).collect()
 }
 
-/// Whether triangles `t` and `s`, which share a side, are of one group and material and differ by no
-/// more than the crease angle, degrees.
+/// Whether triangles `t` and `s`, which share a side, are of one group and material and differ by
+/// no more than the crease angle, degrees.
 fn continues(
     scene: &Scene,
     t: usize,

@@ -18,8 +18,9 @@ use glam::DVec3;
 use crate::error::{Error, ErrorKind};
 use crate::sampling::low_discrepancy::{radical_inverse, sobol_02_point};
 
-/// Directions spread over a hemisphere in proportion to the cosine, so that each stands for the same
-/// form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on low-discrepancy points.
+/// Directions spread over a hemisphere in proportion to the cosine, so that each stands for the
+/// same form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on low-discrepancy
+/// points.
 #[derive(Debug)]
 pub(crate) struct HemisphereSamples {
     /// Unit vectors, by components along two tangents and the normal.
@@ -45,9 +46,9 @@ impl HemisphereSamples {
         }))
     }
 
-    /// `count` directions, clamped to 1 to [`MAX_RAYS`], on Sobol's (0,2)-sequence: of a power of two,
-    /// the first half, quarter and so on are evenly spread sets of their own, and so is the second
-    /// half.
+    /// `count` directions, clamped to 1 to [`MAX_RAYS`], on Sobol's (0,2)-sequence: of a power of
+    /// two, the first half, quarter and so on are evenly spread sets of their own, and so is the
+    /// second half.
     pub fn progressive(count: u32) -> HemisphereSamples {
         HemisphereSamples::from_points(count.clamp(1, MAX_RAYS), sobol_02_point)
     }

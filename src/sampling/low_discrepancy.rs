@@ -112,8 +112,8 @@ mod tests {
             let mut first: Vec<usize> = order.into_iter().take(FIRST).collect();
             first.push(count);
             first.sort_unstable();
-            // By the three-gap theorem no gap is larger than the sum of the two others, which at the
-            // golden section is below 2.7 times the mean; steps are rounded.
+            // By the three-gap theorem no gap is larger than the sum of the two others, which at
+            // the golden section is below 2.7 times the mean; steps are rounded.
             let gap = first.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
             assert!(gap as f64 <= 3.0 * count as f64 / FIRST as f64 + 1.0, "{count}: {gap}");
         }

@@ -86,7 +86,8 @@ mod tests {
         let points: Vec<SurfacePoint> = surface.spread(1000, 0.5).collect();
         assert_eq!(points.iter().filter(|p| p.triangle == 0).count(), 750);
         let mean = |k: usize| points.iter().map(|p| p.barycentric[k]).sum::<f64>() / 1000.0;
-        // The centroid's weights are 1/3; a low-discrepancy mean of 1000 points is off by some 1/1000.
+        // The centroid's weights are 1/3; a low-discrepancy mean of 1000 points is off by some
+        // 1/1000.
         assert!((mean(0) - 1.0 / 3.0).abs() < 5e-3 && (mean(1) - 1.0 / 3.0).abs() < 5e-3);
         assert!(points.iter().all(|p| p.barycentric[0] + p.barycentric[1] <= 1.0));
         assert_eq!(AreaSampler::new([]).spread(10, 0.0).count(), 0);

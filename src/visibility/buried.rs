@@ -4,13 +4,19 @@
 //! surface, sees backs. The share is of the point's hemisphere, weighted by form factor. How sure
 //! one must be depends on what follows from a wrong answer:
 //!
-//! | constant | share | asked of | if it is exceeded | why not another value |
-//! |---|---|---|---|---|
-//! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | try another viewpoint of the patch | another try is cheap, so more likely than not is enough |
-//! | [`HIDDEN_SAMPLE`] | 0.5 | sample of the error estimate | leave it out, if surfaces are near as well | few samples are at stake, and a second condition guards |
-//! | [`ENCLOSED`] | 0.75 | sample of the winding check | its back hits do not count against the winding | above a half, so that inverted walls of a room are still reported |
-//! | [`BURIED`] | 0.9 | gather point | its sample is replaced, if surfaces are near as well | the replacement is extrapolated, so a dark sample is rather kept |
-//! | [`INSIDE`] | 0.995 | gather point | its sample is replaced, however far surfaces are | no second condition; seams still let a ray or two through |
+//! | constant | share | asked of | consequence |
+//! |---|---|---|---|
+//! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | another viewpoint is tried |
+//! | [`HIDDEN_SAMPLE`] | 0.5 | sample of the error estimate | left out, if surfaces are near too |
+//! | [`ENCLOSED`] | 0.75 | sample of the winding check | its back hits are no evidence |
+//! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
+//! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
+//!
+//! Why they differ: another viewpoint is cheap, and a left-out sample is guarded by a second
+//! condition, so that more likely than not is enough for both. The winding check needs more than a
+//! half, so that inverted walls of a room are still reported. The sample of a gather point is
+//! replaced by an extrapolation, so that a dark sample is rather kept; without the second condition
+//! only what seams let through, a ray or two, may see a front.
 //!
 //! The values were chosen by hand; no measurement was kept. A share of 0.5 is what a point at the
 //! foot of an inverted wall sees of it.

@@ -4,15 +4,21 @@
 //! other's planes. A ray therefore skips its first stretch, or its origin is lifted off the
 //! surface. Too small, and surfaces shade themselves; too large, and contact is lost.
 //!
-//! | constant | value | unit | used by | what bounds it |
-//! |---|---|---|---|---|
-//! | [`RAY_START`] | 1e-6 | √area of the patch or triangle | rays from points on surfaces | above the 64-bit rounding of scenes up to 1e9 patch sizes from the origin |
-//! | [`SEGMENT_START`] | 1e-6 | length of the segment | occlusion between two points, from its start | as above; no patch size is at hand |
-//! | [`SEGMENT_END`] | 1e-9 | length of the segment | occlusion between two points, at its end | the target itself must not count; rounding is 1e-15 |
-//! | [`NEAR_PLANE`] | 1e-4 | √area of the patch | hemicubes on a GPU | 32-bit coordinates; the patch's own triangle is skipped anyway |
-//! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element there | gather points, which skip no triangle | far below an element, far above what devices confuse |
-//! | [`MIN_LIFT_ULPS`] | 1024 | steps of the scene's coordinates | gather points of tiny elements | a quarter of it is 4 × the 2⁻⁴⁸ of a device's split floats |
-//! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather | rounding stays below the rest |
+//! | constant | value | in units of | used by |
+//! |---|---|---|---|
+//! | [`RAY_START`] | 1e-6 | √area of the patch or triangle | rays from points on surfaces |
+//! | [`SEGMENT_START`] | 1e-6 | the segment | occlusion between two points |
+//! | [`SEGMENT_END`] | 1e-9 | the segment | occlusion between two points |
+//! | [`NEAR_PLANE`] | 1e-4 | √area of the patch | hemicubes on a GPU |
+//! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element | gather points |
+//! | [`MIN_LIFT_ULPS`] | 1024 | steps of coordinates | gather points of tiny elements |
+//! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather |
+//!
+//! Why they differ: rays in 64 bits need only be above rounding, 1e-6 of a patch in scenes up to
+//! 1e9 patch sizes from the origin; at the end of a segment only the target itself must not count.
+//! Hemicubes have 32-bit coordinates, and skip the patch's own triangle anyway. Gather points skip
+//! no triangle, and their lift must exceed what a device confuses: a quarter of 1024 steps is four
+//! times the 2⁻⁴⁸ of its split floats.
 //!
 //! The shares were chosen by hand within these bounds; no measurement was kept.
 

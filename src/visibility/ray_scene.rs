@@ -6,9 +6,9 @@
 //!           boxes grown by a margin)
 //! ```
 //!
-//! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is lost
-//! between it and the exact test. Of hits at equal distances the lowest triangle index wins, whatever
-//! the order of traversal, so that results do not depend on the hierarchy.
+//! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
+//! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
+//! whatever the order of traversal, so that results do not depend on the hierarchy.
 
 use std::ops::Range;
 
@@ -51,12 +51,12 @@ pub(crate) struct Hit {
 /// end nearer than 1e-4 units: 1e-9 of the scene at this size.
 const HIERARCHY_SCENE_SIZE: f64 = 1e5;
 
-/// Boxes grow by this much on every side, in the hierarchy's unit: 1e-6 of the scene, several roundings
-/// of a 32-bit coordinate (6e-8 each).
+/// Boxes grow by this much on every side, in the hierarchy's unit: 1e-6 of the scene, several
+/// roundings of a 32-bit coordinate (6e-8 each).
 const BOX_MARGIN: f32 = 1e-6 * HIERARCHY_SCENE_SIZE as f32;
 
-/// Barycentric weights down to minus this count as inside, which closes the seam between neighbours:
-/// far above the rounding of the test (some 1e-15), far below anything visible.
+/// Barycentric weights down to minus this count as inside, which closes the seam between
+/// neighbours: far above the rounding of the test (some 1e-15), far below anything visible.
 const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
 
 impl RayScene {
@@ -117,8 +117,8 @@ impl RayScene {
         best
     }
 
-    /// Whether any hit that `counts` lies along `direction` (any length) from `from`, within `reach` in
-    /// units of it.
+    /// Whether any hit that `counts` lies along `direction` (any length) from `from`, within
+    /// `reach` in units of it.
     pub fn occluded(
         &self,
         from: DVec3,
@@ -143,13 +143,14 @@ impl RayScene {
     fn ray(&self, from: DVec3, direction: DVec3) -> (Ray, f64) {
         let local = ((from - self.origin) * self.scale).as_vec3();
         let (unit, length) = direction.normalize_and_length();
-        // Adding zero turns -0 into 0: the traversal takes its octant and its inverse from the sign.
+        // Adding zero turns -0 into 0: the traversal takes its octant and its inverse from the
+        // sign.
         let ray = Ray::new_inf(local.into(), (unit.as_vec3() + Vec3::ZERO).into());
         (ray, length * self.scale)
     }
 
-    /// Where the line meets a triangle, within `reach` in units of `direction`, in 64 bits: its plane
-    /// first (Badouel 1990), because most are met too far off or not at all.
+    /// Where the line meets a triangle, within `reach` in units of `direction`, in 64 bits: its
+    /// plane first (Badouel 1990), because most are met too far off or not at all.
     #[inline(always)]
     fn intersect(
         &self,
@@ -160,8 +161,8 @@ impl RayScene {
     ) -> Option<Hit> {
         let TrianglePlane { corner, normal, gradients } = self.triangles[triangle];
         let (facing, to) = (normal.dot(direction), corner - from);
-        // Most are too far off or behind, which is told without a division. Written so that NaN is no
-        // hit, as of a line in the plane.
+        // Most are too far off or behind, which is told without a division. Written so that NaN is
+        // no hit, as of a line in the plane.
         let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
         if !(rise > reach.start * steep && rise <= reach.end * steep) || steep == 0.0 {
             return None;

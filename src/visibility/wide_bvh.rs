@@ -13,8 +13,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 
-/// Levels below the root, at most. The traversal's stack has 32 entries, one a level, and drops further
-/// ones silently.
+/// Levels below the root, at most. The traversal's stack has 32 entries, one a level, and drops
+/// further ones silently.
 const MAX_LEVELS: u32 = 31;
 
 /// Bins along an axis, between which a split may lie. Chosen by hand; no measurement was kept.
@@ -30,8 +30,8 @@ pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
 
 /// Parts boxes where rays are expected to meet the fewest of them (Wald 2007, "On fast Construction
 /// of SAH-based Bounding Volume Hierarchies", sections 3.1 to 3.3), and into halves where nothing
-/// tells them apart, or levels run out. That takes n log n time even if all boxes are the same, or lie one
-/// in the other; merging neighbours from below takes n² then, and ends in a chain.
+/// tells them apart, or levels run out. That takes n log n time even if all boxes are the same, or
+/// lie one in the other; merging neighbours from below takes n² then, and ends in a chain.
 fn binary(boxes: &[Aabb]) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -90,7 +90,8 @@ fn split(boxes: &[Aabb], part: &mut [u32], levels: u32) -> usize {
     }
 }
 
-/// The axis, and the first bin of the second part, for which a ray is expected to meet the fewest boxes.
+/// The axis, and the first bin of the second part, for which a ray is expected to meet the fewest
+/// boxes.
 fn best_sah_split(
     boxes: &[Aabb],
     part: &[u32],

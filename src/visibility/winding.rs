@@ -10,9 +10,9 @@
 //!   met from behind half as often as from the front, or more: inverted
 //! ```
 //!
-//! Points that see backs almost everywhere are enclosed: within a body that stands on their surface,
-//! or in a room that is inverted as a whole. What they meet counts only for triangles whose front is
-//! never met.
+//! Points that see backs almost everywhere are enclosed: within a body that stands on their
+//! surface, or in a room that is inverted as a whole. What they meet counts only for triangles
+//! whose front is never met.
 
 use rayon::prelude::*;
 
@@ -23,8 +23,8 @@ use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 use crate::visibility::{buried, offset};
 
-/// Points on the fronts of faces from which rays are cast, spread evenly over the area, and rays from
-/// each. Chosen by hand; no measurement was kept.
+/// Points on the fronts of faces from which rays are cast, spread evenly over the area, and rays
+/// from each. Chosen by hand; no measurement was kept.
 const SAMPLES: usize = 2048;
 const RAYS_PER_SAMPLE: u32 = 32;
 
@@ -39,8 +39,8 @@ impl Scene {
     /// meet backs from without.) Faces that are to be seen from both sides but have only one are
     /// named too: light that meets a back is lost.
     ///
-    /// Casts 65 536 rays, the same for the same scene. In a scene that is all of one group, a closed
-    /// body without others within cannot be told from a room.
+    /// Casts 65 536 rays, the same for the same scene. In a scene that is all of one group, a
+    /// closed body without others within cannot be told from a room.
     pub fn check_winding(&mut self) {
         let of_triangles = sample_orientation(self);
         let mut of_groups = vec![HitCounts::default(); self.groups().len()];
@@ -53,8 +53,8 @@ impl Scene {
         let names: Vec<&str> = named.map(|g| &*self.groups()[g]).collect();
         if !names.is_empty() {
             self.warn(format!(
-                "groups with faces that are seen from behind, where light is lost: {}; turn them if \
-                 they are wound inside out, or give them a second face",
+                "groups with faces that are seen from behind, where light is lost: {}; turn them \
+                 if they are wound inside out, or give them a second face",
                 quoted(&names)
             ));
         }
