@@ -4,7 +4,9 @@ mod common;
 
 mod slow {
     mod accuracy;
+    mod checkpoint;
     mod extremes;
+    mod hemicubes;
     #[cfg(feature = "cli")]
     mod kill_and_resume;
     mod many_triangles;

@@ -5,6 +5,8 @@ pub mod closed_forms;
 pub mod fakes;
 pub mod files;
 pub mod framed;
+pub mod hemicubes;
+pub mod measures;
 pub mod scenes;
 pub mod surface;
 pub mod truth;

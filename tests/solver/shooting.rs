@@ -11,17 +11,9 @@ use radiosity::{
 
 use crate::common::closed_forms::exact;
 use crate::common::framed::{self, Frame};
+use crate::common::measures::mean_and_worst;
 use crate::common::scenes::paint;
 use crate::common::{cube, keep_going, quads};
-
-/// Area-weighted mean radiosity, and the largest relative deviation of an element from `exact`.
-pub fn mean_and_worst(mesh: &Mesh, s: &Solution, exact: Rgb) -> (Rgb, f64) {
-    let area = |e: usize| mesh.area(mesh.element(e));
-    let flux: Rgb = s.radiosity.iter().zip(0..).map(|(&b, e)| b * area(e)).sum();
-    let total: f64 = (0..mesh.element_count()).map(area).sum();
-    let off = |b: &Rgb| ((*b - exact) / exact).abs().max_element();
-    (flux / total, s.radiosity.iter().map(off).fold(0.0, f64::max))
-}
 
 /// Solves with the rows that `rows` makes; no element is off by more than `tolerance` of its value.
 pub fn unequal_areas<R: FormFactors>(rows: impl Fn(&Mesh) -> R, tolerance: f64) {

@@ -1,7 +1,5 @@
 //! Gathering with hemicubes: against closed forms, against rays, and against itself.
 
-use std::f64::consts::PI;
-
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{
@@ -10,6 +8,7 @@ use radiosity::{
 };
 
 use crate::common::fakes::GivenRadiosity;
+use crate::common::hemicubes::outline_bound;
 use crate::common::scenes::{Quad, facing_down, grey, lamp};
 use crate::common::{cornell_box, cube, gpu, quads};
 
@@ -23,14 +22,6 @@ fn gather_all(
     let mut gather = HemicubeGather::new(gpu, &light.mesh, n).unwrap();
 
     gather.gather(&light.sources(), places).unwrap()
-}
-
-/// Bound on the error of a form factor seen by a hemicube of resolution `n`, when its outline is
-/// `half_faces` long in units of half a face's width and has so many corners: a line of l pixels
-/// crosses at most √2 l + 2, each wrong by at most half the largest weight, 4/(π n²).
-fn outline_bound(n: u32, half_faces: f64, corners: f64) -> f64 {
-    let crossed = 2f64.sqrt() * half_faces * f64::from(n) / 2.0 + 2.0 * corners;
-    crossed * 2.0 / (PI * f64::from(n).powi(2))
 }
 
 /// Exitance of all lamps, W/m².

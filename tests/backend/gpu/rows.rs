@@ -4,40 +4,12 @@ use std::f64::consts::PI;
 use std::num::NonZeroU32;
 
 use glam::DVec3;
-use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
+use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, RayRows, Row};
 
+use crate::common::hemicubes::{factor_to_group, hemicube_rows, largest_pixel, outline_bound};
 use crate::common::scenes::grey;
 use crate::common::{cornell_box, cube, gpu, quads};
-
-/// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
-fn largest_pixel(n: u32) -> f64 {
-    4.0 / (PI * f64::from(n).powi(2))
-}
-
-/// Bound on the error of a form factor to a polygon seen within the top face (or one side face),
-/// when its outline there is `perimeter` long in units of half the face's width.
-///
-/// A pixel is counted by its centre. Wrong are only the pixels that the outline crosses, each by
-/// at most half its weight (a straight line leaves the side of the centre at least half the pixel).
-/// A line of `l` pixels crosses at most √2 l + 2 of them.
-fn outline_bound(n: u32, perimeter: f64, corners: f64) -> f64 {
-    let pixels = 2f64.sqrt() * perimeter * f64::from(n) / 2.0 + 2.0 * corners;
-    0.5 * largest_pixel(n) * pixels
-}
-
-fn rows(gpu: &Gpu, mesh: &Mesh, n: u32, patches: &[NodeId]) -> Vec<Row> {
-    let rows = HemicubeRows::new(gpu, mesh, n).unwrap().rows(mesh, patches, 1.0).unwrap();
-    rows.iter().zip(patches).for_each(|(row, &p)| row.check(mesh, p).unwrap());
-    rows
-}
-
-/// Form factor to all elements of one group.
-fn to_group(mesh: &Mesh, row: &Row, group: u32) -> f64 {
-    let of = |e: u32| mesh.scene().triangles()[mesh.triangle(mesh.element(e as usize))].group;
-    let seen = row.entries.iter().filter(|e| of(e.element) == group);
-    seen.map(|e| Row::form_factor(e.share)).sum()
-}
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
@@ -52,8 +24,8 @@ fn square_on_axis_matches_closed_form() {
     let corners = square.map(DVec3::from_array);
     assert!((point_to_polygon(DVec3::ZERO, DVec3::Z, &corners) - exact).abs() < 1e-14);
     for n in [16, 32, 64, 128, 256, 512, 1024] {
-        let row = &rows(&gpu, &mesh, n, &[mesh.element(0)])[0];
-        let got = to_group(&mesh, row, 1);
+        let row = &hemicube_rows(&gpu, &mesh, n, &[mesh.element(0)])[0];
+        let got = factor_to_group(&mesh, row, 1);
         // The centroid of the speck's first triangle is 7e-4 off the axis: a shift of the order
         // of its square; the outline is 4 sides of 0.5.
         let bound = outline_bound(n, 2.0, 4.0) + 1e-6;
@@ -63,71 +35,18 @@ fn square_on_axis_matches_closed_form() {
     }
 }
 
-/// Area-averaged factor between two unit squares from rows at every element; its error has two
-/// causes, each with its own bound: pixels, against the closed form from the same points, and the
-/// points, against the closed form from the whole area.
-fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, perimeter: f64) {
-    let gpu = gpu();
-    let first = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
-    let (p, q) = (first.map(DVec3::from_array), second.map(DVec3::from_array));
-    assert!((polygon_to_polygon(&p, &q) - exact).abs() < 5e-9, "{}", polygon_to_polygon(&p, &q));
-    let mesh = Mesh::new(quads(&[(first, grey()), (second, grey())]), 0.1).unwrap();
-    let patches: Vec<NodeId> = [0, 1]
-        .into_iter()
-        .flat_map(|t| mesh.elements_of(mesh.root(t)))
-        .map(|e| mesh.element(e))
-        .collect();
-    let point = |&n: &NodeId| point_to_polygon(mesh.centroid(n), mesh.normal(n), &q) * mesh.area(n);
-    let at_points: f64 = patches.iter().map(point).sum();
-    assert!((at_points - exact).abs() <= quadrature, "{at_points} {exact}");
-    for n in [16, 64, 256, 1024] {
-        let rows = rows(&gpu, &mesh, n, &patches);
-        let got: f64 =
-            rows.iter().zip(&patches).map(|(r, &n)| to_group(&mesh, r, 1) * mesh.area(n)).sum();
-        let bound = outline_bound(n, perimeter, 12.0);
-        println!(
-            "n {n:4}: pixels {:+.2e} within {bound:.1e}, points {:+.2e}",
-            got - at_points,
-            at_points - exact
-        );
-        assert!((got - at_points).abs() <= bound, "n {n}: {got} {at_points} {bound}");
-        assert!((got - exact).abs() <= bound + quadrature);
-    }
-}
-
-#[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn parallel_unit_squares_match_closed_form() {
-    // Centroid rule: for a triangle of longest edge h, |error| ≤ h²/24·max|∇²F| or less; ∇²F of
-    // the point factor is below 4 here, h = 0.0884: 1.3e-3. The outline on the hemicube is at most
-    // the square's, 4 sides of 1 at distance 1, in units of half a face: 4 times 1, wherever the
-    // point is; folded over the edge of the top face it gets no longer.
-    let above = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
-    between_unit_squares(above, 0.199_824_895_698_387_46, 1.3e-3, 4.0);
-}
-
-#[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn perpendicular_unit_squares_match_closed_form() {
-    // Near the shared edge the point factor runs up to 1/2 like a function of (distance to edge)/
-    // (length), so the centroid rule misses up to a share of the edge row's own area times its
-    // factor's variation: 0.0625 · 1/2 · 1/4. The outline spans at most two faces: 8 half-faces.
-    let wall = [[1., 0., 0.], [1., 0., 1.], [1., 1., 1.], [1., 1., 0.]];
-    between_unit_squares(wall, 0.200_043_776_075_403_16, 7.9e-3, 8.0);
-}
-
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn closed_cube_has_no_gaps() {
     let gpu = gpu();
     let mesh = Mesh::new(cube(&grey()), 0.3).unwrap();
     let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
-    for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
+    for (row, &p) in hemicube_rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
         // Pixels look along directions of at least 1/64 above the horizon: no gap at the edges.
         assert_eq!((row.escaped, row.backface), (0, 0));
         assert_eq!(row.closure(), 1.0);
         let own = mesh.scene().triangles()[mesh.triangle(p)].group;
-        assert_eq!(to_group(&mesh, row, own), 0.0, "a flat wall does not see itself");
+        assert_eq!(factor_to_group(&mesh, row, own), 0.0, "a flat wall does not see itself");
     }
 }
 
@@ -150,7 +69,7 @@ fn culling_leaves_no_holes() {
     let mesh = Mesh::new(quads(&tiles), f64::INFINITY).unwrap();
     let patches: Vec<NodeId> =
         (0..mesh.element_count()).step_by(31).map(|e| mesh.element(e)).collect();
-    for (row, &p) in rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
+    for (row, &p) in hemicube_rows(&gpu, &mesh, 64, &patches).iter().zip(&patches) {
         assert_eq!((row.escaped, row.backface), (0, 0), "from {}", mesh.centroid(p));
     }
 }
@@ -165,7 +84,7 @@ fn back_faces_block_and_are_counted() {
     let lid = [[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]];
     let mesh = Mesh::new(quads(&[(floor, grey()), (screen, grey()), (lid, grey())]), 0.5).unwrap();
     let patches: Vec<NodeId> = mesh.elements_of(mesh.root(0)).map(|e| mesh.element(e)).collect();
-    for row in rows(&gpu, &mesh, 64, &patches) {
+    for row in hemicube_rows(&gpu, &mesh, 64, &patches) {
         assert_eq!(row.entries, []);
         // At least 8 to each side at height 0.1: all but 0.5·(1 − 8/√(64.01))·4 ≈ 3e-4 is covered.
         assert!(Row::form_factor(row.backface) > 1.0 - 4e-4, "{}", Row::form_factor(row.backface));
@@ -178,7 +97,7 @@ fn agree(size: f64, n: u32, rays: u32, count: usize) {
     let mesh = cornell_box(size);
     let all = mesh.element_count();
     let patches: Vec<NodeId> = (0..count).map(|k| mesh.element(k * 7919 % all)).collect();
-    let gpu_rows = rows(&gpu, &mesh, n, &patches);
+    let gpu_rows = hemicube_rows(&gpu, &mesh, n, &patches);
     let cpu_rows = RayRows::new(&mesh, rays).unwrap().rows(&mesh, &patches, 1.0).unwrap();
     let (pixel, mut worst) = (largest_pixel(n), 0.0f64);
     for (a, b) in gpu_rows.iter().zip(&cpu_rows) {
@@ -252,7 +171,8 @@ fn far_scene_has_the_same_rows() {
     let far = radiosity::Scene::new(moved, triangles, groups, materials).unwrap();
     let far = Mesh::new(far, 200.0).unwrap();
     let patches: Vec<NodeId> = (0..40).map(|e| near.element(e * 5)).collect();
-    let (a, b) = (rows(&gpu, &near, 64, &patches), rows(&gpu, &far, 64, &patches));
+    let (a, b) =
+        (hemicube_rows(&gpu, &near, 64, &patches), hemicube_rows(&gpu, &far, 64, &patches));
     for (a, b) in a.iter().zip(&b) {
         let total = |row: &Row| row.entries.iter().map(|e| u64::from(e.share)).sum::<u64>();
         // Positions round at 2^19 by 2^-34: a pixel on a border may flip, no more than a few.
@@ -304,7 +224,7 @@ fn rotations_average_pixel_errors() {
         }
         f64::sqrt(squares / count)
     };
-    assert!(make(1) == rows(&gpu, &mesh, 128, &patches), "one rotation is none");
+    assert!(make(1) == hemicube_rows(&gpu, &mesh, 128, &patches), "one rotation is none");
     let (one, four) = (make(1), make(4));
     assert!(four == make(4), "the same bits again");
     let ratio = rms(&four) / rms(&one);
