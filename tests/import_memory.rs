@@ -53,8 +53,8 @@ fn peak_memory_is_bounded_by_file_size() {
     for mtl in &mtls {
         check(mtl, &format!("{square}mtllib it.mtl\nusemtl 1\nf 1 2 3\n"), mtl);
     }
-    // The corner of a polygon, of two bytes, becomes an index, a place in space and a triangle of 28
-    // bytes; a face, a group or a material of four to eight bytes some 100 to 150.
+    // The corner of a polygon, of two bytes, becomes an index, a place in space and a triangle of
+    // 28 bytes; a face, a group or a material of four to eight bytes some 100 to 150.
     let factor = (highest - start) as f64 / BYTES as f64;
     assert!(factor < 40.0, "{factor} bytes a byte");
 }

@@ -1,4 +1,11 @@
-//! Tests that take minutes: `cargo test --release --test slow`.
+//! Tests that take minutes, ignored unless asked for:
+//!
+//! ```sh
+//! cargo test --release --features cli --test slow -- --ignored
+//! ```
+//!
+//! With `--nocapture` they print what they measure: `extremes` its table, for one. Those that need
+//! a graphics adapter are left out where RADIOSITY_NO_GPU is set.
 
 mod common;
 
@@ -6,6 +13,7 @@ mod slow {
     mod accuracy;
     mod checkpoint;
     mod extremes;
+    #[cfg(not(skip_gpu_tests))]
     mod hemicubes;
     #[cfg(feature = "cli")]
     mod kill_and_resume;

@@ -32,8 +32,8 @@ fn noisy_points_get_more_rays() {
     let (plain, more) = (off(few()), off(few().with_noise(0.02, 0.0)));
     let all = off(RayGather::new(&light.mesh, 1 << 14).unwrap());
     println!("off by {plain:.4}, {more:.4} where they disagree, {all:.4} with 16 times as many");
-    // Some 8 of 256 rays find it: 1/8 off, or less as they are stratified. Four times as many are off
-    // by less than half of that; 16 times by a quarter of that again.
+    // Some 8 of 256 rays find it: 1/8 off, or less as they are stratified. Four times as many are
+    // off by less than half of that; 16 times by a quarter of that again.
     assert!(plain > 0.04 && more < plain / 2.0 && all < plain / 4.0);
     // Where they agree, nothing changes: with light from everywhere, bit for bit.
     let even =

@@ -27,8 +27,8 @@ fn furnace(reflectance: f64) -> Scene {
 #[test]
 fn furnace_is_exact_and_estimated_so() {
     let baked = bake_to_error(furnace(0.5), 0.02);
-    // Most of what is left is what was not shot, e/40 = 5e-4 of what is emitted, of which half returns,
-    // and what few looks into corners miss.
+    // Most of what is left is what was not shot, e/40 = 5e-4 of what is emitted, of which half
+    // returns, and what few looks into corners miss.
     let all = &baked.light.surface.radiosity;
     let rms = all.iter().map(|b| (b.x / 2.0 - 1.0).powi(2)).sum::<f64>() / all.len() as f64;
     println!("off by {}, {:?}", rms.sqrt(), baked.estimate);
@@ -94,17 +94,25 @@ fn two_runs_give_the_same_bits() {
 }
 
 #[test]
-fn more_time_lowers_the_estimate() {
-    let bake = |seconds: f64| {
-        BakeTarget::seconds(seconds).unwrap().bake(cornell(), &Backend::Cpu, keep_going).unwrap()
-    };
+fn time_target_returns_last_finished_attempt() {
     // No time at all: what was reached, which is little, comes back at once.
-    let none = bake(1e-9);
+    let target = BakeTarget::Time(Duration::from_nanos(1));
+    let none = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
     assert_eq!(none.solution.stop, StopReason::Cancelled);
     assert_eq!(none.light.surface.error.len(), none.light.surface.positions.len());
-    // Nothing is said of the clock here: any machine has done the first accuracy by then, or stops.
-    let some = bake(4.0);
-    assert!(some.estimate.total < none.estimate.total);
+    // Time enough on any machine: stopped by hand as the second attempt starts to shoot.
+    let target = BakeTarget::Time(Duration::from_secs(1 << 30));
+    let (mut estimated, mut stopped) = (false, false);
+    let progress = |stage: &BakeProgress| {
+        estimated |= matches!(stage, BakeProgress::Estimated(_));
+        stopped |= estimated && matches!(stage, BakeProgress::Shooting(_));
+        if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let first = target.bake(cornell(), &Backend::Cpu, progress).unwrap();
+    assert!(stopped, "a second attempt was begun");
+    assert_eq!(first.solution.stop, StopReason::Converged);
+    assert_eq!(first.light.stop, StopReason::Converged);
+    assert!(first.estimate.total < none.estimate.total);
 }
 
 #[test]

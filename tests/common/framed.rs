@@ -56,8 +56,8 @@ pub fn plates(frame: Frame) -> Scene {
     frame.quads(&[(floor, grey(0.0, 0.0)), (ceiling, grey(0.0, 0.0))])
 }
 
-/// The same two, of `side` and as far apart, groups 0 and 1, in a scene that is as large as ever for a
-/// unit square some way off.
+/// The same two, of `side` and as far apart, groups 0 and 1, in a scene that is as large as ever
+/// for a unit square some way off.
 pub fn small_plates(frame: Frame, side: f64) -> Scene {
     let [.., floor, ceiling] = walls([0.0; 3], [1.0; 3]);
     let small = |p: [f64; 3]| (DVec3::new(0.3, 0.2, 0.1) + side * DVec3::from_array(p)).to_array();
@@ -69,7 +69,8 @@ pub fn small_plates(frame: Frame, side: f64) -> Scene {
 /// Howell, configuration C-11: unit squares at distance one.
 pub const PLATES: f64 = 0.199_824_895_698_387_46;
 
-/// A closed unit room with a lamp under its ceiling, another, `second` W/m², on a wall, and a block.
+/// A closed unit room with a lamp under its ceiling, another, `second` W/m², on a wall, and a
+/// block.
 pub fn room(frame: Frame, first: f64, second: f64) -> Scene {
     let reflectances = [0.8, 0.3, 0.6, 0.6, 0.4, 0.9];
     let surfaces = walls([0.0; 3], [1.0; 3]).into_iter().zip(reflectances);
@@ -90,8 +91,8 @@ pub fn rooms(reflectance: f64, first: f64, second: f64) -> Scene {
     HERE.quads(&[one, two].concat())
 }
 
-/// The unit cube with a square of `side` in the middle of its floor, group 4; the floor around it is
-/// groups 0 to 3.
+/// The unit cube with a square of `side` in the middle of its floor, group 4; the floor around it
+/// is groups 0 to 3.
 pub fn panelled(frame: Frame, side: f64, walls_of: Material, panel: Material) -> Scene {
     let [x0, x1, y0, y1, floor, ceiling] = walls([0.0; 3], [1.0; 3]);
     let (a, b) = ((1.0 - side) / 2.0, (1.0 + side) / 2.0);

@@ -76,7 +76,8 @@ fn summary(errors: Vec<(f64, f64)>) -> Errors {
     Errors { count, bias, rms, median: errors[count / 2], worst: errors[count - 1] }
 }
 
-/// Interpolated radiosity, and the error it may have, at `p` with unit normal `n`, in the nearest face that faces alike.
+/// Interpolated radiosity, and the error it may have, at `p` with unit normal `n`, in the nearest
+/// face that faces alike.
 pub fn at(surface: &VertexMesh, p: DVec3, n: DVec3) -> Option<(Rgb, f64)> {
     let mut best: Option<(f64, (Rgb, f64))> = None;
     for face in &surface.faces {

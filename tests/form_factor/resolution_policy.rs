@@ -67,8 +67,8 @@ fn solver_passes_largest_unshot_share_of_batch() {
     let mesh = lamps();
     let mut told = Told::default();
     Solver { unshot: 0.0, ..Default::default() }.solve(&mesh, &mut told, keep_going).unwrap();
-    // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch is
-    // three patches, or fewer where light falls to a quarter.
+    // Of red, a triangle has 4, 2 and 0.4 of 2·6.4; of green the second lamp's have half. A batch
+    // is three patches, or fewer where light falls to a quarter.
     let want = [(0.5, 3), (4.0 / 12.8, 1), (0.4 / 12.8, 2)];
     assert_eq!(told.0.len(), 3, "{:?}", told.0);
     for (told, want) in told.0.iter().zip(want) {

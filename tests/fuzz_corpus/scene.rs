@@ -9,8 +9,8 @@ const SEPARATOR: u8 = 0xff;
 /// Scenes of more triangles are only loaded, so that an input takes milliseconds.
 const MOST_TRIANGLES: usize = 64;
 
-/// Loads an OBJ file that may name one library, `m.mtl`, and lets light settle in the scene if there
-/// is one. Panics where a scene or an error breaks its promises.
+/// Loads an OBJ file that may name one library, `m.mtl`, and lets light settle in the scene if
+/// there is one. Panics where a scene or an error breaks its promises.
 pub fn try_scene(input: &[u8]) -> Option<Scene> {
     let mut files = input.splitn(2, |&byte| byte == SEPARATOR);
     let obj = files.next().unwrap_or_default();

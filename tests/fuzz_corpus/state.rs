@@ -1,7 +1,7 @@
 //! What the fuzz target does with a saved state, and the replay of its corpus.
 //!
-//! An input is a byte that picks the method and what a file has between the names of mesh and settings
-//! and the checksum: these are put around it, so that what they guard is reached.
+//! An input is a byte that picks the method and what a file has between the names of mesh and
+//! settings and the checksum: these are put around it, so that what they guard is reached.
 
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -70,8 +70,8 @@ fn names(solver: &Solver, rows: &mut RayRows) -> Vec<u8> {
     bytes
 }
 
-/// Reads the state that `input` stands for and goes on from there. Answers whether it was taken; panics
-/// where a solve or an error breaks its promises.
+/// Reads the state that `input` stands for and goes on from there. Answers whether it was taken;
+/// panics where a solve or an error breaks its promises.
 pub fn try_state(input: &[u8]) -> bool {
     let Some((&pick, body)) = input.split_first() else { return false };
     let (solver, mut rows) = (solver(pick), rows());

@@ -17,9 +17,9 @@ fn shown<const N: usize>(radiances: [f64; N]) -> [u8; N] {
 
 #[test]
 fn even_picture_is_shown_at_the_key() {
-    // Reinhard et al. (2002), equation 1: the logarithmic mean is exposed to the key, 0.24. White is
-    // at 1 then, and equation 4 leaves 0.24 (1 + 0.24/1²)/(1 + 0.24) = 0.24. In sRGB (IEC 61966-2-1)
-    // that is 1.055 · 0.24^(1/2.4) − 0.055 = 0.5271, 134.4 of 255.
+    // Reinhard et al. (2002), equation 1: the logarithmic mean is exposed to the key, 0.24. White
+    // is at 1 then, and equation 4 leaves 0.24 (1 + 0.24/1²)/(1 + 0.24) = 0.24. In sRGB (IEC
+    // 61966-2-1) that is 1.055 · 0.24^(1/2.4) − 0.055 = 0.5271, 134.4 of 255.
     for radiance in [1e-6, 1.0, 7.0, 1e6] {
         assert_eq!(shown([radiance]), [134], "{radiance}");
     }

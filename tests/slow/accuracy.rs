@@ -15,6 +15,7 @@ fn bake_to_error(scene: Scene, error: f64) -> BakeResult {
 }
 
 #[test]
+#[ignore = "slow"]
 fn error_target_is_reached_and_estimated() {
     for error in [0.1, 0.05, 0.02] {
         let baked = bake_to_error(cornell(), error);
@@ -32,7 +33,8 @@ fn error_target_is_reached_and_estimated() {
             said.total,
             points.len()
         );
-        // What a target is for: no worse than asked, and the estimate between half of it and thrice.
+        // What a target is for: no worse than asked, and the estimate between half of it and
+        // thrice.
         assert!(rms <= error && said.total <= error);
         assert!(said.total > 0.5 * rms && said.total < 3.0 * rms);
         // 95 % would be what two standard errors of a normal distribution hold; 198 points of a

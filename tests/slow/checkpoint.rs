@@ -30,6 +30,7 @@ impl FormFactors for Failing {
 }
 
 #[test]
+#[ignore = "slow"]
 fn resuming_after_every_batch_changes_no_bit() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
@@ -54,6 +55,7 @@ fn resuming_after_every_batch_changes_no_bit() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn row_errors_lose_no_progress() {
     let mesh = cornell_box(150.0);
     for solver in solvers() {
@@ -80,6 +82,7 @@ fn row_errors_lose_no_progress() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn cancelled_solve_converges_to_same_light() {
     let mesh = cornell_box(300.0);
     for solver in solvers() {

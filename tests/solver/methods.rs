@@ -230,8 +230,8 @@ fn gauss_seidel_needs_fewer_sweeps_than_jacobi() {
         solver.solve(mesh, &mut maker, keep_going).unwrap().steps
     });
     println!("{jacobi} bounces, {gauss_seidel} sweeps");
-    // Where all eigenvalues are real Gauss–Seidel converges like their squares: half the sweeps, and
-    // here some more for light that goes against the order.
+    // Where all eigenvalues are real Gauss–Seidel converges like their squares: half the sweeps,
+    // and here some more for light that goes against the order.
     assert!(gauss_seidel < jacobi * 3 / 4);
 }
 

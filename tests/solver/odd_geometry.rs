@@ -235,8 +235,8 @@ fn lamp_flush_in_the_ceiling() {
     println!("{hole:?} {first:?} {last:?}");
     for g in 0..5 {
         for flush in [first[g], last[g]] {
-            // From the lamp a side wall gets some F = 0.16, the floor 0.25 of 32 patches of 1024 rays:
-            // √(0.84 / 0.16 / 32768) = 1.3 %, in each of two scenes; four of both.
+            // From the lamp a side wall gets some F = 0.16, the floor 0.25 of 32 patches of 1024
+            // rays: √(0.84 / 0.16 / 32768) = 1.3 %, in each of two scenes; four of both.
             assert!((flush / hole[g] - 1.0).abs() < 0.07, "{g}: {flush} {}", hole[g]);
         }
     }

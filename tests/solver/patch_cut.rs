@@ -112,9 +112,10 @@ fn unevenly_lit_wall_shoots_in_parts() {
     };
     let rows = |lit: Vec<u32>| {
         let mut maker = Sent { lit, black: of([4, 5]), asked: HashSet::new() };
-        // Half of the emitted light is at stake. Lit evenly it lies √(1/6) from the middle, RMS, and
-        // goes a distance of 5: (1/6)/25 √½ = 0.005, or seen from a cube of area 3 (before there is a
-        // row) (1/6)·2 √½ = 0.24. Uneven light is off by the angle, 0.5, times its share and more.
+        // Half of the emitted light is at stake. Lit evenly it lies √(1/6) from the middle, RMS,
+        // and goes a distance of 5: (1/6)/25 √½ = 0.005, or seen from a cube of area 3 (before
+        // there is a row) (1/6)·2 √½ = 0.24. Uneven light is off by the angle, 0.5, times its share
+        // and more.
         let settings = Solver { patch_tolerance: 0.3, ..Default::default() };
         let s = settings.solve(&mesh, &mut maker, keep_going).unwrap();
         assert_eq!(s.stop, StopReason::Converged);
@@ -142,8 +143,8 @@ fn viewpoint_under_a_block_is_avoided() {
     // The last wall is the ceiling: all of it shines.
     walls[5].1 = lamp(LAMP);
     let empty = quads(&walls);
-    // Blocks without a bottom on the two elements nearest to the middle of the floor, the fifth wall:
-    // each hides its element's centroid and a tenth of its area.
+    // Blocks without a bottom on the two elements nearest to the middle of the floor, the fifth
+    // wall: each hides its element's centroid and a tenth of its area.
     let mesh = Mesh::new(empty.clone(), 1.0).unwrap();
     let floor = [8, 9].into_iter().flat_map(|t| mesh.elements_of(mesh.root(t)));
     let mut middles: Vec<DVec3> = floor.map(|e| mesh.centroid(mesh.element(e))).collect();
@@ -165,7 +166,8 @@ fn viewpoint_under_a_block_is_avoided() {
         let s = solve(&mesh, Solver { patch_tolerance: 5.0, ..Default::default() });
         let back = s.ledger.backface_loss.x / s.ledger.emitted.x;
         println!("{back} of the light met backs, {} rows", s.rows_made);
-        // The room is closed: backs are only seen from inside a block, where nobody is to shoot from.
+        // The room is closed: backs are only seen from inside a block, where nobody is to shoot
+        // from.
         assert_eq!(back, 0.0);
     }
 }

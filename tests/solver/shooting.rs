@@ -205,7 +205,8 @@ fn ray_rows_match_closed_form() {
 
 #[test]
 fn ties_are_broken_alike_at_any_scale() {
-    // All walls alike: whose turn it is to shoot is a matter of order alone, unless rounding decides.
+    // All walls alike: whose turn it is to shoot is a matter of order alone, unless rounding
+    // decides.
     let light = |scale: f64| {
         let scene = framed::furnace(Frame::scaled(scale), 0.5, 1.0);
         let mesh = Mesh::new(scene, 0.2 * scale).unwrap();

@@ -244,9 +244,9 @@ fn splits_only_at_the_shadow() {
             rms[rms.len() - 1]
         );
     }
-    // What is allowed to a size l goes as tolerance l^(−¾), what is found as l: an eighth of the one
-    // gives 1/3.3 of the other, and of the width of where it is: 1/5.9 of an RMS. Sizes are halves
-    // of halves; being off by one is worth 2^1.5.
+    // What is allowed to a size l goes as tolerance l^(−¾), what is found as l: an eighth of the
+    // one gives 1/3.3 of the other, and of the width of where it is: 1/5.9 of an RMS. Sizes are
+    // halves of halves; being off by one is worth 2^1.5.
     assert!(rms[1] < rms[0] / 2.0 && rms[1] < 0.01, "{rms:?}");
 }
 
@@ -377,8 +377,8 @@ fn no_darkness_leaks_from_under_block() {
 
 #[test]
 fn sweeps_gather_from_previous_sweep() {
-    // Light from nowhere is taken for half of what is known: reflectance ½, no emission, so that the
-    // light of each sweep is half of the last one's.
+    // Light from nowhere is taken for half of what is known: reflectance ½, no emission, so that
+    // the light of each sweep is half of the last one's.
     let mesh = Mesh::new(cube(&grey()), 0.8).unwrap();
     let fine = Mesh::new(mesh.scene().clone(), 0.2).unwrap();
     let light = shot(&fine, &vec![Rgb::ONE; fine.element_count()]);

@@ -186,8 +186,8 @@ fn triangulation_of_plate_does_not_matter() {
 
 #[test]
 fn long_floor_matches_closed_form() {
-    // All that a small face gets of a floor five hundred times as long comes from next to it; a wall
-    // stands between by rounding alone, so that the closed form is right all the same.
+    // All that a small face gets of a floor five hundred times as long comes from next to it; a
+    // wall stands between by rounding alone, so that the closed form is right all the same.
     let scene = load_obj(data("long_room.obj")).unwrap();
     let m = exact_view_factors(&scene, 1e-4);
     let quad = |name: &str| {

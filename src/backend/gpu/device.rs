@@ -215,9 +215,8 @@ mod tests {
 
     use super::*;
 
-    fn gpu() -> Option<Gpu> {
-        let without = std::env::var_os("RADIOSITY_NO_GPU").is_some();
-        (!without).then(|| Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set"))
+    fn gpu() -> Gpu {
+        Gpu::new(None).expect("a graphics adapter; RADIOSITY_NO_GPU=1 ignores this test")
     }
 
     /// Memory that the host maps and shaders write does not exist.
@@ -227,8 +226,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn what_is_not_valid_is_an_error_and_the_device_stays() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         let e = gpu.with_error_scopes(|| not_valid(&gpu)).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Device);
         assert!(e.to_string().contains("odd"), "names what it is about: {e}");
@@ -237,8 +237,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn what_goes_wrong_unseen_is_an_error_afterwards() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         not_valid(&gpu).unwrap();
         let e = gpu.wait().unwrap_err();
         assert!(e.kind() == ErrorKind::Device && e.to_string().contains("odd"), "{e}");
@@ -246,8 +247,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn a_device_lost_under_way_is_an_error() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let result = gpu.with_error_scopes(|| {
             let buffer = gpu.memory().buffer("staging", 16, usage)?;
@@ -262,8 +264,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn batches_are_halved_until_there_is_memory() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         let tried = RefCell::new(vec![]);
         let most = |most: u32, kind: ErrorKind| {
             tried.borrow_mut().clear();
@@ -283,8 +286,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn memory_is_counted_and_given_back() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         let gpu = Gpu { budget: Arc::new(MemoryBudget::new(1000)), ..gpu };
         let usage = wgpu::BufferUsages::STORAGE;
         let memory = gpu.memory();

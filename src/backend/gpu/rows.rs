@@ -378,15 +378,14 @@ mod tests {
         Mesh::new(scene.unwrap(), f64::INFINITY).unwrap()
     }
 
-    /// The device; a test without one fails unless RADIOSITY_NO_GPU says that none is there.
-    fn gpu() -> Option<Gpu> {
-        let without = std::env::var_os("RADIOSITY_NO_GPU").is_some();
-        (!without).then(|| Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set"))
+    fn gpu() -> Gpu {
+        Gpu::new(None).expect("a graphics adapter; RADIOSITY_NO_GPU=1 ignores this test")
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn every_face_looks_where_its_frame_says() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         // Pixels off all symmetries, in each face's own image.
         let pixels = [(40, 11), (9, 20), (50, 7), (30, 26), (13, 13)];
         let patch = NodeId(0);
@@ -411,8 +410,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn the_nearer_of_two_is_seen() {
-        let Some(gpu) = gpu() else { return };
+        let gpu = gpu();
         // Same cone of directions, drawn far first and near first.
         for (near, far) in [(1, 2), (2, 1)] {
             let at = |k: u32| (DVec3::new(0.3, 0.2, 1.0) * if k == near { 1.0 } else { 2.0 }, true);

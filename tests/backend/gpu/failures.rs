@@ -1,5 +1,5 @@
-//! What callers get from devices that fail: every failure is brought about, and answered by an error
-//! or by smaller batches; what was solved by then stays.
+//! What callers get from devices that fail: every failure is brought about, and answered by an
+//! error or by smaller batches; what was solved by then stays.
 
 use std::cell::RefCell;
 use std::num::NonZeroU32;

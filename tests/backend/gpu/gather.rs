@@ -62,9 +62,9 @@ fn hemicubes_agree_with_rays() {
     let want = rays.gather(&light.sources(), &places).unwrap();
     for ((place, got), want) in places.iter().zip(&got).zip(&want) {
         let indirect = |g: &IrradianceSample| g.irradiance - g.direct;
-        // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half of
-        // the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump there,
-        // 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
+        // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half
+        // of the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump
+        // there, 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
         let error = (indirect(got) - indirect(want)).abs().max_element();
         assert!(error < 6.0 * 1.8e-3, "{place:?}: {error}");
         // Hit or miss of outlines, 3 half faces long or 300 pixels: 6 · √(300/12) · 3e-5 = 9e-4; a
@@ -136,7 +136,8 @@ fn direct_light_is_the_closed_form() {
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn half_hidden_light_matches_clipped_polygon() {
     let gpu = gpu();
-    // Shadows with an edge parallel to the light's, and at angles to it; places at and off its axis.
+    // Shadows with an edge parallel to the light's, and at angles to it; places at and off its
+    // axis.
     let square = facing_down([-0.5, 0.5], [-0.5, 0.5], 2.0);
     let mut worst = [0f64; 3];
     for k in 0..60usize {
@@ -166,10 +167,10 @@ fn half_hidden_light_matches_clipped_polygon() {
         let error = (got.direct.x - want) / whole;
         worst[k / 20] = error.abs().max(worst[k / 20]);
         // The shadow's edge crosses some 28 of the tile's columns, the light covers some 700 of its
-        // pixels. A column is off by half a pixel at most. Parallel to the light's edge, the shadow's
-        // climbs a line in four or five columns that even out but for one: 7 halves. At the other
-        // angles its slopes are near 3/4 and 3/5, and the midpoints of as many columns miss by an
-        // eighth of a pixel each and one by a half where the pattern shifts: 28/8 + 7/2.
+        // pixels. A column is off by half a pixel at most. Parallel to the light's edge, the
+        // shadow's climbs a line in four or five columns that even out but for one: 7 halves. At
+        // the other angles its slopes are near 3/4 and 3/5, and the midpoints of as many columns
+        // miss by an eighth of a pixel each and one by a half where the pattern shifts: 28/8 + 7/2.
         let pixels = if angle == 0.0 { 3.5 } else { 7.0 };
         assert!(error.abs() < pixels / 700.0, "{k}: {error}");
     }
@@ -222,8 +223,8 @@ fn light_of_many_triangles_matches_closed_form() {
             let want: f64 =
                 corners.iter().map(|t| point_to_polygon(place.position, place.normal, t)).sum();
             let error = got.direct.x / want - 1.0;
-            // Not convex: pixels' own form factors. Some 700 show it, four sides of some 30 pixels are
-            // crossed, each wrong by half a pixel and as often too little as too much: 6 σ are
+            // Not convex: pixels' own form factors. Some 700 show it, four sides of some 30 pixels
+            // are crossed, each wrong by half a pixel and as often too little as too much: 6 σ are
             // 6·√(120/12) = 19 pixels, and midpoints are off by (2/32)²/24·8 = 1.3e-3.
             let bound = if convex { 1e-6 } else { 19.0 / 700.0 + 1.3e-3 };
             println!("convex {convex}: {error:.1e}");

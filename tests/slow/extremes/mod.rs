@@ -1,7 +1,7 @@
 //! Quantities over their whole ranges against what is known exactly, on hemicubes and on rays: the
 //! ends and the middle of every range. All steps, as tables (many minutes with lavapipe):
 //!
-//!     cargo test --release --test slow -- --ignored --nocapture in_all_steps
+//!     RADIOSITY_ALL_STEPS=1 cargo test --release --test slow extremes -- --ignored --nocapture
 
 mod sweep;
 mod sweeps;
@@ -13,7 +13,8 @@ const HEADER: &str = "\
 |---|---|---|---|---|---|---|---|---|";
 
 /// Goes through every sweep and prints a table; fails with the sweeps that do not hold.
-fn sweep_with(device: &Backend, all: bool) {
+fn sweep_with(device: &Backend) {
+    let all = std::env::var_os("RADIOSITY_ALL_STEPS").is_some();
     let AdapterInfo { name, kind, driver } = device.adapter();
     println!("{name}, {kind}, {driver}\n{HEADER}");
     let ask = sweeps::Ask { device, all };
@@ -29,32 +30,24 @@ fn sweep_with(device: &Backend, all: bool) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn rays_hold_over_all_ranges() {
-    sweep_with(&Backend::Cpu, false);
+    sweep_with(&Backend::Cpu);
 }
 
 #[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+#[ignore = "slow"]
+#[cfg(not(skip_gpu_tests))]
 fn hemicubes_hold_over_all_ranges() {
-    sweep_with(&Backend::Gpu(crate::common::gpu()), false);
+    sweep_with(&Backend::Gpu(crate::common::gpu()));
 }
 
 #[test]
-#[ignore = "goes through all steps, in many minutes"]
-fn rays_hold_in_all_steps() {
-    sweep_with(&Backend::Cpu, true);
-}
-
-#[test]
-#[ignore = "goes through all steps, in many minutes"]
-fn hemicubes_hold_in_all_steps() {
-    sweep_with(&Backend::Gpu(crate::common::gpu()), true);
-}
-
-#[test]
+#[ignore = "slow"]
 fn gmres_needs_few_products_in_white_furnace() {
     // Light that fills the scene evenly is one direction: found in a product. What is left are 48
-    // elements' own, in 48 at most; shares of 2⁻³² that differ, not light, are what takes more than one.
+    // elements' own, in 48 at most; shares of 2⁻³² that differ, not light, are what takes more than
+    // one.
     let ask = sweeps::Ask { device: &Backend::Cpu, all: true };
     let s = sweeps::reflectance_of_furnace(&ask).unwrap();
     assert!(s.steps >= 12 && s.off <= 1e-4 && s.most <= 48, "{s:?}");

@@ -69,9 +69,9 @@ const FURNACE: &str = "furnace, E/(1−ρ)";
 /// Rounding alone, of some million sums, and some of them of what nearly cancels.
 const ROUNDING: f64 = 1e-9;
 
-/// One ray, or one pixel of a hemicube, that falls to the other side of an edge moves 1/64² of what a
-/// patch sends, 3e-4. A patch of a lamp can send a tenth of all light, and an element have a thousandth
-/// of it: that is 3e-2 of it.
+/// One ray, or one pixel of a hemicube, that falls to the other side of an edge moves 1/64² of what
+/// a patch sends, 3e-4. A patch of a lamp can send a tenth of all light, and an element have a
+/// thousandth of it: that is 3e-2 of it.
 const ONE_RAY: f64 = 3e-2;
 
 impl Ask<'_> {
@@ -129,8 +129,8 @@ fn furnace(mut sweep: Sweep, steps: Vec<(Frame, f64, f64)>, method: Option<Metho
     Ok(sweep)
 }
 
-/// Shares of 2⁻³² in columns that sum to 1/48 or so, each rounded for itself: 48 of them, 1e-8 each, and
-/// one over 1 − ρ times that if all are off the same way.
+/// Shares of 2⁻³² in columns that sum to 1/48 or so, each rounded for itself: 48 of them, 1e-8
+/// each, and one over 1 − ρ times that if all are off the same way.
 const SHARES: f64 = 1e-6;
 
 fn scale_of_furnace(ask: &Ask) -> Swept {
@@ -155,8 +155,8 @@ pub fn reflectance_of_furnace(ask: &Ask) -> Swept {
     furnace(sweep, steps, Some(Method::Gmres { restart: 50 }))
 }
 
-/// A sphere of which a cap shines: B = E + ρ Ē/(1−ρ), Ē the mean over the area. Of the cap and of the
-/// rest the means, since what comes from the nearest facets is theirs and not the sphere's.
+/// A sphere of which a cap shines: B = E + ρ Ē/(1−ρ), Ē the mean over the area. Of the cap and of
+/// the rest the means, since what comes from the nearest facets is theirs and not the sphere's.
 fn sphere(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     for (frame, rho) in steps {
         let scene = scenes::sphere(frame, 2, grey(rho, 1.0), grey(rho, 0.0));
@@ -178,8 +178,8 @@ fn sphere(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
-/// Facets of 320 triangles have a tenth of a radian to the next: 1 − cos 0.1 is 5e-3 of the light near
-/// by, and as much are rays and pixels.
+/// Facets of 320 triangles have a tenth of a radian to the next: 1 − cos 0.1 is 5e-3 of the light
+/// near by, and as much are rays and pixels.
 const FACETS: f64 = 1e-2;
 
 fn scale_of_sphere(ask: &Ask) -> Swept {
@@ -213,9 +213,9 @@ fn shift_of_plates(ask: &Ask) -> Swept {
     plates(Sweep::new("shift", SHIFTS, "plates, F = 0.19982", 1e-9), ask.shifts())
 }
 
-/// At a patch's centroid not the mean over it: 6e-3 at most, by h²/24 times the factor's curvature. The
-/// rim is some 200 pixels, each off by up to 1.5e-4 either way: 1e-3 a patch, of which the mean of some
-/// hundred has a tenth; over F, six times as much is 3e-3.
+/// At a patch's centroid not the mean over it: 6e-3 at most, by h²/24 times the factor's curvature.
+/// The rim is some 200 pixels, each off by up to 1.5e-4 either way: 1e-3 a patch, of which the mean
+/// of some hundred has a tenth; over F, six times as much is 3e-3.
 const PATCHES: f64 = 9e-3;
 
 fn rows_of_plates(ask: &Ask) -> Swept {
@@ -372,8 +372,8 @@ fn lamps_together(ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
-/// What is gathered in the middle of a unit cube's ceiling from a square lamp of `side` in the middle of
-/// its floor, against its closed form (Howell, B-3): four times a corner's.
+/// What is gathered in the middle of a unit cube's ceiling from a square lamp of `side` in the
+/// middle of its floor, against its closed form (Howell, B-3): four times a corner's.
 fn lamp(sweep: &mut Sweep, frame: Frame, side: f64, e: f64, ask: &Ask) -> Result<(), Error> {
     let scene = scenes::panelled(frame, side, grey(0.0, 0.0), grey(0.0, e));
     let mesh = Mesh::new(scene, f64::INFINITY)?;
@@ -412,8 +412,8 @@ fn area_of_lamp(ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
-/// What is gathered in the second of two rooms, whose walls reflect 1e-12 of what those of the first
-/// emit: as much as leaves them.
+/// What is gathered in the second of two rooms, whose walls reflect 1e-12 of what those of the
+/// first emit: as much as leaves them.
 fn exitance_next_door(ask: &Ask) -> Swept {
     // Sums of 32 bits.
     let mut sweep = Sweep::new("exitance", EXITANCES, "next door, 1e-12 E", 1e-5);
@@ -431,10 +431,11 @@ fn exitance_next_door(ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
-/// A furnace with a panel in a wall: the mean over all area, and vertices that gather, each by itself.
+/// A furnace with a panel in a wall: the mean over all area, and vertices that gather, each by
+/// itself.
 fn areas(ask: &Ask) -> Swept {
-    // Three sweeps of gathering leave ρ⁴ of what elements are off by, a tenth, and rays or pixels have
-    // 1/64 of what they see unevenly: 6e-3 each.
+    // Three sweeps of gathering leave ρ⁴ of what elements are off by, a tenth, and rays or pixels
+    // have 1/64 of what they see unevenly: 6e-3 each.
     let mut sweep = Sweep::new("area ratio", RATIOS, FURNACE, 1.2e-2);
     for side in ask.steps((0..=12).map(|k| 0.5 * 10f64.powf(-f64::from(k) / 2.0))) {
         let scene = scenes::panelled(HERE, side, grey(0.5, 1.0), grey(0.5, 1.0));
