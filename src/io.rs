@@ -18,7 +18,7 @@ mod ply;
 mod png;
 mod text;
 mod tone;
-mod view_factor_tables;
+pub mod view_factors;
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -33,7 +33,6 @@ pub use self::png::write_png;
 pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
 pub use tone::ToneCurve;
-pub use view_factor_tables::{write_matrix_market, write_view_factor_list, write_view_factors};
 
 /// Creates `path` and hands it to `write`; any failure names the file.
 fn write_file(

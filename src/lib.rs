@@ -96,10 +96,7 @@ pub use gather::{
 pub use io::write_exr;
 #[cfg(feature = "png")]
 pub use io::write_png;
-pub use io::{
-    ToneCurve, load_obj, read_obj, write_matrix_market, write_ply, write_view_factor_list,
-    write_view_factors,
-};
+pub use io::{ToneCurve, load_obj, read_obj, write_ply};
 pub use mesh::{Mesh, NodeId};
 pub use progress::{StopReason, Timings};
 pub use scene::{Material, Rgb, Scene, Triangle};

@@ -21,7 +21,9 @@
 //! ```
 
 mod contour;
+mod edge;
 mod face;
+mod lambert;
 mod point_to_polygon;
 mod polygon_to_polygon;
 #[cfg(test)]
@@ -31,4 +33,4 @@ pub use self::point_to_polygon::point_to_polygon;
 pub use self::polygon_to_polygon::polygon_to_polygon;
 pub use crate::geometry::polygon::polygon_area;
 
-pub(crate) use self::point_to_polygon::lambert;
+pub(crate) use self::lambert::lambert;

@@ -1,9 +1,9 @@
 //! Convex plane polygons in space, as slices of corners.
 //!
-//! A polygon is planar, convex and runs counter-clockwise seen from its front; the last corner joins
-//! the first. Cutting by a plane is one walk around the corners (I. E. Sutherland, G. W. Hodgman,
-//! "Reentrant polygon clipping", CACM 17, 1974): every corner is above the plane, below it or on
-//! it, and an edge whose ends are on different sides gets a corner where it crosses.
+//! A polygon is planar, convex and runs counter-clockwise seen from its front; the last corner
+//! joins the first. Cutting by a plane is one walk around the corners (I. E. Sutherland, G. W.
+//! Hodgman, "Reentrant polygon clipping", CACM 17, 1974): every corner is above the plane, below it
+//! or on it, and an edge whose ends are on different sides gets a corner where it crosses.
 //!
 //! ```text
 //!        1───────0          above: 0 1 c₁₂ c₃₀

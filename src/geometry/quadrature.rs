@@ -2,7 +2,7 @@
 //!
 //! | rule | points | for |
 //! |---|---|---|
-//! | Gauss–Legendre | 2, 3, 4, 6 | smooth integrands on [0, 1]; n points are exact to degree 2n − 1 |
+//! | Gauss–Legendre | 2, 3, 4, 6 | smooth integrands on [0, 1]; exact to degree 2n − 1 |
 //! | Gauss–Jacobi, weight u | 2, 3 | the direction from the tip of a triangle, see below |
 //! | tanh–sinh | as many as it takes | integrands that are singular at the ends of an interval |
 //! | Radon | 7 | a triangle, exact to degree 5, with a rule of degree 2 on the same points |
@@ -37,8 +37,8 @@ use glam::DVec3;
 /// 4e-15 of the integral.
 pub(crate) const SIX_POINT_MIN_GAP: f64 = 8.0;
 
-/// Gap, in radii of the polygon integrated over, from which four Gauss points a direction suffice to
-/// 1e-17 of the integral. Six would do as well; four are cheaper.
+/// Gap, in radii of the polygon integrated over, from which four Gauss points a direction suffice
+/// to 1e-17 of the integral. Six would do as well; four are cheaper.
 pub(crate) const FOUR_POINT_MIN_GAP: f64 = 64.0;
 
 /// Gap, in radii of the larger polygon, from which three Gauss points a direction suffice to 6e-8

@@ -12,8 +12,8 @@ use glam::DVec3;
 /// worst. Chosen by hand.
 pub(crate) const MAX_EAR_CLIPPING_CORNERS: usize = 10_000;
 
-/// Triangles no higher than this are flat but for the rounding of their corners: a few operations on
-/// coordinates. In units of the polygon's extent or of its largest coordinate, if that is more.
+/// Triangles no higher than this are flat but for the rounding of their corners: a few operations
+/// on coordinates. In units of the polygon's extent or of its largest coordinate, if that is more.
 const FLAT_HEIGHT: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.

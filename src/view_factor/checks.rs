@@ -1,13 +1,23 @@
 //! What must hold of a matrix of view factors, measured on raw numbers.
+//!
+//! | law | in numbers | measured by |
+//! |---|---|---|
+//! | closure | Σ_j F_ij + open_i + back_i = 1 | [`MatrixChecks::closure`] |
+//! | reciprocity | A_i F_ij = A_j F_ji | [`MatrixChecks::reciprocity`] |
+//! | bounds | 0 ≤ F_ij ≤ min(1, A_j / A_i) | [`MatrixChecks::bounds`] |
+//!
+//! The share of a row that is open tells of the scene: more than its error, and the enclosure has a
+//! gap; less than minus its error, and surfaces lie twice in one place.
 
-use super::{Missing, ViewFactors};
+use super::matrix::{Missing, ViewFactors};
 
 /// How far a matrix is from what must hold. A good row sum is no proof of good entries: that of a
-/// hemicube is perfect while its entries are off.
+/// hemicube is perfect while its entries are off. Dimensionless, as form factors are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct MatrixChecks {
     /// Row sum + open + back − 1, over rows. The `open` of an exact matrix is not measured but left
-    /// over: there it is row sum + back − 1, over the rows that do not leak.
+    /// over: there it is row sum + back − 1, over the rows that are closed.
     pub closure: ErrorStats,
     /// (A_i F_ij − A_j F_ji) / min(A_i, A_j), over pairs: an error of the smaller group's factor.
     pub reciprocity: ErrorStats,
@@ -16,85 +26,106 @@ pub struct MatrixChecks {
     pub bounds: ErrorStats,
 }
 
-/// Size of an error over many.
+/// Size of an error over many places.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorStats {
     /// Root of the mean square.
     pub rms: f64,
     /// The largest magnitude.
-    pub worst: f64,
+    pub max: f64,
     /// Row and column of the largest; of a whole row, twice the row.
     pub at: (usize, usize),
 }
 
-/// Standard errors that an open share must exceed to be a leak, and rounding.
-const SURE: (f64, f64) = (3.0, 1e-9);
+/// The open share of a row is not zero if it is more than so many standard errors away.
+const OPEN_SIGMAS: f64 = 3.0;
+
+/// Rounding of the open share of a row of thousands of factors, beside its standard error.
+const OPEN_ROUNDING: f64 = 1e-9;
 
 impl ErrorStats {
     fn of(errors: impl Iterator<Item = ((usize, usize), f64)>) -> ErrorStats {
-        let mut found = ErrorStats::default();
+        let mut stats = ErrorStats::default();
         let mut count = 0.0;
         for (at, error) in errors {
-            found.rms += error * error;
+            stats.rms += error * error;
             count += 1.0;
-            if error.abs() > found.worst {
-                (found.worst, found.at) = (error.abs(), at);
+            if error.abs() > stats.max {
+                stats.max = error.abs();
+                stats.at = at;
             }
         }
         if count > 0.0 {
-            found.rms = (found.rms / count).sqrt();
+            stats.rms = (stats.rms / count).sqrt();
         }
-        found
+        stats
     }
 }
 
-impl ViewFactors {
-    /// Measures closure, reciprocity and bounds.
-    pub fn checks(&self) -> MatrixChecks {
-        let rows = 0..self.areas.len();
-        let entries = || rows.clone().flat_map(|i| self.factors[i].iter().map(move |f| (i, f)));
-        let exact = self.absent == Missing::Zero;
-        let measured = rows.clone().filter(|&i| !exact || self.is_closed(i));
-        let closure = measured.map(|i| {
-            let sum: f64 = self.factors[i].iter().map(|f| f.value).sum();
-            let open = if exact { 0.0 } else { self.open[i].value };
-            ((i, i), sum + open + self.back[i].value - 1.0)
-        });
-        let reciprocity = entries().filter(|(i, f)| *i != f.to as usize).map(|(i, f)| {
-            let j = f.to as usize;
-            let (a, b) = (self.areas[i], self.areas[j]);
-            ((i, j), (a * f.value - b * self.factor(j, i).value) / a.min(b))
-        });
-        let bounds = entries().map(|(i, f)| {
-            let most = (self.areas[f.to as usize] / self.areas[i]).min(1.0);
-            ((i, f.to as usize), (f.value - most).max(-f.value).max(0.0))
-        });
+impl MatrixChecks {
+    /// Measures closure, reciprocity and bounds of `matrix`.
+    pub fn of(matrix: &ViewFactors) -> MatrixChecks {
         MatrixChecks {
-            closure: ErrorStats::of(closure),
-            reciprocity: ErrorStats::of(reciprocity),
-            bounds: ErrorStats::of(bounds),
+            closure: ErrorStats::of(closure_errors(matrix)),
+            reciprocity: ErrorStats::of(reciprocity_errors(matrix)),
+            bounds: ErrorStats::of(bound_errors(matrix)),
         }
     }
+}
 
-    /// The groups whose enclosure leaks: more of their flux meets nothing than three standard
-    /// errors explain. The leakiest come first.
-    pub fn leaks(&self) -> Vec<usize> {
-        let mut leaks: Vec<usize> = (0..self.open.len()).filter(|&i| !self.is_closed(i)).collect();
-        leaks.sort_by(|&i, &j| self.open[j].value.total_cmp(&self.open[i].value).then(i.cmp(&j)));
-        leaks
-    }
+fn closure_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
+    let is_exact = m.absent == Missing::Zero;
+    let rows = (0..m.areas.len()).filter(move |&i| !is_exact || is_closed(m, i));
+    rows.map(move |i| {
+        let sum: f64 = m.factors[i].iter().map(|f| f.value).sum();
+        let open = if is_exact { 0.0 } else { m.open[i].value };
+        ((i, i), sum + open + m.back[i].value - 1.0)
+    })
+}
 
-    /// The groups whose flux arrives more than once, beyond three standard errors: something they see
-    /// is there twice, such as a poster in the plane of its wall. The worst come first.
-    pub fn overfull(&self) -> Vec<usize> {
-        let excess = |i: usize| -self.open[i].value;
-        let over = |i: &usize| excess(*i) > SURE.0 * self.open[*i].error + SURE.1;
-        let mut overfull: Vec<usize> = (0..self.open.len()).filter(over).collect();
-        overfull.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
-        overfull
-    }
+/// All factors with their rows and columns.
+fn entries(m: &ViewFactors) -> impl Iterator<Item = (usize, usize, f64)> {
+    let row = |i: usize| m.factors[i].iter().map(move |f| (i, f.to as usize, f.value));
+    (0..m.areas.len()).flat_map(row)
+}
 
-    pub(super) fn is_closed(&self, i: usize) -> bool {
-        self.open[i].value <= SURE.0 * self.open[i].error + SURE.1
-    }
+fn reciprocity_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
+    entries(m).filter(|(i, j, _)| i != j).map(|(i, j, value)| {
+        let (a, b) = (m.areas[i], m.areas[j]);
+        ((i, j), (a * value - b * m.factor(j, i).value) / a.min(b))
+    })
+}
+
+fn bound_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
+    entries(m).map(|(i, j, value)| {
+        let largest = (m.areas[j] / m.areas[i]).min(1.0);
+        ((i, j), (value - largest).max(-value).max(0.0))
+    })
+}
+
+/// How far an open share may be from zero for all that.
+fn open_tolerance(m: &ViewFactors, i: usize) -> f64 {
+    OPEN_SIGMAS * m.open[i].error + OPEN_ROUNDING
+}
+
+/// Whether the open share of group `i` is zero within its error, or below.
+pub(super) fn is_closed(m: &ViewFactors, i: usize) -> bool {
+    m.open[i].value <= open_tolerance(m, i)
+}
+
+/// The groups that are not closed, the most open first.
+pub(super) fn open_rows(m: &ViewFactors) -> Vec<usize> {
+    let mut rows: Vec<usize> = (0..m.open.len()).filter(|&i| !is_closed(m, i)).collect();
+    rows.sort_by(|&i, &j| m.open[j].value.total_cmp(&m.open[i].value).then(i.cmp(&j)));
+    rows
+}
+
+/// The groups whose rows sum to more than one beyond their error, the largest sum first.
+pub(super) fn rows_over_unity(m: &ViewFactors) -> Vec<usize> {
+    let excess = |i: usize| -m.open[i].value;
+    let is_over = |i: &usize| excess(*i) > open_tolerance(m, *i);
+    let mut rows: Vec<usize> = (0..m.open.len()).filter(is_over).collect();
+    rows.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
+    rows
 }

@@ -1,34 +1,38 @@
-//! Convex pieces of a scene: coplanar neighbouring triangles, merged.
+//! Convex polygons of a scene: coplanar neighbouring triangles, merged.
+//!
+//! Fewer and larger polygons mean fewer pairs, and no shadow edges along the diagonals of quads.
+//!
+//! ```text
+//! weld corners ─→ find sides shared by two triangles that run along them in opposite directions
+//!              ─→ flood coplanar regions; one that is convex as a whole becomes one polygon
+//!              ─→ of others, join neighbours across the longest sides while the union is convex
+//!              ─→ drop corners at which the outline goes straight on
+//! ```
 
 use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
+use super::tolerances::{COPLANARITY, STRAIGHT_SINE};
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::area_vector;
 use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 
-/// Corners off a common plane by less than this, in units of the scene's size, are in it: above the
-/// rounding of coordinates, and below what counts as contact elsewhere, so that nothing stands
-/// before its own plane.
-pub(super) const PLANAR: f64 = 4e-15;
-
-/// A turn at a corner, as the sine of its angle, that is straight on.
-const STRAIGHT: f64 = 1e-9;
-
 /// A convex plane polygon, counter-clockwise seen from its front, in units of the scene's size.
 #[derive(Clone, Debug)]
 pub(super) struct ConvexPolygon {
     pub corners: Vec<DVec3>,
+    /// Unit normal, towards the front.
     pub normal: DVec3,
+    /// In squares of the scene's size.
     pub area: f64,
     /// Group of its triangles; that of the first one where groups are merged.
     pub group: u32,
 }
 
 impl ConvexPolygon {
-    /// Nothing without area.
+    /// The polygon with these corners; none if it has no area.
     pub fn new(corners: Vec<DVec3>, group: u32) -> Option<ConvexPolygon> {
         let vector = area_vector(&corners);
         let area = vector.length();
@@ -36,7 +40,7 @@ impl ConvexPolygon {
         (normal != DVec3::ZERO).then_some(ConvexPolygon { corners, normal, area, group })
     }
 
-    /// The box around it.
+    /// The smallest box around the corners.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.corners.iter().copied())
     }
@@ -48,21 +52,21 @@ impl ConvexPolygon {
     }
 }
 
-/// Which triangles may become one piece.
+/// Which triangles may become one polygon.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Merge {
-    /// Those of one group: pieces that give and receive.
+    /// Those of one group: polygons that give and receive.
     WithinGroups,
-    /// Any: pieces that stand in the way.
+    /// Any: polygons that stand in the way.
     AcrossGroups,
 }
 
-/// The scene as convex pieces around its middle, every length divided by `unit`, in the order of
+/// The scene as convex polygons around its middle, every length divided by `unit`, in the order of
 /// first triangles.
 ///
-/// A connected coplanar region that is convex as a whole becomes one piece; of any other region
+/// A connected coplanar region that is convex as a whole becomes one polygon; of any other region
 /// neighbours are joined across their longest common sides as long as the union stays convex.
-pub(super) fn pieces(scene: &Scene, unit: f64, merge: Merge) -> Vec<ConvexPolygon> {
+pub(super) fn convex_polygons(scene: &Scene, unit: f64, merge: Merge) -> Vec<ConvexPolygon> {
     let mut outlines = Outlines::new(scene, unit, merge);
     outlines.join_whole_regions();
     outlines.join_neighbours();
@@ -179,7 +183,7 @@ impl Outlines {
         let Some(origin) = own.clone().next() else { return false };
         let all = own.chain(other);
         let mut off = all.map(|p| self.normals[t].dot(p - origin).abs());
-        off.all(|off| off <= PLANAR)
+        off.all(|off| off <= COPLANARITY)
     }
 
     /// The loop around all of `members`, if it is one and convex.
@@ -220,7 +224,7 @@ impl Outlines {
         let mut around = 0.0;
         for k in 0..outline.len() {
             let (sine, cosine) = self.turn(outline, k, normal);
-            if sine < -STRAIGHT || (cosine < 0.0 && sine <= STRAIGHT) {
+            if sine < -STRAIGHT_SINE || (cosine < 0.0 && sine <= STRAIGHT_SINE) {
                 return false;
             }
             around += sine.atan2(cosine);
@@ -238,14 +242,14 @@ impl Outlines {
     }
 
     fn finish(self, scene: &Scene) -> Vec<ConvexPolygon> {
-        let mut pieces = Vec::new();
+        let mut polygons = Vec::new();
         for (t, outline) in self.loops.iter().enumerate() {
-            let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT;
+            let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT_SINE;
             let kept = (0..outline.len()).filter(bend);
             let corners = kept.map(|k| self.corners[outline[k] as usize]).collect();
-            pieces.extend(ConvexPolygon::new(corners, scene.triangles()[t].group));
+            polygons.extend(ConvexPolygon::new(corners, scene.triangles()[t].group));
         }
-        pieces
+        polygons
     }
 }
 

@@ -1,188 +1,267 @@
-//! Adaptive cubature over a polygon of what its points see of another, past others.
+//! Adaptive cubature of an occluded pair: over one polygon, of what its points see of the other.
+//!
+//! ```text
+//!        target            A₁F₁₂ = ∫ over the domain of F(point → visible part of the target)
+//!      ───────────
+//!          ▬▬  blockers    F at a point is exact (see `point_visibility`); it is smooth but where
+//!      ╱╲  ╱╲  ╱╲  ╱╲      the point crosses a visual event (see `visual_events`)
+//!        domain: cells
+//! ```
+//!
+//! The domain is cut into triangles, cells. A cell with nothing left between it and the target is a
+//! closed form; one that a single blocker hides entirely is zero; over others Radon's seven-point
+//! rule is applied. The cell with the largest error bound is cut again, along an event plane if one
+//! crosses it, else in two, until the bounds and estimates of all cells of a sum are small enough.
+//!
+//! Every cell carries two errors. Its *bound* decides what is cut: the difference of two rules of
+//! different degree, plus what seven points may miss. Its *estimate* is told: what the last cut has
+//! changed. Errors of cells are independent (cuts are jittered), so squares add up.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::Estimate;
-use super::exchange::unblocked;
-use super::point_visibility::PointVisibility;
-use super::shaft::{Blocker, Shaft, covers};
-use super::visual_events::{most_even, split_triangle};
+use super::matrix::Estimate;
+use super::point_visibility::{PointFactors, PointVisibility};
+use super::shaft::{Blocker, Shaft, fully_occludes};
+use super::unoccluded::unoccluded_exchange;
+use super::visual_events::{most_balanced_split, split_triangle};
 use crate::geometry::plane::Plane;
 use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
 
-/// Most cells that a sum is cut into; what error is left then is told.
-const MOST_CELLS: usize = 40_000;
+/// Most cells that a sum is cut into; the error that is left then is told. Limits time and memory;
+/// chosen by hand.
+const MAX_CELLS: usize = 40_000;
 
-/// Cautious error of a cell behind blockers, as a share of what it could exchange with nothing in
-/// the way, if it is all of the domain, or a crease halves it. Seven points can agree by chance;
-/// only many cells cannot. At 0.1, one pair in ten thousand was off by four estimates; at 0.25,
-/// none.
-const DOUBT: f64 = 0.25;
+/// Error bound of a cell behind blockers, as a share of what it could exchange with nothing in the
+/// way, if it is all of the domain or an event plane halves it; less in proportion for smaller
+/// cells. Seven points can agree by chance; only many cells cannot. Measured: at 0.1, one pair in
+/// ten thousand was off by four estimates; at 0.25, none.
+const COARSE_CELL_BOUND: f64 = 0.25;
 
-/// Cautious error, as a share of the cell, of what its corners see otherwise if its points see all,
-/// or nothing: a sharp shadow ends between its sides and the points next to them, in a strip of up
-/// to a tenth of its area.
-const MARGIN: f64 = 0.1;
+/// Share of a cell's area in which a sharp shadow may end unseen if all points of the rule see all,
+/// or nothing: the strip between a side and the points next to it has up to a tenth of the area.
+const RIM_AREA_SHARE: f64 = 0.1;
 
-/// Corners are looked from a little within, by this share of the way to the middle.
-const WITHIN: f64 = 1e-3;
+/// Corners are looked from a little within the cell, by this share of the way to its centroid: on
+/// the rim itself blockers may touch. Chosen by hand.
+const CORNER_INSET: f64 = 1e-3;
 
-/// Less than this share of what could be seen is nothing.
-const NEITHER: f64 = 1e-9;
+/// Visible or hidden flux below this share of the unoccluded flux is none: above rounding.
+const NOTHING_SHARE: f64 = 1e-9;
 
-/// The likely error of a cell is at least this share of its cautious one.
-const LEAST: f64 = 0.03;
+/// The error estimate of a cell is at least this share of its bound: one cut that changes nothing
+/// proves little. Chosen by hand; no measurement kept.
+const MIN_ESTIMATE_SHARE: f64 = 0.03;
 
-/// The likely error of a sum that is asked for, as a share of its cautious one.
-const LIKELY: f64 = 0.1;
+/// Error estimate asked for of a sum, as a share of its tolerance, to which the bound is brought:
+/// rows of thousands of factors then close to a tenth of what was asked.
+const ESTIMATE_SHARE: f64 = 0.1;
+
+/// Cuts in two are off the middle by up to this share of the side, so that errors along a line of
+/// cells are independent. Chosen by hand.
+const CUT_JITTER: f64 = 0.1;
 
 /// A pair of polygons with others between: one of the two, the domain, in cells.
 pub(super) struct OccludedPair {
     /// Area of the domain.
     pub area: f64,
-    /// Normal of the domain.
+    /// Unit normal of the domain.
     pub normal: DVec3,
+    /// Corners of the other polygon, all before the domain.
     pub target: Vec<DVec3>,
+    /// Unit normal of the target.
     pub target_normal: DVec3,
-    pub creases: Vec<Plane>,
+    /// Event planes that cross the domain.
+    pub event_planes: Vec<Plane>,
+    /// Triangles that make up the domain.
     pub cells: Vec<Cell>,
 }
 
-/// A triangle of the domain.
+/// A triangle of the domain. Fluxes and errors are A₁F₁₂, in squares of the unit of length.
 pub(super) struct Cell {
     corners: [DVec3; 3],
     /// What of the blockers is between this cell and the target; empty if all of the target is seen
     /// from all of the cell, or nothing from anywhere.
     blockers: Vec<Blocker>,
     flux: f64,
-    /// Error that cuts are decided by: what rules of different degree differ by, for both what is
-    /// seen and what is hidden, and doubt.
-    cautious: f64,
-    /// Error that is told: what the last cut changed, if that is less.
-    likely: f64,
+    /// Error that cuts are decided by.
+    error_bound: f64,
+    /// Error that is told; at most the bound.
+    error_estimate: f64,
     /// Number that the place of its next cut is drawn from.
     seed: u64,
 }
 
+/// Flux of a cell by one rule.
+#[derive(Clone, Copy, Default)]
+struct CellFlux {
+    /// Past the blockers.
+    visible: f64,
+    /// As if there were none.
+    unoccluded: f64,
+}
+
+impl CellFlux {
+    /// Adds what a point with this share of the cell's area sees.
+    fn add(&mut self, area: f64, weight: f64, factors: PointFactors) {
+        self.visible += area * weight * factors.visible;
+        self.unoccluded += area * weight * factors.unoccluded;
+    }
+}
+
 impl Cell {
-    /// Of `candidates`, those that matter are kept.
+    /// The triangle `corners` of the domain of `pair`. Of `candidates`, the parts between the
+    /// triangle and the target are kept.
     pub fn new(
         pair: &OccludedPair,
         corners: [DVec3; 3],
         candidates: &[Blocker],
         seed: u64,
-        eye: &mut PointVisibility,
+        visibility: &mut PointVisibility,
     ) -> Cell {
-        let mut cell =
-            Cell { corners, blockers: Vec::new(), flux: 0.0, cautious: 0.0, likely: 0.0, seed };
+        let mut cell = Cell {
+            corners,
+            blockers: Vec::new(),
+            flux: 0.0,
+            error_bound: 0.0,
+            error_estimate: 0.0,
+            seed,
+        };
         let shaft = Shaft::new(&corners, pair.normal, &pair.target, pair.target_normal);
         let inside =
             |b: &Blocker| Some(Blocker { corners: shaft.clip(&b.corners)?, normal: b.normal });
         let blockers: Vec<Blocker> = candidates.iter().filter_map(inside).collect();
-        if blockers.iter().any(|b| covers(b, &corners, &pair.target)) {
+        if blockers.iter().any(|b| fully_occludes(b, &corners, &pair.target)) {
             return cell;
         }
         if blockers.is_empty() {
-            let flux = unblocked(&corners, pair.normal, &pair.target, pair.target_normal);
-            (cell.flux, cell.cautious, cell.likely) = (flux.value, flux.error, flux.error);
+            let exchange =
+                unoccluded_exchange(&corners, pair.normal, &pair.target, pair.target_normal);
+            cell.flux = exchange.value;
+            cell.error_bound = exchange.error;
+            cell.error_estimate = exchange.error;
             return cell;
         }
         cell.blockers = blockers;
-        let [a, b, c] = corners;
-        let area = 0.5 * (b - a).cross(c - a).length();
-        // Visible and whole, by either rule.
-        let (mut five, mut two) = ([0.0; 2], [0.0; 2]);
-        for node in radon_nodes(corners) {
-            let (normal, facing) = (pair.normal, pair.target_normal);
-            let seen = eye.look(node.point, normal, &pair.target, facing, &cell.blockers);
-            for (k, value) in [seen.visible, seen.whole].into_iter().enumerate() {
-                five[k] += area * node.degree_5 * value;
-                two[k] += area * node.degree_2 * value;
-            }
-        }
-        let [visible, whole] = [0, 1].map(|k| five[k] - two[k]);
-        cell.flux = five[0];
-        cell.cautious = visible.abs();
-        let crossed = most_even(&pair.creases, &corners).map_or(0.0, |(even, _)| even);
-        let margin = cell.margin(pair, five, eye);
-        let doubt = DOUBT * five[1] * crossed.max(area / pair.area) + MARGIN * area * margin;
-        cell.cautious += (whole - visible).abs() + doubt;
-        cell.likely = cell.cautious;
+        cell.integrate(pair, visibility);
         cell
     }
 
-    /// If its points see all, or nothing, of `visible` and `whole` flux: how far from that is what a
-    /// corner sees. A straight shadow that passes by all points takes in a corner.
-    fn margin(
-        &self,
-        pair: &OccludedPair,
-        [visible, whole]: [f64; 2],
-        eye: &mut PointVisibility,
-    ) -> f64 {
-        let nothing = NEITHER * whole;
-        if visible > nothing && whole - visible > nothing {
-            return 0.0;
+    /// Sets flux and errors by Radon's rule.
+    fn integrate(&mut self, pair: &OccludedPair, visibility: &mut PointVisibility) {
+        let [a, b, c] = self.corners;
+        let area = 0.5 * (b - a).cross(c - a).length();
+        let mut degree_5 = CellFlux::default();
+        let mut degree_2 = CellFlux::default();
+        for node in radon_nodes(self.corners) {
+            let factors = self.factors_from(node.point, pair, visibility);
+            degree_5.add(area, node.degree_5, factors);
+            degree_2.add(area, node.degree_2, factors);
         }
-        let middle = self.corners.iter().sum::<DVec3>() / 3.0;
-        let other = |corner: &DVec3| {
-            let at = corner.lerp(middle, WITHIN);
-            let seen = eye.look(at, pair.normal, &pair.target, pair.target_normal, &self.blockers);
-            if visible > nothing { seen.whole - seen.visible } else { seen.visible }
-        };
-        self.corners.iter().map(other).fold(0.0, f64::max)
+        let visible_change = degree_5.visible - degree_2.visible;
+        let unoccluded_change = degree_5.unoccluded - degree_2.unoccluded;
+        let balance = most_balanced_split(&pair.event_planes, &self.corners)
+            .map_or(0.0, |(balance, _)| balance);
+        let rim = self.largest_corner_deviation(pair, degree_5, visibility);
+        let unseen = COARSE_CELL_BOUND * degree_5.unoccluded * balance.max(area / pair.area)
+            + RIM_AREA_SHARE * area * rim;
+        self.flux = degree_5.visible;
+        // What the rules differ by, of what is seen and of what is hidden, and what they may miss.
+        self.error_bound = visible_change.abs();
+        self.error_bound += (unoccluded_change - visible_change).abs() + unseen;
+        self.error_estimate = self.error_bound;
     }
 
-    /// Its parts, cut along a crease if there is one, else in two.
+    /// Form factors from a point of the cell to the target.
+    fn factors_from(
+        &self,
+        point: DVec3,
+        pair: &OccludedPair,
+        visibility: &mut PointVisibility,
+    ) -> PointFactors {
+        let facing = pair.target_normal;
+        visibility.factors(point, pair.normal, &pair.target, facing, &self.blockers)
+    }
+
+    /// If the points of the rule see all of the target, or nothing of it, by `flux`: how far from
+    /// that is what a corner sees, as a form factor. A straight shadow that passes by all points
+    /// takes in a corner.
+    fn largest_corner_deviation(
+        &self,
+        pair: &OccludedPair,
+        flux: CellFlux,
+        visibility: &mut PointVisibility,
+    ) -> f64 {
+        let nothing = NOTHING_SHARE * flux.unoccluded;
+        if flux.visible > nothing && flux.unoccluded - flux.visible > nothing {
+            return 0.0;
+        }
+        let centroid = self.corners.iter().sum::<DVec3>() / 3.0;
+        let mut largest = 0.0_f64;
+        for corner in &self.corners {
+            let point = corner.lerp(centroid, CORNER_INSET);
+            let factors = self.factors_from(point, pair, visibility);
+            let deviation = if flux.visible > nothing {
+                factors.unoccluded - factors.visible
+            } else {
+                factors.visible
+            };
+            largest = largest.max(deviation);
+        }
+        largest
+    }
+
+    /// The cell's parts, cut along an event plane if one crosses it, else in two.
     ///
     /// What the cut changes is what was off before, and more than is off in the parts together:
-    /// spread evenly over them, it is their likely error.
-    fn parts(&self, pair: &OccludedPair, eye: &mut PointVisibility) -> Vec<Cell> {
-        let triangles = match most_even(&pair.creases, &self.corners) {
-            Some((_, crease)) => split_triangle(&self.corners, crease),
+    /// spread evenly over them, it is their error estimate.
+    fn split(&self, pair: &OccludedPair, visibility: &mut PointVisibility) -> Vec<Cell> {
+        let triangles = match most_balanced_split(&pair.event_planes, &self.corners) {
+            Some((_, plane)) => split_triangle(&self.corners, plane),
             None => self.halves().to_vec(),
         };
         let seeds = (1..).map(|k| split_mix64(self.seed ^ k));
         let mut parts: Vec<Cell> = triangles
             .into_iter()
             .zip(seeds)
-            .map(|(corners, seed)| Cell::new(pair, corners, &self.blockers, seed, eye))
+            .map(|(corners, seed)| Cell::new(pair, corners, &self.blockers, seed, visibility))
             .collect();
         let change = parts.iter().map(|part| part.flux).sum::<f64>() - self.flux;
-        let likely = change.abs() / (parts.len() as f64).sqrt();
+        let share = change.abs() / (parts.len() as f64).sqrt();
         for part in &mut parts {
-            part.likely = likely.max(LEAST * part.cautious).min(part.cautious);
+            let least = MIN_ESTIMATE_SHARE * part.error_bound;
+            part.error_estimate = share.max(least).min(part.error_bound);
         }
         parts
     }
 
-    /// Both parts of a cut from the middle of the longest side, roughly, to the far corner.
+    /// Both parts of a cut from near the middle of the longest side to the opposite corner.
     fn halves(&self) -> [[DVec3; 3]; 2] {
         let [a, b, c] = self.corners;
         let sides = [(a, b, c), (b, c, a), (c, a, b)];
         let square = |side: &(DVec3, DVec3, DVec3)| side.0.distance_squared(side.1);
         let longest = sides.iter().max_by(|x, y| square(x).total_cmp(&square(y)));
-        let &(p, q, r) = longest.unwrap_or(&sides[0]);
-        // Off the middle by up to a tenth, so that errors along a line of cells are independent.
-        let share = 0.4 + 0.2 * unit_interval(self.seed);
+        let &(p, q, opposite) = longest.unwrap_or(&sides[0]);
+        let share = (0.5 - CUT_JITTER) + 2.0 * CUT_JITTER * unit_interval(self.seed);
         let middle = p.lerp(q, share);
-        [[p, middle, r], [middle, q, r]]
+        [[p, middle, opposite], [middle, q, opposite]]
     }
 }
 
-/// A cell waiting to be cut, the worst first; ties go by number, so that the order is certain.
+/// A cell waiting to be cut, the largest error bound first; ties go by number, so that the order is
+/// the same on every run.
 struct HeapEntry {
-    cautious: f64,
+    error_bound: f64,
     pair: usize,
     cell: usize,
 }
 
 impl Ord for HeapEntry {
     fn cmp(&self, other: &Self) -> Ordering {
-        let order = self.cautious.total_cmp(&other.cautious);
+        let order = self.error_bound.total_cmp(&other.error_bound);
         order.then_with(|| (other.pair, other.cell).cmp(&(self.pair, self.cell)))
     }
 }
@@ -201,57 +280,64 @@ impl PartialEq for HeapEntry {
 
 impl Eq for HeapEntry {}
 
-/// Squares of the errors of all cells.
+/// Sums over cells of the squares of their errors.
 #[derive(Default)]
-struct Squares {
-    cautious: f64,
-    likely: f64,
+struct SquaredErrors {
+    bound: f64,
+    estimate: f64,
 }
 
-impl Squares {
-    fn add(&mut self, cell: &Cell, sign: f64) {
-        self.cautious += sign * cell.cautious * cell.cautious;
-        self.likely += sign * cell.likely * cell.likely;
+impl SquaredErrors {
+    fn add(&mut self, cell: &Cell) {
+        self.bound += cell.error_bound * cell.error_bound;
+        self.estimate += cell.error_estimate * cell.error_estimate;
+    }
+
+    fn remove(&mut self, cell: &Cell) {
+        self.bound -= cell.error_bound * cell.error_bound;
+        self.estimate -= cell.error_estimate * cell.error_estimate;
+    }
+
+    fn are_within(&self, tolerance: f64) -> bool {
+        self.bound <= tolerance.powi(2) && self.estimate <= (ESTIMATE_SHARE * tolerance).powi(2)
     }
 }
 
-/// Flux over all `pairs`: cells are cut until the cautious error of the sum is below `tolerance`,
-/// and the likely one a tenth of that.
-pub(super) fn total(
+/// The sum of A₁F₁₂ over all `pairs`: cells are cut until the error bound of the sum is at most
+/// `tolerance` and its estimate a tenth of that, or [`MAX_CELLS`] are reached.
+pub(super) fn integrate_adaptively(
     pairs: &mut [OccludedPair],
     tolerance: f64,
-    eye: &mut PointVisibility,
+    visibility: &mut PointVisibility,
 ) -> Estimate {
     let mut heap = BinaryHeap::new();
-    let mut squares = Squares::default();
-    for (pair, partial) in pairs.iter().enumerate() {
-        for (cell, of) in partial.cells.iter().enumerate() {
-            squares.add(of, 1.0);
-            heap.push(HeapEntry { cautious: of.cautious, pair, cell });
+    let mut squared_errors = SquaredErrors::default();
+    for (pair, occluded) in pairs.iter().enumerate() {
+        for (index, cell) in occluded.cells.iter().enumerate() {
+            squared_errors.add(cell);
+            heap.push(HeapEntry { error_bound: cell.error_bound, pair, cell: index });
         }
     }
-    let fine =
-        |s: &Squares| s.cautious <= tolerance.powi(2) && s.likely <= (LIKELY * tolerance).powi(2);
-    while !fine(&squares) && heap.len() < MOST_CELLS {
-        let Some(HeapEntry { cautious, pair, cell }) = heap.pop() else { break };
-        if cautious == 0.0 {
+    while !squared_errors.are_within(tolerance) && heap.len() < MAX_CELLS {
+        let Some(HeapEntry { error_bound, pair, cell }) = heap.pop() else { break };
+        if error_bound == 0.0 {
             break;
         }
-        let partial = &mut pairs[pair];
-        squares.add(&partial.cells[cell], -1.0);
-        let parts = partial.cells[cell].parts(partial, eye);
+        let occluded = &mut pairs[pair];
+        squared_errors.remove(&occluded.cells[cell]);
+        let parts = occluded.cells[cell].split(occluded, visibility);
         for (k, part) in parts.into_iter().enumerate() {
-            squares.add(&part, 1.0);
-            let at = if k == 0 { cell } else { partial.cells.len() };
-            heap.push(HeapEntry { cautious: part.cautious, pair, cell: at });
+            squared_errors.add(&part);
+            let index = if k == 0 { cell } else { occluded.cells.len() };
+            heap.push(HeapEntry { error_bound: part.error_bound, pair, cell: index });
             if k == 0 {
-                partial.cells[cell] = part;
+                occluded.cells[cell] = part;
             } else {
-                partial.cells.push(part);
+                occluded.cells.push(part);
             }
         }
     }
     let cells = || pairs.iter().flat_map(|pair| &pair.cells);
-    let likely: f64 = cells().map(|cell| cell.likely * cell.likely).sum();
-    Estimate { value: cells().map(|cell| cell.flux).sum(), error: likely.sqrt() }
+    let squared: f64 = cells().map(|cell| cell.error_estimate * cell.error_estimate).sum();
+    Estimate { value: cells().map(|cell| cell.flux).sum(), error: squared.sqrt() }
 }

@@ -1,122 +1,136 @@
 //! A matrix made to keep energy: closure and reciprocity enforced, and what it took.
+//!
+//! ```text
+//! both factors of a pair → their mean, weighted by inverse variances → symmetric G = A_i F_ij
+//! repeat: ratio_i = x_i (Σ_j G_ij x_j + lost_i) / A_i;  x_i ← x_i / √ratio_i   until all are 1
+//! F_ij = x_i G_ij x_j / A_i
+//! ```
 
 use std::collections::BTreeMap;
 
-use super::{Missing, ViewFactors};
+use super::checks::is_closed;
+use super::matrix::{Factor, Missing, ViewFactors};
 
-/// What enforcing closure and reciprocity has changed.
+/// What enforcing closure and reciprocity has changed. Dimensionless, as form factors are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct EnforcementReport {
     /// Root of the mean square of the changes of factors.
-    pub rms: f64,
+    pub rms_change: f64,
     /// The largest change of a factor.
-    pub worst: f64,
-    /// Rows taken for closed: their open share, within its error of zero, is now zero.
-    pub closed: usize,
+    pub max_change: f64,
+    /// Number of rows taken for closed: their open share, within its error of zero, is now zero.
+    pub closed_rows: usize,
     /// The largest closure error of a row that is left: not zero where a row has no factor that
     /// could take up what is missing.
-    pub left: f64,
+    pub closure_left: f64,
 }
 
-/// Steps of scaling at most; each about halves the error.
-const MOST_STEPS: usize = 2000;
+/// Steps of the symmetric scaling (a Sinkhorn iteration) at most; each about halves the error, so
+/// that a few dozen do unless zeros keep a row from closing. Chosen by hand.
+const MAX_SINKHORN_STEPS: usize = 2000;
 
-/// Closure that is good enough: rounding of a thousand sums.
-const CLOSED: f64 = 1e-13;
+/// Relative closure error of a row that is good enough: rounding of a sum of a thousand terms.
+const CLOSURE_TOLERANCE: f64 = 1e-13;
 
-impl ViewFactors {
-    /// The matrix with reciprocity and closure enforced, and the size of the correction.
-    ///
-    /// First both factors of a pair are set to their mean, weighted by the inverse of their
-    /// variances: A_i F_ij is then a symmetric matrix G. Then G is scaled from both sides, x_i G_ij
-    /// x_j, until every row adds up to A_i: symmetric matrix scaling, which keeps symmetry and
-    /// zeros, makes nothing negative, and changes the factors least in the sense of relative entropy
-    /// (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix scaling", SIAM
-    /// J. Matrix Anal. Appl. 35, 2014). What a row loses to the open or to backs is scaled with it;
-    /// an open share within its error of zero is taken to be zero. No total comes out above 1. What
-    /// a factor was changed by is added to its error, in squares.
-    pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
-        let n = self.areas.len();
-        let closed: Vec<bool> = (0..n).map(|i| self.is_closed(i)).collect();
-        let mut rows = self.symmetric();
-        let lost = |i: usize| {
-            let open = if closed[i] { 0.0 } else { self.open[i].value };
-            self.areas[i] * (open + self.back[i].value).max(0.0)
-        };
-        let lost: Vec<f64> = (0..n).map(lost).collect();
-        let x = scaling(&rows, &lost, &self.areas);
-        for (i, row) in rows.iter_mut().enumerate() {
-            row.iter_mut().for_each(|(&j, flux)| *flux *= x[i] * x[j as usize]);
+/// [`ViewFactors::enforced`].
+pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) {
+    let n = matrix.areas.len();
+    let closed: Vec<bool> = (0..n).map(|i| is_closed(matrix, i)).collect();
+    let mut exchange = symmetric_exchange(matrix);
+    let lost: Vec<f64> = (0..n).map(|i| lost_exchange(matrix, i, closed[i])).collect();
+    let x = scaling(&exchange, &lost, &matrix.areas);
+    for (i, row) in exchange.iter_mut().enumerate() {
+        for (&j, area) in row.iter_mut() {
+            *area *= x[i] * x[j as usize];
         }
-        let total = |i: usize| (rows[i].values().sum::<f64>() + x[i] * lost[i]) / self.areas[i];
-        // Below 1 by the rounding of a sum, so that no order of summation is above it.
-        let most = (0..n).map(total).fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
-        let left = (0..n).map(|i| (total(i) - 1.0).abs()).fold(0.0, f64::max);
-        let mut out = self.clone();
-        let (mut squares, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
-        for (i, row) in rows.iter().enumerate() {
-            let area = self.areas[i];
-            for (&j, &flux) in row {
-                let value = flux / area / most;
-                let change = value - self.factor(i, j as usize).value;
-                (squares, count) = (squares + change * change, count + 1.0);
-                worst = worst.max(change.abs());
-                out.set(i, j, value);
-            }
-            let scale = x[i] / most;
-            out.back[i].value = (self.back[i].value * scale).max(0.0);
-            out.open[i].value = if closed[i] { 0.0 } else { (self.open[i].value * scale).max(0.0) };
-        }
-        let rms = if count > 0.0 { f64::sqrt(squares / count) } else { 0.0 };
-        let closed = closed.iter().filter(|c| **c).count();
-        (out, EnforcementReport { rms, worst, closed, left })
     }
-
-    /// A_i F_ij, the same both ways.
-    fn symmetric(&self) -> Vec<BTreeMap<u32, f64>> {
-        let mut rows: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); self.areas.len()];
-        for (i, row) in self.factors.iter().enumerate() {
-            for f in row {
-                let j = f.to as usize;
-                let there = self.factor(j, i);
-                let (a, b) = (self.areas[i], self.areas[j]);
-                let (here, there, e, d) =
-                    (a * f.value, b * there.value, a * f.error, b * there.error);
-                let weight = if e * d > 0.0 { d * d / (e * e + d * d) } else { 0.5 };
-                let flux = weight * here + (1.0 - weight) * there;
-                let flux = flux.max(0.0);
-                rows[i].insert(j as u32, flux);
-                rows[j].insert(i as u32, flux);
-            }
+    let row_total =
+        |i: usize| (exchange[i].values().sum::<f64>() + x[i] * lost[i]) / matrix.areas[i];
+    // Below 1 by the rounding of a sum, so that no order of summation is above it.
+    let largest_total = (0..n).map(row_total).fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
+    let closure_left = (0..n).map(|i| (row_total(i) - 1.0).abs()).fold(0.0, f64::max);
+    let mut enforced = matrix.clone();
+    let mut sum_of_squares = 0.0;
+    let mut count = 0.0;
+    let mut max_change = 0.0_f64;
+    for (i, row) in exchange.iter().enumerate() {
+        let area = matrix.areas[i];
+        for (&j, &exchange_area) in row {
+            let value = exchange_area / area / largest_total;
+            let change = value - matrix.factor(i, j as usize).value;
+            sum_of_squares += change * change;
+            count += 1.0;
+            max_change = max_change.max(change.abs());
+            set_factor(&mut enforced, i, j, value);
         }
-        rows
+        let scale = x[i] / largest_total;
+        enforced.back[i].value = (matrix.back[i].value * scale).max(0.0);
+        let open = if closed[i] { 0.0 } else { (matrix.open[i].value * scale).max(0.0) };
+        enforced.open[i].value = open;
     }
+    let rms_change = if count > 0.0 { f64::sqrt(sum_of_squares / count) } else { 0.0 };
+    let closed_rows = closed.iter().filter(|c| **c).count();
+    (enforced, EnforcementReport { rms_change, max_change, closed_rows, closure_left })
+}
 
-    fn set(&mut self, i: usize, to: u32, value: f64) {
-        let row = &mut self.factors[i];
-        match row.binary_search_by_key(&to, |f| f.to) {
-            Ok(k) => {
-                row[k].error = row[k].error.hypot(value - row[k].value);
-                row[k].value = value;
-            }
-            Err(k) => {
-                debug_assert_eq!(self.absent, Missing::NotSeen);
-                row.insert(k, super::Factor { to, value, error: value });
-            }
+/// What group `i` loses to the open and to backs, as an exchange area.
+fn lost_exchange(matrix: &ViewFactors, i: usize, is_closed: bool) -> f64 {
+    let open = if is_closed { 0.0 } else { matrix.open[i].value };
+    matrix.areas[i] * (open + matrix.back[i].value).max(0.0)
+}
+
+/// Exchange areas A_i F_ij, the same both ways: means weighted by inverse variances.
+fn symmetric_exchange(matrix: &ViewFactors) -> Vec<BTreeMap<u32, f64>> {
+    let mut rows: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); matrix.areas.len()];
+    for (i, row) in matrix.factors.iter().enumerate() {
+        for there in row {
+            let j = there.to as usize;
+            let back = matrix.factor(j, i);
+            let (a, b) = (matrix.areas[i], matrix.areas[j]);
+            let (value_there, error_there) = (a * there.value, a * there.error);
+            let (value_back, error_back) = (b * back.value, b * back.error);
+            let weight = if error_there * error_back > 0.0 {
+                let square = error_back * error_back;
+                square / (error_there * error_there + square)
+            } else {
+                0.5
+            };
+            let mean = weight * value_there + (1.0 - weight) * value_back;
+            let exchange_area = mean.max(0.0);
+            rows[i].insert(j as u32, exchange_area);
+            rows[j].insert(i as u32, exchange_area);
+        }
+    }
+    rows
+}
+
+/// Sets a factor; what it changes by is added to its error, in squares.
+fn set_factor(matrix: &mut ViewFactors, i: usize, to: u32, value: f64) {
+    let row = &mut matrix.factors[i];
+    match row.binary_search_by_key(&to, |f| f.to) {
+        Ok(k) => {
+            row[k].error = row[k].error.hypot(value - row[k].value);
+            row[k].value = value;
+        }
+        Err(k) => {
+            debug_assert_eq!(matrix.absent, Missing::NotSeen);
+            row.insert(k, Factor { to, value, error: value });
         }
     }
 }
 
-/// The x with x_i (Σ_j G_ij x_j + lost_i) = A_i, as closely as there is one.
-fn scaling(rows: &[BTreeMap<u32, f64>], lost: &[f64], areas: &[f64]) -> Vec<f64> {
+/// The x with x_i (Σ_j G_ij x_j + lost_i) = A_i, as closely as there is one (P. A. Knight, D. Ruiz,
+/// B. Uçar 2014, see [`ViewFactors::enforced`]).
+fn scaling(exchange: &[BTreeMap<u32, f64>], lost: &[f64], areas: &[f64]) -> Vec<f64> {
     let mut x = vec![1.0; areas.len()];
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_SINKHORN_STEPS {
         let ratio = |i: usize| {
-            let seen: f64 = rows[i].iter().map(|(&j, flux)| flux * x[j as usize]).sum();
-            x[i] * (seen + lost[i]) / areas[i]
+            let arrives: f64 = exchange[i].iter().map(|(&j, area)| area * x[j as usize]).sum();
+            x[i] * (arrives + lost[i]) / areas[i]
         };
         let ratios: Vec<f64> = (0..areas.len()).map(ratio).collect();
-        if ratios.iter().all(|r| *r == 0.0 || (r - 1.0).abs() <= CLOSED) {
+        if ratios.iter().all(|r| *r == 0.0 || (r - 1.0).abs() <= CLOSURE_TOLERANCE) {
             break;
         }
         for (x, ratio) in x.iter_mut().zip(ratios) {

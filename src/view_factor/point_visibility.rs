@@ -1,4 +1,16 @@
-//! What a point sees of a polygon past others: exact, by clipping.
+//! What a point sees of a polygon past others: exact, by subtracting shadows.
+//!
+//! ```text
+//!      ┌──────┬╌╌╌╌┬───┐   target: convex regions that are visible so far
+//!      │      ╎////╎   │
+//!      └──────┴╌╌╌╌┴───┘
+//!              ╲▬▬╱        blocker; the cone from the point over its edges cuts out its shadow
+//!               •          point
+//! ```
+//!
+//! A region that meets a shadow is split by the planes of the cone, one after another: what is
+//! outside a plane stays visible, what is inside all of them is dropped. Lambert's formula over the
+//! regions that are left is exact but for rounding.
 
 use std::ops::Range;
 
@@ -9,85 +21,89 @@ use crate::form_factor::closed_form::lambert;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::{PLANE_TOLERANCE, split_through_origin};
 
-/// Shadow boxes are larger than shadows by this share of the reach: well above rounding.
-const MARGIN: f64 = 1e-9;
+/// Boxes around shadows are larger than the shadows by this share of the distance to the farthest
+/// corner of the target: well above rounding. A blocker no farther before the point than this share
+/// of the target has no bounded shadow.
+const SHADOW_MARGIN: f64 = 1e-9;
 
-/// A convex part of what is seen: its corners, as a range of all, and the box around them.
-struct Part {
+/// A convex region of the target that is visible so far.
+struct Region {
+    /// Range of [`PointVisibility::corners`].
     corners: Range<usize>,
+    /// Box around the corners.
     bounds: Aabb,
 }
 
-/// An eye on a surface, and room to work in.
+/// Finds what single points see of a polygon; keeps its memory from point to point.
 #[derive(Default)]
 pub(super) struct PointVisibility {
-    /// Corners of parts, also of those that are gone.
+    /// Corners of regions relative to the point, also of regions that are gone.
     corners: Vec<DVec3>,
-    parts: Vec<Part>,
-    /// Planes through the eye along a blocker's edges, unit normals inwards.
-    cone: Vec<DVec3>,
+    visible_regions: Vec<Region>,
+    /// Planes through the point along a blocker's edges: unit normals inwards.
+    shadow_cone: Vec<DVec3>,
+    /// The part of a region within the planes of the cone applied so far.
     inside: Vec<DVec3>,
-    rest: Vec<DVec3>,
+    /// The part of `inside` within the next plane.
+    still_inside: Vec<DVec3>,
 }
 
-/// Form factors from one point to a polygon.
+/// Form factors from one point to a polygon, in [0, 1].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct PointFactors {
     /// To its visible part.
     pub visible: f64,
     /// To all of it, as if nothing stood between.
-    pub whole: f64,
+    pub unoccluded: f64,
 }
 
 impl PointVisibility {
     /// Form factors from the surface element at `point` with unit `normal` to `target`, whose unit
     /// normal is `facing`, past `blockers`, all of them convex, before the element's plane, and
     /// between it and the target's plane.
-    ///
-    /// A blocker's shadow is what of the target lies within the cone from the point over the
-    /// blocker. Shadows are cut off the convex parts seen so far, one blocker after another; what
-    /// is left is summed by Lambert's formula: exact but for rounding.
-    pub fn look(
+    pub fn factors(
         &mut self,
         point: DVec3,
         normal: DVec3,
         target: &[DVec3],
         facing: DVec3,
         blockers: &[Blocker],
-    ) -> Seen {
+    ) -> PointFactors {
         self.corners.clear();
-        self.parts.clear();
+        self.visible_regions.clear();
         self.corners.extend(target.iter().map(|corner| corner - point));
-        self.keep(0);
-        let see = |part: &[DVec3]| lambert(DVec3::ZERO, normal, part);
-        let whole = see(&self.corners);
+        self.keep_region(0);
+        let factor_to = |region: &[DVec3]| lambert(DVec3::ZERO, normal, region);
+        let unoccluded = factor_to(&self.corners);
         let reach = self.corners.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let depth = self.corners.first().map_or(0.0, |v| -facing.dot(*v));
         for blocker in blockers {
-            if self.set_cone(point, blocker) {
-                let shadow = shadow(point, blocker, facing, depth, MARGIN * reach);
-                self.cut(&shadow, PLANE_TOLERANCE * reach);
-                if self.parts.is_empty() {
-                    return Seen { visible: 0.0, whole };
+            if self.set_shadow_cone(point, blocker) {
+                let shadow = shadow_bounds(point, blocker, facing, depth, SHADOW_MARGIN * reach);
+                self.subtract_shadow(&shadow, PLANE_TOLERANCE * reach);
+                if self.visible_regions.is_empty() {
+                    return PointFactors { visible: 0.0, unoccluded };
                 }
             }
         }
-        let visible = self.parts.iter().map(|part| see(&self.corners[part.corners.clone()])).sum();
-        Seen { visible, whole }
+        let regions = self.visible_regions.iter();
+        let visible = regions.map(|region| factor_to(&self.corners[region.corners.clone()])).sum();
+        PointFactors { visible, unoccluded }
     }
 
-    /// Makes a part of all corners from `start`, if there are enough.
-    fn keep(&mut self, start: usize) {
+    /// Makes a region of all corners from `start`; fewer than three are dropped.
+    fn keep_region(&mut self, start: usize) {
         if self.corners.len() < start + 3 {
-            return self.corners.truncate(start);
+            self.corners.truncate(start);
+            return;
         }
         let bounds = Aabb::from_points(self.corners[start..].iter().copied());
-        self.parts.push(Part { corners: start..self.corners.len(), bounds });
+        self.visible_regions.push(Region { corners: start..self.corners.len(), bounds });
     }
 
     /// The cone from `point` over `blocker`; false if that is seen edge on.
-    fn set_cone(&mut self, point: DVec3, blocker: &Blocker) -> bool {
-        self.cone.clear();
+    fn set_shadow_cone(&mut self, point: DVec3, blocker: &Blocker) -> bool {
+        self.shadow_cone.clear();
         let Blocker { corners, normal } = blocker;
         let Some(&corner) = corners.first() else { return false };
         let facing = normal.dot(corner - point);
@@ -98,38 +114,39 @@ impl PointVisibility {
             let across = a.cross(b);
             let length = across.length();
             if length > PLANE_TOLERANCE * a.length() * b.length() {
-                self.cone.push(across * (sign / length));
+                self.shadow_cone.push(across * (sign / length));
             }
         }
-        facing != 0.0 && self.cone.len() > 2
+        facing != 0.0 && self.shadow_cone.len() > 2
     }
 
-    /// Cuts the cone, and so all that is in `shadow`, off all parts.
-    fn cut(&mut self, shadow: &Aabb, contact: f64) {
-        // From the last: what takes the place of a part that is gone has been dealt with.
-        for k in (0..self.parts.len()).rev() {
-            if !self.parts[k].bounds.overlaps(shadow) {
+    /// Takes the cone, and so all that is in the box `shadow`, off all visible regions. Corners at
+    /// most `tolerance` (a length) off a plane of the cone are on it.
+    fn subtract_shadow(&mut self, shadow: &Aabb, tolerance: f64) {
+        // From the last: what takes the place of a region that is gone has been dealt with.
+        for k in (0..self.visible_regions.len()).rev() {
+            if !self.visible_regions[k].bounds.overlaps(shadow) {
                 continue;
             }
-            let part = &self.corners[self.parts[k].corners.clone()];
-            let beyond = |n: &DVec3| part.iter().all(|v| n.dot(*v) <= contact);
-            if self.cone.iter().any(beyond) {
+            let region = &self.corners[self.visible_regions[k].corners.clone()];
+            let is_outside = |n: &DVec3| region.iter().all(|v| n.dot(*v) <= tolerance);
+            if self.shadow_cone.iter().any(is_outside) {
                 continue;
             }
             self.inside.clear();
-            self.inside.extend_from_slice(part);
-            self.parts.swap_remove(k);
-            for plane in 0..self.cone.len() {
-                let n = self.cone[plane];
-                if self.inside.iter().all(|v| n.dot(*v) >= -contact) {
+            self.inside.extend_from_slice(region);
+            self.visible_regions.swap_remove(k);
+            for plane in 0..self.shadow_cone.len() {
+                let n = self.shadow_cone[plane];
+                if self.inside.iter().all(|v| n.dot(*v) >= -tolerance) {
                     continue;
                 }
-                self.rest.clear();
+                self.still_inside.clear();
                 let start = self.corners.len();
-                let (above, below) = (&mut self.rest, &mut self.corners);
-                split_through_origin(&self.inside, n, contact, above, below);
-                self.keep(start);
-                std::mem::swap(&mut self.inside, &mut self.rest);
+                let (above, below) = (&mut self.still_inside, &mut self.corners);
+                split_through_origin(&self.inside, n, tolerance, above, below);
+                self.keep_region(start);
+                std::mem::swap(&mut self.inside, &mut self.still_inside);
                 if self.inside.len() < 3 {
                     break;
                 }
@@ -139,16 +156,17 @@ impl PointVisibility {
 }
 
 /// A box around what `blocker` hides, from `point`, of a plane at `depth` before it that faces
-/// `facing`; everything where a part of the blocker is beside the point or behind it.
-fn shadow(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
+/// `facing`, expanded by `margin`; everything where a part of the blocker is beside the point or
+/// behind it.
+fn shadow_bounds(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for corner in &blocker.corners {
         let v = corner - point;
-        let down = -facing.dot(v);
-        if down <= MARGIN * depth {
+        let height = -facing.dot(v);
+        if height <= SHADOW_MARGIN * depth {
             return Aabb::EVERYTHING;
         }
-        bounds.include(v * (depth / down));
+        bounds.include(v * (depth / height));
     }
     bounds.expanded(margin)
 }
@@ -162,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_target_is_what_rays_find() {
+    fn visible_factor_matches_a_sum_over_rays() {
         // Two overlapping shadows, seen from aside; the target in 400 × 400 squares.
         let eye = DVec3::new(0.1, -0.2, 0.0);
         let target = rectangle([-1.0, 1.0], [-1.0, 1.0], 2.0);
@@ -183,10 +201,11 @@ mod tests {
                 sum += area * ray.z * ray.z / (std::f64::consts::PI * ray.length_squared().powi(2));
             }
         }
-        let seen = PointVisibility::default().look(eye, DVec3::Z, &target, DVec3::NEG_Z, &blockers);
-        // ElementLoops of the shadows, below 10 long, pass through squares of side 1/200 and kernel below
-        // 0.08: if all were off by half a square the same way, 0.002; they are not.
-        assert!((seen.visible - sum).abs() < 5e-4, "{} {sum}", seen.visible);
-        assert!(seen.visible < 0.9 * seen.whole && seen.visible > 0.0);
+        let factors =
+            PointVisibility::default().factors(eye, DVec3::Z, &target, DVec3::NEG_Z, &blockers);
+        // Outlines of the shadows, below 10 long, pass through squares of side 1/200 with a kernel
+        // below 0.08: if all were off by half a square the same way, 0.002; they are not.
+        assert!((factors.visible - sum).abs() < 5e-4, "{} {sum}", factors.visible);
+        assert!(factors.visible < 0.9 * factors.unoccluded && factors.visible > 0.0);
     }
 }

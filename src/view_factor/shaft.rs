@@ -1,112 +1,111 @@
-//! Who can stand between two polygons.
-
-use std::ops::ControlFlow;
+//! Shafts: the space between two polygons, in which others can stand in the way.
+//!
+//! ```text
+//!        b                The shaft of a and b is the convex hull of both: all segments from one
+//!     ───────             to the other. Its faces are the two polygons and, along each of their
+//!    ╱       ╲            edges, a supporting plane that leans on a corner of the other.
+//!   ╱  ▬▬     ╲
+//!  ╱           ╲          A blocker matters as far as it is strictly within: clipped by all
+//!  ─────────────          planes, and dropped if nothing but contact is left.
+//!        a
+//! ```
+//!
+//! (E. A. Haines, J. R. Wallace, "Shaft Culling for Efficient Ray-Cast Radiosity", 1991, for shafts
+//! between boxes; between convex polygons the hull itself has few enough faces.)
 
 use glam::DVec3;
 
-use super::convex_polygons::ConvexPolygon;
+use super::tolerances::{CONTACT_HEIGHT, MIN_LEANING_EDGE, SAME_POSITION, SLIVER_WIDTH};
 use crate::geometry::aabb::Aabb;
-use crate::geometry::bvh::Bvh;
 use crate::geometry::plane::Plane;
-use crate::geometry::polygon::{clip, merge_close_corners, polygon_area, polygon_difference};
+use crate::geometry::polygon::{clip, max_distance, merge_close_corners, polygon_area};
 
-/// Heights over a plane below this, in units of the scene's size, are contact: well above rounding,
-/// and above what pieces may be off their own planes ([`super::convex_polygons::PLANAR`]).
-pub(super) const CONTACT: f64 = 1e-12;
-
-/// An edge shorter than this share of the shaft has a direction too uncertain to lean on: rounding of
-/// its ends, 1e-16, moves the plane by up to [`CONTACT`] at the far end.
-const SHORT: f64 = 1e-4;
-
-/// What is left of a piece within a shaft is only contact if its area is less than its length times
-/// this: its edges may be out of order.
-const SLIVER: f64 = 4.0 * CONTACT;
-
-/// Corners closer than this share of a polygon's extent are one: the line through both is too
-/// uncertain to cut by.
-pub(super) const ONE: f64 = 1e-9;
-
-/// Pieces in one leaf of the tree, at most. Chosen by hand; no measurement was kept.
-const LEAF_SIZE: usize = 4;
-
-/// The convex hull of two polygons that are all before one another: every segment between them.
+/// The convex hull of two convex polygons that are all before one another.
 pub(super) struct Shaft {
+    /// The hull is on the positive side of each.
     planes: Vec<Plane>,
     bounds: Aabb,
 }
 
 impl Shaft {
-    /// Of the hull's faces, the two polygons themselves and the one beside each of their edges,
-    /// which leans on a corner of the other polygon. These are all.
+    /// The shaft between `a` and `b`, unit normals given.
     pub fn new(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Shaft {
         let bounds = Aabb::from_points(a.iter().chain(b).copied());
         let mut planes = Vec::with_capacity(a.len() + b.len() + 2);
         planes.extend(a.first().map(|&p| Plane::through(p, a_normal)));
         planes.extend(b.first().map(|&p| Plane::through(p, b_normal)));
-        lean(a, a_normal, b, &mut planes);
-        lean(b, b_normal, a, &mut planes);
+        add_supporting_planes(a, a_normal, b, &mut planes);
+        add_supporting_planes(b, b_normal, a, &mut planes);
         Shaft { planes, bounds }
     }
 
-    /// What of `polygon` is strictly within the shaft; nothing if that has no area.
+    /// What of `polygon` is strictly within the shaft; none if that has no area.
     pub fn clip(&self, polygon: &[DVec3]) -> Option<Vec<DVec3>> {
         for plane in &self.planes {
-            if polygon.iter().all(|&p| plane.signed_distance(p) <= CONTACT) {
+            if polygon.iter().all(|&p| plane.signed_distance(p) <= CONTACT_HEIGHT) {
                 return None;
             }
         }
         let mut kept = polygon.to_vec();
         for plane in &self.planes {
-            if kept.iter().any(|&p| plane.signed_distance(p) < -CONTACT) {
+            if kept.iter().any(|&p| plane.signed_distance(p) < -CONTACT_HEIGHT) {
                 kept = clip(&kept, plane.nearest_to_origin(), plane.normal);
             }
-            if kept.len() < 3 || kept.iter().all(|&p| plane.signed_distance(p) <= CONTACT) {
+            if kept.len() < 3 || kept.iter().all(|&p| plane.signed_distance(p) <= CONTACT_HEIGHT) {
                 return None;
             }
         }
-        merge_close_corners(&mut kept, ONE);
-        let size = kept.iter().map(|p| p.distance(kept[0])).fold(0.0, f64::max);
-        (polygon_area(&kept) > SLIVER * size).then_some(kept)
+        merge_close_corners(&mut kept, SAME_POSITION);
+        let extent = max_distance(&kept, kept[0]);
+        (polygon_area(&kept) > SLIVER_WIDTH * extent).then_some(kept)
     }
 
-    fn meets(&self, bounds: &Aabb) -> bool {
-        self.bounds.overlaps(bounds)
-            && self.planes.iter().all(|plane| plane.max_signed_distance(bounds) > CONTACT)
+    /// Whether a part of a box may be strictly within the shaft; true for some that are not.
+    pub fn intersects(&self, bounds: &Aabb) -> bool {
+        let is_reached = |plane: &Plane| plane.max_signed_distance(bounds) > CONTACT_HEIGHT;
+        self.bounds.overlaps(bounds) && self.planes.iter().all(is_reached)
     }
 }
 
-/// The planes along the edges of `a`, `b` before it, that have both on their upper side. None along
-/// an edge that has a corner of `b` beside it in the plane of `a`: there that plane is the hull's.
-fn lean(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
+/// Adds the planes along the edges of `a`, `b` before it, that have both on their positive side.
+/// None along an edge that has a corner of `b` beside it in the plane of `a`: there that plane is
+/// the hull's.
+fn add_supporting_planes(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
     let Some(&origin) = a.first() else { return };
     let size = a.iter().chain(b).map(|p| p.distance(origin)).fold(0.0, f64::max);
     let (flat, raised): (Vec<DVec3>, Vec<DVec3>) =
-        b.iter().partition(|p| normal.dot(**p - origin) <= CONTACT);
+        b.iter().partition(|p| normal.dot(**p - origin) <= CONTACT_HEIGHT);
     for (k, &start) in a.iter().enumerate() {
         let edge = a[(k + 1) % a.len()] - start;
-        if edge.length() < SHORT * size {
+        if edge.length() < MIN_LEANING_EDGE * size {
             continue;
         }
         let along = edge.normalize_or_zero();
         let outwards = along.cross(normal);
-        if flat.iter().any(|p| outwards.dot(p - start) > CONTACT) {
+        if flat.iter().any(|p| outwards.dot(p - start) > CONTACT_HEIGHT) {
             continue;
         }
-        // Upright to the edge first: its length times an error of angle is far above contact.
-        let upright = |p: DVec3| {
-            let n = (p - start).cross(along).normalize_or_zero();
-            n.reject_from_normalized(along).normalize_or_zero()
-        };
-        let mut n = DVec3::ZERO;
-        for &p in &raised {
-            if n == DVec3::ZERO || n.dot(p - start) < 0.0 {
-                n = upright(p);
-            }
-        }
-        if n != DVec3::ZERO {
-            planes.push(Plane::through(start, n));
+        if let Some(normal) = supporting_normal(start, along, &raised) {
+            planes.push(Plane::through(start, normal));
         }
     }
+}
+
+/// Normal of the plane through the line from `start` along the unit vector `along` and one of
+/// `points` that has all of them on its positive side or on it; none if all are on the line.
+fn supporting_normal(start: DVec3, along: DVec3, points: &[DVec3]) -> Option<DVec3> {
+    // Perpendicular to the line first: its length times an error of angle is far above contact.
+    let perpendicular = |p: DVec3| {
+        let n = (p - start).cross(along).normalize_or_zero();
+        n.reject_from_normalized(along).normalize_or_zero()
+    };
+    let mut normal = DVec3::ZERO;
+    for &p in points {
+        if normal == DVec3::ZERO || normal.dot(p - start) < 0.0 {
+            normal = perpendicular(p);
+        }
+    }
+    (normal != DVec3::ZERO).then_some(normal)
 }
 
 /// A convex polygon that stands in the way, and its unit normal.
@@ -116,17 +115,18 @@ pub(super) struct Blocker {
     pub normal: DVec3,
 }
 
-/// Whether every segment between `a` and `b` crosses `blocker`: those between corners tell.
-pub(super) fn covers(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
+/// Whether every segment between `a` and `b` crosses `blocker`: it does if those between corners
+/// do.
+pub(super) fn fully_occludes(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
     let Blocker { corners: blocker, normal } = blocker;
-    let Some(&p) = blocker.first() else { return false };
-    let reach = a.iter().chain(b).map(|v| v.distance(p)).fold(0.0, f64::max);
-    let contact = CONTACT * reach;
-    let above = |v: &DVec3| normal.dot(*v - p) >= -contact;
-    let below = |v: &DVec3| normal.dot(*v - p) <= contact;
-    let (front, rear) = if a.iter().all(above) && b.iter().all(below) {
+    let Some(&origin) = blocker.first() else { return false };
+    let reach = a.iter().chain(b).map(|v| v.distance(origin)).fold(0.0, f64::max);
+    let contact = CONTACT_HEIGHT * reach;
+    let is_above = |v: &DVec3| normal.dot(*v - origin) >= -contact;
+    let is_below = |v: &DVec3| normal.dot(*v - origin) <= contact;
+    let (front, rear) = if a.iter().all(is_above) && b.iter().all(is_below) {
         (a, b)
-    } else if a.iter().all(below) && b.iter().all(above) {
+    } else if a.iter().all(is_below) && b.iter().all(is_above) {
         (b, a)
     } else {
         return false;
@@ -135,87 +135,11 @@ pub(super) fn covers(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
         (0..blocker.len()).all(|k| {
             let (u, v) = (blocker[k] - eye, blocker[(k + 1) % blocker.len()] - eye);
             // Seen from its front the blocker runs counter-clockwise: inwards is v × u.
-            let across = v.cross(u);
-            let least = -CONTACT * across.length() * reach;
-            rear.iter().all(|&w| across.dot(w - eye) >= least)
+            let inwards = v.cross(u);
+            let least = -CONTACT_HEIGHT * inwards.length() * reach;
+            rear.iter().all(|&w| inwards.dot(w - eye) >= least)
         })
     })
-}
-
-/// Whether two pieces face the same way in the same plane.
-fn lies_on(piece: &ConvexPolygon, other: &ConvexPolygon) -> bool {
-    let Some(&origin) = other.corners.first() else { return false };
-    let size = piece.corners.iter().map(|p| p.distance(origin)).fold(0.0, f64::max);
-    let flat = |p: &DVec3| other.normal.dot(*p - origin).abs() <= 1e-9 * size;
-    piece.normal.dot(other.normal) > 0.0 && piece.corners.iter().all(flat)
-}
-
-/// Pieces in a tree of boxes.
-pub(super) struct Tree {
-    pieces: Vec<ConvexPolygon>,
-    bvh: Bvh,
-}
-
-impl Tree {
-    /// Halves pieces at the median along the longest side of their box.
-    pub fn new(pieces: Vec<ConvexPolygon>) -> Tree {
-        let boxes: Vec<Aabb> = pieces.iter().map(ConvexPolygon::bounds).collect();
-        let bvh = Bvh::new(&boxes, LEAF_SIZE, |part, bounds| {
-            let axis = bounds.longest_axis();
-            let twice_centre = |&k: &u32| (boxes[k as usize].low + boxes[k as usize].high)[axis];
-            part.sort_by(|a, b| twice_centre(a).total_cmp(&twice_centre(b)));
-        });
-        Tree { pieces, bvh }
-    }
-
-    /// The backs of all pieces, less what is hidden right there by a piece of `fronts` that lies on
-    /// it: such a plate has two fronts.
-    pub fn backs(&self, fronts: &Tree) -> Vec<ConvexPolygon> {
-        let mut backs = Vec::new();
-        for piece in self.bvh.order().iter().map(|&k| &self.pieces[k as usize]) {
-            let back = piece.reversed();
-            let mut parts = vec![back.corners.clone()];
-            for front in fronts.nearby(&piece.bounds()) {
-                if lies_on(front, &back) {
-                    parts = parts
-                        .iter()
-                        .flat_map(|part| polygon_difference(part, &front.corners, front.normal))
-                        .collect();
-                }
-            }
-            backs
-                .extend(parts.into_iter().filter_map(|part| ConvexPolygon::new(part, piece.group)));
-        }
-        backs
-    }
-
-    /// The pieces in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.
-    fn nearby(&self, bounds: &Aabb) -> Vec<&ConvexPolygon> {
-        let mut found = Vec::new();
-        self.bvh.visit(
-            |node| node.overlaps(bounds),
-            |k| {
-                found.push(&self.pieces[k as usize]);
-                ControlFlow::Continue(())
-            },
-        );
-        found
-    }
-
-    /// What of the pieces is strictly within `shaft`.
-    pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
-        let mut found = Vec::new();
-        self.bvh.visit(
-            |node| shaft.meets(node),
-            |k| {
-                let piece = &self.pieces[k as usize];
-                let clipped = shaft.clip(&piece.corners);
-                found.extend(clipped.map(|corners| Blocker { corners, normal: piece.normal }));
-                ControlFlow::Continue(())
-            },
-        );
-        found
-    }
 }
 
 #[cfg(test)]
@@ -250,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn every_segment_is_in_the_shaft_and_clipping_keeps_what_it_meets() {
+    fn shaft_contains_every_segment_and_clip_keeps_what_segments_meet() {
         let mut state = 88_172_645_463_325_252;
         let mut met = 0;
         for _ in 0..300 {
@@ -280,9 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn what_covers_is_crossed_by_every_segment() {
+    fn full_occluder_is_crossed_by_every_segment() {
         let mut state = 88_172_645_463_325_252;
-        let mut covered = 0;
+        let mut occluding = 0;
         for _ in 0..2000 {
             let (mut a, _) = triangle(-1.0, 0.3, true, &mut state);
             let (mut b, _) = triangle(1.0, 0.3, false, &mut state);
@@ -291,10 +215,10 @@ mod tests {
             }
             let (corners, normal) = triangle(0.0, 0.5, true, &mut state);
             let blocker = Blocker { corners: corners.to_vec(), normal };
-            if !covers(&blocker, &a, &b) {
+            if !fully_occludes(&blocker, &a, &b) {
                 continue;
             }
-            covered += 1;
+            occluding += 1;
             for _ in 0..50 {
                 let (p, q) = (within(&a, &mut state), within(&b, &mut state));
                 let hit = p + (q - p) * (normal.dot(corners[0] - p) / normal.dot(q - p));
@@ -304,6 +228,6 @@ mod tests {
                 }
             }
         }
-        assert!(covered > 50, "{covered}");
+        assert!(occluding > 50, "{occluding}");
     }
 }

@@ -5,4 +5,4 @@ mod obj_polygons;
 mod obj_texts;
 mod ply;
 mod tone;
-mod view_factor_tables;
+mod view_factors;

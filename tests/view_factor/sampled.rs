@@ -29,17 +29,19 @@ fn sampled_factors_estimate_their_errors() {
     // Neighbouring walls are seen from a sixteenth away at the nearest: up to 0.02.
     assert!(worst < 0.02, "{worst}");
     let checks = m.checks();
-    assert!(checks.closure.worst < 1e-8, "shares are whole numbers of 2^-32");
-    assert!(checks.reciprocity.worst > 1e-5, "rays are not reciprocal: {checks:?}");
+    assert!(checks.closure.max < 1e-8, "shares are whole numbers of 2^-32");
+    assert!(checks.reciprocity.max > 1e-5, "rays are not reciprocal: {checks:?}");
 
     let (enforced, correction) = m.enforced();
     let after = enforced.checks();
     println!("{correction:?}");
-    assert!(after.reciprocity.worst < 1e-14, "{after:?}");
-    assert!(after.closure.worst < 1e-12 && correction.left < 1e-12, "{after:?}");
-    assert_eq!(after.bounds.worst, 0.0);
+    assert!(after.reciprocity.max < 1e-14, "{after:?}");
+    assert!(after.closure.max < 1e-12 && correction.closure_left < 1e-12, "{after:?}");
+    assert_eq!(after.bounds.max, 0.0);
     assert!(
-        correction.worst > 0.0 && correction.worst < 0.02 && correction.rms <= correction.worst
+        correction.max_change > 0.0
+            && correction.max_change < 0.02
+            && correction.rms_change <= correction.max_change
     );
     for (i, row) in enforced.factors.iter().enumerate() {
         let total = row.iter().map(|f| f.value).sum::<f64>() + enforced.back[i].value;

@@ -191,11 +191,11 @@ fn enforce(matrix: &ViewFactors) -> ViewFactors {
     println!(
         "enforced: factors changed by {:.1e} RMS, {:.1e} at most; {} of {} rows closed; \
          closure left {:.1e}",
-        report.rms,
-        report.worst,
-        report.closed,
+        report.rms_change,
+        report.max_change,
+        report.closed_rows,
         matrix.names.len(),
-        report.left
+        report.closure_left
     );
     enforced
 }
@@ -218,15 +218,15 @@ fn print_checks(m: &ViewFactors) {
     let checks = m.checks();
     let name = |i: usize| &m.names[i];
     let (r, b) = (checks.reciprocity, checks.bounds);
-    println!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.worst);
-    println!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.worst);
-    if b.worst > 0.0 {
+    println!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.max);
+    println!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.max);
+    if b.max > 0.0 {
         let (from, to) = (name(b.at.0), name(b.at.1));
-        println!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.worst);
+        println!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.max);
     } else {
         println!("bounds: kept");
     }
-    if let Some(&worst) = m.overfull().first() {
+    if let Some(&worst) = m.rows_over_unity().first() {
         eprintln!(
             "warning: more than all of {}'s flux arrives, {:.3e} too much: are two surfaces in one \
              place?",
@@ -234,7 +234,7 @@ fn print_checks(m: &ViewFactors) {
             -m.open[worst].value
         );
     }
-    let leaks = m.leaks();
+    let leaks = m.open_rows();
     if let Some(&worst) = leaks.first() {
         eprintln!(
             "warning: {} of {} groups see out of the scene; {} loses most, {:.3e}",

@@ -11,7 +11,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::face::{Edge, Face, edges};
+use super::edge::{Edge, edges};
+use super::face::Face;
 use crate::geometry::quadrature::tanh_sinh;
 
 /// Edges whose angle differs from 0 or 90 degrees by no more than this (radians) are parallel or

@@ -1,10 +1,11 @@
-//! A convex polygon prepared for integration: its normal, a sphere around it, its edges.
+//! A convex polygon prepared for integration: its normal and a sphere around it.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::point_to_polygon::lambert;
+use super::edge::edges;
+use super::lambert::lambert;
 use crate::geometry::polygon::{clip, fan, max_distance};
 use crate::geometry::quadrature::{collapsed_point, gauss_legendre_for_gap};
 
@@ -71,23 +72,4 @@ impl Face {
         let half = |axis| Face::new(clip(&self.corners, self.centre, axis), self.normal);
         [half(axis), half(-axis)].into_iter().flatten()
     }
-}
-
-/// An edge of a polygon.
-#[derive(Clone, Copy)]
-pub(super) struct Edge {
-    pub start: DVec3,
-    pub end: DVec3,
-    /// From start to end, of unit length.
-    pub direction: DVec3,
-    pub length: f64,
-}
-
-/// The edges of a polygon in order, less those without length.
-pub(super) fn edges(polygon: &[DVec3]) -> impl Iterator<Item = Edge> {
-    let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).filter_map(|(&start, &end)| {
-        let length = start.distance(end);
-        (length > 0.0).then(|| Edge { start, end, direction: (end - start) / length, length })
-    })
 }

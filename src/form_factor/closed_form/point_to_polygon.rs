@@ -1,10 +1,8 @@
-//! From a surface element to a polygon: Lambert's formula.
-
-use std::f64::consts::TAU;
+//! From a surface element to a polygon: clipped by the horizon, then Lambert's formula.
 
 use glam::DVec3;
 
-use super::face::{Edge, Face, edges};
+use super::face::Face;
 use crate::geometry::polygon::{PLANE_TOLERANCE, area_vector, clip, max_distance};
 
 /// Form factor from a surface element at `point` with unit `normal` to the front of `polygon`: the
@@ -28,16 +26,4 @@ pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     }
     Face::new(clip(polygon, point, normal), facing)
         .map_or(0.0, |face| face.factor_from(point, normal).clamp(0.0, 1.0))
-}
-
-/// Lambert's formula for a polygon that is all above the horizon of the surface element at `point`
-/// with unit `normal`; negative if the element is behind the polygon.
-pub(crate) fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
-    let along_normal = |edge: Edge| {
-        let (a, b) = (edge.start - point, edge.end - point);
-        let across = a.cross(b - a);
-        let sine = across.length();
-        if sine > 0.0 { sine.atan2(a.dot(b)) * normal.dot(across) / sine } else { 0.0 }
-    };
-    -edges(corners).map(along_normal).sum::<f64>() / TAU
 }

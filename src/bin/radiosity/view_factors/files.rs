@@ -5,10 +5,8 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use npyz::WriterBuilder;
-use radiosity::{
-    Error, ErrorKind, Estimate, ViewFactors, write_matrix_market, write_view_factor_list,
-    write_view_factors,
-};
+use radiosity::io::view_factors::{write_csv_list, write_csv_matrix, write_matrix_market};
+use radiosity::{Error, ErrorKind, Estimate, ViewFactors};
 
 use crate::args::{self, Stop};
 
@@ -58,8 +56,8 @@ impl Format {
     pub fn write(self, stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
         let path = self.path(stem);
         match self {
-            Format::Csv => write_view_factors(path, matrix),
-            Format::List => write_view_factor_list(path, matrix),
+            Format::Csv => write_csv_matrix(path, matrix),
+            Format::List => write_csv_list(path, matrix),
             Format::MatrixMarket => write_matrix_market(path, matrix),
             Format::Npy => write_npy(&path, matrix).map_err(|e| {
                 let place = path.display().to_string();

@@ -1,4 +1,13 @@
-//! View factors out: a CSV matrix, a CSV list with errors, Matrix Market.
+//! Writers for matrices of view factors.
+//!
+//! | function | file | zeros | errors |
+//! |---|---|---|---|
+//! | [`write_csv_matrix`] | CSV, one row a group: for spreadsheets | `0` | no |
+//! | [`write_csv_list`] | CSV, one line a nonzero | left out | yes |
+//! | [`write_matrix_market`] | Matrix Market, one line a nonzero | left out | no |
+//!
+//! In all of them the group that leaves comes first: rows leave, columns receive. Areas are in the
+//! scene's length unit squared, factors are dimensionless.
 
 use std::io::Write;
 use std::path::Path;
@@ -14,7 +23,7 @@ use crate::view_factor::{Estimate, Missing, ViewFactors};
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_view_factors(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
         writeln!(out, "F from row to column,{},open,back,area", names.join(","))?;
@@ -42,7 +51,7 @@ pub fn write_view_factors(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resul
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_view_factor_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
         writeln!(out, "from,to,factor,standard_error,from_area,to_area")?;
@@ -144,12 +153,14 @@ impl std::fmt::Display for RoundedValue {
 
 /// A CSV field (RFC 4180): quoted where a comma, quote or line break is in it.
 fn quoted(name: &str) -> String {
-    match name.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", name.replace('"', "\"\"")),
-        false => name.to_string(),
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_string()
     }
 }
 
+/// A name without line breaks, for a comment.
 fn one_line(name: &str) -> String {
     name.replace(['\n', '\r'], " ")
 }

@@ -2,7 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::{Material, Mesh, RayRows, ViewFactors, write_view_factors};
+use radiosity::io::view_factors::write_csv_matrix;
+use radiosity::{Material, Mesh, RayRows, ViewFactors};
 
 use crate::common::cube;
 
@@ -32,7 +33,7 @@ fn matrix_csv_reads_back() {
     matrix.names[1] = "a \"b\", c".into();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cube.csv");
-    write_view_factors(&path, &matrix).unwrap();
+    write_csv_matrix(&path, &matrix).unwrap();
     let text = std::fs::read_to_string(path).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 7);

@@ -1,0 +1,94 @@
+//! The convex polygons of a scene in a tree of boxes, to find those in a shaft.
+//!
+//! Polygons are halved at the median of their box centres along the longest side of their common
+//! box, until few are left. A query goes down where boxes meet it.
+
+use std::ops::ControlFlow;
+
+use super::convex_polygons::ConvexPolygon;
+use super::shaft::{Blocker, Shaft};
+use super::tolerances::SAME_POSITION;
+use crate::geometry::aabb::Aabb;
+use crate::geometry::bvh::Bvh;
+use crate::geometry::polygon::{max_distance, polygon_difference};
+
+/// Polygons in one leaf of the tree, at most. Chosen by hand; no measurement was kept.
+const LEAF_SIZE: usize = 4;
+
+/// Convex polygons in a tree of boxes.
+pub(super) struct BlockerTree {
+    polygons: Vec<ConvexPolygon>,
+    bvh: Bvh,
+}
+
+impl BlockerTree {
+    /// The tree of `polygons`.
+    pub fn new(polygons: Vec<ConvexPolygon>) -> BlockerTree {
+        let boxes: Vec<Aabb> = polygons.iter().map(ConvexPolygon::bounds).collect();
+        let bvh = Bvh::new(&boxes, LEAF_SIZE, |part, bounds| {
+            let axis = bounds.longest_axis();
+            let twice_centre = |&k: &u32| (boxes[k as usize].low + boxes[k as usize].high)[axis];
+            part.sort_by(|a, b| twice_centre(a).total_cmp(&twice_centre(b)));
+        });
+        BlockerTree { polygons, bvh }
+    }
+
+    /// What of the polygons is strictly within `shaft`.
+    pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
+        let mut blockers = Vec::new();
+        self.bvh.visit(
+            |node| shaft.intersects(node),
+            |k| {
+                let polygon = &self.polygons[k as usize];
+                if let Some(corners) = shaft.clip(&polygon.corners) {
+                    blockers.push(Blocker { corners, normal: polygon.normal });
+                }
+                ControlFlow::Continue(())
+            },
+        );
+        blockers
+    }
+
+    /// The polygons in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.
+    fn nearby(&self, bounds: &Aabb) -> Vec<&ConvexPolygon> {
+        let mut polygons = Vec::new();
+        self.bvh.visit(
+            |node| node.overlaps(bounds),
+            |k| {
+                polygons.push(&self.polygons[k as usize]);
+                ControlFlow::Continue(())
+            },
+        );
+        polygons
+    }
+
+    /// The backs of all polygons, less what is hidden right there by a polygon of `fronts` that lies
+    /// on it: such a plate has two fronts.
+    pub fn backs(&self, fronts: &BlockerTree) -> Vec<ConvexPolygon> {
+        let mut backs = Vec::new();
+        for &k in self.bvh.order() {
+            let polygon = &self.polygons[k as usize];
+            let back = polygon.reversed();
+            let mut parts = vec![back.corners.clone()];
+            for front in fronts.nearby(&polygon.bounds()) {
+                if lies_on(front, &back) {
+                    parts = parts
+                        .iter()
+                        .flat_map(|part| polygon_difference(part, &front.corners, front.normal))
+                        .collect();
+                }
+            }
+            let with_area = |part| ConvexPolygon::new(part, polygon.group);
+            backs.extend(parts.into_iter().filter_map(with_area));
+        }
+        backs
+    }
+}
+
+/// Whether two polygons face the same way in the same plane.
+fn lies_on(polygon: &ConvexPolygon, other: &ConvexPolygon) -> bool {
+    let Some(&origin) = other.corners.first() else { return false };
+    let tolerance = SAME_POSITION * max_distance(&polygon.corners, origin);
+    let mut heights = polygon.corners.iter().map(|p| other.normal.dot(*p - origin));
+    polygon.normal.dot(other.normal) > 0.0 && heights.all(|height| height.abs() <= tolerance)
+}

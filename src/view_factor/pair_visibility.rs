@@ -1,0 +1,132 @@
+//! What two convex polygons see of one another: nothing, all, or a part past others.
+//!
+//! ```text
+//! one behind the other                       → nothing
+//! clip each by the plane of the other
+//! lay a shaft around both, clip blockers     → no blocker left: all, in closed form
+//! one blocker between every two points       → nothing
+//! else choose the domain to integrate over,
+//! cut it where whole edges align, into cells → occluded, for adaptive cubature
+//! ```
+
+use glam::DVec3;
+
+use super::blocker_tree::BlockerTree;
+use super::convex_polygons::ConvexPolygon;
+use super::cubature::{Cell, OccludedPair};
+use super::matrix::Estimate;
+use super::point_visibility::PointVisibility;
+use super::shaft::{Blocker, Shaft, fully_occludes};
+use super::tolerances::{CONTACT_HEIGHT, SAME_POSITION};
+use super::unoccluded::unoccluded_exchange;
+use super::visual_events::{event_planes, parts_between_planes, standing_on};
+use crate::geometry::polygon::{clip, fan, max_distance, merge_close_corners, polygon_area};
+use crate::sampling::hash::split_mix64;
+
+/// Of two polygons whose extents have a ratio below this, the shorter one is integrated over: all
+/// it could receive may come from a spot of the longer that no cell of that one finds. Chosen by
+/// hand; no measurement kept.
+const MIN_EXTENT_RATIO: f64 = 0.25;
+
+/// What is known of the exchange between two polygons before any refinement.
+pub(super) enum PairVisibility {
+    /// Neither sees the other.
+    Hidden,
+    /// All that faces the other sees all of it: A₁F₁₂ in closed form.
+    Unoccluded(Estimate),
+    /// Others stand between.
+    Occluded(Box<OccludedPair>),
+}
+
+/// One of two polygons, clipped to what is before the other's plane.
+struct End {
+    corners: Vec<DVec3>,
+    normal: DVec3,
+    /// Blockers that stand on it.
+    standing: Vec<Blocker>,
+}
+
+impl PairVisibility {
+    /// Of `s` and `t` past `blockers`; `seed` makes cuts differ from pair to pair.
+    pub fn between(
+        s: &ConvexPolygon,
+        t: &ConvexPolygon,
+        blockers: &BlockerTree,
+        visibility: &mut PointVisibility,
+        seed: u64,
+    ) -> PairVisibility {
+        let (Some(&at_s), Some(&at_t)) = (s.corners.first(), t.corners.first()) else {
+            return PairVisibility::Hidden;
+        };
+        if !reaches_before(t, s, at_s) || !reaches_before(s, t, at_t) {
+            return PairVisibility::Hidden;
+        }
+        let mut a = clip(&s.corners, at_t, t.normal);
+        let mut b = clip(&t.corners, at_s, s.normal);
+        merge_close_corners(&mut a, SAME_POSITION);
+        merge_close_corners(&mut b, SAME_POSITION);
+        if a.len() < 3 || b.len() < 3 {
+            return PairVisibility::Hidden;
+        }
+        let between = blockers.within(&Shaft::new(&a, s.normal, &b, t.normal));
+        if between.is_empty() {
+            let exchange = unoccluded_exchange(&a, s.normal, &b, t.normal);
+            return PairVisibility::Unoccluded(exchange);
+        }
+        if between.iter().any(|blocker| fully_occludes(blocker, &a, &b)) {
+            return PairVisibility::Hidden;
+        }
+        let standing_on_a = standing_on(&a, s.normal, &between);
+        let standing_on_b = standing_on(&b, t.normal, &between);
+        let a = End { corners: a, normal: s.normal, standing: standing_on_a };
+        let b = End { corners: b, normal: t.normal, standing: standing_on_b };
+        let (domain, target) = if is_better_domain(&a, &b) { (a, b) } else { (b, a) };
+        let occluded = occluded_pair(domain, target, &between, visibility, seed);
+        PairVisibility::Occluded(Box::new(occluded))
+    }
+}
+
+/// Whether a corner of `polygon` is before the plane of `other`, which passes through `origin`.
+fn reaches_before(polygon: &ConvexPolygon, other: &ConvexPolygon, origin: DVec3) -> bool {
+    polygon.corners.iter().any(|&p| other.normal.dot(p - origin) > CONTACT_HEIGHT)
+}
+
+/// Whether `a` rather than `b` is to be integrated over: the much shorter one; else the one on
+/// which fewer blockers stand, for from there less changes at once; else the smaller one.
+fn is_better_domain(a: &End, b: &End) -> bool {
+    let extent_a = max_distance(&a.corners, a.corners[0]);
+    let extent_b = max_distance(&b.corners, b.corners[0]);
+    if extent_a.min(extent_b) < MIN_EXTENT_RATIO * extent_a.max(extent_b) {
+        extent_a <= extent_b
+    } else {
+        let rank_a = (a.standing.len(), polygon_area(&a.corners));
+        let rank_b = (b.standing.len(), polygon_area(&b.corners));
+        rank_a <= rank_b
+    }
+}
+
+/// The pair with its domain cut into cells: between the planes of the blockers that stand on it,
+/// then into triangles.
+fn occluded_pair(
+    domain: End,
+    target: End,
+    between: &[Blocker],
+    visibility: &mut PointVisibility,
+    seed: u64,
+) -> OccludedPair {
+    let mut pair = OccludedPair {
+        area: polygon_area(&domain.corners),
+        normal: domain.normal,
+        event_planes: event_planes(&target.corners, between, &domain.corners),
+        target: target.corners,
+        target_normal: target.normal,
+        cells: Vec::new(),
+    };
+    let parts = parts_between_planes(domain.corners, &domain.standing);
+    for (triangle, k) in parts.iter().flat_map(|part| fan(part)).zip(0..) {
+        let cell_seed = split_mix64(seed.wrapping_add(k));
+        let cell = Cell::new(&pair, triangle, between, cell_seed, visibility);
+        pair.cells.push(cell);
+    }
+    pair
+}
