@@ -5,7 +5,8 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::{Error, ViewFactors, load_obj, write_view_factors};
+use radiosity::io::view_factors::write_csv_matrix;
+use radiosity::{Error, ViewFactors, load_obj};
 
 fn main() -> Result<(), Error> {
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
@@ -28,6 +29,6 @@ fn main() -> Result<(), Error> {
     let checks = matrix.checks();
     println!("closure {:.1e}, reciprocity {:.1e}", checks.closure.rms, checks.reciprocity.rms);
     let (enforced, report) = matrix.enforced();
-    println!("enforced: changed by {:.1e} RMS", report.rms);
-    write_view_factors("view_factors.csv", &enforced)
+    println!("enforced: changed by {:.1e} RMS", report.rms_change);
+    write_csv_matrix("view_factors.csv", &enforced)
 }
