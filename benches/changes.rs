@@ -1,11 +1,13 @@
-//! A lamp dimmed and a block moved: what going on from the old solution takes, beside starting over.
+//! A lamp dimmed and a block moved: what going on from the old solution takes, beside starting
+//! over.
 //! A table; nothing is repeated. Runs in full only:
 //!
 //!     RADIOSITY_BENCH=full cargo bench --bench changes
 //!
 //! After each change: the hemicubes that it takes to go on and to start over, and how far both are
-//! from starting over with a thousandth of the unshot share: the sum over elements of the differences
-//! of flux, as a share of what is emitted, and the largest difference relative to the mean radiosity.
+//! from starting over with a thousandth of the unshot share: the sum over elements of the
+//! differences of flux, as a share of what is emitted, and the largest difference relative to the
+//! mean radiosity.
 
 mod common;
 

@@ -3,9 +3,9 @@
 //!
 //!     RADIOSITY_BENCH=full cargo bench --bench near_repair
 //!
-//! Per reach of the correction: raw reciprocity over all pairs of elements, A_i F_ij against A_j F_ji,
-//! as an error of the smaller one's factor; then a bake, its hemicubes and seconds, and its errors at
-//! points of path-traced truth.
+//! Per reach of the correction: raw reciprocity over all pairs of elements, A_i F_ij against
+//! A_j F_ji, as an error of the smaller one's factor; then a bake, its hemicubes and seconds, and
+//! its errors at points of path-traced truth.
 
 mod common;
 

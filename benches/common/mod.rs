@@ -1,6 +1,7 @@
 //! What the benches share: scenes, the adapter, and which benches were asked for.
 //!
-//! `cargo bench` runs what takes seconds; `RADIOSITY_BENCH=full cargo bench --bench NAME` all of one.
+//! `cargo bench` runs what takes seconds, `RADIOSITY_BENCH=full cargo bench --bench NAME` all of
+//! one.
 #![allow(dead_code)] // each bench uses a part of it
 
 #[path = "../../tests/common/scenes.rs"]

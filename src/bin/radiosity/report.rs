@@ -120,7 +120,8 @@ impl Report {
                 share(ledger.unshot)
             ),
             format!(
-                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, unshot {:.2}",
+                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, \
+                 unshot {:.2}",
                 100.0 * error.total,
                 100.0 * error.mesh,
                 100.0 * error.sampling,

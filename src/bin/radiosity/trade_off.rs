@@ -4,7 +4,8 @@
 //! ```text
 //! Grid: settings to try ──> bake each ──> Measured: seconds, error against a Reference
 //!                                              │
-//!                 CSV: all runs, SVG and PNG: error over time, a summary: targets against the front
+//!                      CSV: all runs; SVG and PNG: error over time;
+//!                      summary: error targets against the best of the fixed settings
 //! ```
 
 mod chart;

@@ -1,9 +1,9 @@
-//! The settings that are tried: one knob at a time around one base, and those chosen for an error
-//! target.
+//! The runs: one setting at a time is varied around those meant for one error, and some errors are
+//! asked for as targets.
 
 use std::num::NonZeroU32;
 
-use radiosity::{BakeSettings, Scene};
+use radiosity::{BakeSettings, GatherSettings, Scene};
 
 /// How far a run goes.
 pub enum Target {
@@ -15,19 +15,19 @@ pub enum Target {
 
 /// One bake.
 pub struct Run {
-    /// The knob that was turned for it.
+    /// The setting that was varied for it.
     pub knob: &'static str,
     pub value: String,
     pub target: Target,
 }
 
-/// Runs in the order of a knob's values, each with its label.
+/// The runs of one variation, in the order of its values, each with its label.
 pub struct Series {
     pub name: &'static str,
     pub runs: Vec<(String, usize)>,
 }
 
-/// All there is of one knob.
+/// All runs in one panel of the chart.
 pub struct Panel {
     pub title: &'static str,
     pub note: &'static str,
@@ -38,160 +38,199 @@ pub struct Panel {
 pub struct Grid {
     pub runs: Vec<Run>,
     pub panels: Vec<Panel>,
-    /// The run around which knobs are turned, and the error that it is meant for.
+    /// The run around which settings are varied, and the error that it is meant for.
     pub base: usize,
     pub base_error: f64,
     /// The finest error of fixed settings.
     pub finest: f64,
 }
 
+/// A setting that is varied: the values that `change` is called with, and the label of what comes
+/// of it.
+struct Variation {
+    knob: &'static str,
+    /// Among the series of its panel.
+    name: &'static str,
+    values: &'static [f64],
+    quick_values: &'static [f64],
+    change: fn(&mut BakeSettings, f64),
+    label: fn(&BakeSettings) -> String,
+}
+
+/// Title, note and variations of a panel.
+type PanelPlan = (&'static str, &'static str, &'static [Variation]);
+
+const PANELS: [PanelPlan; 6] = [
+    ("Resolution", "hemicube pixels an edge; rays as their square", &[RESOLUTION]),
+    ("Element size", "edge of those that shoot; others with it", &[ELEMENT_SIZE]),
+    ("Unshot share", "of the light, at which shooting stops", &[UNSHOT]),
+    ("Rotations", "hemicubes a viewpoint, averaged", &[ROTATIONS]),
+    ("Near field", "closed forms within so many patch diameters", &[NEAR_FIELD]),
+    ("Gather", "none; how often; how much a side may bend", &[NO_GATHER, SWEEPS, BEND]),
+];
+
+const RESOLUTION: Variation = Variation {
+    knob: "resolution",
+    name: "",
+    values: &[0.25, 0.5, 1.0, 2.0],
+    quick_values: &[0.5, 1.0, 2.0],
+    change: |settings, factor| {
+        let pixels = &mut settings.solve.hemicube_resolution;
+        *pixels = 2 * (factor * f64::from(*pixels) / 2.0).round().max(1.0) as u32;
+        change_gather(settings, |gather| {
+            gather.rays = (factor * factor * f64::from(gather.rays)).ceil().max(16.0) as u32;
+        });
+    },
+    label: |settings| settings.solve.hemicube_resolution.to_string(),
+};
+
+const ELEMENT_SIZE: Variation = Variation {
+    knob: "element size",
+    name: "",
+    values: &[4.0, 2.0, 1.0, 0.5],
+    quick_values: &[2.0, 1.0, 0.5],
+    change: |settings, factor| {
+        settings.solve.element_size *= factor;
+        change_gather(settings, |gather| {
+            gather.element_size *= factor;
+            gather.refinement.min_edge *= factor;
+        });
+    },
+    label: element_size,
+};
+
+const UNSHOT: Variation = Variation {
+    knob: "unshot",
+    name: "",
+    values: &[64.0, 16.0, 4.0, 1.0, 0.25],
+    quick_values: &[16.0, 4.0, 1.0],
+    change: |settings, factor| settings.solve.solver.unshot *= factor,
+    label: |settings| percent(settings.solve.solver.unshot),
+};
+
+const ROTATIONS: Variation = Variation {
+    knob: "rotations",
+    name: "",
+    values: &[1.0, 2.0, 4.0],
+    quick_values: &[1.0, 2.0],
+    change: |settings, rotations| {
+        settings.solve.rotations = NonZeroU32::new(rotations as u32).expect("not zero");
+    },
+    label: |settings| settings.solve.rotations.to_string(),
+};
+
+const NEAR_FIELD: Variation = Variation {
+    knob: "near field",
+    name: "",
+    values: &[-1.0, 1.0, 3.0],
+    quick_values: &[-1.0, 1.0, 3.0],
+    change: |settings, reach| settings.solve.near_reach = reach,
+    label: |settings| match settings.solve.near_reach {
+        reach if reach < 0.0 => "none".into(),
+        reach => reach.to_string(),
+    },
+};
+
+const NO_GATHER: Variation = Variation {
+    knob: "no gather",
+    name: "none, element size",
+    values: &[2.0, 1.0, 0.5, 0.25],
+    quick_values: &[2.0, 1.0, 0.5],
+    change: |settings, factor| {
+        settings.solve.element_size *= factor;
+        settings.gather = None;
+    },
+    label: element_size,
+};
+
+const SWEEPS: Variation = Variation {
+    knob: "sweeps",
+    name: "sweeps",
+    values: &[1.0, 2.0, 3.0],
+    quick_values: &[1.0, 2.0, 3.0],
+    change: |settings, passes| {
+        change_gather(settings, |gather| gather.refinement.gather_passes = passes as u32);
+    },
+    label: |settings| {
+        settings.gather.as_ref().map_or(0, |g| g.refinement.gather_passes).to_string()
+    },
+};
+
+const BEND: Variation = Variation {
+    knob: "bend",
+    name: "bend",
+    values: &[4.0, 2.0, 1.0, 0.5, 0.25],
+    quick_values: &[2.0, 1.0, 0.5],
+    change: |settings, factor| {
+        change_gather(settings, |gather| {
+            let tolerance = &mut gather.refinement.surplus_tolerance;
+            *tolerance = (factor * *tolerance).min(1.0);
+            gather.refinement.interpolation_tolerance *= factor;
+        });
+    },
+    label: |settings| {
+        percent(settings.gather.as_ref().map_or(0.0, |g| g.refinement.surplus_tolerance))
+    },
+};
+
+fn change_gather(settings: &mut BakeSettings, change: impl Fn(&mut GatherSettings)) {
+    if let Some(gather) = &mut settings.gather {
+        change(gather);
+    }
+}
+
+fn element_size(settings: &BakeSettings) -> String {
+    short(settings.solve.element_size)
+}
+
 impl Grid {
     pub fn new(scene: &Scene, quick: bool) -> Grid {
         let all = [0.1, 0.05, 0.02, 0.01];
-        let (errors, middle, targets) =
+        let (errors, base_error, targets) =
             if quick { (&all[..3], 0.05, &all[..2]) } else { (&all[..], 0.02, &all[..]) };
-        let base = BakeSettings::for_error(middle, scene);
-        let mut grid = Grid {
-            runs: vec![],
-            panels: vec![],
-            base: 0,
-            base_error: middle,
-            finest: errors.iter().copied().fold(1.0, f64::min),
-        };
+        let finest = errors.iter().copied().fold(1.0, f64::min);
+        let mut grid = Grid { runs: vec![], panels: vec![], base: 0, base_error, finest };
         for &error in errors {
             let run = grid.add("effort", percent(error), BakeSettings::for_error(error, scene));
-            if error == middle {
+            if error == base_error {
                 grid.base = run;
             }
         }
-        grid.turn(&base, quick);
+        let base = BakeSettings::for_error(base_error, scene);
+        for (title, note, variations) in PANELS {
+            let series = variations.iter().map(|v| grid.vary(&base, v, quick)).collect();
+            grid.panels.push(Panel { title, note, series });
+        }
         for &error in targets {
-            grid.runs.push(Run {
-                knob: "dial",
-                value: percent(error),
-                target: Target::Error(error),
-            });
+            let (value, target) = (percent(error), Target::Error(error));
+            grid.runs.push(Run { knob: "dial", value, target });
         }
         grid
     }
 
-    fn turn(&mut self, base: &BakeSettings, quick: bool) {
-        let steps: &[f64] = if quick { &[0.5, 1.0, 2.0] } else { &[0.25, 0.5, 1.0, 2.0] };
-        let resolution = self.vary(
-            base,
-            "resolution",
-            "",
-            steps,
-            |e| e.solve.hemicube_resolution.to_string(),
-            |e, f| {
-                e.solve.hemicube_resolution =
-                    2 * (f * f64::from(e.solve.hemicube_resolution) / 2.0).round().max(1.0) as u32;
-                if let Some(gather) = &mut e.gather {
-                    gather.rays = (f * f * f64::from(gather.rays)).ceil().max(16.0) as u32;
-                }
-            },
-        );
-        self.panel("Resolution", "hemicube pixels an edge; rays as their square", [resolution]);
-
-        let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5] };
-        let sizes = self.vary(base, "element size", "", steps, size, |e, f| {
-            e.solve.element_size *= f;
-            if let Some(gather) = &mut e.gather {
-                gather.element_size *= f;
-                gather.refinement.min_edge *= f;
-            }
-        });
-        self.panel("Element size", "edge of those that shoot; others with it", [sizes]);
-
-        let steps: &[f64] = if quick { &[16.0, 4.0, 1.0] } else { &[64.0, 16.0, 4.0, 1.0, 0.25] };
-        let label = |e: &BakeSettings| percent(e.solve.solver.unshot);
-        let unshot = self.vary(base, "unshot", "", steps, label, |e, f| e.solve.solver.unshot *= f);
-        self.panel("Unshot share", "of the light, at which shooting stops", [unshot]);
-
-        let steps: &[f64] = if quick { &[1.0, 2.0] } else { &[1.0, 2.0, 4.0] };
-        let label = |e: &BakeSettings| e.solve.rotations.to_string();
-        let rotations = self.vary(base, "rotations", "", steps, label, |e, f| {
-            e.solve.rotations = NonZeroU32::new(f as u32).expect("not zero");
-        });
-        self.panel("Rotations", "hemicubes a viewpoint, averaged", [rotations]);
-
-        let label = |e: &BakeSettings| match e.solve.near_reach {
-            reach if reach < 0.0 => "none".into(),
-            reach => reach.to_string(),
-        };
-        let near = self
-            .vary(base, "near field", "", &[-1.0, 1.0, 3.0], label, |e, f| e.solve.near_reach = f);
-        self.panel("Near field", "closed forms within so many patch diameters", [near]);
-
-        let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.0, 0.5, 0.25] };
-        let none = self.vary(base, "no gather", "none, element size", steps, size, |e, f| {
-            e.solve.element_size *= f;
-            e.gather = None;
-        });
-        let label = |e: &BakeSettings| {
-            e.gather.as_ref().map_or(0, |g| g.refinement.gather_passes).to_string()
-        };
-        let sweeps = self.vary(base, "sweeps", "sweeps", &[1.0, 2.0, 3.0], label, |e, f| {
-            if let Some(gather) = &mut e.gather {
-                gather.refinement.gather_passes = f as u32;
-            }
-        });
-        let label = |e: &BakeSettings| {
-            percent(e.gather.as_ref().map_or(0.0, |g| g.refinement.surplus_tolerance))
-        };
-        let steps: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[4.0, 2.0, 1.0, 0.5, 0.25] };
-        let bend = self.vary(base, "bend", "bend", steps, label, |e, f| {
-            if let Some(gather) = &mut e.gather {
-                gather.refinement.surplus_tolerance =
-                    (f * gather.refinement.surplus_tolerance).min(1.0);
-                gather.refinement.interpolation_tolerance *= f;
-            }
-        });
-        self.panel("Gather", "none; how often; how much a side may bend", [none, sweeps, bend]);
-    }
-
-    /// The runs of `base` with one knob turned to each of `values`.
-    fn vary(
-        &mut self,
-        base: &BakeSettings,
-        knob: &'static str,
-        name: &'static str,
-        values: &[f64],
-        label: impl Fn(&BakeSettings) -> String,
-        change: impl Fn(&mut BakeSettings, f64),
-    ) -> Series {
-        let run = |&value: &f64| {
+    /// Adds the runs of one variation of `base`.
+    fn vary(&mut self, base: &BakeSettings, variation: &Variation, quick: bool) -> Series {
+        let values = if quick { variation.quick_values } else { variation.values };
+        let mut runs = vec![];
+        for &value in values {
             let mut settings = base.clone();
-            change(&mut settings, value);
-            let label = label(&settings);
-            (label.clone(), self.add(knob, label, settings))
-        };
-        Series { name, runs: values.iter().map(run).collect() }
+            (variation.change)(&mut settings, value);
+            let label = (variation.label)(&settings);
+            runs.push((label.clone(), self.add(variation.knob, label, settings)));
+        }
+        Series { name: variation.name, runs }
     }
 
-    /// A run of these settings, the one there is if they are not new.
+    /// The index of the run of these settings, which is added unless it is there.
     fn add(&mut self, knob: &'static str, value: String, settings: BakeSettings) -> usize {
         let same =
             |run: &Run| matches!(&run.target, Target::Settings(other) if **other == settings);
-        if let Some(there) = self.runs.iter().position(same) {
-            return there;
+        if let Some(index) = self.runs.iter().position(same) {
+            return index;
         }
         self.runs.push(Run { knob, value, target: Target::Settings(Box::new(settings)) });
         self.runs.len() - 1
     }
-
-    fn panel<const N: usize>(
-        &mut self,
-        title: &'static str,
-        note: &'static str,
-        series: [Series; N],
-    ) {
-        self.panels.push(Panel { title, note, series: series.into() });
-    }
-}
-
-fn size(settings: &BakeSettings) -> String {
-    short(settings.solve.element_size)
 }
 
 pub fn percent(share: f64) -> String {

@@ -97,7 +97,8 @@ impl SurfacePoints {
         ((p - self.low) / self.size).to_array().map(|c| (c.max(0.0) as usize).min(CELLS - 1))
     }
 
-    /// Root mean square of the errors of `surface`, each point in the nearest face that faces alike.
+    /// Root mean square of the errors of `surface`, each point in the nearest face that faces
+    /// alike.
     pub fn error(&self, surface: &VertexMesh) -> f64 {
         let mut nearest: Vec<(f64, Rgb)> = vec![(f64::INFINITY, Rgb::ZERO); self.points.len()];
         for face in &surface.faces {

@@ -2,14 +2,10 @@
 
 use std::fmt::Write;
 
+use radiosity::GatherSettings;
+
 use super::Results;
 use super::grid::{Target, percent};
-
-const HEADER: &str = "\
-knob,value,element_size,contacts,hemicube,rotations,near,unshot,patch_tolerance,gather,\
-gather_size,gather_contacts,rays,bend,curve,smallest,sweeps,bake_seconds,error_over_area,\
-error_all_points,error_against,estimate,vertices,shot_elements,elements,hemicubes,\
-gathers,on_front\n";
 
 impl Results {
     /// The fastest fixed settings whose error is no larger than that of run `k`.
@@ -18,44 +14,49 @@ impl Results {
         self.front.iter().copied().find(|&f| self.measured[f].errors.area <= error)
     }
 
-    /// A row a run.
+    /// A row a run, under a row of column names.
     pub fn csv(&self) -> String {
-        let mut out = String::from(HEADER);
-        for (k, (run, m)) in self.grid.runs.iter().zip(&self.measured).enumerate() {
-            let e = &m.settings;
-            let gather = e.gather.as_ref().map_or("none,,,,,,,".to_string(), |g| {
-                let s = &g.refinement;
-                let (size, contacts, rays) = (g.element_size, g.contact_levels, g.rays);
-                let (bend, curve) = (s.surplus_tolerance, s.interpolation_tolerance);
-                let (smallest, sweeps) = (s.min_edge, s.gather_passes);
-                format!("needed,{size:.6},{contacts},{rays},{bend},{curve},{smallest:.6},{sweeps}")
-            });
-            let all = m.errors.all.map_or(String::new(), |all| format!("{all:.6}"));
-            let _ = writeln!(
-                out,
-                "{},{},{:.6},{},{},{},{},{},{},{gather},{:.4},{:.6},{all},{},{:.6},{},{},{},{},{},{}",
-                run.knob,
-                run.value,
-                e.solve.element_size,
-                e.solve.contact_levels,
-                e.solve.hemicube_resolution,
-                e.solve.rotations,
-                e.solve.near_reach,
-                e.solve.solver.unshot,
-                e.solve.solver.patch_tolerance,
-                m.seconds,
-                m.errors.area,
-                self.reference.name(),
-                m.estimate,
-                m.vertices,
-                m.shot_elements,
-                m.elements,
-                m.hemicubes,
-                m.gathers,
-                u8::from(self.front.contains(&k))
-            );
+        let mut out = String::new();
+        for k in 0..self.measured.len() {
+            let (columns, cells): (Vec<&str>, Vec<String>) = self.row(k).into_iter().unzip();
+            if k == 0 {
+                let _ = writeln!(out, "{}", columns.join(","));
+            }
+            let _ = writeln!(out, "{}", cells.join(","));
         }
         out
+    }
+
+    /// Columns and cells of run `k`.
+    fn row(&self, k: usize) -> Vec<(&'static str, String)> {
+        let (run, m) = (&self.grid.runs[k], &self.measured[k]);
+        let solve = &m.settings.solve;
+        let mut row = vec![
+            ("knob", run.knob.into()),
+            ("value", run.value.clone()),
+            ("element_size", format!("{:.6}", solve.element_size)),
+            ("contacts", solve.contact_levels.to_string()),
+            ("hemicube", solve.hemicube_resolution.to_string()),
+            ("rotations", solve.rotations.to_string()),
+            ("near", solve.near_reach.to_string()),
+            ("unshot", solve.solver.unshot.to_string()),
+            ("patch_tolerance", solve.solver.patch_tolerance.to_string()),
+        ];
+        row.extend(gather_cells(m.settings.gather.as_ref()));
+        row.extend([
+            ("bake_seconds", format!("{:.4}", m.seconds)),
+            ("error_over_area", format!("{:.6}", m.errors.area)),
+            ("error_all_points", m.errors.all.map_or("".into(), |all| format!("{all:.6}"))),
+            ("error_against", self.reference.name().into()),
+            ("estimate", format!("{:.6}", m.estimate)),
+            ("vertices", m.vertices.to_string()),
+            ("shot_elements", m.shot_elements.to_string()),
+            ("elements", m.elements.to_string()),
+            ("hemicubes", m.hemicubes.to_string()),
+            ("gathers", m.gathers.to_string()),
+            ("on_front", u8::from(self.front.contains(&k)).to_string()),
+        ]);
+        row
     }
 
     /// What reaching an error target takes against the fastest fixed settings that are as good.
@@ -90,4 +91,19 @@ impl Results {
         );
         out
     }
+}
+
+/// Columns and cells of the settings of vertices that gather: empty where none does.
+fn gather_cells(gather: Option<&GatherSettings>) -> [(&'static str, String); 8] {
+    let cell = |value: fn(&GatherSettings) -> String| gather.map_or(String::new(), value);
+    [
+        ("gather", if gather.is_some() { "needed".into() } else { "none".into() }),
+        ("gather_size", cell(|g| format!("{:.6}", g.element_size))),
+        ("gather_contacts", cell(|g| g.contact_levels.to_string())),
+        ("rays", cell(|g| g.rays.to_string())),
+        ("bend", cell(|g| g.refinement.surplus_tolerance.to_string())),
+        ("curve", cell(|g| g.refinement.interpolation_tolerance.to_string())),
+        ("smallest", cell(|g| format!("{:.6}", g.refinement.min_edge))),
+        ("sweeps", cell(|g| g.refinement.gather_passes.to_string())),
+    ]
 }
