@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mean_of_rows_is_exact() {
+    fn mean_of_rows_is_exact() {
         let row = |entries: &[(u32, u32)], open: u32| {
             let entries = entries.iter().map(|&(element, share)| Entry { element, share });
             let row = Row { entries: entries.collect(), escaped: open, backface: 0 };

@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn raw_delta_form_factors_sum_to_one_at_every_resolution() {
+    fn raw_delta_form_factors_sum_to_one() {
         // Each pixel is a difference of four corner values below 0.25, rounded to 2^-55 each;
         // 3 n² of them with random signs stay below 1e-12 even at n = 1024.
         for n in (16..=1024).step_by(2).filter(|n| n % 16 == 0 || *n < 64) {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn delta_form_factors_are_the_density_over_small_pixels() {
+    fn delta_form_factors_approach_the_density() {
         // Midpoint rule against exact integral: relative error (h²/24)·max|f''/f| summed over both
         // axes. At n = 512, h = 1/256 and |f''| ≤ 24 f over the hemicube: below 3.1e-5.
         let n = 512u32;
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn fixed_point_weights_keep_the_total_and_every_line() {
+    fn fixed_point_weights_keep_totals() {
         for n in [2, 16, 30, 128, 256, 1024] {
             let (exact, units) = (delta_form_factors(n).unwrap(), weights(n).unwrap());
             let sum: u64 = units.iter().map(|&w| u64::from(w)).sum();

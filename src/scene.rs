@@ -314,7 +314,7 @@ mod tests {
     const RIGHT: [[f64; 3]; 3] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
 
     #[test]
-    fn a_plain_triangle_is_taken_with_its_normal_and_area() {
+    fn triangle_has_its_normal_and_area() {
         let s = one(RIGHT, Material::grey("m", 0.5)).unwrap();
         assert_eq!(s.normal(0), DVec3::Z);
         assert_eq!(s.area(0), 0.5);
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bad_number_and_index_is_refused() {
+    fn rejects_bad_numbers_and_indices() {
         let m = || Material::grey("m", 0.5);
         assert!(one([[f64::NAN, 0., 0.], RIGHT[1], RIGHT[2]], m()).is_err());
         assert!(one([[0., 0., f64::INFINITY], RIGHT[1], RIGHT[2]], m()).is_err());
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_without_area_are_dropped_and_counted_but_one_must_stay() {
+    fn degenerate_triangles_are_dropped_and_counted() {
         let line = [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.]];
         assert!(one(line, Material::grey("m", 0.5)).is_err());
         assert!(Scene::new(vec![], vec![], vec![], vec![]).is_err());

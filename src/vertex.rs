@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn one_smooth_square_shares_its_diagonal_and_one_of_two_groups_or_materials_does_not() {
+    fn groups_and_materials_cut_the_diagonal() {
         let count = |second: (u32, u32)| {
             let faces = [([0, 1, 2], 0, 0), ([0, 2, 3], second.0, second.1)];
             let m = mesh(&SQUARE, &faces, 0.36);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fold_is_shared_below_the_crease_angle_and_cut_above() {
+    fn crease_angle_decides_shared_normals() {
         for (degrees, vertices) in
             [(Mesh::CREASE_DEGREES - 1.0, 4), (Mesh::CREASE_DEGREES + 1.0, 6)]
         {
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_and_slopes_are_kept_and_nothing_goes_negative() {
+    fn fit_keeps_constants_and_slopes() {
         let faces = [([0, 1, 2], 0, 0), ([0, 2, 3], 0, 0)];
         let m = mesh(&SQUARE, &faces, 0.1);
         let constant = vec![Rgb::new(1., 2., 3.); m.element_count()];

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_parts_above_the_cap_are_refined() {
+    fn only_parts_above_cap_are_refined() {
         let gather = settings();
         let small = ErrorEstimate { total: 0.5, ..ErrorEstimate::default() };
         let cases = [
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pilot_chooses_rays_by_the_law_of_sampling() {
+    fn pilot_chooses_rays_by_sampling_law() {
         let gather = settings();
         let allowed = model::SAMPLING_SHARE * model::allowed_error(0.02);
         assert_eq!(with_rays_for(&gather, allowed, 0.02).rays, gather.rays);

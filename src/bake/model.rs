@@ -322,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn water_filling_lowers_the_highest_parts_and_meets_the_budget() {
+    fn water_filling_meets_the_budget() {
         let square = |parts: [f64; 3]| parts.iter().map(|p| p * p).sum::<f64>();
         let cases =
             [([3.0, 4.0, 5.0], 0.0, 5.0), ([0.1, 4.0, 5.0], 1.0, 2.0), ([0.1, 0.2, 5.0], 0.1, 1.0)];

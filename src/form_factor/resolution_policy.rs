@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_resolution_follows_the_law_from_above() {
+    fn resolution_follows_law_from_above() {
         let mut before = HALVINGS;
         for k in 0..4000 {
             let share = 1e-8 * 1e9f64.powf(f64::from(k) / 4000.0);
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn with_nothing_to_be_full_from_all_is_full() {
+    fn zero_full_share_halves_nothing() {
         for share in [0.0, 1e-300, 1e-3, 1.0, f64::NAN] {
             assert_eq!(halvings(share, 0.0), 0);
         }

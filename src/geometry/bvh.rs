@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn visit_reaches_all_that_overlaps_and_stops_when_told() {
+    fn visit_reaches_overlaps_and_stops() {
         let (boxes, bvh) = row(100);
         let query = Aabb { low: DVec3::X * 20.5, high: DVec3::X * 29.5 };
         let mut found = vec![];

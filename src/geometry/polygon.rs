@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn clip_keeps_what_is_above_and_drops_what_only_touches() {
+    fn clip_drops_what_only_touches() {
         let square = rectangle([0.0, 1.0], [0.0, 1.0]);
         assert_eq!(clip(&square, DVec3::ZERO, DVec3::X), square);
         assert!(clip(&square, DVec3::ZERO, DVec3::NEG_X).is_empty());
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn close_corners_are_merged_around_the_closing_edge_too() {
+    fn close_corners_merge_across_closing_edge() {
         let square = rectangle([0.0, 1.0], [0.0, 1.0]);
         let mut doubled: Vec<DVec3> = Vec::new();
         for &corner in &square {

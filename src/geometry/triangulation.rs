@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_convex_outline_is_a_fan_from_its_first_corner() {
+    fn convex_outline_becomes_a_fan() {
         let corner = |i: usize| DVec3::from_array([(i as f64).cos(), (i as f64).sin(), 0.0]);
         let corners: Vec<DVec3> = (0..6).map(corner).collect();
         let fan = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];

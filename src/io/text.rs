@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_backslash_joins_lines_and_keeps_the_first_number() {
+    fn backslash_joins_lines() {
         assert_eq!(split("f 1 \\\r\n 2\\\n3\nv"), owned(&[(1, "f 1  2 3"), (4, "v")]));
         assert_eq!(split("a\\"), owned(&[(1, "a")]));
     }

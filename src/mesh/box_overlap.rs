@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn crowded_boxes_learn_of_all_that_are_not() {
+    fn crowded_boxes_find_all_others() {
         // Some floors, each below all the cubes, are in crowds; the cubes are not.
         let mut boxes = cubes(3000, 0.02);
         boxes.extend([UNIT; 3]);

@@ -184,7 +184,7 @@ mod tests {
         [[Some(0), Some(0)], [Some(3), Some(4)], [Some(3), Some(0)], [Some(3), None]];
 
     #[test]
-    fn smoothing_groups_separate_up_to_coplanar_and_join_up_to_crease() {
+    fn smoothing_groups_override_crease_angle() {
         for (degrees, same, others) in [
             (0.0, true, true),
             (Mesh::COPLANAR_DEGREES - 0.1, true, true),

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_have_the_moments_of_a_cosine_at_any_rotation() {
+    fn directions_have_cosine_moments() {
         // Means over a cosine-weighted hemisphere: n·d is 2/3, x² is 1/4, x is 0. Stratified points
         // are off by less than 2/√n here, and by far less in the first.
         let samples = HemisphereSamples::new(4096).unwrap();

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn golden_ratio_order_takes_each_once_and_spreads_the_first() {
+    fn golden_ratio_order_is_a_spread_permutation() {
         const FIRST: usize = 16;
         for count in [0, 1, 2, 3, 10, 192, 1000, 1024] {
             let order = golden_ratio_order(count);

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn rotation_is_the_same_for_a_scaled_and_shifted_scene() {
+    fn rotation_is_invariant_under_scale_and_shift() {
         let shift = DVec3::new(64.0, -32.0, 16.0);
         for k in 0..100 {
             let p = DVec3::new(0.37, 0.011, 0.93) * f64::from(k) / 100.0;
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn rotation_is_constant_within_a_cell_and_spread_across_cells() {
+    fn rotation_is_constant_per_cell() {
         let rotation = unit_box(1.0, DVec3::ZERO);
         let at = |k: i32| rotation.at(DVec3::X * f64::from(k) / 1000.0, 1e-3);
         // 1000 points over cells with an edge of 8 to 16 thousandths: 63 to 126 values.

@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn restore_rejects_ledger_that_is_not_that_of_the_flux() {
+    fn restore_rejects_ledger_of_other_flux() {
         let [shooting, ..] = Method::ALL.map(Solver::new);
         expect_refusal(shooting, "ledger", |s| s.unshot[0].x += 1e9);
         expect_refusal(shooting, "ledger", |s| s.ledger.absorbed.z = f64::NAN);
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn restore_rejects_histories_that_do_not_fit_the_mesh() {
+    fn restore_rejects_history_of_other_mesh() {
         let [shooting, ..] = Method::ALL.map(Solver::new);
         expect_refusal(shooting, "patches", |s| s.histories.swap(0, 1));
         expect_refusal(shooting, "patches", |s| s.histories[0].1.importance = -1.0);

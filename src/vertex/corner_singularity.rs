@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_crowd_nobody_hears_of_another() {
+    fn crowded_boxes_skip_each_other() {
         let heard = |triangles: usize| {
             // A fan of separate triangles: their first corners are at one place.
             let rim = |k: usize| {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_edge_a_floor_sees_half_of_what_the_wall_has_there() {
+    fn floor_at_edge_receives_half_of_wall() {
         let mesh = corner(0.8);
         for (at_edge, slope) in [(0.0, 1.0), (1.0, -1.0), (0.5, 2.0)] {
             let values = lit(&mesh, &|p| at_edge + slope * p.z);
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_wall_takes_nothing_out() {
+    fn even_wall_is_unchanged() {
         let mesh = corner(0.8);
         let values = lit(&mesh, &|_| 3.0);
         let [plain, mended] = at_the_edge(&mesh, &values);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_meet_despite_rounding_and_only_at_one_place() {
+    fn segment_ends_meet_despite_rounding() {
         let end = |x: f64| {
             let position = DVec3::new(0.0, x, 0.0);
             BoundaryVertex { vertex: 0, position, fit: vec![], wide: vec![] }
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn no_end_sees_more_than_everything() {
+    fn boundary_end_sees_at_most_everything() {
         let mesh = corner(0.8);
         let Vertices { positions, outlines: rims, .. } =
             Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bright_foot_of_a_wall_brings_nothing_below_zero() {
+    fn bright_wall_foot_stays_nonnegative() {
         let mesh = corner(0.8);
         let values = lit(&mesh, &|p| if p.z < SIDE { 0.0 } else { 1e6 });
         let Vertices { positions, outlines: rims, .. } =

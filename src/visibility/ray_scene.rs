@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn closest_hit_is_the_nearest_side_that_is_not_ignored() {
+    fn closest_hit_skips_ignored_triangle() {
         let at = |z: f64| [DVec3::new(0., 0., z), DVec3::new(1., 0., z), DVec3::new(0., 1., z)];
         let rays = RayScene::new([at(2.0), at(1.0), at(1.0)].into_iter());
         let from = DVec3::new(0.2, 0.3, 0.0);

@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-    fn what_is_not_valid_is_an_error_and_the_device_stays() {
+    fn validation_error_keeps_device_usable() {
         let gpu = gpu();
         let e = gpu.with_error_scopes(|| not_valid(&gpu)).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Device);
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-    fn what_goes_wrong_unseen_is_an_error_afterwards() {
+    fn unscoped_error_is_reported_by_wait() {
         let gpu = gpu();
         not_valid(&gpu).unwrap();
         let e = gpu.wait().unwrap_err();
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-    fn a_device_lost_under_way_is_an_error() {
+    fn device_lost_in_scope_is_an_error() {
         let gpu = gpu();
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let result = gpu.with_error_scopes(|| {

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_face_sees_is_in_its_runs_and_most_of_the_rest_is_not() {
+    fn runs_hold_all_that_a_face_sees() {
         let scene = sphere();
         let draw_list = DrawList::new(&scene);
         let faces = Face::all(&Frame::new(DVec3::new(0.6, 0.0, 0.8), 0.3));

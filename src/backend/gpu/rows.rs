@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-    fn every_face_looks_where_its_frame_says() {
+    fn faces_look_along_their_frames() {
         let gpu = gpu();
         // Pixels off all symmetries, in each face's own image.
         let pixels = [(40, 11), (9, 20), (50, 7), (30, 26), (13, 13)];
@@ -411,7 +411,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-    fn the_nearer_of_two_is_seen() {
+    fn nearer_of_two_is_seen() {
         let gpu = gpu();
         // Same cone of directions, drawn far first and near first.
         for (near, far) in [(1, 2), (2, 1)] {
@@ -430,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_row_is_an_error() {
+    fn row_check_rejects_invalid_rows() {
         // OPEN, BACK and three elements.
         let total = Row::TOTAL;
         let good = sparse(&[total - 10, 3, 0, 7, 0], NodeId(5)).unwrap();

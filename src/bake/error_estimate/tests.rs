@@ -54,7 +54,7 @@ impl Normal {
 }
 
 #[test]
-fn what_is_exact_has_no_error() {
+fn exact_light_has_no_error() {
     let found = estimate_of(|_| exact());
     assert_eq!(found, ErrorEstimate { samples: COUNT, ..ErrorEstimate::default() });
     let none = estimate(&[], &CONDITIONS).0;
@@ -62,7 +62,7 @@ fn what_is_exact_has_no_error() {
 }
 
 #[test]
-fn normal_noise_is_found_as_sampling_and_gathers_are_not_charged_with_it() {
+fn noise_counts_as_sampling_error_only() {
     for sigma in [0.001, 0.01] {
         for seed in 0..4u64 {
             let mut normal = Normal(seed << 32);
@@ -90,7 +90,7 @@ fn normal_noise_is_found_as_sampling_and_gathers_are_not_charged_with_it() {
 }
 
 #[test]
-fn a_known_bias_is_found_as_the_error_of_the_mesh() {
+fn known_bias_counts_as_mesh_error() {
     for bias in [-0.1, 0.003, 0.2] {
         let found =
             estimate_of(|_| Observation { interpolated: (1.0 + bias) * Rgb::ONE, ..exact() });
@@ -121,7 +121,7 @@ fn bias_and_noise_add_up_as_squares() {
 }
 
 #[test]
-fn rare_large_errors_count_with_one_standard_error_more() {
+fn rare_large_errors_add_a_standard_error() {
     let outliers = 10;
     let found = estimate_of(|k| match k % (COUNT / outliers) {
         0 => Observation { interpolated: 0.5 * Rgb::ONE, ..exact() },
@@ -133,7 +133,7 @@ fn rare_large_errors_count_with_one_standard_error_more() {
 }
 
 #[test]
-fn what_one_more_pass_changes_goes_on_as_a_geometric_series() {
+fn change_of_pass_extrapolates_geometrically() {
     for change in [-0.01, 0.03] {
         let next = (1.0 + change) * Rgb::ONE;
         let found = estimate_of(|_| Observation { next, ..exact() });
@@ -149,7 +149,7 @@ fn what_one_more_pass_changes_goes_on_as_a_geometric_series() {
 }
 
 #[test]
-fn light_not_shot_is_passed_on_by_every_pass_and_not_counted_twice() {
+fn unshot_light_is_counted_once() {
     let ambient = 0.08;
     for (gather_passes, passed) in [(None, 1.0), (Some(1), 0.375), (Some(2), 0.375 * 0.375)] {
         let conditions = Conditions { ambient, gather_passes, ..CONDITIONS };
@@ -161,7 +161,7 @@ fn light_not_shot_is_passed_on_by_every_pass_and_not_counted_twice() {
 }
 
 #[test]
-fn points_that_reflect_nothing_are_exact_and_points_in_gaps_are_left_out() {
+fn black_points_are_exact_and_gaps_left_out() {
     let off = Observation { interpolated: 0.9 * Rgb::ONE, ..exact() };
     let black = Observation { excluded: true, ..off };
     let found = estimate_of(|k| if k % 4 == 0 { off } else { black });
