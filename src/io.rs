@@ -6,7 +6,7 @@
 //! | PLY | [`write_ply`] | a mesh with radiosity at its vertices |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
-//! | CSV, Matrix Market | [`write_view_factors`] and others | view factors between groups |
+//! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
 
 #[cfg(feature = "exr")]
 mod exr;
