@@ -33,13 +33,13 @@ fn main() -> Result<(), Error> {
     println!("Cornell box, {} elements, hemicube {HEMICUBE}", mesh.element_count());
     println!(
         "{:14} {:>9} {:>9} {:>9} | {:>8} {:>6} | {:>7} {:>7} {:>7} {:>7}",
-        "rows", "RMS", "worst", "moved", "hemicub.", "s", "area", "median", "edge", "bias"
+        "rows", "RMS", "worst", "corr.", "hemicub.", "s", "area", "median", "edge", "bias"
     );
     for (name, reach) in [("plain", -1.0), ("near 1", 1.0), ("near 3", 3.0)] {
         let hemicubes = || HemicubeRows::new(&gpu, &mesh, HEMICUBE);
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
         let (rms, worst) = reciprocity(&mesh, &mut rows)?;
-        let moved = rows.moved();
+        let correction = rows.mean_correction();
 
         let start = Instant::now();
         let mut rows = ProximityCorrection::new(hemicubes()?, &mesh, reach);
@@ -49,7 +49,7 @@ fn main() -> Result<(), Error> {
         let errors = truth::compare(&surface, TRUTH);
         let (area, edge) = (errors["area"], errors["edge"]);
         println!(
-            "{name:14} {rms:9.2e} {worst:9.2e} {moved:9.2e} | {:8} {seconds:6.1} | {:6.2}% {:6.2}% \
+            "{name:14} {rms:9.2e} {worst:9.2e} {correction:9.2e} | {:8} {seconds:6.1} | {:6.2}% {:6.2}% \
              {:6.2}% {:+6.2}%",
             rows.inner().drawn(),
             100.0 * area.rms,

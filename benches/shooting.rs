@@ -32,9 +32,9 @@ impl FormFactors for Recording {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let rows = self.0.rows(mesh, patches, unshot_share)?;
+        let rows = self.0.rows(mesh, patches, importance)?;
         self.1.extend(patches.iter().copied().zip(rows.iter().cloned()));
         Ok(rows)
     }

@@ -1,204 +1,81 @@
-//! The contract between whoever makes form-factor rows and whoever uses them.
+//! Form factors of patches, row by row: the contract between what makes rows and what uses them.
+//!
+//! ```text
+//! row source        RayRows, HemicubeRows, your own: a patch seen from its centroid
+//!   └ ProximityCorrection   near receivers: closed forms of the whole patch
+//!       └ AdaptiveViewpoints   occluders that split a patch: the mean of what its parts see
+//!           └ Solver, view factors: checked rows
+//! ```
+//!
+//! Each layer is a [`FormFactors`] again; any of them can be left out. Sources stand in
+//! [`backend`](crate::backend); here are the contract, the layers that know no backend, the closed
+//! forms, and the policy that gives rows as many samples as their light is worth.
 
 pub mod closed_form;
 pub(crate) mod proximity;
 pub(crate) mod resolution_policy;
+mod row;
 pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
-use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
+pub use row::{Entry, Row};
 
-/// Where light that leaves one patch goes: the row F_i· of the form-factor matrix, sparse.
+/// A source of rows: hemicubes on a GPU, rays on the CPU, closed forms.
 ///
-/// F_ij is the fraction of the flux leaving patch i that arrives at the front of element j. Shares
-/// are whole numbers in units of 1/[`Row::TOTAL`], so that they add up exactly, in any order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Row {
-    /// Elements that receive, by ascending index, each with its share.
-    pub entries: Vec<Entry>,
-    /// Share that meets nothing and leaves the scene.
-    pub escaped: u32,
-    /// Share that meets the back of a surface and is lost there.
-    pub backface: u32,
-}
-
-/// One nonzero of a [`Row`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// Receiving element.
-    pub element: u32,
-    /// Form factor in units of 1/[`Row::TOTAL`].
-    pub share: u32,
-}
-
-impl Row {
-    /// The share that is all of the light: F = 1.
-    pub const TOTAL: u32 = u32::MAX;
-
-    /// The form factor, in [0, 1], that `share` stands for.
-    pub fn form_factor(share: u32) -> f64 {
-        f64::from(share) / f64::from(Row::TOTAL)
-    }
-
-    /// Sum of all shares over [`Row::TOTAL`]: 1 for a row that neither loses nor makes light.
-    pub fn closure(&self) -> f64 {
-        self.sum() as f64 / f64::from(Row::TOTAL)
-    }
-
-    pub(crate) fn sum(&self) -> u64 {
-        let seen: u64 = self.entries.iter().map(|e| u64::from(e.share)).sum();
-        seen + u64::from(self.escaped) + u64::from(self.backface)
-    }
-
-    /// Bytes that keeping this row takes.
-    pub fn bytes(&self) -> usize {
-        size_of::<Row>() + self.entries.len() * size_of::<Entry>()
-    }
-
-    /// Gives the entries, then `open` and `back`, these form factors, which sum to 1 but for
-    /// rounding; rounded by their running sum, so that the shares sum to [`Row::TOTAL`]. Entries
-    /// that round to nothing go.
-    pub(crate) fn set_factors(&mut self, factors: &[f64]) {
-        let (mut sum, mut shares) = (0.0, Apportion::default());
-        let slots = self.entries.iter_mut().map(|e| &mut e.share);
-        for (slot, factor) in slots.chain([&mut self.escaped, &mut self.backface]).zip(factors) {
-            sum += factor;
-            *slot = shares.part_up_to((sum * f64::from(Row::TOTAL)).round() as u32);
-        }
-        // The largest slot can take what rounding of the sum has left.
-        let slots = self.entries.iter_mut().map(|e| &mut e.share);
-        let largest = slots.chain([&mut self.escaped, &mut self.backface]).max_by_key(|s| **s);
-        largest.into_iter().for_each(|s| *s += shares.remainder(Row::TOTAL));
-        self.entries.retain(|e| e.share > 0);
-    }
-
-    /// The mean of `rows`, each of which sums to [`Row::TOTAL`]: so does the mean, exactly, and every
-    /// share of it is off by less than one unit. No rows make the row of nothing.
-    pub(crate) fn mean(rows: &[&Row]) -> Row {
-        let count = rows.len().max(1) as u64;
-        let mut seen: Vec<Entry> = rows.iter().flat_map(|r| r.entries.iter().copied()).collect();
-        // Runs in order already: a stable sort merges them.
-        seen.sort_by_key(|e| e.element);
-        let (mut sum, mut means) = (0, Apportion::default());
-        let mut part = |shares: &mut dyn Iterator<Item = u32>| {
-            sum += shares.map(u64::from).sum::<u64>();
-            means.part_up_to((sum / count) as u32)
-        };
-        let runs = seen.chunk_by(|a, b| a.element == b.element);
-        let mean = |run: &[Entry]| Entry {
-            element: run[0].element,
-            share: part(&mut run.iter().map(|e| e.share)),
-        };
-        let entries = runs.map(mean).filter(|e| e.share > 0).collect();
-        let open = part(&mut rows.iter().map(|r| r.escaped));
-        Row { entries, escaped: open, backface: part(&mut rows.iter().map(|r| r.backface)) }
-    }
-
-    /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
-    ///
-    /// # Errors
-    /// [`ErrorKind::FormFactor`] that names `patch` and what is off.
-    pub fn check(&self, mesh: &Mesh, patch: NodeId) -> Result<(), Error> {
-        let broken = |found: String, remedy: &str| {
-            let place = format!("form-factor row of patch {}", patch.0);
-            Err(Error::new(ErrorKind::FormFactor, place, found, remedy))
-        };
-        if self.sum() != u64::from(Row::TOTAL) {
-            let found = format!("shares sum to {} of {}", self.sum(), Row::TOTAL);
-            return broken(found, "entries, open and back must add up to Row::TOTAL");
-        }
-        if self.entries.windows(2).any(|w| w[0].element >= w[1].element) {
-            return broken("elements out of order".into(), "they must ascend, each once");
-        }
-        match self.entries.last() {
-            Some(last) if last.element as usize >= mesh.element_count() => broken(
-                format!("element {}", last.element),
-                &format!("the mesh has {} elements", mesh.element_count()),
-            ),
-            _ => Ok(()),
-        }
-    }
-}
-
-/// Someone who makes rows: hemicubes on a GPU, rays on the CPU, closed forms.
+/// **What a source must do.** It returns one row for each patch that is asked for, in that order,
+/// each of which passes [`Row::check`]. A row depends on the mesh, the patch, the source's settings
+/// (what [`FormFactors::fingerprint`] names) and the importance alone: not on what was asked for
+/// before, nor on the other patches of the batch. So a row can be thrown away and made again with
+/// the same bits, and a solve can be saved and resumed. Bits may differ between devices.
+///
+/// **What a user does.** It asks for patches of the mesh that the source was made for, some
+/// [`FormFactors::preferred_batch_len`] at once; any number is allowed. Rows are checked where they
+/// are used: the solver, the view factors and the layers of this module return an error for a row
+/// that breaks its contract. An error leaves the source usable: the same or other patches can be
+/// asked for again.
 pub trait FormFactors {
     /// The rows of `patches`, in their order.
     ///
-    /// `unshot_share` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
-    /// the worst channel, that one of `patches` is about to shoot. A maker may take less trouble
-    /// over rows along which little light goes; 1 asks for all it can do.
+    /// `importance` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
+    /// the worst channel, that one of `patches` is about to shoot. A source may use fewer samples
+    /// for rows of little importance; 1 asks for all it can do.
     ///
     /// # Errors
-    /// Whatever keeps the maker from making them, [`ErrorKind::Device`] above all.
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        unshot_share: f64,
-    ) -> Result<Vec<Row>, Error>;
+    /// What keeps the source from making them, [`ErrorKind::Device`] above all.
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], importance: f64)
+    -> Result<Vec<Row>, Error>;
 
-    /// How many rows are best asked for at once.
+    /// How many rows are best asked for at once, 1 or more.
     fn preferred_batch_len(&self) -> usize {
         1
     }
 
-    /// What its rows depend on beside the mesh, in words: a saved solve goes on only with rows made
-    /// alike.
+    /// Everything that the bits of its rows depend on beside mesh, patch and importance, in words: a
+    /// saved solve is resumed only with rows of the same fingerprint.
     fn fingerprint(&self) -> String {
         "rows".into()
     }
 }
 
-/// The rows of `patches` by `maker`, one each, every one of which keeps its contract.
+/// The rows of `patches` by `source`, one each, every one of which keeps its contract.
+///
+/// # Errors
+/// [`ErrorKind::FormFactor`] when one does not, or there are too few or too many; those of `source`.
 pub(crate) fn checked_rows(
-    maker: &mut (impl FormFactors + ?Sized),
+    source: &mut (impl FormFactors + ?Sized),
     mesh: &Mesh,
     patches: &[NodeId],
-    unshot_share: f64,
+    importance: f64,
 ) -> Result<Vec<Row>, Error> {
-    let rows = maker.rows(mesh, patches, unshot_share)?;
+    let rows = source.rows(mesh, patches, importance)?;
     if rows.len() != patches.len() {
         let found = format!("{} rows for {} patches", rows.len(), patches.len());
         let remedy = "FormFactors::rows must return one row a patch";
         return Err(Error::new(ErrorKind::FormFactor, "form factors", found, remedy));
     }
-    patches.iter().zip(&rows).try_for_each(|(&patch, row)| row.check(mesh, patch))?;
-    Ok(rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mean_of_rows_is_exact() {
-        let row = |entries: &[(u32, u32)], open: u32| {
-            let entries = entries.iter().map(|&(element, share)| Entry { element, share });
-            let row = Row { entries: entries.collect(), escaped: open, backface: 0 };
-            Row { backface: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
-        };
-        // Remainders of 1, 2 and 3 in four, an entry that is in one row only, one that is lost.
-        let rows = [
-            row(&[(1, 5), (3, 7), (4, 1)], 9),
-            row(&[(1, 4), (7, 1 << 31)], 0),
-            row(&[(0, 2), (3, 4)], u32::MAX - 6),
-            row(&[(3, 4)], 3),
-        ];
-        let mean = Row::mean(&rows.each_ref());
-        assert_eq!(mean.sum(), u64::from(Row::TOTAL));
-        assert!(mean.entries.windows(2).all(|w| w[0].element < w[1].element));
-        assert!(mean.entries.iter().all(|e| e.share > 0));
-        let share =
-            |r: &Row, k: u32| r.entries.iter().find(|e| e.element == k).map_or(0, |e| e.share);
-        let near = |got: u32, all: [u32; 4]| {
-            let want = all.iter().map(|&s| f64::from(s)).sum::<f64>() / 4.0;
-            assert!((f64::from(got) - want).abs() < 1.0, "{got} {want}");
-        };
-        (0..8).for_each(|k| near(share(&mean, k), rows.each_ref().map(|r| share(r, k))));
-        near(mean.escaped, rows.each_ref().map(|r| r.escaped));
-        near(mean.backface, rows.each_ref().map(|r| r.backface));
-        // Of equal rows, the row.
-        assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
+    for (&patch, row) in patches.iter().zip(&rows) {
+        row.check(mesh, patch)?;
     }
+    Ok(rows)
 }

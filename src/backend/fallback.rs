@@ -67,11 +67,11 @@ impl<A: FormFactors, B: FormFactors> FormFactors for Fallback<'_, A, B> {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
         self.ask(
-            |first| first.rows(mesh, patches, unshot_share),
-            |second| second.rows(mesh, patches, unshot_share),
+            |first| first.rows(mesh, patches, importance),
+            |second| second.rows(mesh, patches, importance),
         )
     }
 

@@ -98,10 +98,10 @@ impl FormFactors for BackendRows {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
-        let rows = self.source.rows(mesh, patches, unshot_share);
+        let rows = self.source.rows(mesh, patches, importance);
         self.seconds += start.elapsed().as_secs_f64();
         rows
     }

@@ -73,8 +73,8 @@ pub(super) fn shoot(
     }
     clock.timings.solve = clock.lap() - row_seconds;
     let rotations = u64::from(settings.rotations.get());
-    let hemicubes = (solution.rows_made + rows.extra()) * rotations;
-    let mean_near_correction = rows.inner().moved();
+    let hemicubes = (solution.rows_made + rows.extra_rows()) * rotations;
+    let mean_near_correction = rows.inner().mean_correction();
     let hemicubes_by_resolution = sources.first().drawn_by_resolution();
     drop(rows);
     Ok(ShotLight { mesh, solution, hemicubes, hemicubes_by_resolution, mean_near_correction })

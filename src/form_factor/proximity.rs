@@ -1,4 +1,17 @@
-//! The proximity repair: near receivers get their factor from the whole patch, not its centroid.
+//! The proximity correction: near receivers get the factor of the whole patch, not of its centroid.
+//!
+//! A row source sees a patch from its centroid, as if all its light came from there. That is off for
+//! a receiver within a few patch diameters (the proximity assumption of Baum, Rushmeier and Winget
+//! 1989). For each entry whose receiver is near, with closed forms of Lambert for both factors:
+//!
+//! ```text
+//!            F(receiver's centroid → whole patch) × A_receiver / A_patch    by reciprocity
+//! share  ×=  ──────────────────────────────────────────────────────────
+//!            F(patch's centroid → whole receiver)
+//! ```
+//!
+//! So what the source found hidden stays hidden. All other entries are scaled alike, so that the row
+//! still sums to one.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -8,35 +21,34 @@ use super::{FormFactors, Row, checked_rows};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
-/// Rows of another maker, with the entries of near receivers mended.
+/// Distances within this factor of the reach are near. On grids many receivers are just at the
+/// reach: rounding must not decide which of them are near.
+const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
+
+/// Rows of another source, with the entries of near receivers corrected by closed forms.
 ///
-/// A row maker sees a patch from its centroid, as if all its light came from there. That is off for
-/// a receiver within a few patch diameters (the proximity assumption of Baum, Rushmeier and Winget
-/// 1989). Such an entry is multiplied by what closed forms say of it: the factor from the
-/// receiver's centroid to the whole patch, turned round by reciprocity, over the factor from the
-/// patch's centroid to the whole receiver (both Lambert's). What the maker found hidden stays
-/// hidden. All other entries share the difference in proportion, so that the row still sums to one.
+/// The correction is for the proximity assumption of Baum, Rushmeier and Winget (1989): that all
+/// light of a patch leaves its centroid, which is off for receivers within a few patch diameters.
 #[derive(Debug)]
 pub struct ProximityCorrection<M> {
-    rows: M,
-    near: Near,
-    moved: f64,
-    made: u64,
+    source: M,
+    near_field: NearField,
+    /// Sum over rows of the share that went to other receivers.
+    total_correction: f64,
+    /// Rows corrected so far.
+    rows: u64,
 }
 
-/// What counts as near.
+/// Which receivers are near a patch.
 #[derive(Debug)]
-struct Near {
+struct NearField {
     /// In patch diameters.
     reach: f64,
     /// About each element.
     spheres: Vec<Sphere>,
 }
 
-/// On grids many are just at the reach: rounding is not to tell which of them are near.
-const TIE: f64 = 1.0 + 1e-6;
-
-/// A sphere about an element.
+/// A bounding sphere about the centroid of a node.
 #[derive(Clone, Copy, Debug)]
 struct Sphere {
     centre: DVec3,
@@ -44,45 +56,48 @@ struct Sphere {
 }
 
 impl<M: FormFactors> ProximityCorrection<M> {
-    /// Mends receivers in `mesh` whose surface is within `reach` patch diameters of the patch's;
+    /// Corrects receivers in `mesh` whose surface is within `reach` patch diameters of the patch's;
     /// below 0 none, not even those that touch it.
-    pub fn new(rows: M, mesh: &Mesh, reach: f64) -> ProximityCorrection<M> {
+    pub fn new(source: M, mesh: &Mesh, reach: f64) -> ProximityCorrection<M> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let spheres = elements.map(|n| Sphere::around(mesh, n)).collect();
-        ProximityCorrection { rows, near: Near { reach, spheres }, moved: 0.0, made: 0 }
+        let spheres = elements.map(|node| Sphere::around(mesh, node)).collect();
+        let near_field = NearField { reach, spheres };
+        ProximityCorrection { source, near_field, total_correction: 0.0, rows: 0 }
     }
 
-    /// The maker of the rows.
+    /// The source of the rows.
     pub fn inner(&self) -> &M {
-        &self.rows
+        &self.source
     }
 
     /// Size of the correction: the share of a row, in [0, 1], that went to other receivers than the
-    /// maker said, in the mean over all rows so far.
-    pub fn moved(&self) -> f64 {
-        if self.made == 0 { 0.0 } else { self.moved / self.made as f64 }
+    /// source found, in the mean over all rows so far.
+    pub fn mean_correction(&self) -> f64 {
+        if self.rows == 0 { 0.0 } else { self.total_correction / self.rows as f64 }
     }
 
-    /// The maker's own rows, nothing mended; checked, since to mend what is no row may panic.
-    pub(super) fn raw(
+    /// The source's own rows, not corrected; checked, since the correction of a row that breaks its
+    /// contract may panic.
+    pub(super) fn uncorrected(
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        checked_rows(&mut self.rows, mesh, patches, unshot_share)
+        checked_rows(&mut self.source, mesh, patches, importance)
     }
 
-    /// Mends `rows` as seen from the centroids of `patches`.
-    pub(super) fn mend(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
-        if self.near.reach < 0.0 {
+    /// Corrects `rows`, which are as seen from the centroids of `patches`.
+    pub(super) fn correct(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
+        if self.near_field.reach < 0.0 {
             return;
         }
-        let near = &self.near;
+        let near_field = &self.near_field;
         let pairs = rows.par_iter_mut().zip(patches);
-        let moved: Vec<f64> = pairs.map(|(row, &patch)| near.mend(mesh, patch, row)).collect();
-        self.made += moved.len() as u64;
-        self.moved += moved.iter().sum::<f64>();
+        let corrections: Vec<f64> =
+            pairs.map(|(row, &patch)| near_field.correct(mesh, patch, row)).collect();
+        self.rows += corrections.len() as u64;
+        self.total_correction += corrections.iter().sum::<f64>();
     }
 }
 
@@ -91,54 +106,58 @@ impl<M: FormFactors> FormFactors for ProximityCorrection<M> {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let mut rows = self.raw(mesh, patches, unshot_share)?;
-        self.mend(mesh, patches, &mut rows);
+        let mut rows = self.uncorrected(mesh, patches, importance)?;
+        self.correct(mesh, patches, &mut rows);
         Ok(rows)
     }
 
     fn preferred_batch_len(&self) -> usize {
-        self.rows.preferred_batch_len()
+        self.source.preferred_batch_len()
     }
 
     fn fingerprint(&self) -> String {
-        format!("{}, near {}", self.rows.fingerprint(), self.near.reach)
+        format!("{}, near {}", self.source.fingerprint(), self.near_field.reach)
     }
 }
 
-impl Near {
-    /// Mends one row and says what share of it went elsewhere.
-    fn mend(&self, mesh: &Mesh, patch: NodeId, row: &mut Row) -> f64 {
+impl NearField {
+    /// Corrects one row; returns the share of it that went to other receivers.
+    fn correct(&self, mesh: &Mesh, patch: NodeId, row: &mut Row) -> f64 {
         let (polygon, normal) = (mesh.corners(patch), mesh.normal(patch));
         let around = Sphere::around(mesh, patch);
-        let (mut near_before, mut near_after) = (0.0, 0.0);
-        let mut mended: Vec<(usize, f64)> = vec![];
+        let mut near_before = 0.0;
+        let mut near_after = 0.0;
+        let mut corrected: Vec<(usize, f64)> = vec![];
         for (k, entry) in row.entries.iter().enumerate() {
             let sphere = self.spheres[entry.element as usize];
-            if sphere.gap(&around) > self.reach * 2.0 * around.radius * TIE {
+            if sphere.gap(&around) > self.reach * 2.0 * around.radius * REACH_TOLERANCE {
                 continue;
             }
             let element = mesh.element(entry.element as usize);
             let from_centroid = point_to_polygon(around.centre, normal, &mesh.corners(element));
             let back = point_to_polygon(sphere.centre, mesh.normal(element), &polygon);
-            let from_all = back * mesh.area(element) / mesh.area(patch);
+            let from_patch = back * mesh.area(element) / mesh.area(patch);
             let before = Row::form_factor(entry.share);
-            let after = before * from_all / from_centroid;
+            let after = before * from_patch / from_centroid;
+            // The centroid may be in the receiver's plane, and see nothing of it.
             if after.is_finite() {
                 near_before += before;
                 near_after += after;
-                mended.push((k, after));
+                corrected.push((k, after));
             }
         }
-        if mended.is_empty() || near_after >= 1.0 || near_before >= 1.0 {
+        if corrected.is_empty() || near_after >= 1.0 || near_before >= 1.0 {
             return 0.0;
         }
-        let far = (1.0 - near_after) / (1.0 - near_before);
+        let far_scale = (1.0 - near_after) / (1.0 - near_before);
         let shares = row.entries.iter().map(|e| e.share).chain([row.escaped, row.backface]);
         let before: Vec<f64> = shares.map(Row::form_factor).collect();
-        let mut after: Vec<f64> = before.iter().map(|f| f * far).collect();
-        mended.into_iter().for_each(|(k, factor)| after[k] = factor);
+        let mut after: Vec<f64> = before.iter().map(|f| f * far_scale).collect();
+        for (k, factor) in corrected {
+            after[k] = factor;
+        }
         row.set_factors(&after);
         before.iter().zip(&after).map(|(a, b)| (a - b).abs()).sum::<f64>() / 2.0
     }

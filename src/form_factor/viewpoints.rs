@@ -1,4 +1,15 @@
-//! The visibility repair: a patch seen from several points where an occluder splits it.
+//! The visibility correction: a patch seen from several points where an occluder splits it.
+//!
+//! A tree of views is grown for each patch, a level at a time for all patches at once, so that a
+//! device gets large batches:
+//!
+//! ```text
+//!   patch          1. see the patch and three of its children from their centroids; the middle
+//!  ╱ │ │ ╲            child has the patch's centroid, and so its view
+//! ○  ○ ○  ◉        2. where the mean of the children disagrees with the patch, go on with step 1
+//! ╱│╲╲                for each child
+//! ○○○◉             3. the row of a view is the mean of its children's rows, where it has any
+//! ```
 
 use rayon::prelude::*;
 
@@ -7,27 +18,31 @@ use super::{FormFactors, Row};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
+/// Views of a patch whose children disagree with it: 1 of its own, 3 of its children's, 3 more for
+/// each of the four children.
+const VIEWS_PER_PATCH: usize = 16;
+
 /// Rows of patches as the mean of what their parts see, finer where the parts disagree.
 ///
-/// A row maker takes what the centroid of a patch sees for what all of it sees, which is off where
+/// A row source takes what the centroid of a patch sees for what all of it sees, which is off where
 /// an occluder hides a receiver from a part of the patch only (the visibility assumption of Baum,
 /// Rushmeier and Winget 1989; several viewpoints are their remedy too). Here a patch is seen from
-/// the centroids of its four children as well: its row is the mean of theirs, whose areas are
-/// equal. Where that mean differs from the patch's own row by more than the tolerance, each child
-/// is seen from its children in turn, to a given depth or to the elements. Elements have no
-/// children: they keep the one view from their centroid, and so do patches that are elements.
+/// the centroids of its four children as well: its row is the mean of theirs, whose areas are equal.
+/// Where that mean differs from the patch's own row by more than the tolerance, each child is seen
+/// from its children in turn, to a given depth or to the elements. Elements have no children: they
+/// keep the one view from their centroid, and so do patches that are elements.
 ///
-/// **What disagreement is**: half the sum over scene triangles of |own share − mean share|, with
-/// the shares that leave the scene and that meet backs: the part of the light, in [0, 1], that
-/// lands on another triangle. Single elements are often some pixels wide, and their noise would
-/// drown an occluder. The children are compared by their mean, not one by one, since a view that
-/// shifts evenly over the patch has the centroid's view for its mean and is no error. What an
-/// occluder moves about within one scene triangle goes unseen.
+/// **What disagreement is**: half the sum over scene triangles of |own share − mean share|, with the
+/// shares that leave the scene and that meet backs: the part of the light, in [0, 1], that lands on
+/// another triangle. Single elements are often some pixels wide, and their noise would drown an
+/// occluder. The children are compared by their mean, not one by one, since a view that shifts
+/// evenly over the patch has the centroid's view for its mean and is no error. What an occluder
+/// moves about within one scene triangle goes unseen.
 ///
 /// **What it costs**: the middle child of a patch has the patch's centroid, so the patch's row is
 /// the middle child's too. Three more rows a patch are made to compare; once made they are used,
 /// disagreement or not. Twelve more come for each patch or part that is gone down into; see
-/// [`AdaptiveViewpoints::extra`].
+/// [`AdaptiveViewpoints::extra_rows`].
 ///
 /// **What it is worth** (Cornell box in elements of 30 mm, hemicubes of 128 pixels, against rays
 /// from all over the patch; share of a row on the wrong triangle, over 60 patches): patches of 16
@@ -36,35 +51,69 @@ use crate::mesh::{Mesh, NodeId};
 /// of four elements gain in the median, 0.0020 to 0.0008, hardly in the RMS: most of that is in
 /// patches whose elements are themselves cut by an occluder.
 ///
-/// **Where the proximity repair goes**: inside, since near factors are those of the node that was
-/// seen from; that is why this takes a [`ProximityCorrection`] (with a reach below 0 for none). Each part's
-/// row is mended for that part, the middle child's anew from the unmended row. A [`ProximityCorrection`]
-/// around this would take the mean for the view from the patch's centroid and mend it twice.
+/// **Where the proximity correction goes**: inside, since near factors are those of the node that
+/// was seen from; that is why this takes a [`ProximityCorrection`] (with a reach below 0 for none).
+/// Each part's row is corrected for that part, the middle child's anew from the uncorrected row. A
+/// [`ProximityCorrection`] around this would take the mean for the view from the patch's centroid
+/// and correct it twice.
 #[derive(Debug)]
 pub struct AdaptiveViewpoints<M> {
-    rows: ProximityCorrection<M>,
+    source: ProximityCorrection<M>,
     tolerance: f64,
     levels: u32,
-    extra: u64,
+    extra_rows: u64,
 }
 
-/// So many views a patch takes that has parts which disagree: its own and theirs, and their parts'.
-const MANY: usize = 16;
-
-/// A node that was seen from.
-struct View {
+/// A node that is seen from its centroid.
+struct ViewNode {
     node: NodeId,
-    /// As the maker gave it; what a middle child starts from.
-    raw: Row,
-    /// Mended.
-    row: Row,
-    /// GatherPoint of the first of the four children's views.
-    parts: Option<usize>,
+    /// What the source found; also that of the middle child.
+    uncorrected: Row,
+    /// The same, corrected for near receivers.
+    corrected: Row,
+    /// Views of the four children, the middle one last, where they are seen from.
+    children: Vec<ViewNode>,
 }
 
-impl View {
-    fn of(node: NodeId) -> View {
-        View { node, raw: Row::default(), row: Row::default(), parts: None }
+impl ViewNode {
+    fn new(node: NodeId) -> ViewNode {
+        ViewNode { node, uncorrected: Row::default(), corrected: Row::default(), children: vec![] }
+    }
+
+    /// Adds the views of the children, where there are any.
+    fn add_children(&mut self, mesh: &Mesh) {
+        self.children = mesh.children(self.node).into_iter().flatten().map(ViewNode::new).collect();
+    }
+
+    /// The mean of the children's rows, or its own where it has none.
+    fn mean_row(&self) -> Row {
+        if self.children.is_empty() {
+            return self.corrected.clone();
+        }
+        let rows: Vec<Row> = self.children.iter().map(ViewNode::mean_row).collect();
+        Row::mean(&rows.iter().collect::<Vec<_>>())
+    }
+
+    /// The share of the light that lands on another scene triangle by the mean of the children than
+    /// by the view's own row, in [0, 1]; 0 without children.
+    fn disagreement(&self, mesh: &Mesh) -> f64 {
+        if self.children.is_empty() {
+            return 0.0;
+        }
+        let triangles = mesh.scene().triangles().len();
+        // Four times the difference, in shares; then what escapes, then what meets back faces.
+        let mut difference = vec![0i64; triangles + 2];
+        let children = self.children.iter().map(|child| (&child.corrected, -1));
+        for (row, weight) in children.chain([(&self.corrected, 4)]) {
+            for entry in &row.entries {
+                let triangle = mesh.triangle(mesh.element(entry.element as usize));
+                difference[triangle] += weight * i64::from(entry.share);
+            }
+            difference[triangles] += weight * i64::from(row.escaped);
+            difference[triangles + 1] += weight * i64::from(row.backface);
+        }
+        let sum = difference.iter().map(|d| d.unsigned_abs()).sum::<u64>();
+        sum as f64 / (8.0 * f64::from(Row::TOTAL))
     }
 }
 
@@ -72,40 +121,101 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
     /// Sees patches from parts at most `levels` below them, and from more than their children where
     /// these disagree with the patch by more than `tolerance`, a share of the light in [0, 1].
     /// `levels` 0 leaves the rows as they are, `tolerance` 1 always stops at the children.
-    pub fn new(rows: ProximityCorrection<M>, tolerance: f64, levels: u32) -> AdaptiveViewpoints<M> {
-        AdaptiveViewpoints { rows, tolerance, levels, extra: 0 }
+    pub fn new(
+        source: ProximityCorrection<M>,
+        tolerance: f64,
+        levels: u32,
+    ) -> AdaptiveViewpoints<M> {
+        AdaptiveViewpoints { source, tolerance, levels, extra_rows: 0 }
     }
 
-    /// The maker of the rows.
+    /// The source of the rows.
     pub fn inner(&self) -> &ProximityCorrection<M> {
-        &self.rows
+        &self.source
     }
 
     /// Rows made so far beyond one a patch.
-    pub fn extra(&self) -> u64 {
-        self.extra
+    pub fn extra_rows(&self) -> u64 {
+        self.extra_rows
     }
 
-    /// Fills the views at `places`.
-    fn see(
+    /// Sees `views`, all at depth `level` below the patches, from their children, and goes on below
+    /// those that disagree with theirs. Patches themselves are seen here too.
+    fn refine(
         &mut self,
         mesh: &Mesh,
-        views: &mut [View],
-        places: &[usize],
-        unshot_share: f64,
+        views: &mut [&mut ViewNode],
+        level: u32,
+        importance: f64,
     ) -> Result<(), Error> {
-        let nodes: Vec<NodeId> = places.iter().map(|&k| views[k].node).collect();
-        let made = self.rows.raw(mesh, &nodes, unshot_share)?;
-        places.iter().zip(made).for_each(|(&k, row)| views[k].raw = row);
+        if level < self.levels {
+            for view in views.iter_mut() {
+                view.add_children(mesh);
+            }
+        }
+        let are_patches = level == 0;
+        self.cast_missing_rows(mesh, views, are_patches, importance)?;
+        self.correct_new_rows(mesh, views, are_patches);
+        if level + 1 >= self.levels {
+            return Ok(());
+        }
+        let disagree: Vec<bool> =
+            views.par_iter().map(|view| view.disagreement(mesh) > self.tolerance).collect();
+        let coarse = views.iter_mut().zip(disagree).filter(|(_, disagrees)| *disagrees);
+        let mut children: Vec<&mut ViewNode> =
+            coarse.flat_map(|(view, _)| view.children.iter_mut()).collect();
+        if children.is_empty() {
+            return Ok(());
+        }
+        self.refine(mesh, &mut children, level + 1, importance)
+    }
+
+    /// Asks the source for the rows of `views`, if they are patches, and of their children, all at
+    /// once; the middle child gets its parent's.
+    fn cast_missing_rows(
+        &mut self,
+        mesh: &Mesh,
+        views: &mut [&mut ViewNode],
+        are_patches: bool,
+        importance: f64,
+    ) -> Result<(), Error> {
+        let patches = if are_patches { views.len() } else { 0 };
+        let mut nodes: Vec<NodeId> = views[..patches].iter().map(|view| view.node).collect();
+        for view in views.iter() {
+            nodes.extend(view.children.iter().take(3).map(|child| child.node));
+        }
+        let mut rows = self.source.uncorrected(mesh, &nodes, importance)?.into_iter();
+        self.extra_rows += (nodes.len() - patches) as u64;
+        for view in views[..patches].iter_mut() {
+            view.uncorrected = rows.next().unwrap_or_default();
+        }
+        for view in views.iter_mut() {
+            let Some((middle, others)) = view.children.split_last_mut() else { continue };
+            middle.uncorrected = view.uncorrected.clone();
+            for child in others {
+                child.uncorrected = rows.next().unwrap_or_default();
+            }
+        }
         Ok(())
     }
 
-    /// Mends the views from `first` on.
-    fn mend(&mut self, mesh: &Mesh, views: &mut [View]) {
-        let nodes: Vec<NodeId> = views.iter().map(|v| v.node).collect();
-        let mut rows: Vec<Row> = views.iter().map(|v| v.raw.clone()).collect();
-        self.rows.mend(mesh, &nodes, &mut rows);
-        views.iter_mut().zip(rows).for_each(|(v, row)| v.row = row);
+    /// Corrects the rows of `views`, if they are patches, and of their children, for near receivers.
+    fn correct_new_rows(&mut self, mesh: &Mesh, views: &mut [&mut ViewNode], are_patches: bool) {
+        let patches = if are_patches { views.len() } else { 0 };
+        let (mut nodes, mut rows) = (vec![], vec![]);
+        let children = views.iter().flat_map(|view| &view.children);
+        for view in views[..patches].iter().map(|view| &**view).chain(children) {
+            nodes.push(view.node);
+            rows.push(view.uncorrected.clone());
+        }
+        self.source.correct(mesh, &nodes, &mut rows);
+        let mut rows = rows.into_iter();
+        for view in views[..patches].iter_mut() {
+            view.corrected = rows.next().unwrap_or_default();
+        }
+        for child in views.iter_mut().flat_map(|view| &mut view.children) {
+            child.corrected = rows.next().unwrap_or_default();
+        }
     }
 }
 
@@ -114,80 +224,24 @@ impl<M: FormFactors> FormFactors for AdaptiveViewpoints<M> {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let mut views: Vec<View> = patches.iter().map(|&p| View::of(p)).collect();
-        let mut unseen: Vec<usize> = (0..views.len()).collect();
-        let mut split = if self.levels > 0 { unseen.clone() } else { vec![] };
-        let (mut level, mut mended) = (0, 0);
-        // All that is to be seen from on one level is asked for at once.
-        while !unseen.is_empty() || !split.is_empty() {
-            split.retain(|&k| {
-                let children = mesh.children(views[k].node);
-                views[k].parts = children.map(|_| views.len());
-                views.extend(children.into_iter().flatten().map(View::of));
-                children.is_some()
-            });
-            let parts = |views: &[View], k: usize| views[k].parts.map_or(0..0, |p| p..p + 4);
-            unseen.extend(split.iter().flat_map(|&k| parts(&views, k).take(3)));
-            self.see(mesh, &mut views, &unseen, unshot_share)?;
-            self.extra += (unseen.len() - if level == 0 { patches.len() } else { 0 }) as u64;
-            unseen.clear();
-            for &k in &split {
-                if let Some(middle) = parts(&views, k).last() {
-                    views[middle].raw = views[k].raw.clone();
-                }
-            }
-            self.mend(mesh, &mut views[mended..]);
-            mended = views.len();
-            level += 1;
-            if level >= self.levels {
-                break;
-            }
-            let apart = |&k: &usize| disagreement(mesh, &views, k) > self.tolerance;
-            let down: Vec<usize> = split.par_iter().copied().filter(apart).collect();
-            split = down.into_iter().flat_map(|k| parts(&views, k)).collect();
-        }
-        Ok((0..patches.len()).into_par_iter().map(|k| mean(&views, k)).collect())
+        let mut views: Vec<ViewNode> = patches.iter().map(|&patch| ViewNode::new(patch)).collect();
+        self.refine(mesh, &mut views.iter_mut().collect::<Vec<_>>(), 0, importance)?;
+        Ok(views.par_iter().map(ViewNode::mean_row).collect())
     }
 
-    /// Patches that are seen from their parts take as many views as a batch has, or more.
+    /// As many patches as fill a batch of the source where their children disagree, and 1 at least.
     fn preferred_batch_len(&self) -> usize {
         if self.levels == 0 {
-            self.rows.preferred_batch_len()
+            self.source.preferred_batch_len()
         } else {
-            self.rows.preferred_batch_len().div_ceil(MANY)
+            self.source.preferred_batch_len().div_ceil(VIEWS_PER_PATCH)
         }
     }
 
     fn fingerprint(&self) -> String {
-        let AdaptiveViewpoints { rows, tolerance, levels, .. } = self;
-        format!("{}, {levels} levels of viewpoints to {tolerance}", rows.fingerprint())
+        let AdaptiveViewpoints { source, tolerance, levels, .. } = self;
+        format!("{}, {levels} levels of viewpoints to {tolerance}", source.fingerprint())
     }
-}
-
-/// The row of view `k`: the mean of its parts' rows, where it has parts.
-fn mean(views: &[View], k: usize) -> Row {
-    let Some(first) = views[k].parts else { return views[k].row.clone() };
-    let rows = [0, 1, 2, 3].map(|part| mean(views, first + part));
-    Row::mean(&rows.each_ref())
-}
-
-/// The share of the light that lands on another scene triangle by the mean of the parts of view
-/// `k` than by its own row, in [0, 1].
-fn disagreement(mesh: &Mesh, views: &[View], k: usize) -> f64 {
-    let Some(first) = views[k].parts else { return 0.0 };
-    let (own, parts) = (&views[k].row, &views[first..first + 4]);
-    let triangles = mesh.scene().triangles().len();
-    // Four times the difference, in shares; then what leaves, then what meets backs.
-    let mut apart = vec![0i64; triangles + 2];
-    for (row, times) in parts.iter().map(|p| (&p.row, -1)).chain([(own, 4)]) {
-        for entry in &row.entries {
-            let triangle = mesh.triangle(mesh.element(entry.element as usize));
-            apart[triangle] += times * i64::from(entry.share);
-        }
-        apart[triangles] += times * i64::from(row.escaped);
-        apart[triangles + 1] += times * i64::from(row.backface);
-    }
-    apart.iter().map(|d| d.unsigned_abs()).sum::<u64>() as f64 / (8.0 * f64::from(Row::TOTAL))
 }

@@ -41,7 +41,7 @@ fn near_entries_approach_area_averaged_factor() {
             let pairs = dense(&mesh, row).into_iter().zip(dense(&mesh, right));
             worst = pairs.map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
         }
-        (worst, repair.moved())
+        (worst, repair.mean_correction())
     };
     let ((raw, none), (mended, moved)) = (error(-1.0), error(1.0));
     println!("largest error {raw:.4} before, {mended:.4} after; {moved:.4} of a row moved");
@@ -95,5 +95,5 @@ fn rows_out_of_reach_stay_unchanged() {
         touching.rows(&mesh, &middle, 1.0).unwrap()
             == from_centroid().rows(&mesh, &middle, 1.0).unwrap()
     );
-    assert_eq!(touching.moved(), 0.0);
+    assert_eq!(touching.mean_correction(), 0.0);
 }

@@ -63,7 +63,7 @@ fn lamps() -> Mesh {
 }
 
 #[test]
-fn solver_passes_largest_unshot_share_of_batch() {
+fn solver_asks_with_the_largest_unshot_share_of_a_batch() {
     let mesh = lamps();
     let mut told = Told::default();
     Solver { unshot: 0.0, ..Default::default() }.solve(&mesh, &mut told, keep_going).unwrap();
@@ -77,7 +77,7 @@ fn solver_passes_largest_unshot_share_of_batch() {
 }
 
 #[test]
-fn wrappers_pass_unshot_share_on() {
+fn wrappers_pass_importance_on() {
     let mesh = cornell_box(200.0);
     let near = ProximityCorrection::new(Told::default(), &mesh, 1.0);
     let mut rows = AdaptiveViewpoints::new(near, 0.0, u32::MAX);

@@ -48,7 +48,7 @@ fn patch_behind_plate_is_seen_from_both_sides() {
         let mut rows = AdaptiveViewpoints::new(rays(&mesh), 0.02, levels);
         let row = rows.rows(&mesh, &[patch], 1.0).unwrap().remove(0);
         row.check(&mesh, patch).unwrap();
-        (to_wall(&mesh, &row), rows.extra())
+        (to_wall(&mesh, &row), rows.extra_rows())
     };
     assert_eq!(see(0), (0.0, 0), "the centroid sees nothing of the wall");
     for levels in [4, 5] {
@@ -116,7 +116,7 @@ fn each_part_is_corrected_by_itself() {
         assert!(worst < 12.0, "{worst}");
         patches += 1;
     }
-    assert_eq!(rows.extra(), 3 * patches);
+    assert_eq!(rows.extra_rows(), 3 * patches);
     assert_eq!(rows.inner().inner().made, 4 * patches);
 }
 
@@ -137,8 +137,8 @@ fn open_patches_cost_one_comparison() {
         let near = ProximityCorrection::new(from_centroid(), &mesh, 1.0);
         let mut rows = AdaptiveViewpoints::new(near, tolerance, levels);
         rows.rows(&mesh, &patches, 1.0).unwrap();
-        assert_eq!(rows.inner().inner().made, rows.extra() + patches.len() as u64);
-        rows.extra()
+        assert_eq!(rows.inner().inner().made, rows.extra_rows() + patches.len() as u64);
+        rows.extra_rows()
     };
     let count = patches.len() as u64;
     assert_eq!(spent(0.015, u32::MAX), 3 * count);
@@ -156,9 +156,9 @@ fn rejects_missing_rows_by_name() {
             &mut self,
             mesh: &Mesh,
             patches: &[NodeId],
-            unshot_share: f64,
+            importance: f64,
         ) -> Result<Vec<Row>, Error> {
-            self.0.rows(mesh, &patches[1..], unshot_share)
+            self.0.rows(mesh, &patches[1..], importance)
         }
     }
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 1.0).unwrap();

@@ -83,11 +83,12 @@ impl FormFactors for RayRows {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let halvings = resolution_policy::halvings(unshot_share, self.full_share);
-        let count =
-            (self.count >> (2 * halvings)).max(resolution_policy::LEAST.pow(2)).min(self.count);
+        let halvings = resolution_policy::halvings_for_importance(importance, self.full_share);
+        let count = (self.count >> (2 * halvings))
+            .max(resolution_policy::MIN_HALVED_RESOLUTION.pow(2))
+            .min(self.count);
         let fan = HemisphereSamples::new(count)?;
         Ok(patches.par_iter().map(|&p| self.row(mesh, p, &fan, count)).collect())
     }

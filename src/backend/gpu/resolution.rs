@@ -27,7 +27,7 @@ impl Resolution {
         resolution: u32,
         batch: u32,
     ) -> Result<Vec<Resolution>, Error> {
-        let halvings = 0..=resolution_policy::HALVINGS;
+        let halvings = 0..=resolution_policy::MAX_HALVINGS;
         let mut pixels: Vec<u32> =
             halvings.map(|k| resolution_policy::halved(resolution, k)).collect();
         pixels.dedup();

@@ -267,9 +267,10 @@ impl FormFactors for HemicubeRows {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        unshot_share: f64,
+        importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let halvings = resolution_policy::halvings(unshot_share, self.full_share) as usize;
+        let halvings =
+            resolution_policy::halvings_for_importance(importance, self.full_share) as usize;
         let at = halvings.min(self.batches.resolutions.len() - 1);
         let count = self.rotations.get();
         let step = FRAC_PI_2 / f64::from(count);
