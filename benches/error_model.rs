@@ -20,10 +20,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use common::{keep_going, truth};
+use glam::DVec3;
 use radiosity::bake::model::{self, PowerLaw};
 use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, GatherSettings, Scene,
-    VertexMesh, load_obj,
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, Gather, GatherPoint,
+    GatherSettings, GatheredMesh, RayGather, Rgb, Scene, VertexMesh, load_obj,
 };
 
 /// The error around whose settings others are varied.
@@ -164,7 +165,6 @@ impl Bench {
     /// Errors against a finer bake: of elements that light is shot on, and of the estimates.
     fn against_reference(&self) -> Result<(), Error> {
         let reference = self.bake(&BakeSettings::for_error(REFERENCE, &self.scene))?;
-        let reference = &reference.light.surface;
         let mut errors = vec![];
         for factor in [4.0, 2.0, 1.0] {
             let mut settings = BakeSettings::for_error(BASE, &self.scene);
@@ -173,13 +173,13 @@ impl Bench {
             settings.gather = BakeSettings::for_error(0.5 * BASE, &self.scene).gather;
             settings.gather.iter_mut().for_each(|gather| gather.refinement.gather_passes = 1);
             let baked = self.bake(&settings)?;
-            errors.push((factor, compare(&baked.light.surface, reference).error));
+            errors.push((factor, compare(&baked, &reference)?.error));
         }
         row("error ~ shooting edge", &errors, Some(1.0 / model::SHOOTING_EDGE.exponent));
         for error in [0.1, BASE] {
             let baked =
                 BakeTarget::Error(error).bake(self.scene.clone(), &Backend::Cpu, keep_going)?;
-            let compared = compare(&baked.light.surface, reference);
+            let compared = compare(&baked, &reference)?;
             println!(
                 "{:25} {:>10} {:>10}   asked {error}, estimated {:.4}, off by {:.4}; {:.0} % of \
                  points within 2 standard errors",
@@ -195,7 +195,7 @@ impl Bench {
     }
 
     fn mean_reflectance(&self) -> f64 {
-        let (mut sum, mut area) = (radiosity::Rgb::ZERO, 0.0);
+        let (mut sum, mut area) = (Rgb::ZERO, 0.0);
         for (t, triangle) in self.scene.triangles().iter().enumerate() {
             let reflectance = self.scene.materials()[triangle.material as usize].reflectance;
             sum += reflectance * self.scene.area(t);
@@ -215,44 +215,83 @@ struct Comparison {
     tail_factor: f64,
 }
 
-/// Compares `surface` with `reference` at points spread over its area: the centroids of faces.
-fn compare(surface: &VertexMesh, reference: &VertexMesh) -> Comparison {
-    let area = |face: &[u32; 3]| {
-        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
-        (b - a).cross(c - a).length() / 2.0
-    };
-    let stride = surface.faces.iter().map(area).sum::<f64>() / POINTS as f64;
-    let mut found = vec![];
-    let mut next = stride / 2.0;
-    let mut sum = 0.0;
-    for face in &surface.faces {
-        sum += area(face);
-        let corners = face.map(|v| surface.positions[v as usize]);
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        let centroid = corners.iter().sum::<glam::DVec3>() / 3.0;
-        let radiosity =
-            face.map(|v| surface.radiosity[v as usize]).iter().sum::<glam::DVec3>() / 3.0;
-        let error = face.map(|v| surface.error[v as usize]).iter().sum::<f64>() / 3.0;
-        while next < sum {
-            next += stride;
-            if let Some((truth, _)) = truth::at(reference, centroid, normal) {
-                found.push((radiosity, error, truth));
-            }
-        }
+/// What two bakes have at one point.
+struct Pair {
+    radiosity: Rgb,
+    standard_error: f64,
+    reference: Rgb,
+}
+
+impl Pair {
+    fn difference(&self) -> f64 {
+        self.radiosity.distance(self.reference)
     }
-    let count = found.len().max(1) as f64;
-    let floor = model::RADIOSITY_FLOOR * found.iter().map(|f| f.2.length()).sum::<f64>() / count;
-    let square = |f: &(glam::DVec3, f64, glam::DVec3)| {
-        (f.0.distance(f.2) / f.0.length().max(f.2.length()).max(floor)).powi(2)
-    };
-    let error = (found.iter().map(square).sum::<f64>() / count).sqrt();
-    // Points that emit only are exact, and have no standard error.
-    let judged = found.iter().filter(|f| f.1 > 0.0);
-    let mut ratios: Vec<f64> = judged.map(|f| f.0.distance(f.2) / f.1).collect();
+
+    fn relative_square(&self, floor: f64) -> f64 {
+        let scale = self.radiosity.length().max(self.reference.length()).max(floor);
+        (self.difference() / scale).powi(2)
+    }
+}
+
+/// Compares `baked` with `reference` at points spread over the area, as the estimate does.
+fn compare(baked: &BakeResult, reference: &BakeResult) -> Result<Comparison, Error> {
+    let pairs = pairs(&baked.light, &reference.light.surface)?;
+    let count = pairs.len().max(1) as f64;
+    let mean = pairs.iter().map(|pair| pair.reference.length()).sum::<f64>() / count;
+    let floor = model::RADIOSITY_FLOOR * mean;
+    let square = pairs.iter().map(|pair| pair.relative_square(floor)).sum::<f64>() / count;
+    // Points that only emit are exact, and have no standard error.
+    let uncertain = pairs.iter().filter(|pair| pair.standard_error > 0.0);
+    let mut ratios: Vec<f64> = uncertain.map(|p| p.difference() / p.standard_error).collect();
     ratios.sort_by(f64::total_cmp);
     let quantile = ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(0.0);
     let within = ratios.partition_point(|&ratio| ratio <= 2.0) as f64 / ratios.len().max(1) as f64;
-    Comparison { error, within, tail_factor: model::TAIL_FACTOR * quantile / 2.0 }
+    Ok(Comparison {
+        error: square.sqrt(),
+        within,
+        tail_factor: model::TAIL_FACTOR * quantile / 2.0,
+    })
+}
+
+/// Both at the centroids of faces, one for every so much area; none where other surfaces cover them.
+fn pairs(light: &GatheredMesh, reference: &VertexMesh) -> Result<Vec<Pair>, Error> {
+    let surface = &light.surface;
+    let diagonal = light.mesh.scene().bounds().diagonal();
+    let mut points = vec![];
+    let mut faces = vec![];
+    let mut position = 0.5;
+    let area: f64 = surface.faces.iter().map(|face| area_normal(surface, face).length()).sum();
+    let mut sum = 0.0;
+    for face in &surface.faces {
+        let area_normal = area_normal(surface, face);
+        sum += area_normal.length() / area * POINTS as f64;
+        while position < sum {
+            position += 1.0;
+            let centroid = face.iter().map(|&v| surface.positions[v as usize]).sum::<DVec3>() / 3.0;
+            let normal = area_normal.normalize();
+            let near = 1e-6 * diagonal;
+            points.push(GatherPoint { position: centroid + near * normal, normal, near });
+            faces.push(face);
+        }
+    }
+    let seen = RayGather::new(&light.mesh, 256)?.gather(&light.radiosity_field(), &points)?;
+    let mut pairs = vec![];
+    for ((point, face), seen) in points.iter().zip(faces).zip(seen) {
+        // What sees back faces mostly is under something.
+        let covered = seen.backface > 0.5;
+        let truth = truth::at(reference, point.position, point.normal).filter(|_| !covered);
+        let Some((reference, _)) = truth else { continue };
+        let mean = |values: &[f64]| face.iter().map(|&v| values[v as usize]).sum::<f64>() / 3.0;
+        let radiosity = face.iter().map(|&v| surface.radiosity[v as usize]).sum::<Rgb>() / 3.0;
+        pairs.push(Pair { radiosity, standard_error: mean(&surface.error), reference });
+    }
+    Ok(pairs)
+}
+
+/// The normal of a face, as long as its area is large.
+fn area_normal(surface: &VertexMesh, face: &[u32; 3]) -> DVec3 {
+    let [a, b, c] = face.map(|v| surface.positions[v as usize]);
+    (b - a).cross(c - a) / 2.0
 }
 
 /// A line of the table for value = scale · setting^exponent, given both.
