@@ -1,31 +1,24 @@
-// Draws the scene's own triangles as they shine: over one face of a hemicube, or over a tile that
-// fits a light which is looked at apart. The element that a pixel sees is found in the triangle's
-// quadtree: in a lattice of nodes at the deepest level that it is complete to, then by descent.
+// Draws the radiosity of the scene's own triangles: over one face of a hemicube, or over a tile that
+// fits one light. The element that a pixel sees is found in the triangle's quadtree: in a lattice of
+// nodes at the deepest level that it is complete to, then by descent. Needs shared/corner.wgsl and
+// shared/lattice.wgsl before it.
 
 const INNER: u32 = 0x80000000u;
-const APART: u32 = 8u;
+const MAX_EXPLICIT_LIGHTS: u32 = 8u;
 const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
 
-// A corner in two parts that add up to it.
-struct Corner {
-    high: vec3f,          // from the middle of the scene, in units of its size
-    padding: u32,
-    low: vec3f,           // what rounding took off
-    padding_2: u32,
-}
-
 struct RadianceView {
-    eye: vec3f,           // the place, from the middle of the scene, in units of its size
+    eye: vec3f,           // the point, from the middle of the scene, in units of its size
     near: f32,            // near plane, same unit
     right: vec3f,         // dot products with these three are clip x, y and w
     bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
     up: vec3f,
     light: u32,           // the light that a tile looks for
     forward: vec3f,
-    apart: u32,           // how many lights shine apart
+    light_count: u32,     // how many lights have tiles of their own
     eye_low: vec3f,       // what rounding took off the eye
     padding: u32,
-    lights: array<u32, APART>,   // and which: their exitance is not counted here
+    lights: array<u32, MAX_EXPLICIT_LIGHTS>,   // and which: their exitance is not counted here
 }
 
 struct RadianceTriangle {
@@ -59,24 +52,18 @@ struct Varying {
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index: u32) -> Varying {
     let triangle = triangles[index / 3u];
-    let corner = index % 3u;
-    // Of corners near the eye the first difference is exact: nothing is too small to be seen.
-    let high = corners[index].high - views[view_index].eye;
-    let d = high + (corners[index].low - views[view_index].eye_low);
+    let d = from_eye(corners[index], views[view_index].eye, views[view_index].eye_low);
     let x = dot(d, views[view_index].right);
     let y = dot(d, views[view_index].up);
     let w = dot(d, views[view_index].forward);
-    // Lines from `bottom` to 1 fill the viewport; depth near/w is reversed, its far end infinite.
-    let bottom = views[view_index].bottom;
-    let height = (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom);
     var out: Varying;
-    out.position = vec4f(x, height, views[view_index].near, w);
+    out.position = clip_position(x, y, w, views[view_index].bottom, views[view_index].near);
     let lattice = lattices[triangle.index];
-    out.lattice = f32(lattice.side) * vec2f(f32(corner == 1u), f32(corner == 2u));
+    out.lattice = lattice_corner(index % 3u, lattice.side);
     out.first = lattice.first;
     out.side = lattice.side;
     out.exitance = triangle.exitance;
-    for (var k = 0u; k < views[view_index].apart; k++) {
+    for (var k = 0u; k < views[view_index].light_count; k++) {
         if views[view_index].lights[k] == triangle.light {
             out.exitance = vec3f(0.0);
         }
@@ -90,16 +77,14 @@ fn reflected(lattice: vec2f, first: u32, side: u32) -> vec3f {
     // The middle of a pixel is in the triangle but for the rounding of its corners.
     let inside = max(lattice, vec2f(0.0));
     let at = inside * min(f32(side) / max(inside.x + inside.y, 1e-30), 1.0);
-    let i = min(u32(at.x), side - 1u);
-    let j = min(u32(at.y), side - 1u - i);
-    // A square of the lattice holds an upright cell and, beyond its diagonal, a flipped one.
-    var p = at - vec2f(f32(i), f32(j));
-    let beyond = p.x + p.y > 1.0 && i + j + 1u < side;
+    let square = lattice_square(at, side);
+    var p = at - vec2f(square);
+    let beyond = p.x + p.y > 1.0 && has_flipped_cell(square, side);
     if beyond {
         p = 1.0 - p;
     }
     // Weights of the second and third corner of the node.
-    var node = nodes[first + i * (2u * side - i) + 2u * j + u32(beyond)];
+    var node = nodes[first + cell_index(square, side, beyond)];
     // What lies out of the arrays reads as 0, an element: the descent ends.
     while (node & INNER) != 0u {
         node &= ~INNER;

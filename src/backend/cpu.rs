@@ -1,7 +1,30 @@
 //! Rays on the CPU: rows of form factors, and light gathered at points.
+//!
+//! Beside them, for tests alone, a twin of every shader: the same entry points in plain sequential
+//! Rust, named as the WGSL files are, which the device's results are compared with pixel by pixel.
+//!
+//! | shader | twin | compared in |
+//! |---|---|---|
+//! | `item_buffer.wgsl` | `item_buffer` | `gpu/rows/twin_tests.rs`: items equal |
+//! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
+//! | `radiance.wgsl` | `radiance` | `gpu/gather/twin_tests.rs`: within rounding |
+//! | `hemisphere_sum.wgsl` | `hemisphere_sum` | `gpu/gather/twin_tests.rs`: columns within rounding, sums bit for bit |
+//! | `shared/*.wgsl` | `shared` | with the draw shaders |
 
 mod gather;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod hemisphere_sum;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod item_buffer;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod radiance;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod rasterizer;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod reduce;
 mod rows;
+#[cfg(all(test, feature = "gpu"))]
+mod shared;
 
 pub use gather::RayGather;
 pub use rows::RayRows;

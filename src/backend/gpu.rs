@@ -9,7 +9,7 @@ mod gather;
 mod hemisphere_sum;
 mod item_buffer;
 mod item_table;
-mod layout;
+pub(in crate::backend) mod layout;
 mod limits;
 mod memory;
 mod pipeline;
@@ -19,8 +19,11 @@ mod reduce;
 mod render_targets;
 mod resolution;
 mod rows;
+mod shaders;
 mod sources;
 mod split_float;
+#[cfg(test)]
+mod test_support;
 
 pub use crate::backend::AdapterInfo;
 pub use device::Gpu;

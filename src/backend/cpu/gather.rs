@@ -1,4 +1,19 @@
-//! RefinementSettings with rays on the CPU: a second opinion, and what runs without a GPU.
+//! Irradiance gathered with rays on the CPU: a second opinion, and the backend without a GPU.
+//!
+//! ```text
+//!                ┌ rays over the hemisphere ─► reflected light, escaped, backface, 1/distance
+//! point ─ trace ─┤
+//!                └ shadow rays to each light ─► visible share × closed form = direct light
+//! ```
+//!
+//! The number of rays doubles until halves of them agree, or the most is reached:
+//!
+//! ```text
+//! error = max(|E_first − E_second|, c_max / n) / 2   ≤   noise · max(E, dim) ?
+//! ```
+//!
+//! E_first and E_second being those of the two halves of the rays, and c_max the largest contribution
+//! of one ray: both halves may miss the same small source.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -24,27 +39,27 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 /// share of it that a quarter as many rays find visible, weighted by their form factors.
 #[derive(Debug)]
 pub struct RayGather {
-    rays: RayScene,
+    scene: RayScene,
     lights: Lights,
-    turns: CellRotation,
-    fan: HemisphereSamples,
-    /// RayScene a place: at least and at most.
-    least: u32,
-    most: u32,
-    /// How much half of the rays may differ from all, as a share of the irradiance, and the irradiance
-    /// that is taken for none.
+    rotations: CellRotation,
+    samples: HemisphereSamples,
+    /// Rays a point: at least and at most.
+    min_rays: u32,
+    max_rays: u32,
+    /// Error that is allowed, as a share of the irradiance; none where infinite.
     noise: f64,
+    /// Irradiance below which the error is a share of this instead, W/m².
     dim: f64,
 }
 
-/// RayScene for a place where they disagree, for one where they do not.
-const MORE: u32 = 16;
+/// Rays at most for one where all agree. Chosen by hand; no measurement kept.
+const MAX_OVERSAMPLING: u32 = 16;
 
-/// RayScene over the hemisphere for one to a light.
-const A_LIGHT: u32 = 4;
+/// Rays over the hemisphere for one shadow ray to each light. Chosen by hand; no measurement kept.
+const RAYS_PER_SHADOW_RAY: u32 = 4;
 
 impl RayGather {
-    /// About `count` rays a place over the triangles of `mesh`'s scene: the nearest power of two.
+    /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
@@ -54,67 +69,76 @@ impl RayGather {
             let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
             return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
         }
-        let least = 1 << f64::from(count).log2().round().max(1.0) as u32;
-        let (rays, lights) = (RayScene::of_scene(mesh.scene()), Lights::new(mesh.shared_scene()));
-        let (fan, noise, dim) = (HemisphereSamples::progressive(least), f64::INFINITY, 0.0);
-        let turns = CellRotation::new(&mesh.scene().bounds());
-        Ok(RayGather { rays, lights, turns, fan, least, most: least, noise, dim })
+        let min_rays = 1 << f64::from(count).log2().round().max(1.0) as u32;
+        Ok(RayGather {
+            scene: RayScene::of_scene(mesh.scene()),
+            lights: Lights::new(mesh.shared_scene()),
+            rotations: CellRotation::new(&mesh.scene().bounds()),
+            samples: HemisphereSamples::progressive(min_rays),
+            min_rays,
+            max_rays: min_rays,
+            noise: f64::INFINITY,
+            dim: 0.0,
+        })
     }
 
-    /// Twice as many rays where half of them find more or less than all by over a share `noise` of the
-    /// irradiance, or of `dim` (W/m²) where there is less, or where half of what the luckiest ray found
-    /// is as much; and so on, up to 16 times as many. That is for seldom places, such as those that see
-    /// a bright spot through a gap.
+    /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
+    /// `noise`·max(E, `dim`), E being the irradiance and `dim` in W/m². The estimate is half the
+    /// larger of: the difference between the irradiance of both halves of the rays, and the largest
+    /// contribution of one ray. Few points need more rays, such as those that see a bright spot
+    /// through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
-        let most = if noise.is_finite() {
-            (self.least * MORE).min(hemisphere::MAX_RAYS)
+        let max_rays = if noise.is_finite() {
+            (self.min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS)
         } else {
-            self.least
+            self.min_rays
         };
-        RayGather { fan: HemisphereSamples::progressive(most), most, noise, dim, ..self }
+        let samples = HemisphereSamples::progressive(max_rays);
+        RayGather { samples, max_rays, noise, dim, ..self }
     }
 
-    fn at(&self, sources: &RadiosityField, place: &GatherPoint) -> IrradianceSample {
-        let mut apart = self.lights.importance_ranked(place);
-        // Without a closed form, what reaches far around is seen better by the rays over the hemisphere
-        // than by points spread over its area.
-        apart.retain(|&(light, _)| {
+    fn irradiance(&self, sources: &RadiosityField, point: &GatherPoint) -> IrradianceSample {
+        let mut lights = self.lights.importance_ranked(point);
+        // A light without a closed form that reaches far around is sampled better by rays over the
+        // hemisphere than by points spread over its area.
+        lights.retain(|&(light, _)| {
             let light = &self.lights.lights[light as usize];
             let corner = |&t: &u32| sources.mesh.scene().corners(t as usize);
             light.convex
-                || LightProjection::new(place, light.triangles.iter().map(corner)).is_some()
+                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
         });
-        let look = |range| self.look(sources, place, &apart, range);
-        let (mut count, mut known) = (self.least, look(0..self.least / 2));
+        let trace = |range| self.trace(sources, point, &lights, range);
+        let mut count = self.min_rays;
+        let mut sums = trace(0..count / 2);
         loop {
-            let more = look(count / 2..count);
-            let [half, other] = [&known, &more].map(|seen| self.found(seen, &apart, count / 2));
-            known.add(&more);
-            let all = self.found(&known, &apart, count);
-            // Stratified halves may miss the same; then by as much as one ray finds.
-            let off = half.irradiance.distance(other.irradiance).max(known.most / f64::from(count));
-            if off / 2.0 <= self.noise * all.irradiance.length().max(self.dim) || count == self.most
-            {
+            let second = trace(count / 2..count);
+            let [a, b] = [&sums, &second].map(|half| self.sample(half, &lights, count / 2));
+            sums.add(&second);
+            let all = self.sample(&sums, &lights, count);
+            let largest_share = sums.max_contribution / f64::from(count);
+            let difference = a.irradiance.distance(b.irradiance).max(largest_share);
+            let allowed = self.noise * all.irradiance.length().max(self.dim);
+            if difference / 2.0 <= allowed || count == self.max_rays {
                 return all;
             }
             count *= 2;
         }
     }
 
-    /// What a part of the rays see.
-    fn look(
+    /// Sums over the rays of `range`.
+    fn trace(
         &self,
         sources: &RadiosityField,
-        place: &GatherPoint,
-        apart: &[(u32, f64)],
+        point: &GatherPoint,
+        lights: &[(u32, f64)],
         range: Range<u32>,
     ) -> RaySums {
-        let turn = self.turns.at(place.position, place.near);
-        let is_apart = |light: u32| apart.iter().any(|&(k, _)| k == light);
-        let mut seen = RaySums::default();
-        let out = &mut seen.around;
-        for direction in self.fan.directions_in(range.clone(), place.normal, turn) {
-            let Some(hit) = self.rays.closest_hit(place.position, direction, place.near, None)
+        let rotation = self.rotations.at(point.position, point.near);
+        let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
+        let mut sums = RaySums::default();
+        let out = &mut sums.hemisphere;
+        for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
+            let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
             else {
                 out.escaped += 1.0;
                 continue;
@@ -126,32 +150,33 @@ impl RayGather {
             }
             let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v);
             out.irradiance += reflected;
-            seen.most = seen.most.max(reflected.length());
+            sums.max_contribution = sums.max_contribution.max(reflected.length());
             let light = self.lights.of_triangle[hit.triangle];
-            if light != NO_LIGHT && !is_apart(light) {
+            if light != NO_LIGHT && !has_shadow_rays(light) {
                 out.irradiance += self.lights.lights[light as usize].exitance;
             }
         }
-        let range = range.start / A_LIGHT..range.end.div_ceil(A_LIGHT);
+        let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
         let visible = |&(light, _): &(u32, f64)| {
-            self.visible(sources.mesh.scene(), place, light, range.clone(), turn)
+            self.shadow_rays(sources.mesh.scene(), point, light, range.clone(), rotation)
         };
-        seen.lights = apart.iter().map(visible).collect();
-        seen
+        sums.lights = lights.iter().map(visible).collect();
+        sums
     }
 
-    /// What was found by `count` rays.
-    fn found(&self, seen: &RaySums, apart: &[(u32, f64)], count: u32) -> IrradianceSample {
-        let (share, mut out) = (1.0 / f64::from(count), seen.around);
+    /// The irradiance by sums over `count` rays.
+    fn sample(&self, sums: &RaySums, lights: &[(u32, f64)], count: u32) -> IrradianceSample {
+        let (share, mut out) = (1.0 / f64::from(count), sums.hemisphere);
         out.irradiance *= share;
-        [&mut out.escaped, &mut out.backface, &mut out.inverse_distance]
-            .into_iter()
-            .for_each(|x| *x *= share);
-        for (&(light, factor), visible) in apart.iter().zip(&seen.lights) {
+        out.escaped *= share;
+        out.backface *= share;
+        out.inverse_distance *= share;
+        for (&(light, factor), visible) in lights.iter().zip(&sums.lights) {
             let light = &self.lights.lights[light as usize];
-            let share = match light.convex {
-                true => factor / visible.all.max(1e-300),
-                false => 1.0 / visible.points.max(1.0),
+            let share = if light.convex {
+                factor / visible.all.max(1e-300)
+            } else {
+                1.0 / visible.points.max(1.0)
             };
             out.direct += light.exitance * visible.seen * share;
         }
@@ -159,15 +184,15 @@ impl RayGather {
         out
     }
 
-    /// The form factor from `place` to what is visible of a light, and to all of it as if nothing
+    /// The form factor from `point` to what is visible of a light, and to all of it as if nothing
     /// were in between, both by the same points on it: those of `range`.
-    fn visible(
+    fn shadow_rays(
         &self,
         scene: &Scene,
-        place: &GatherPoint,
+        point: &GatherPoint,
         light: u32,
         range: Range<u32>,
-        turn: f64,
+        rotation: f64,
     ) -> Visible {
         let Light { triangles, surface, .. } = &self.lights.lights[light as usize];
         let area = surface.total_area();
@@ -178,11 +203,11 @@ impl RayGather {
             let triangle = triangles[k] as usize;
             let [a, b, c] = scene.corners(triangle);
             // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
-            let (root, v) = (across.sqrt(), (y + turn).fract());
-            let point = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
-            let to = point - place.position;
+            let (root, v) = (across.sqrt(), (y + rotation).fract());
+            let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
+            let to = target - point.position;
             let facing = -scene.normal(triangle).dot(to);
-            let above = place.normal.dot(to);
+            let above = point.normal.dot(to);
             if facing <= 0.0 || above <= 0.0 {
                 continue;
             }
@@ -190,10 +215,10 @@ impl RayGather {
             let factor = area * facing * above / (PI * r2 * r2);
             out.all += factor;
             // What is met first may be another part of the light, which is as good.
-            let near = place.near / r2.sqrt();
+            let near = point.near / r2.sqrt();
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
             let blocked =
-                self.rays.occluded(place.position, to, near..1.0 - offset::SEGMENT_END, other);
+                self.scene.occluded(point.position, to, near..1.0 - offset::SEGMENT_END, other);
             out.seen += if blocked { 0.0 } else { factor };
         }
         out
@@ -203,9 +228,9 @@ impl RayGather {
 /// Sums over rays.
 #[derive(Debug, Default)]
 struct RaySums {
-    around: IrradianceSample,
-    /// The brightest that a ray found, W/m².
-    most: f64,
+    hemisphere: IrradianceSample,
+    /// The largest reflected radiosity that one ray found, W/m².
+    max_contribution: f64,
     lights: Vec<Visible>,
 }
 
@@ -215,22 +240,22 @@ struct Visible {
     points: f64,
     /// To those that are visible.
     seen: f64,
-    /// To all that are above the horizon and face the place.
+    /// To all that are above the horizon and face the point.
     all: f64,
 }
 
 impl RaySums {
     fn add(&mut self, other: &RaySums) {
-        let (sum, more) = (&mut self.around, &other.around);
-        sum.irradiance += more.irradiance;
-        sum.escaped += more.escaped;
-        sum.backface += more.backface;
-        sum.inverse_distance += more.inverse_distance;
-        self.most = self.most.max(other.most);
-        for (sum, more) in self.lights.iter_mut().zip(&other.lights) {
-            sum.points += more.points;
-            sum.seen += more.seen;
-            sum.all += more.all;
+        let (sum, term) = (&mut self.hemisphere, &other.hemisphere);
+        sum.irradiance += term.irradiance;
+        sum.escaped += term.escaped;
+        sum.backface += term.backface;
+        sum.inverse_distance += term.inverse_distance;
+        self.max_contribution = self.max_contribution.max(other.max_contribution);
+        for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
+            sum.points += term.points;
+            sum.seen += term.seen;
+            sum.all += term.all;
         }
     }
 }
@@ -241,6 +266,6 @@ impl Gather for RayGather {
         sources: &RadiosityField,
         places: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        Ok(places.par_iter().map(|p| self.at(sources, p)).collect())
+        Ok(places.par_iter().map(|p| self.irradiance(sources, p)).collect())
     }
 }

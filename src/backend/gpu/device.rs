@@ -213,11 +213,11 @@ fn record(slot: &Mutex<Option<String>>, message: String) {
 mod tests {
     use std::cell::RefCell;
 
+    use super::super::HemicubeRows;
+    use super::super::test_support::{gpu, scene};
     use super::*;
-
-    fn gpu() -> Gpu {
-        Gpu::new(None).expect("a graphics adapter; RADIOSITY_NO_GPU=1 ignores this test")
-    }
+    use crate::form_factor::{FormFactors, Row};
+    use crate::mesh::Mesh;
 
     /// Memory that the host maps and shaders write does not exist.
     fn not_valid(gpu: &Gpu) -> Result<wgpu::Buffer, Error> {
@@ -299,5 +299,43 @@ mod tests {
         assert!(text.contains("600 bytes for second when 600 of 1000 are taken"), "{text}");
         drop(memory);
         gpu.memory().buffer("second", 600, usage).unwrap();
+    }
+
+    /// A device as a caller may have opened it, with these limits.
+    fn callers_device(limits: wgpu::Limits) -> (wgpu::Device, wgpu::Queue) {
+        let adapter = adapters::choose(None).unwrap();
+        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        pollster::block_on(adapter.request_device(&descriptor)).unwrap()
+    }
+
+    fn rows(gpu: &Gpu, mesh: &Mesh) -> Result<Vec<Row>, Error> {
+        HemicubeRows::new(gpu, mesh, 16)?.rows(mesh, &[mesh.element(0)], 1.0)
+    }
+
+    #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+    fn from_wgpu_makes_the_same_rows() {
+        let own = gpu();
+        let mesh = scene();
+        let (device, queue) = callers_device(wgpu::Limits::downlevel_defaults());
+        let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::MOST).unwrap();
+        assert_eq!(gpu.adapter(), own.adapter());
+        assert_eq!(rows(&gpu, &mesh).unwrap(), rows(&own, &mesh).unwrap());
+        let limits = GpuLimits { memory: 1000, ..GpuLimits::MOST };
+        let small = Gpu::from_wgpu(device.clone(), gpu.queue.clone(), &limits).unwrap();
+        assert_eq!(rows(&small, &mesh).unwrap_err().kind(), ErrorKind::Memory);
+        device.destroy();
+        assert_eq!(rows(&gpu, &mesh).unwrap_err().kind(), ErrorKind::Device);
+    }
+
+    #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+    fn from_wgpu_rejects_low_limits() {
+        let (device, queue) = callers_device(wgpu::Limits::downlevel_webgl2_defaults());
+        let e = Gpu::from_wgpu(device, queue, &GpuLimits::MOST).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Setting);
+        let text = e.to_string();
+        assert!(text.contains("max_storage_buffers_per_shader_stage = 0"), "{text}");
+        assert!(text.contains("at least 4"), "{text}");
     }
 }

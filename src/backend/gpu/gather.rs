@@ -129,18 +129,23 @@ impl HemicubeGather {
 
     /// Images of `self.size`, or fewer of them where memory is short.
     fn make_batches(&self, scene: &Scene) -> Result<Batches, Error> {
-        let drawn = DrawnScene {
-            scene,
-            lights: &self.lights,
-            order: &self.draw_list.order,
-            coordinates: &self.coordinates,
-            radiance_unit: self.radiance_unit,
-        };
+        let drawn = self.drawn_scene(scene);
         self.gpu.retry_with_smaller_batches(self.size.batch, |memory, batch| {
             Batches::new(memory, drawn, TargetSize { batch, ..self.size })
         })
     }
 
+    fn drawn_scene<'a>(&'a self, scene: &'a Scene) -> DrawnScene<'a> {
+        DrawnScene {
+            scene,
+            lights: &self.lights,
+            order: &self.draw_list.order,
+            coordinates: &self.coordinates,
+            radiance_unit: self.radiance_unit,
+        }
+    }
+
+    /// What is drawn for `point`.
     fn job(&self, scene: &Scene, point: &GatherPoint) -> GatherJob {
         let mut lights = self.lights.importance_ranked(point);
         let mut projections = vec![];
@@ -167,7 +172,7 @@ impl HemicubeGather {
                 up: face.up.as_vec3().to_array(),
                 light,
                 forward: face.forward.as_vec3().to_array(),
-                apart: lights.len() as u32,
+                light_count: lights.len() as u32,
                 eye_low,
                 padding: 0,
                 lights: ids,
@@ -356,6 +361,9 @@ fn tile(fit: &LightProjection, frame: &Frame) -> Tile {
         padding_2: 0,
     }
 }
+
+#[cfg(test)]
+mod twin_tests;
 
 #[cfg(test)]
 mod tests {

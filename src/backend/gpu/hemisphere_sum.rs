@@ -10,11 +10,12 @@
 //!
 //! Every sum is in a fixed order. The twin on the CPU is `backend/cpu/hemisphere_sum.rs`.
 
-use super::layout::{HEMISPHERE_SUM_WGSL, LANES, Summation, Sums, Tile};
+use super::layout::{LANES, Summation, Sums, Tile};
 use super::memory::Memory;
 use super::pipeline;
 use super::radiance::TargetSize;
 use super::render_targets::RenderTargets;
+use super::shaders::HEMISPHERE_SUM_WGSL;
 use crate::error::Error;
 use crate::hemicube::{self, Face};
 
@@ -24,6 +25,9 @@ pub struct HemisphereSum {
     add_columns: Step,
     add_up: Step,
     tiles: wgpu::Buffer,
+    /// Partial sums of each point: for every number of [`Sums`], one a lane.
+    #[cfg(test)]
+    pub columns: wgpu::Buffer,
     /// What each point receives, a [`Sums`] each.
     pub sums: wgpu::Buffer,
 }
@@ -53,7 +57,7 @@ impl HemisphereSum {
         let column_bytes = sum_bytes * u64::from(LANES);
         let columns = buffer("columns", column_bytes, wgpu::BufferUsages::COPY_SRC)?;
         let weights = memory.storage("weights", bytemuck::cast_slice(&weights(resolution)?))?;
-        let summation = Summation { resolution, slots: tiles };
+        let summation = Summation { resolution, tiles };
         let summation = memory.uniform("summation", bytemuck::bytes_of(&summation))?;
         let pixels = targets.texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -77,7 +81,14 @@ impl HemisphereSum {
         let sums_in = [columns.as_entire_binding(), sums.as_entire_binding()];
         let add_columns = step("add_columns", &columns_in, 0);
         let add_up = step("add_up", &sums_in, 5);
-        Ok(HemisphereSum { add_columns, add_up, tiles: tile_buffer, sums })
+        Ok(HemisphereSum {
+            add_columns,
+            add_up,
+            tiles: tile_buffer,
+            #[cfg(test)]
+            columns,
+            sums,
+        })
     }
 
     /// Records the summation over the first `count` layers, whose tiles are `tiles`, with a

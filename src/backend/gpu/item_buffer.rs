@@ -13,10 +13,11 @@
 
 use std::ops::Range;
 
-use super::layout::{Corner, FaceView, ITEM_BUFFER_WGSL, TriangleCells};
+use super::layout::{Corner, FaceView, TriangleCells};
 use super::memory::Memory;
 use super::pipeline::{self, DepthMode};
 use super::render_targets::RenderTargets;
+use super::shaders::ITEM_BUFFER_WGSL;
 use crate::error::Error;
 use crate::hemicube::Face;
 

@@ -1,4 +1,14 @@
-//! Structs shared with the shaders, under the same names; a test compares every offset.
+//! Structs and constants shared with the shaders, under the same names; a test compares every
+//! offset and value.
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `item_buffer.wgsl` | [`Corner`] ×3 and [`TriangleCells`] a triangle, [`FaceView`] ×5 a hemicube | u32 a pixel |
+//! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
+//! | `radiance.wgsl` | [`Corner`] ×3 and [`RadianceTriangle`] a triangle, [`RadianceView`] ×5 + tiles a point, [`Lattice`] a triangle, u32 a node, corner texels | 4 × f32 a pixel |
+//! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`] a tile, [`Summation`] | [`Sums`] a point |
+//!
+//! Members that a shader does not read pad the struct to WGSL's alignment.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -58,7 +68,7 @@ pub struct RadianceView {
     pub up: [f32; 3],
     pub light: u32,
     pub forward: [f32; 3],
-    pub apart: u32,
+    pub light_count: u32,
     pub eye_low: [f32; 3],
     pub padding: u32,
     pub lights: [u32; APART],
@@ -87,7 +97,7 @@ pub struct Lattice {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Summation {
     pub resolution: u32,
-    pub slots: u32,
+    pub tiles: u32,
 }
 
 /// Where the pixels of a light's tile look.
@@ -102,8 +112,8 @@ pub struct Tile {
     pub padding_2: u32,
 }
 
-/// What a place receives, but for the exitance of the lights apart: form factors of what is seen of
-/// each, and of all of it as if nothing were in between.
+/// What a point receives, but for the exitance of the lights with tiles: of each the form factor of
+/// what is seen of it, and of all of it as if nothing were in between.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Sums {
@@ -121,7 +131,7 @@ pub const TILE: u32 = 32;
 /// Elements side by side in the texture of their corners' radiosity.
 pub const ELEMENTS_A_LINE: u32 = 2048;
 
-/// Threads of `hemisphere_sum.wgsl` that add up a place's pixels.
+/// Threads of `hemisphere_sum.wgsl` that add up a point's pixels.
 pub const LANES: u32 = 64;
 
 /// A node with children: this plus the first of the four. A leaf holds its element.
@@ -138,15 +148,14 @@ pub const FIRST_ELEMENT: u32 = 2;
 pub const STRIP: u32 = 16;
 pub const WORKGROUP: u32 = 64;
 
-pub const ITEM_BUFFER_WGSL: &str = include_str!("../../../shaders/item_buffer.wgsl");
-pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
-pub const RADIANCE_WGSL: &str = include_str!("../../../shaders/radiance.wgsl");
-pub const HEMISPHERE_SUM_WGSL: &str = include_str!("../../../shaders/hemisphere_sum.wgsl");
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::mem::offset_of;
+
+    use super::super::shaders::{
+        HEMISPHERE_SUM_WGSL, ITEM_BUFFER_WGSL, RADIANCE_WGSL, REDUCE_WGSL,
+    };
+    use super::*;
 
     fn parsed(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source).expect("WGSL parses");
@@ -227,7 +236,7 @@ mod tests {
                 up,
                 light,
                 forward,
-                apart,
+                light_count,
                 eye_low,
                 padding,
                 lights
@@ -246,7 +255,7 @@ mod tests {
         assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));
         assert_eq!(
             wgsl_layout(&gather, "Summation"),
-            rust_layout!(Summation { resolution, slots })
+            rust_layout!(Summation { resolution, tiles })
         );
         assert_eq!(
             wgsl_layout(&gather, "Tile"),
@@ -271,10 +280,10 @@ mod tests {
         let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
         assert_eq!(constant(&radiance, "INNER"), INNER);
         assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
-        assert_eq!(constant(&radiance, "APART"), APART as u32);
+        assert_eq!(constant(&radiance, "MAX_EXPLICIT_LIGHTS"), APART as u32);
         assert_eq!(constant(&gather, "TILE"), TILE);
         assert_eq!(constant(&gather, "LANES"), LANES);
-        // The shader writes a place's numbers one after the other.
+        // The shader writes a point's numbers one after the other.
         assert_eq!(constant(&gather, "WORDS") as usize * 4, size_of::<Sums>());
         let (nearness, lights) = (offset_of!(Sums, nearness), offset_of!(Sums, lights));
         assert_eq!((nearness, lights), (5 * 4, 8 * 4));

@@ -13,10 +13,11 @@
 
 use std::ops::Range;
 
-use super::layout::{RADIANCE_WGSL, RadianceTriangle, RadianceView, TILE};
+use super::layout::{RadianceTriangle, RadianceView, TILE};
 use super::memory::Memory;
 use super::pipeline::{self, DepthMode};
 use super::render_targets::RenderTargets;
+use super::shaders::RADIANCE_WGSL;
 use super::sources::SourceBuffers;
 use super::split_float::SplitFloat;
 use crate::error::Error;

@@ -9,10 +9,11 @@
 //! A thread adds up a strip of [`STRIP`] pixels of one column; sums meet in integer atomics, so that
 //! their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
-use super::layout::{REDUCE_WGSL, Reduction, STRIP, WORKGROUP};
+use super::layout::{Reduction, STRIP, WORKGROUP};
 use super::memory::Memory;
 use super::pipeline;
 use super::render_targets::RenderTargets;
+use super::shaders::REDUCE_WGSL;
 use crate::error::Error;
 use crate::hemicube;
 

@@ -320,40 +320,20 @@ fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
 }
 
 #[cfg(test)]
+mod twin_tests;
+
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
 
     use super::*;
     use crate::backend::gpu::layout::FIRST_CELL;
+    use crate::backend::gpu::test_support::{gpu, read_texture};
     use crate::scene::{Material, Scene, Triangle};
 
-    /// The item buffer of the last hemicube drawn alone, line by line; 64 pixels wide.
+    /// The item buffer of the last hemicube drawn alone, line by line.
     fn items(h: &HemicubeRows) -> Vec<u32> {
-        let size = 64 * 192 * 4;
-        let buffer = h.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = h.gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            h.batches.resolutions[0].targets.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(64 * 4),
-                    rows_per_image: None,
-                },
-            },
-            wgpu::Extent3d { width: 64, height: 192, depth_or_array_layers: 1 },
-        );
-        h.gpu.queue.submit([encoder.finish()]);
-        buffer.slice(..).map_async(wgpu::MapMode::Read, |r| r.unwrap());
-        h.gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-        let bytes = buffer.slice(..).get_mapped_range().unwrap();
-        bytemuck::pod_collect_to_vec(&bytes)
+        read_texture(&h.gpu, &h.batches.resolutions[0].targets.texture, 0)
     }
 
     /// A patch at the origin that faces +z, and small triangles around each given centre, facing
@@ -377,10 +357,6 @@ mod tests {
             materials,
         );
         Mesh::new(scene.unwrap(), f64::INFINITY).unwrap()
-    }
-
-    fn gpu() -> Gpu {
-        Gpu::new(None).expect("a graphics adapter; RADIOSITY_NO_GPU=1 ignores this test")
     }
 
     #[test]

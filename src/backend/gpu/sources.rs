@@ -40,22 +40,10 @@ impl SourceBuffers {
         radiance_unit: f64,
     ) -> Result<SourceBuffers, Error> {
         check(limits, sources, triangles)?;
-        let RadiosityField { mesh, corners, reflected } = *sources;
+        let RadiosityField { mesh, corners, .. } = *sources;
         let (lattices, nodes) = quadtrees(mesh);
-        let value =
-            |k: u32| (reflected[k as usize] / radiance_unit).as_vec3().extend(0.0).to_array();
-        let line = ELEMENTS_A_LINE as usize;
-        let lines = corners.len().div_ceil(line);
-        let mut texels = vec![[0f32; 4]; lines * 3 * line];
-        texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(
-            |(texels, corners)| {
-                for (x, corner) in corners.iter().enumerate() {
-                    for k in 0..3 {
-                        texels[k * line + x] = value(corner[k]);
-                    }
-                }
-            },
-        );
+        let texels = element_texels(sources, radiance_unit);
+        let lines = corners.len().div_ceil(ELEMENTS_A_LINE as usize);
         let size = [ELEMENTS_A_LINE, 3 * lines as u32, 1];
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
         let format = wgpu::TextureFormat::Rgba32Float;
@@ -75,8 +63,24 @@ impl SourceBuffers {
     }
 }
 
+/// The texture of the elements' corners, line by line.
+pub fn element_texels(sources: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4]> {
+    let RadiosityField { corners, reflected, .. } = *sources;
+    let value = |k: u32| (reflected[k as usize] / radiance_unit).as_vec3().extend(0.0).to_array();
+    let line = ELEMENTS_A_LINE as usize;
+    let mut texels = vec![[0f32; 4]; corners.len().div_ceil(line) * 3 * line];
+    texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(|(texels, corners)| {
+        for (x, corner) in corners.iter().enumerate() {
+            for k in 0..3 {
+                texels[k * line + x] = value(corner[k]);
+            }
+        }
+    });
+    texels
+}
+
 /// All quadtrees' nodes as numbers, and once more those of each triangle's deepest complete level.
-fn quadtrees(mesh: &Mesh) -> (Vec<Lattice>, Vec<u32>) {
+pub fn quadtrees(mesh: &Mesh) -> (Vec<Lattice>, Vec<u32>) {
     let first_child = |n: usize| mesh.children(NodeId(n as u32)).map_or(0, |c| INNER | c[0].0);
     let mut nodes: Vec<u32> = (0..mesh.node_count()).map(first_child).collect();
     let mut complete = vec![u32::MAX; mesh.scene().triangles().len()];

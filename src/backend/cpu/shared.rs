@@ -1,0 +1,37 @@
+//! Twins of `shaders/shared`: where a view has a corner, and the cells of a lattice.
+
+use glam::{UVec2, Vec2, Vec3, Vec4};
+
+use crate::backend::gpu::layout::Corner;
+
+/// From the eye, itself in two parts, to a corner.
+pub fn from_eye(corner: &Corner, eye: Vec3, eye_low: Vec3) -> Vec3 {
+    (Vec3::from(corner.high) - eye) + (Vec3::from(corner.low) - eye_low)
+}
+
+/// Clip coordinates of a point with view coordinates `x`, `y` and `w`.
+pub fn clip_position(x: f32, y: f32, w: f32, bottom: f32, near: f32) -> Vec4 {
+    Vec4::new(x, (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom), near, w)
+}
+
+/// The corner of a triangle's lattice, three one after the other.
+pub fn lattice_corner(corner: u32, side: u32) -> Vec2 {
+    let unit = [Vec2::ZERO, Vec2::X, Vec2::Y];
+    side as f32 * unit[corner as usize]
+}
+
+/// The square that a position is in.
+pub fn lattice_square(p: Vec2, side: u32) -> UVec2 {
+    let i = (p.x as u32).min(side - 1);
+    UVec2::new(i, (p.y as u32).min(side - 1 - i))
+}
+
+/// Whether the square has a flipped cell beyond its diagonal.
+pub fn has_flipped_cell(square: UVec2, side: u32) -> bool {
+    square.x + square.y + 1 < side
+}
+
+/// Number of a cell of the square.
+pub fn cell_index(square: UVec2, side: u32, beyond: bool) -> u32 {
+    square.x * (2 * side - square.x) + 2 * square.y + u32::from(beyond)
+}
