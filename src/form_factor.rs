@@ -51,8 +51,8 @@ pub trait FormFactors {
         1
     }
 
-    /// Everything that the bits of its rows depend on beside mesh, patch and importance, in words: a
-    /// saved solve is resumed only with rows of the same fingerprint.
+    /// Everything that the bits of its rows depend on beside mesh, patch and importance, in words:
+    /// a saved solve is resumed only with rows of the same fingerprint.
     fn fingerprint(&self) -> String {
         "rows".into()
     }
@@ -61,7 +61,8 @@ pub trait FormFactors {
 /// The rows of `patches` by `source`, one each, every one of which keeps its contract.
 ///
 /// # Errors
-/// [`ErrorKind::FormFactor`] when one does not, or there are too few or too many; those of `source`.
+/// [`ErrorKind::FormFactor`] when one does not, or there are too few or too many; those of
+/// `source`.
 pub(crate) fn checked_rows(
     source: &mut (impl FormFactors + ?Sized),
     mesh: &Mesh,

@@ -1,8 +1,9 @@
 //! The proximity correction: near receivers get the factor of the whole patch, not of its centroid.
 //!
-//! A row source sees a patch from its centroid, as if all its light came from there. That is off for
-//! a receiver within a few patch diameters (the proximity assumption of Baum, Rushmeier and Winget
-//! 1989). For each entry whose receiver is near, with closed forms of Lambert for both factors:
+//! A row source sees a patch from its centroid, as if all its light came from there. That is off
+//! for a receiver within a few patch diameters (the proximity assumption of Baum, Rushmeier and
+//! Winget 1989). For each entry whose receiver is near, with closed forms of Lambert for both
+//! factors:
 //!
 //! ```text
 //!            F(receiver's centroid → whole patch) × A_receiver / A_patch    by reciprocity
@@ -10,8 +11,8 @@
 //!            F(patch's centroid → whole receiver)
 //! ```
 //!
-//! So what the source found hidden stays hidden. All other entries are scaled alike, so that the row
-//! still sums to one.
+//! So what the source found hidden stays hidden. All other entries are scaled alike, so that the
+//! row still sums to one.
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A file is resumed only with a mesh, a method and rows of the same identity. Rows are not in it
-//! but for those that cannot be made again; what else was cached is rebuilt when it is asked for, as
-//! it was.
+//! but for those that cannot be made again; what else was cached is rebuilt when it is asked for,
+//! as it was.
 
 use std::fs;
 use std::path::Path;
@@ -42,8 +42,8 @@ struct Identity {
 }
 
 impl SolveSession<'_> {
-    /// Writes the state to `path`, so that [`Solver::resume`] can go on from there. Whenever this is
-    /// cut short, the file is either what it was or what it was to be.
+    /// Writes the state to `path`, so that [`Solver::resume`] can go on from there. Whenever this
+    /// is cut short, the file is either what it was or what it was to be.
     ///
     /// Takes 48 bytes an element, some 40 a patch that has shot, and what the method has in hand:
     /// with GMRES 48 bytes an element for each product of the cycle.

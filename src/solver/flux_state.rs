@@ -1,8 +1,8 @@
 //! Where the light is while a solver runs.
 //!
 //! The state is flux, not radiosity: a patch that sends Φ along row i sends F_ij Φ to element j,
-//! which absorbs (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that is
-//! the textbook ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose
+//! which absorbs (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that
+//! is the textbook ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose
 //! energy.
 //!
 //! With s what was sent, e what is emitted and (Mx)_j = ρ_j Σ_i F_ij x_i, the unshot flux is the

@@ -111,8 +111,8 @@ impl GeometryDelta {
     }
 }
 
-/// The form factor to `bounds` from a point `eye` with that `normal`, as if nothing were in between;
-/// 1 from inside.
+/// The form factor to `bounds` from a point `eye` with that `normal`, as if nothing were in
+/// between; 1 from inside.
 fn form_factor_to(bounds: &Aabb, eye: DVec3, normal: DVec3) -> f64 {
     if bounds.contains(eye) {
         return 1.0;

@@ -2,9 +2,9 @@
 //!
 //! A cycle looks for what to send in the Krylov space of the unshot flux r, Ar, A²r … with
 //! A = 1 − M, such that the least is unshot afterwards. All it needs are products with M, that is,
-//! light sent along all rows, so that a product costs what a bounce of Jacobi does; but however near
-//! one the reflectance is, light that fills a scene evenly is a single direction, and found in a
-//! step. One cycle:
+//! light sent along all rows, so that a product costs what a bounce of Jacobi does; but however
+//! near one the reflectance is, light that fills a scene evenly is a single direction, and found in
+//! a step. One cycle:
 //!
 //! 1. v₀ = r/|r|; product: w = A v_k by sending v_k along the rows of all elements;
 //! 2. modified Gram–Schmidt: w = Σ h_ik v_i + h_{k+1,k} v_{k+1}, a column of the Hessenberg matrix;
@@ -28,8 +28,8 @@ use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// A full cycle that takes less than this share off what is unshot, in norm, stagnates: the next has
-/// twice the products. Chosen by hand; no measurement kept.
+/// A full cycle that takes less than this share off what is unshot, in norm, stagnates: the next
+/// has twice the products. Chosen by hand; no measurement kept.
 const MIN_CYCLE_REDUCTION: f64 = 0.5;
 
 /// Cycles of products; a step is a product.
@@ -118,8 +118,8 @@ impl Product {
     }
 }
 
-/// One cycle, of all channels at once: as many systems that share rows. A channel that has converged
-/// goes on with vectors of 0.
+/// One cycle, of all channels at once: as many systems that share rows. A channel that has
+/// converged goes on with vectors of 0.
 #[derive(Clone, Serialize, Deserialize)]
 struct Cycle {
     /// Weights of the inner product: Σ A over A of each element. With these a vector's norm is no

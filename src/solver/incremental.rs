@@ -1,9 +1,9 @@
 //! Incremental solving: other lamps, other materials and moved objects, without starting over.
 //!
-//! The unshot flux is the residual r = e − s + Ms of what was sent, s. When e or the reflectances in
-//! M change, the residual is known at once from what each element received, and the solve goes on
-//! from there; light that is no longer there is shot as negative light (Chen 1990; George, Sillion
-//! and Greenberg 1990).
+//! The unshot flux is the residual r = e − s + Ms of what was sent, s. When e or the reflectances
+//! in M change, the residual is known at once from what each element received, and the solve goes
+//! on from there; light that is no longer there is shot as negative light (Chen 1990; George,
+//! Sillion and Greenberg 1990).
 //!
 //! When objects move, so do the form factors in M: what went along a row that sees them is taken
 //! back along that row and sent along a new one. Most rows see little of an object: what they are
@@ -53,9 +53,9 @@ impl<'m> SolveSession<'m> {
     ///
     /// Rows that see where triangles were or are get made anew, those first that most light went
     /// along, until the flux that the others may have misplaced, at most
-    /// [`SolveSession::stale_flux_bound`], is no more than twice the unshot share that is asked for;
-    /// [`SolveSession::run`] then goes down to half of that share. A vase and a chair that were
-    /// moved in a furnished room misplaced in fact a sixth to a half of the bound.
+    /// [`SolveSession::stale_flux_bound`], is no more than twice the unshot share that is asked
+    /// for; [`SolveSession::run`] then goes down to half of that share. A vase and a chair that
+    /// were moved in a furnished room misplaced in fact a sixth to a half of the bound.
     ///
     /// `before` makes rows of the present mesh, as far as they are not kept, and `after` those of
     /// `mesh`, which is made of the present one by [`Mesh::with_scene`]. The bound of a row is what
@@ -66,8 +66,8 @@ impl<'m> SolveSession<'m> {
     /// they are: [`SolveSession::stale_flux_bound`] tells how much light that may concern.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] when elements are others, or the emitted flux is not finite; nothing has
-    /// changed then. Those of [`SolveSession::advance`].
+    /// [`ErrorKind::Scene`] when elements are others, or the emitted flux is not finite; nothing
+    /// has changed then. Those of [`SolveSession::advance`].
     pub fn update_geometry(
         &mut self,
         mesh: &'m Mesh,
@@ -123,9 +123,9 @@ impl<'m> SolveSession<'m> {
         self.state.recompute_and_verify_energy()
     }
 
-    /// Adds what `delta` may make wrong to the stale fraction of every row. Returns the fractions of
-    /// earlier moves that stay whatever is done now, since the rows that they are about cannot be
-    /// had any more to take the light back.
+    /// Adds what `delta` may make wrong to the stale fraction of every row. Returns the fractions
+    /// of earlier moves that stay whatever is done now, since the rows that they are about cannot
+    /// be had any more to take the light back.
     fn mark_stale(&mut self, old: &Mesh, delta: &GeometryDelta) -> BTreeMap<NodeId, f64> {
         let mut irreparable = BTreeMap::new();
         let patches: Vec<NodeId> = self.rows.histories.keys().copied().collect();
@@ -144,8 +144,8 @@ impl<'m> SolveSession<'m> {
         irreparable
     }
 
-    /// Patches whose rows are stale, by the flux that they may have misplaced, most first; of equals
-    /// the first in the mesh.
+    /// Patches whose rows are stale, by the flux that they may have misplaced, most first; of
+    /// equals the first in the mesh.
     fn patches_by_misplaced_flux(&self) -> Vec<NodeId> {
         let stale = self.rows.histories.iter().filter(|(_, history)| history.stale_fraction > 0.0);
         let mut patches: Vec<(f64, NodeId)> = stale

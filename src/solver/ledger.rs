@@ -56,7 +56,8 @@ impl Ledger {
         ambient
     }
 
-    /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell evenly.
+    /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell
+    /// evenly.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
         let absorptance = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
         (self.unshot - self.overshot) / mesh.total_area() / absorptance

@@ -36,8 +36,8 @@ use crate::visibility::buried;
 /// lamps. Chosen by hand; no measurement kept.
 const MAX_EMITTER_ELEMENTS: usize = 1024;
 
-/// A batch of shots ends where the unshot flux is below this share of its brightest patch. Chosen by
-/// hand; no measurement kept.
+/// A batch of shots ends where the unshot flux is below this share of its brightest patch. Chosen
+/// by hand; no measurement kept.
 const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
 
 /// Viewpoints of one patch that are rejected at most; the next one is taken as it is.
@@ -259,8 +259,8 @@ impl<'m> PatchCut<'m> {
         shots
     }
 
-    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is still to be
-    /// taken; if not, the patch has been split, or shoots from elsewhere.
+    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is still to
+    /// be taken; if not, the patch has been split, or shoots from elsewhere.
     pub fn accept_or_split(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
         let eye = self.mesh.centroid(shot.patch);
         let patch = &mut self.patches[shot.index];
@@ -320,8 +320,8 @@ impl<'m> PatchCut<'m> {
         share.sqrt() * misplaced
     }
 
-    /// The node whose row `patch` is to shoot along: itself, where its middle is lit; else, as for a
-    /// cluster, the lit element nearest to where its light is. What no light comes to may lie in
+    /// The node whose row `patch` is to shoot along: itself, where its middle is lit; else, as for
+    /// a cluster, the lit element nearest to where its light is. What no light comes to may lie in
     /// other geometry, such as the floor under a block.
     fn viewpoint(&self, patch: &ShootingPatch, flux: &Flux) -> NodeId {
         let mesh = self.mesh;

@@ -155,8 +155,8 @@ struct TakenFlux {
 }
 
 impl FluxState<'_> {
-    /// Takes the unshot flux of `elements`, and beyond it what `ambient_overshoot` (W/m² per unit of
-    /// reflectance) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
+    /// Takes the unshot flux of `elements`, and beyond it what `ambient_overshoot` (W/m² per unit
+    /// of reflectance) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
     fn take(&mut self, elements: &[Range<usize>], ambient_overshoot: Rgb) -> TakenFlux {
         let mut flux = Rgb::ZERO;
         let mut overshot = Rgb::ZERO;

@@ -22,7 +22,7 @@ pub(super) const MAX_BOUND_OVER_UNSHOT: f64 = 2.0;
 /// kept.
 pub(super) const MAX_STALE_FRACTION: f64 = 0.1;
 
-/// Misplaced flux that is expected, over its bound: chosen from the range of a sixth to a half that
+/// Misplaced flux that is expected, over its bound: within the range of a sixth to a half that
 /// was measured (see the module).
 const EXPECTED_SHARE_OF_BOUND: f64 = 0.25;
 
