@@ -16,10 +16,10 @@ use std::time::Instant;
 
 use common::keep_going;
 use glam::{DAffine3, DVec3};
-use radiosity::{
-    Backend, BackendRows, Error, Mesh, ProximityCorrection, Rgb, Scene, Solution, SolveSession,
-    Solver,
-};
+use radiosity::backend::BackendRows;
+use radiosity::form_factor::ProximityCorrection;
+use radiosity::solver::SolveSession;
+use radiosity::{Backend, Error, Mesh, Rgb, Scene, Solution, Solver};
 
 type Rows = ProximityCorrection<BackendRows>;
 

@@ -21,10 +21,13 @@ use std::time::Instant;
 
 use common::{keep_going, truth};
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
+use radiosity::bake::GatherSettings;
 use radiosity::bake::model::{self, PowerLaw};
+use radiosity::gather::GatherPoint;
 use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, Gather, GatherPoint,
-    GatherSettings, GatheredMesh, RayGather, Rgb, Scene, VertexMesh, load_obj,
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, Gather, GatheredMesh, Rgb,
+    Scene, VertexMesh, load_obj,
 };
 
 /// The error around whose settings others are varied.

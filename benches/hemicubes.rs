@@ -15,7 +15,8 @@ mod common;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, Timings};
+use radiosity::mesh::NodeId;
+use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, Timings};
 
 fn stages(c: &mut Criterion) {
     let gpu = common::gpu();

@@ -12,9 +12,9 @@ mod common;
 use std::time::Instant;
 
 use common::{keep_going, truth};
-use radiosity::{
-    Error, FormFactors, HemicubeRows, Mesh, NodeId, ProximityCorrection, Row, Solver, VertexMesh,
-};
+use radiosity::form_factor::{ProximityCorrection, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{Error, FormFactors, HemicubeRows, Mesh, Solver, VertexMesh};
 
 const TRUTH: &str = include_str!("../tests/data/cornell_box.truth.json");
 

@@ -9,7 +9,9 @@ mod common;
 use std::collections::HashMap;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use radiosity::{Error, FormFactors, Mesh, NodeId, RayRows, Row, Solver, VertexMesh};
+use radiosity::form_factor::Row;
+use radiosity::mesh::NodeId;
+use radiosity::{Error, FormFactors, Mesh, RayRows, Solver, VertexMesh};
 
 /// Hands out rows that were made before.
 struct Stored<'a>(&'a HashMap<NodeId, Row>);

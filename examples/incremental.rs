@@ -5,7 +5,8 @@
 use std::ops::ControlFlow;
 
 use glam::{DAffine3, DVec3};
-use radiosity::{Error, Mesh, RayRows, SolveSession, Solver, load_obj};
+use radiosity::solver::SolveSession;
+use radiosity::{Error, Mesh, RayRows, Solver, load_obj};
 
 fn main() -> Result<(), Error> {
     let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;

@@ -5,7 +5,8 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::{Backend, BakeTarget, Gpu, GpuLimits, load_obj};
+use radiosity::backend::gpu::GpuLimits;
+use radiosity::{Backend, BakeTarget, Gpu, load_obj};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());

@@ -6,6 +6,9 @@
 
 use std::ops::ControlFlow;
 
+use radiosity::backend::cpu::RayGather;
+use radiosity::form_factor::ProximityCorrection;
+use radiosity::gather::{RefinementSettings, gather_at_vertices};
 use radiosity::*;
 
 fn main() -> Result<(), Error> {

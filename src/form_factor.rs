@@ -19,7 +19,9 @@ pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
 use crate::mesh::{Mesh, NodeId};
+pub use proximity::ProximityCorrection;
 pub use row::{Entry, Row};
+pub use viewpoints::AdaptiveViewpoints;
 
 /// A source of rows: hemicubes on a GPU, rays on the CPU, closed forms.
 ///

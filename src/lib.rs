@@ -1,53 +1,65 @@
-//! Radiosity: diffuse light settled in a scene, per vertex.
+//! Bakes diffuse global illumination into mesh vertices.
 //!
-//! The crate draws a hemicube per patch with wgpu, on any Vulkan, Metal or DX12 device (software
-//! Vulkan included), turns it into form factors, lets progressive shooting on the CPU spread the
-//! light, and gives radiosity at the vertices of a mesh. The path, in one line:
-//! [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Solver`] → [`VertexMesh`] → file. For exact
-//! vertices, [`RefinementSettings`] stands before the last: each sees the settled light for itself, and the
-//! mesh grows finer where the light asks for it. [`Solver`] has other methods beside shooting, GMRES
-//! for reflectance near one among them, and a rule that picks one.
+//! Form factors come from hemicubes drawn on the GPU with wgpu (Vulkan, Metal, DX12, software Vulkan
+//! too) or from rays on the CPU. A solver spreads the light between the elements of a mesh, vertices
+//! then gather it, the mesh is refined where the light bends, and the error that is left is estimated:
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;
 //!
-//! use radiosity::{
-//!     Gpu, HemicubeRows, Mesh, ProximityCorrection, Solver, VertexMesh, load_obj, write_ply,
-//! };
+//! use radiosity::{Backend, BakeTarget, load_obj, write_ply};
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
-//! let scene = load_obj("scenes/cornell_box.obj")?;
-//! let mesh = Mesh::new(scene, 30.0)?; // no element edge over 30 units of the file
-//! let gpu = Gpu::new(None)?;
-//! let hemicubes = HemicubeRows::new(&gpu, &mesh, 128)?; // 128 × 128 pixels on the top face
-//! let mut rows = ProximityCorrection::new(hemicubes, &mesh, 1.0); // mends what is within one diameter
-//! let solution = Solver::default().solve(&mesh, &mut rows, |progress| {
-//!     println!("{:.2} % unshot", 100.0 * progress.unshot_share);
-//!     ControlFlow::Continue(())
+//! let backend = Backend::gpu(None)?; // or Backend::Cpu
+//! let baked = BakeTarget::Error(0.02).bake(load_obj("scene.obj")?, &backend, |progress| {
+//!     eprintln!("{progress:?}");
+//!     ControlFlow::Continue(()) // Break(()) stops with what there is
 //! })?;
-//! let surface = VertexMesh::new(&mesh, &solution.radiosity);
-//! write_ply("cornell_box.ply", &surface)?;
+//! eprintln!("off by about {:.2} %", 100.0 * baked.estimate.total);
+//! write_ply("scene.ply", &baked.light.surface)?;
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! # Where to look
+//!
+//! Data flows one way: [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Solver`] → [`GatheredMesh`] →
+//! [`VertexMesh`] → file or [`Camera`]. The root has the names of a usual program; each step has a
+//! module with the rest of its story.
+//!
+//! | module | for |
+//! |---|---|
+//! | [`scene`], [`mesh`] | triangles and materials; elements, patches and clusters |
+//! | [`form_factor`] | rows of form factors: the contract of their makers, closed forms, corrections |
+//! | [`hemicube`] | faces, frames and pixel weights of a hemicube |
+//! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
+//! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
+//! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
+//! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
+//! | [`view_factor`] | area-averaged factors between groups, for heat transfer |
+//! | [`camera`], [`io`] | pictures; OBJ in, PLY, EXR, PNG and tables out |
+//!
+//! Features: `gpu` (wgpu), `exr`, `png`, all on by default, and `cli` for the program `radiosity`.
+//! Long work takes a callback that is told of progress and answers with a
+//! [`ControlFlow`](std::ops::ControlFlow): `Break(())` stops it with what there is.
 //!
 //! # Conventions
 //!
 //! | quantity | name | unit | meaning |
 //! |---|---|---|---|
-//! | B | `radiosity` | W/m² per channel | all flux leaving a surface, per area: emitted plus reflected |
+//! | B | `radiosity` | W/m² per channel | flux leaving a surface per area: emitted plus reflected |
 //! | E | `exitance` | W/m² per channel | the emitted part of B; radiance of a diffuse surface is B/π |
 //! | ρ | `reflectance` | 1, in [0, 1) | diffuse hemispherical reflectance per channel |
-//! | F_ij | form factor | 1 | fraction of the flux leaving i that arrives at j: first index leaves, second receives |
-//! | ΔB·A | `unshot` | W per channel | what was emitted or received and is not yet passed on |
+//! | F_ij | form factor | 1 | fraction of the flux leaving i (first index) that arrives at j |
+//! | ΔB·A | `unshot` | W per channel | flux emitted or received and not yet passed on |
 //!
 //! - Channels are linear (r, g, b); for radiometry use them as any three bands.
 //! - Lengths are in the scene's own unit. Radiosity does not depend on it; W are W/m² times that
 //!   unit squared.
 //! - A face's front is where its corners run counter-clockwise. The front reflects and emits; both
 //!   sides block; light that meets a back is lost there, and counted.
-//! - Shares of light are whole numbers of 1/[`Row::TOTAL`], so rows sum to one exactly and a solve
-//!   gives the same bits on every run with the same adapter.
+//! - Shares of light are whole numbers of 1/[`Row::TOTAL`](form_factor::Row::TOTAL), so rows sum to
+//!   one exactly and a solve gives the same bits on every run with the same adapter.
 //!
 //! # What it does not model
 //!
@@ -75,38 +87,36 @@ pub mod vertex;
 pub mod view_factor;
 mod visibility;
 
-pub use backend::cpu::{RayGather, RayRows};
+pub use glam;
+
+pub use backend::Backend;
+pub use backend::cpu::RayRows;
 #[cfg(feature = "gpu")]
-pub use backend::gpu::{Gpu, GpuLimits, HemicubeGather, HemicubeRows};
-pub use backend::{AdapterInfo, AdapterKind, Backend, BackendRows, Fallback};
-pub use bake::{
-    BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate, GatherSettings,
-    SolveSettings,
-};
+pub use backend::gpu::{Gpu, HemicubeRows};
+pub use bake::{BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate};
 pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
-pub use form_factor::proximity::ProximityCorrection;
-pub use form_factor::viewpoints::AdaptiveViewpoints;
-pub use form_factor::{Entry, FormFactors, Row};
-pub use gather::{
-    Gather, GatherPoint, GatheredMesh, IrradianceSample, Progress as GatherProgress,
-    RadiosityField, RefinementSettings, gather_at_vertices,
-};
+pub use form_factor::FormFactors;
+pub use gather::{Gather, GatheredMesh};
 #[cfg(feature = "exr")]
 pub use io::write_exr;
 #[cfg(feature = "png")]
 pub use io::write_png;
-pub use io::{ToneCurve, load_obj, read_obj, write_ply};
-pub use mesh::{Mesh, NodeId};
+pub use io::{load_obj, write_ply};
+pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
 pub use scene::{Material, Rgb, Scene, Triangle};
-pub use solver::{Ledger, Method, Progress, Solution, SolveSession, Solver};
+pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;
-pub use view_factor::{
-    EnforcementReport, ErrorStats, Estimate, Factor, MatrixChecks, Missing, ViewFactors,
-};
+pub use view_factor::ViewFactors;
 
-/// The README's code compiles.
+/// The code of the README and of the pages under `docs` compiles.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod pages {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/incremental.md")]
+    struct Incremental;
+    #[doc = include_str!("../docs/robustness.md")]
+    struct Robustness;
+}

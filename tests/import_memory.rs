@@ -1,7 +1,7 @@
 //! What loading a file takes of memory, whatever the file says.
 #![cfg(target_os = "linux")]
 
-use radiosity::read_obj;
+use radiosity::io::read_obj;
 
 /// Most memory that this process ever had, bytes.
 fn peak() -> usize {

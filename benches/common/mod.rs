@@ -13,7 +13,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use criterion::Criterion;
-use radiosity::{AdapterInfo, Gpu, Scene, load_obj};
+use radiosity::backend::AdapterInfo;
+use radiosity::{Gpu, Scene, load_obj};
 
 /// The Cornell box that ships with the crate; its unit is the millimetre.
 pub fn cornell_box() -> Scene {

@@ -1,5 +1,19 @@
 //! What holds of the public types whatever is in them.
 
+use radiosity::backend::cpu::RayGather;
+use radiosity::backend::gpu::{GpuLimits, HemicubeGather};
+use radiosity::backend::{AdapterInfo, BackendRows};
+use radiosity::bake::{GatherSettings, SolveSettings};
+use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
+use radiosity::gather::{
+    GatherPoint, IrradianceSample, Progress as GatherProgress, RadiosityField, RefinementSettings,
+};
+use radiosity::io::ToneCurve;
+use radiosity::mesh::NodeId;
+use radiosity::solver::{Ledger, Method, Progress, SolveSession};
+use radiosity::view_factor::{
+    EnforcementReport, ErrorStats, Estimate, Factor, MatrixChecks, Missing,
+};
 use radiosity::*;
 
 #[test]

@@ -1,8 +1,10 @@
 //! Gathering with rays: where rays disagree, more are cast.
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{Gather, GatherPoint, Material, Mesh, RayGather, Rgb};
+use radiosity::gather::GatherPoint;
+use radiosity::{Gather, Material, Mesh, Rgb};
 
 use crate::common::fakes::GivenRadiosity;
 use crate::common::{cube, quads};

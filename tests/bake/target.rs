@@ -4,9 +4,10 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use radiosity::gather::RefinementSettings;
 use radiosity::{
-    Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material,
-    RefinementSettings, Rgb, Scene, Solver, StopReason,
+    Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material, Rgb, Scene,
+    Solver, StopReason,
 };
 
 use crate::common::{cornell_box, cube, keep_going, quads};

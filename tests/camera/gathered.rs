@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
+use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::{
-    Camera, Error, ErrorKind, Gather, GatherPoint, GatheredMesh, IrradianceSample, Material, Mesh,
-    RadianceImage, RadiosityField, RayGather, Rgb,
+    Camera, Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, RadianceImage, Rgb,
 };
 
 use crate::common::{keep_counting, quads};

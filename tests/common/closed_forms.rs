@@ -1,7 +1,9 @@
 //! A row maker for scenes without occluders.
 
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
-use radiosity::{Entry, Error, FormFactors, Mesh, NodeId, Row};
+use radiosity::form_factor::{Entry, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{Error, FormFactors, Mesh};
 
 /// Rows of closed forms, for scenes without occluders: exact, from all of the patch's area, or
 /// as a hemicube without pixels would see them, from the patch's centroid.

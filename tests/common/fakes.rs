@@ -3,7 +3,10 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use radiosity::{Error, FormFactors, GatherPoint, Mesh, NodeId, RadiosityField, Rgb, Row};
+use radiosity::form_factor::Row;
+use radiosity::gather::{GatherPoint, RadiosityField};
+use radiosity::mesh::NodeId;
+use radiosity::{Error, FormFactors, Mesh, Rgb};
 
 /// Returns the same rows whatever it is asked for.
 pub struct GivenRows(pub Vec<Row>);

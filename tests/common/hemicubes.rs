@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, NodeId, Row};
+use radiosity::form_factor::Row;
+use radiosity::mesh::NodeId;
+use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh};
 
 /// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
 pub fn largest_pixel(n: u32) -> f64 {

@@ -3,9 +3,8 @@
 
 use std::num::NonZeroU32;
 
-use radiosity::{
-    AdaptiveViewpoints, FormFactors, HemicubeRows, Mesh, ProximityCorrection, RayRows,
-};
+use radiosity::form_factor::{AdaptiveViewpoints, ProximityCorrection};
+use radiosity::{FormFactors, HemicubeRows, Mesh, RayRows};
 
 use crate::common::scenes::grey;
 use crate::common::{cube, gpu};

@@ -1,7 +1,9 @@
 //! The proximity repair: what it mends, what it leaves alone, and what that is worth.
 
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{FormFactors, Material, Mesh, NodeId, ProximityCorrection, Row};
+use radiosity::form_factor::{ProximityCorrection, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{FormFactors, Material, Mesh};
 
 use crate::common::closed_forms::{exact, from_centroid};
 use crate::common::cube;

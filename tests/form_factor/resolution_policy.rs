@@ -1,9 +1,8 @@
 //! Effort follows the flux at stake: coarse rows for patches that shoot little.
 
-use radiosity::{
-    AdaptiveViewpoints, Error, FormFactors, Material, Mesh, NodeId, ProximityCorrection, RayRows,
-    Rgb, Row, Solution, Solver,
-};
+use radiosity::form_factor::{AdaptiveViewpoints, ProximityCorrection, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{Error, FormFactors, Material, Mesh, RayRows, Rgb, Solution, Solver};
 
 use crate::common::{cornell_box, keep_going, quads};
 

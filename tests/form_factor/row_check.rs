@@ -1,9 +1,9 @@
 //! Rows that break the contract of `FormFactors` are refused, whoever asked for them.
 
-use radiosity::{
-    AdaptiveViewpoints, Entry, Error, ErrorKind, FormFactors, Mesh, Method, NodeId,
-    ProximityCorrection, Row, Solver, ViewFactors,
-};
+use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
+use radiosity::mesh::NodeId;
+use radiosity::solver::Method;
+use radiosity::{Error, ErrorKind, FormFactors, Mesh, Solver, ViewFactors};
 
 use crate::common::closed_forms::exact;
 use crate::common::fakes::GivenRows;

@@ -1,10 +1,9 @@
 //! The visibility repair: what it finds behind a plate, and what it spends where there is none.
 
 use radiosity::form_factor::closed_form::polygon_to_polygon;
-use radiosity::{
-    AdaptiveViewpoints, Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId,
-    ProximityCorrection, RayRows, Row,
-};
+use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{Error, ErrorKind, FormFactors, Material, Mesh, RayRows};
 
 use crate::common::closed_forms::{ClosedForms, from_centroid};
 use crate::common::{cube, quads};

@@ -1,6 +1,7 @@
 //! What the fuzz target does with an input, and the replay of its corpus in `tests/fuzz_corpus.rs`.
 
-use radiosity::{Error, Mesh, RayRows, Scene, Solver, VertexMesh, read_obj};
+use radiosity::io::read_obj;
+use radiosity::{Error, Mesh, RayRows, Scene, Solver, VertexMesh};
 use std::ops::ControlFlow;
 
 /// Parts the OBJ file from the MTL file in an input. In UTF-8 there is no such byte.

@@ -7,10 +7,8 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use radiosity::{
-    ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, SolveSession,
-    Solver, Triangle,
-};
+use radiosity::solver::{Method, Progress, SolveSession};
+use radiosity::{ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solver, Triangle};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Steps, and batches, that a state which is taken goes on by.

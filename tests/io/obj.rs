@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use radiosity::{
-    ErrorKind, GatheredMesh, Mesh, RayGather, RefinementSettings, Rgb, VertexMesh,
-    gather_at_vertices, load_obj, read_obj,
-};
+use radiosity::backend::cpu::RayGather;
+use radiosity::gather::{RefinementSettings, gather_at_vertices};
+use radiosity::io::read_obj;
+use radiosity::{ErrorKind, GatheredMesh, Mesh, Rgb, VertexMesh, load_obj};
 use tempfile::TempDir;
 
 use super::obj_texts::{CHALK, SQUARE, area, load, obj, refused, warned, with_library};

@@ -1,6 +1,7 @@
 //! The tone curve: exposure from the logarithmic mean, highlights rolled off, sRGB.
 
-use radiosity::{Camera, Rgb, ToneCurve};
+use radiosity::io::ToneCurve;
+use radiosity::{Camera, Rgb};
 
 use crate::common::framed::{self, HERE};
 

@@ -2,9 +2,9 @@
 //! term, which knows their areas. No GPU needed.
 
 use glam::DVec3;
+use radiosity::mesh::NodeId;
 use radiosity::{
-    ErrorKind, Material, Mesh, NodeId, RayRows, Rgb, Scene, Solver, StopReason, Triangle,
-    VertexMesh,
+    ErrorKind, Material, Mesh, RayRows, Rgb, Scene, Solver, StopReason, Triangle, VertexMesh,
 };
 
 use crate::common::closed_forms::exact;

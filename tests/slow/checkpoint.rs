@@ -2,9 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::{
-    Error, ErrorKind, FormFactors, Mesh, Method, NodeId, Progress, RayRows, Row, Solver, StopReason,
-};
+use radiosity::form_factor::Row;
+use radiosity::mesh::NodeId;
+use radiosity::solver::{Method, Progress};
+use radiosity::{Error, ErrorKind, FormFactors, Mesh, RayRows, Solver, StopReason};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
-use radiosity::{HemicubeRows, Mesh, NodeId, Rgb, Solver};
+use radiosity::mesh::NodeId;
+use radiosity::{HemicubeRows, Mesh, Rgb, Solver};
 
 use crate::common::closed_forms::from_centroid;
 use crate::common::hemicubes::{factor_to_group, hemicube_rows, outline_bound};

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh, read_obj};
+use radiosity::io::read_obj;
+use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh};
 
 use crate::common::keep_going;
 

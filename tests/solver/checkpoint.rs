@@ -2,7 +2,8 @@
 //! the bits of one that was not. No GPU needed.
 
 use glam::{DAffine3, DVec3};
-use radiosity::{ErrorKind, Mesh, Method, RayRows, Scene, Solver};
+use radiosity::solver::Method;
+use radiosity::{ErrorKind, Mesh, RayRows, Scene, Solver};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};

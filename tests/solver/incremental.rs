@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 
 use glam::{DAffine3, DVec3};
+use radiosity::solver::{Method, Progress, SolveSession};
 use radiosity::{
-    ErrorKind, FormFactors, Material, Mesh, Method, Progress, RayRows, Rgb, Scene, Solution,
-    SolveSession, Solver, StopReason,
+    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver, StopReason,
 };
 
 use crate::common::scenes::{block, walls};

@@ -2,9 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use radiosity::form_factor::{Entry, Row};
+use radiosity::solver::Method;
 use radiosity::{
-    Entry, ErrorKind, FormFactors, Material, Mesh, Method, RayRows, Rgb, Row, Scene, Solution,
-    Solver, StopReason,
+    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver, StopReason,
 };
 
 use crate::common::closed_forms::exact;

@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 
 use glam::DVec3;
+use radiosity::form_factor::{Entry, Row};
+use radiosity::mesh::NodeId;
 use radiosity::{
-    Entry, Error, ErrorKind, FormFactors, Material, Mesh, NodeId, RayRows, Rgb, Row, Scene,
-    Solution, Solver, StopReason, Triangle,
+    Error, ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver,
+    StopReason, Triangle,
 };
 
 use crate::common::scenes::lamp;

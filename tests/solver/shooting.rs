@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::polygon_to_polygon;
 use radiosity::{
-    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Row, Solution, Solver, StopReason,
+    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Solution, Solver, StopReason,
 };
 
 use crate::common::closed_forms::exact;

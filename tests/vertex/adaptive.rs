@@ -4,11 +4,14 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{
-    Error, ErrorKind, Gather, GatherPoint, GatherProgress, GatheredMesh, IrradianceSample,
-    Material, Mesh, RadiosityField, RayGather, RefinementSettings, Rgb, StopReason, VertexMesh,
+use radiosity::gather::{
+    GatherPoint, IrradianceSample, Progress as GatherProgress, RadiosityField, RefinementSettings,
     gather_at_vertices,
+};
+use radiosity::{
+    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, Rgb, StopReason, VertexMesh,
 };
 
 use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};

@@ -1,6 +1,7 @@
 //! Sums, reciprocity, leaks and the enforcement of both.
 
-use radiosity::{Factor, Material, Scene};
+use radiosity::view_factor::Factor;
+use radiosity::{Material, Scene};
 
 use crate::common::scenes::grey;
 use crate::common::view_factors::{exact_view_factors, square};

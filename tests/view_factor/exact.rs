@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::io::view_factors::{write_csv_list, write_matrix_market};
-use radiosity::{ErrorKind, Factor, Missing, Scene, ViewFactors, load_obj};
+use radiosity::view_factor::{Factor, Missing};
+use radiosity::{ErrorKind, Scene, ViewFactors, load_obj};
 use serde_json::Value;
 
 use crate::common::scenes::grey;

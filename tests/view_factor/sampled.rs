@@ -1,6 +1,7 @@
 //! View factors from rows of elements.
 
-use radiosity::{Mesh, Missing, RayRows, ViewFactors, load_obj};
+use radiosity::view_factor::Missing;
+use radiosity::{Mesh, RayRows, ViewFactors, load_obj};
 
 use crate::common::keep_counting;
 use crate::common::view_factors::{data, exact_view_factors};

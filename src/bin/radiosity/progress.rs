@@ -4,7 +4,9 @@
 use std::ops::ControlFlow;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use radiosity::{BakeProgress, GatherProgress, Progress};
+use radiosity::BakeProgress;
+use radiosity::gather::Progress as GatherProgress;
+use radiosity::solver::Progress;
 
 /// Steps of a bar from empty to full.
 const STEPS: usize = 1000;

@@ -1,7 +1,9 @@
 //! The report of a bake: what was done, with what, and where the light and the time went; as JSON
 //! and as a small table.
 
-use radiosity::{AdapterInfo, BakeResult, Ledger, Rgb};
+use radiosity::backend::AdapterInfo;
+use radiosity::solver::Ledger;
+use radiosity::{BakeResult, Rgb};
 use serde_json::{Map, Value, json};
 
 use crate::bake::{Target, settings};

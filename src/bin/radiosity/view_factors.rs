@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use files::Format;
 use lexopt::prelude::*;
-use radiosity::{
-    AdapterInfo, BakeSettings, Error, ErrorKind, Estimate, Mesh, Scene, ViewFactors, load_obj,
-};
+use radiosity::backend::AdapterInfo;
+use radiosity::view_factor::Estimate;
+use radiosity::{BakeSettings, Error, ErrorKind, Mesh, Scene, ViewFactors, load_obj};
 
 use crate::args::{self, Device, Stop};
 use crate::progress;

@@ -5,11 +5,18 @@ use std::cell::RefCell;
 use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 
+use radiosity::backend::Fallback;
+use radiosity::backend::cpu::RayGather;
+use radiosity::backend::gpu::{GpuLimits, HemicubeGather};
+use radiosity::form_factor::Row;
+use radiosity::gather::{
+    GatherPoint, IrradianceSample, RadiosityField, RefinementSettings, gather_at_vertices,
+};
+use radiosity::mesh::NodeId;
+use radiosity::solver::Method;
 use radiosity::{
-    Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, Fallback, FormFactors,
-    Gather, GatherPoint, GatheredMesh, Gpu, GpuLimits, HemicubeGather, HemicubeRows,
-    IrradianceSample, Material, Mesh, Method, NodeId, RadiosityField, RayGather, RayRows,
-    RefinementSettings, Rgb, Row, Solver, StopReason, gather_at_vertices,
+    Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, FormFactors, Gather,
+    GatheredMesh, Gpu, HemicubeRows, Material, Mesh, RayRows, Rgb, Solver, StopReason,
 };
 
 use crate::common::{cornell_box, cube, gpu, keep_going};

@@ -1,11 +1,11 @@
 //! Gathering with hemicubes: against closed forms, against rays, and against itself.
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
+use radiosity::backend::gpu::HemicubeGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{
-    ErrorKind, Gather, GatherPoint, Gpu, HemicubeGather, IrradianceSample, Material, Mesh,
-    RadiosityField, RayGather, Rgb, Scene, Triangle,
-};
+use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
+use radiosity::{ErrorKind, Gather, Gpu, Material, Mesh, Rgb, Scene, Triangle};
 
 use crate::common::fakes::GivenRadiosity;
 use crate::common::hemicubes::outline_bound;

@@ -4,8 +4,10 @@ use std::f64::consts::PI;
 use std::num::NonZeroU32;
 
 use glam::DVec3;
+use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, NodeId, RayRows, Row};
+use radiosity::mesh::NodeId;
+use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, RayRows};
 
 use crate::common::hemicubes::{factor_to_group, hemicube_rows, largest_pixel, outline_bound};
 use crate::common::scenes::grey;

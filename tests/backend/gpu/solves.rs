@@ -1,6 +1,7 @@
 //! Whole solves with rows from hemicubes: against closed forms and path-traced truth.
 
-use radiosity::{HemicubeRows, Material, Mesh, ProximityCorrection, Rgb, Solver};
+use radiosity::form_factor::ProximityCorrection;
+use radiosity::{HemicubeRows, Material, Mesh, Rgb, Solver};
 
 use crate::bake::cornell_box;
 use crate::common::scenes::{self};

@@ -6,7 +6,8 @@
 mod sweep;
 mod sweeps;
 
-use radiosity::{AdapterInfo, Backend};
+use radiosity::Backend;
+use radiosity::backend::AdapterInfo;
 
 const HEADER: &str = "\
 | quantity | range | steps | compared with | off | may be | NaN, ∞ | ledger | by |

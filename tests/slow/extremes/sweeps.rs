@@ -4,10 +4,14 @@ use std::f64::consts::PI;
 use std::num::NonZeroU32;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayGather;
+use radiosity::backend::gpu::HemicubeGather;
+use radiosity::form_factor::{AdaptiveViewpoints, ProximityCorrection};
+use radiosity::gather::{GatherPoint, RefinementSettings, gather_at_vertices};
+use radiosity::solver::Method;
 use radiosity::{
-    AdaptiveViewpoints, Backend, BakeTarget, Error, Gather, GatherPoint, GatheredMesh,
-    HemicubeGather, Mesh, Method, ProximityCorrection, RayGather, RefinementSettings, Rgb, Scene,
-    Solution, Solver, VertexMesh, ViewFactors, gather_at_vertices, write_ply,
+    Backend, BakeTarget, Error, Gather, GatheredMesh, Mesh, Rgb, Scene, Solution, Solver,
+    VertexMesh, ViewFactors, write_ply,
 };
 
 use super::sweep::Sweep;

@@ -3,7 +3,9 @@
 
 use std::str::FromStr;
 
-use radiosity::{BakeSettings, GatherSettings, RefinementSettings};
+use radiosity::BakeSettings;
+use radiosity::bake::GatherSettings;
+use radiosity::gather::RefinementSettings;
 use serde_json::{Map, Value, json};
 
 use crate::args::{self, Stop};

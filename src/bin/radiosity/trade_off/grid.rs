@@ -3,7 +3,8 @@
 
 use std::num::NonZeroU32;
 
-use radiosity::{BakeSettings, GatherSettings, Scene};
+use radiosity::bake::GatherSettings;
+use radiosity::{BakeSettings, Scene};
 
 /// How far a run goes.
 pub enum Target {

@@ -1,7 +1,8 @@
 //! Points spread evenly over a surface, with the radiosity there, to compare other surfaces with.
 
 use glam::DVec3;
-use radiosity::{Backend, Error, GatherPoint, GatheredMesh, Rgb, VertexMesh};
+use radiosity::gather::GatherPoint;
+use radiosity::{Backend, Error, GatheredMesh, Rgb, VertexMesh};
 
 use super::face::Face;
 use super::reference::rms;

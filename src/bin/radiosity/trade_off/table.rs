@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use radiosity::GatherSettings;
+use radiosity::bake::GatherSettings;
 
 use super::Results;
 use super::grid::{Target, percent};

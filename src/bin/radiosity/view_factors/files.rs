@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use npyz::WriterBuilder;
 use radiosity::io::view_factors::{write_csv_list, write_csv_matrix, write_matrix_market};
-use radiosity::{Error, ErrorKind, Estimate, ViewFactors};
+use radiosity::view_factor::Estimate;
+use radiosity::{Error, ErrorKind, ViewFactors};
 
 use crate::args::{self, Stop};
 
