@@ -1,12 +1,14 @@
 // Adds up what a point receives: pixels of its hemicube times their weights, and of each tile the
-// form factors of the pixels that show its light. A workgroup a point, twice: columns by themselves,
-// then their sums; with nothing to wait for, software devices keep sums in registers. Every sum is
-// in a fixed order.
+// form factors of the pixels that show its light. A workgroup a point, twice: columns by
+// themselves, then their sums; with nothing to wait for, software devices keep sums in registers.
+// Every sum is in a fixed order.
 
 const LANES: u32 = 64u;
 const TILE: u32 = 32u;    // pixels along an edge of a light's tile
 const WORDS: u32 = 24u;   // numbers that a point receives
 const PI: f32 = 3.14159265358979;
+
+alias Columns = array<array<f32, LANES>, WORDS>;
 
 struct Summation {
     resolution: u32,      // N: a hemicube is N wide and 3N high, the tiles follow below
@@ -25,12 +27,13 @@ struct Tile {
 }
 
 @group(0) @binding(0) var pixels: texture_2d_array<f32>;   // a layer a point
-@group(0) @binding(1) var<storage, read> weights: array<vec2f>;   // form factor, times axial distance over distance
+// Of a pixel: its form factor, and that times axial distance over distance.
+@group(0) @binding(1) var<storage, read> weights: array<vec2f>;
 @group(0) @binding(2) var<storage, read> tiles: array<Tile>;
-@group(0) @binding(3) var<storage, read_write> columns: array<array<array<f32, LANES>, WORDS>>;   // a point
+@group(0) @binding(3) var<storage, read_write> columns: array<Columns>;   // a point
 @group(0) @binding(4) var<uniform> summation: Summation;
 
-@group(0) @binding(5) var<storage, read> sums_of_columns: array<array<array<f32, LANES>, WORDS>>;   // the same
+@group(0) @binding(5) var<storage, read> sums_of_columns: array<Columns>;   // the same
 @group(0) @binding(6) var<storage, read_write> sums: array<array<f32, WORDS>>;
 
 @compute @workgroup_size(LANES)
@@ -64,7 +67,8 @@ fn add_columns(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
         if tile.scale == 0.0 {
             continue;
         }
-        let corner = vec2u(tile_index % tiles_per_line, tile_index / tiles_per_line) * TILE + vec2u(0u, 3u * n);
+        let cell = vec2u(tile_index % tiles_per_line, tile_index / tiles_per_line);
+        let corner = cell * TILE + vec2u(0u, 3u * n);
         var seen = vec2f(0.0);
         for (var i = lane; i < TILE * TILE; i += LANES) {
             let at = vec2u(i % TILE, i / TILE);

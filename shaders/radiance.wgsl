@@ -1,7 +1,7 @@
-// Draws the radiosity of the scene's own triangles: over one face of a hemicube, or over a tile that
-// fits one light. The element that a pixel sees is found in the triangle's quadtree: in a lattice of
-// nodes at the deepest level that it is complete to, then by descent. Needs shared/corner.wgsl and
-// shared/lattice.wgsl before it.
+// Draws the radiosity of the scene's own triangles: over one face of a hemicube, or over a tile
+// that fits one light. The element that a pixel sees is found in the triangle's quadtree: in a
+// lattice of nodes at the deepest level that it is complete to, then by descent. Needs
+// shared/corner.wgsl and shared/lattice.wgsl before it.
 
 const INNER: u32 = 0x80000000u;
 const MAX_EXPLICIT_LIGHTS: u32 = 8u;
@@ -37,8 +37,8 @@ struct Lattice {
 @group(0) @binding(1) var<storage, read> triangles: array<RadianceTriangle>;
 @group(0) @binding(2) var<storage, read> views: array<RadianceView>;
 @group(0) @binding(3) var<storage, read> lattices: array<Lattice>;   // one a triangle of the scene
-@group(0) @binding(4) var<storage, read> nodes: array<u32>;   // INNER + first of four children, or an element
-@group(0) @binding(5) var elements: texture_2d<f32>;   // reflected radiosity at their corners, same unit
+@group(0) @binding(4) var<storage, read> nodes: array<u32>;   // INNER + first child, or an element
+@group(0) @binding(5) var elements: texture_2d<f32>;   // reflected radiosity at corners, same unit
 
 struct Varying {
     @builtin(position) position: vec4f,

@@ -8,7 +8,7 @@
 //! | `item_buffer.wgsl` | `item_buffer` | `gpu/rows/twin_tests.rs`: items equal |
 //! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
 //! | `radiance.wgsl` | `radiance` | `gpu/gather/twin_tests.rs`: within rounding |
-//! | `hemisphere_sum.wgsl` | `hemisphere_sum` | `gpu/gather/twin_tests.rs`: columns within rounding, sums bit for bit |
+//! | `hemisphere_sum.wgsl` | `hemisphere_sum` | the same; `add_up` bit for bit |
 //! | `shared/*.wgsl` | `shared` | with the draw shaders |
 
 mod gather;

@@ -17,8 +17,8 @@ use crate::mesh::{Mesh, NodeId};
 
 /// A first maker of rows, or gatherer, and a second one that replaces it when its device fails.
 ///
-/// A solver that uses it as its [`FormFactors`] does not notice the change: flux already distributed
-/// stays distributed, and the second makes the rows that are still wanted.
+/// A solver that uses it as its [`FormFactors`] does not notice the change: flux already
+/// distributed stays distributed, and the second makes the rows that are still wanted.
 pub struct Fallback<'a, A, B = A> {
     first: A,
     second: Option<B>,

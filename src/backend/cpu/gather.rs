@@ -12,8 +12,8 @@
 //! error = max(|E_first − E_second|, c_max / n) / 2   ≤   noise · max(E, dim) ?
 //! ```
 //!
-//! E_first and E_second being those of the two halves of the rays, and c_max the largest contribution
-//! of one ray: both halves may miss the same small source.
+//! E_first and E_second being those of the two halves of the rays, and c_max the largest
+//! contribution of one ray: both halves may miss the same small source.
 
 use std::f64::consts::PI;
 use std::ops::Range;

@@ -1,4 +1,9 @@
-//! Form-factor rows from rays on the CPU: a second opinion, and what runs without a GPU.
+//! Form-factor rows from rays on the CPU: a second opinion, and the backend without a GPU.
+//!
+//! ```text
+//! patch ─► n cosine-weighted rays from its centroid, turned by a hash of its id
+//!       ─► what each meets: an element, a back, nothing ─► sorted, counted ─► row of shares
+//! ```
 
 use rayon::prelude::*;
 
@@ -50,24 +55,26 @@ impl RayRows {
         RayRows { full_share, ..self }
     }
 
-    fn row(&self, mesh: &Mesh, patch: NodeId, fan: &HemisphereSamples, count: u32) -> Row {
+    fn row(&self, mesh: &Mesh, patch: NodeId, samples: &HemisphereSamples, count: u32) -> Row {
         let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
         let start = offset::RAY_START * mesh.area(patch).sqrt();
-        let turn = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
-        let see = |direction| match self.rays.closest_hit(eye, direction, start, Some(own)) {
+        let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
+        let meets = |direction| match self.rays.closest_hit(eye, direction, start, Some(own)) {
             None => OPEN,
             Some(hit) if !hit.front => BACK,
             Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v).0 as u32,
         };
-        let mut seen: Vec<u32> = fan.directions(mesh.normal(patch), turn).map(see).collect();
-        seen.sort_unstable();
+        let directions = samples.directions(mesh.normal(patch), rotation);
+        let mut hits: Vec<u32> = directions.map(meets).collect();
+        hits.sort_unstable();
         // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
-        let upto = |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(count)) as u32;
+        let share_of_first =
+            |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(count)) as u32;
         let mut row = Row::default();
         let (mut shares, mut counted) = (Apportion::default(), 0);
-        for run in seen.chunk_by(|a, b| a == b) {
+        for run in hits.chunk_by(|a, b| a == b) {
             counted += run.len();
-            let share = shares.part_up_to(upto(counted));
+            let share = shares.part_up_to(share_of_first(counted));
             match run[0] {
                 OPEN => row.escaped = share,
                 BACK => row.backface = share,
@@ -89,8 +96,8 @@ impl FormFactors for RayRows {
         let count = (self.count >> (2 * halvings))
             .max(resolution_policy::MIN_HALVED_RESOLUTION.pow(2))
             .min(self.count);
-        let fan = HemisphereSamples::new(count)?;
-        Ok(patches.par_iter().map(|&p| self.row(mesh, p, &fan, count)).collect())
+        let samples = HemisphereSamples::new(count)?;
+        Ok(patches.par_iter().map(|&p| self.row(mesh, p, &samples, count)).collect())
     }
 
     /// The same on every machine, since it decides the order of shots; fewer where each takes long.
@@ -103,5 +110,6 @@ impl FormFactors for RayRows {
     }
 }
 
+/// What a ray meets that meets nothing, or a back; all else is an element.
 const OPEN: u32 = u32::MAX;
 const BACK: u32 = u32::MAX - 1;

@@ -1,7 +1,7 @@
 //! An open graphics device: errors of wgpu become errors of the crate, and waiting has an end.
 //!
 //! ```text
-//! with_error_scopes(work)      push scopes → work() → pop scopes → the first error, or work's result
+//! with_error_scopes(work)      push scopes → work() → pop scopes → an error, or work's result
 //! retry_with_smaller_batches   make(batch), make(batch/2), … until there is memory for it
 //! wait                         poll until all submitted work is done; DEVICE_TIMEOUT at most
 //! ```

@@ -3,10 +3,10 @@
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
-//! | `item_buffer.wgsl` | [`Corner`] ×3 and [`TriangleCells`] a triangle, [`FaceView`] ×5 a hemicube | u32 a pixel |
+//! | `item_buffer.wgsl` | [`Corner`] ×3, [`TriangleCells`], [`FaceView`] | u32 a pixel |
 //! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
-//! | `radiance.wgsl` | [`Corner`] ×3 and [`RadianceTriangle`] a triangle, [`RadianceView`] ×5 + tiles a point, [`Lattice`] a triangle, u32 a node, corner texels | 4 × f32 a pixel |
-//! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`] a tile, [`Summation`] | [`Sums`] a point |
+//! | `radiance.wgsl` | [`Corner`] ×3, [`RadianceTriangle`], [`RadianceView`], [`Lattice`] | f32 ×4 |
+//! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`], [`Summation`] | [`Sums`] a point |
 //!
 //! Members that a shader does not read pad the struct to WGSL's alignment.
 

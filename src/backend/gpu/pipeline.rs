@@ -33,8 +33,8 @@ pub fn compute(
     })
 }
 
-/// A pipeline that draws triangles: entry point `vertex`, then `fragment`. Depth is reversed: nearer
-/// is greater.
+/// A pipeline that draws triangles: entry point `vertex`, then `fragment`. Depth is reversed:
+/// nearer is greater.
 #[derive(Clone, Debug)]
 pub struct Draw<'a> {
     pub module: &'a wgpu::ShaderModule,

@@ -6,8 +6,8 @@
 //!                                                        [open, back, element 0, element 1, …]
 //! ```
 //!
-//! A thread adds up a strip of [`STRIP`] pixels of one column; sums meet in integer atomics, so that
-//! their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
+//! A thread adds up a strip of [`STRIP`] pixels of one column; sums meet in integer atomics, so
+//! that their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
 use super::layout::{Reduction, STRIP, WORKGROUP};
 use super::memory::Memory;

@@ -1,8 +1,8 @@
 //! The light to be gathered on the device: quadtrees, and the radiosity at their elements' corners.
 //!
 //! ```text
-//! lattices[t] ─► nodes[first + cell]  the node of that cell, at the deepest level that triangle t's
-//!                    │                quadtree is complete to
+//! lattices[t] ─► nodes[first + cell]  the node of that cell, at the deepest level that the
+//!                    │                quadtree of triangle t is complete to
 //!                    ▼
 //!                INNER + k ─► nodes[k .. k+4], its children, and so on down to
 //!                    e     ─► elements: corners a, b, c of element e in three lines of a texture

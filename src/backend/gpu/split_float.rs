@@ -1,5 +1,10 @@
-//! Coordinates as a device takes them: from the middle of the scene, in units of its size, each as the
-//! sum of two 32-bit numbers. They are the same for a scene of any scale, wherever it stands.
+//! Coordinates as a device takes them: from the middle of the scene, in units of its size, each as
+//! the sum of two 32-bit numbers. They are the same for a scene of any scale, wherever it stands.
+//!
+//! ```text
+//! p = (position − middle) / longest side  ≈  high + low       2⁻⁴⁸ of the scene's size is kept
+//! from the eye: (high − eye_high) + (low − eye_low)           the first difference is exact nearby
+//! ```
 
 use glam::DVec3;
 
@@ -20,8 +25,9 @@ impl SplitFloat {
         SplitFloat { origin: bounds.centre(), unit: bounds.longest_side() }
     }
 
-    /// The two parts of `p`: what 32 bits hold of it, and of the rest. What lies near an eye is told
-    /// apart however small it is: differences of the parts are added, and the first of them is exact.
+    /// The two parts of `p`, high and low: 32 bits of it, and 32 bits of the remainder. Differences
+    /// of parts are added, and near an eye the first of them is exact, so that small things there
+    /// keep their shape.
     pub fn parts(&self, p: DVec3) -> [[f32; 3]; 2] {
         let p = (p - self.origin) / self.unit;
         let high = p.as_vec3();

@@ -8,9 +8,9 @@ use crate::mesh::Mesh;
 use crate::scene::{Material, Rgb, Scene, Triangle};
 
 /// Shifts of pixel centres, pixels: none, then the other points of a grid of ±1/128 in steps of
-/// 1/256. Devices round corners of triangles to a grid of 1/256 pixel, and edge functions in 32 bits
-/// add less than that again: what a device draws at a pixel is what the twin draws at one of these
-/// points, or between them.
+/// 1/256. Devices round corners of triangles to a grid of 1/256 pixel, and edge functions in 32
+/// bits add less than that again: what a device draws at a pixel is what the twin draws at one of
+/// these points, or between them.
 pub fn offsets() -> Vec<[f64; 2]> {
     let steps = || (-2..=2).map(|k| f64::from(k) / 256.0);
     let grid = steps().flat_map(|y| steps().map(move |x| [x, y]));

@@ -25,8 +25,8 @@ fn viewport(k: usize, n: u32) -> Viewport {
     Viewport { x, y, width: TILE, height: TILE }
 }
 
-/// Every channel of a pixel lies between what the twin has within 1/128 pixel around its centre: see
-/// [`offsets`]. Beyond that 32-bit arithmetic of some 30 steps, each off by 2⁻²⁴ of the largest
+/// Every channel of a pixel lies between what the twin has within 1/128 pixel around its centre:
+/// see [`offsets`]. Beyond that 32-bit arithmetic of some 30 steps, each off by 2⁻²⁴ of the largest
 /// value in it, which is below `most`: 2⁻¹⁹ of that.
 fn compare_images(width: u32, device: &[Vec4], twins: &[Vec<Vec4>], what: &str) {
     let mut unsure = 0;
