@@ -25,7 +25,7 @@ mod split_float;
 #[cfg(test)]
 mod test_support;
 
-pub use crate::backend::AdapterInfo;
+pub use crate::backend::adapter::AdapterInfo;
 pub use device::Gpu;
 pub use gather::HemicubeGather;
 pub use limits::GpuLimits;

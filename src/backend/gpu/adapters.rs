@@ -2,7 +2,7 @@
 
 use super::error::place;
 use super::limits::GpuLimits;
-use crate::backend::{AdapterInfo, AdapterKind};
+use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
 
 const PACKAGES: &str = "install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers libvulkan1; \

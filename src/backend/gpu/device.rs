@@ -16,7 +16,7 @@ use super::adapters;
 use super::error::{device_error, invalid_result, message};
 use super::limits::{self, GpuLimits};
 use super::memory::{Memory, MemoryBudget};
-use crate::backend::AdapterInfo;
+use crate::backend::adapter::AdapterInfo;
 use crate::error::{Error, ErrorKind};
 
 /// An open graphics device. Clones are the same device.
