@@ -1,4 +1,15 @@
-//! Elements to vertices: a triangle mesh that carries radiosity, ready to be shown or exported.
+//! From elements to vertices: a triangle mesh that carries radiosity, to be shown or exported.
+//!
+//! ```text
+//!   elements ── keys: which vertices, shared over each smooth surface
+//!            ── area-weighted means ── boundary_fit: at the boundary of a smooth surface
+//!            │                      └─ corner_singularity: where surfaces meet there
+//!            ── one step of van Cittert deconvolution, against the smoothing
+//!            ── hanging_nodes: no cracks where element sizes differ ── VertexMesh
+//! ```
+//!
+//! This is the quick way, which sees no more than the elements. The exact one gathers light at each
+//! vertex: [`gather_at_vertices`](crate::gather::gather_at_vertices).
 
 mod boundary_fit;
 mod corner_singularity;
@@ -10,7 +21,7 @@ use glam::DVec3;
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::Rgb;
 use hanging_nodes::HangingNodes;
-use keys::Vertices;
+use keys::{ElementLoops, Vertices};
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
@@ -28,26 +39,27 @@ pub struct VertexMesh {
     pub normals: Vec<DVec3>,
     /// Radiosity B at the vertices, W/m² per channel, linear.
     pub radiosity: Vec<Rgb>,
-    /// How far the radiosity of each vertex and of the faces around it may be off, one standard error,
-    /// W/m²: a length over the channels. Empty where nothing is known of it.
+    /// Standard error of the radiosity at each vertex and over the faces around it, W/m²: a length
+    /// over the channels. Empty where it was not estimated.
     pub error: Vec<f64>,
     /// Faces, counter-clockwise from the front, as indices of vertices.
     pub faces: Vec<[u32; 3]>,
-    /// The element that each face is (a part of).
+    /// For each face, the index of the element that it is, or is a part of.
     pub elements: Vec<u32>,
-    /// What a reader of the file should know, one line each.
+    /// Comments for a file's header, one line each.
     pub comments: Vec<String>,
 }
 
 impl VertexMesh {
-    /// Radiosity at the vertices of `mesh` from that of its elements, one value an element.
+    /// Radiosity at the vertices of `mesh` from that of its elements: one value an element, W/m²
+    /// per channel.
     ///
-    /// First the area-weighted mean of the elements around each vertex (Cohen and Greenberg 1985),
-    /// at the boundary of a smooth surface a linear fit to them instead, with what is known not to
-    /// be linear kept out of it: light from surfaces that meet this one there. That smooths: the
-    /// mean over an element's corners is no longer the element's value. One step of van Cittert's
-    /// (1931) iteration gives most of it back, by adding the area-weighted mean of the differences.
-    /// No value is let below zero.
+    /// First the area-weighted mean of the elements around each vertex (Cohen and Greenberg 1985).
+    /// At the boundary of a smooth surface a linear fit to them takes its place, from which the
+    /// part is subtracted that is known not to be linear: light from surfaces that meet this one
+    /// there. Means smooth: the mean over an element's corners is no longer the element's value.
+    /// One step of van Cittert's (1931) iteration restores most of it, by adding the area-weighted
+    /// mean of the differences. No value is below zero.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
         VertexMesh::with_corners(mesh, element_radiosity).0
     }
@@ -57,66 +69,57 @@ impl VertexMesh {
         mesh: &Mesh,
         element_radiosity: &[Rgb],
     ) -> (VertexMesh, Vec<[u32; 3]>) {
-        let smooth = SurfaceTopology::new(mesh.scene());
-        let vertices = Vertices::new(mesh, &smooth);
-        let (positions, rims) = (&vertices.positions, &vertices.outlines);
-        let areas: Vec<f64> = rims.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
-        let mut around = vec![0.0; positions.len()];
-        rims.iter().for_each(|(e, rim)| rim.iter().for_each(|&v| around[v as usize] += areas[e]));
-        let mean = |value: &dyn Fn(usize, &[u32]) -> DVec3| {
-            let mut sums = vec![DVec3::ZERO; positions.len()];
-            for (e, rim) in rims.iter() {
-                let weighted = value(e, rim) * areas[e];
-                rim.iter().for_each(|&v| sums[v as usize] += weighted);
-            }
-            sums.into_iter().zip(&around).map(|(sum, area)| sum / area).collect::<Vec<_>>()
-        };
-        let normals = mean(&|e, _| mesh.normal(mesh.element(e)));
-        let mut smoothed = mean(&|e, _| element_radiosity[e]);
-        let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
-        boundary_fit::extrapolate(
-            mesh,
-            rims,
-            positions,
-            &normals,
-            element_radiosity,
-            &mut smoothed,
-        );
-        let missing = mean(&|e, rim| {
-            let corners = rim.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
-            element_radiosity[e] - corners / rim.len() as f64
+        let topology = SurfaceTopology::new(mesh.scene());
+        let vertices = Vertices::new(mesh, &topology);
+        let outlines = &vertices.outlines;
+        let average = VertexAverage::new(mesh, &vertices);
+        let normals: Vec<DVec3> = average
+            .mean(|e, _| mesh.normal(mesh.element(e)))
+            .into_iter()
+            .map(DVec3::normalize_or_zero)
+            .collect();
+        let mut smoothed = average.mean(|e, _| element_radiosity[e]);
+        let positions = &vertices.positions;
+        for (v, value) in
+            boundary_values(mesh, outlines, positions, &normals, element_radiosity, &smoothed)
+        {
+            smoothed[v] = value;
+        }
+        let lost = average.mean(|e, outline| {
+            let corners = outline.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
+            element_radiosity[e] - corners / outline.len() as f64
         });
-        let corrected = smoothed.iter().zip(missing).map(|(&b, m)| (b + m).max(Rgb::ZERO));
+        let restored = smoothed.iter().zip(lost).map(|(&b, lost)| (b + lost).max(Rgb::ZERO));
         let mut out = VertexMesh {
-            radiosity: corrected.collect(),
+            radiosity: restored.collect(),
             normals,
             positions: positions.clone(),
             ..Default::default()
         };
-        out.add_elements(mesh, &HangingNodes::new(mesh, &smooth, &vertices), |_, e| {
-            element_radiosity[e]
-        });
+        let hanging_nodes = HangingNodes::new(mesh, &topology, &vertices);
+        out.add_elements(mesh, &hanging_nodes, |_, e| element_radiosity[e]);
         (out, vertices.corners)
     }
 
-    /// Adds every element of `mesh` as a face, or as a fan where there are vertices on its sides;
-    /// `middle` says what the fan has in its middle, W/m².
+    /// Adds the hanging nodes, and every element of `mesh` as a face, or as a fan where there are
+    /// vertices on its sides. `centre_radiosity` gives the value at the centre of an element's fan,
+    /// W/m² per channel.
     pub(crate) fn add_elements(
         &mut self,
         mesh: &Mesh,
-        seams: &HangingNodes,
-        middle: impl Fn(&Self, usize) -> Rgb,
+        hanging_nodes: &HangingNodes,
+        centre_radiosity: impl Fn(&Self, usize) -> Rgb,
     ) {
-        for seam in &seams.vertices {
-            let [a, b] = seam.between.map(|v| v as usize);
-            self.positions.push(seam.position);
+        for node in &hanging_nodes.nodes {
+            let [a, b] = node.between.map(|v| v as usize);
+            self.positions.push(node.position);
             self.normals.push((self.normals[a] + self.normals[b]).normalize_or_zero());
             self.radiosity.push((self.radiosity[a] + self.radiosity[b]) / 2.0);
         }
-        for (e, rim) in seams.rims.iter() {
-            match *rim {
+        for (e, outline) in hanging_nodes.outlines.iter() {
+            match *outline {
                 [a, b, c] => self.add_face([a, b, c], e),
-                _ => self.add_fan(mesh, rim, e, middle(self, e)),
+                _ => self.add_fan(mesh, outline, e, centre_radiosity(self, e)),
             }
         }
     }
@@ -126,19 +129,19 @@ impl VertexMesh {
         self.elements.push(e as u32);
     }
 
-    /// Adds element `e` as a fan around its centroid.
-    fn add_fan(&mut self, mesh: &Mesh, rim: &[u32], e: usize, radiosity: Rgb) {
+    /// Adds element `e` as a fan around its centroid, which has `radiosity`.
+    fn add_fan(&mut self, mesh: &Mesh, outline: &[u32], e: usize, radiosity: Rgb) {
         let centre = self.positions.len() as u32;
         self.positions.push(mesh.centroid(mesh.element(e)));
         self.normals.push(mesh.normal(mesh.element(e)));
         self.radiosity.push(radiosity);
-        for (k, &a) in rim.iter().enumerate() {
-            self.add_face([centre, a, rim[(k + 1) % rim.len()]], e);
+        for (k, &a) in outline.iter().enumerate() {
+            self.add_face([centre, a, outline[(k + 1) % outline.len()]], e);
         }
     }
 
     /// The same mesh with each element's own value at all its corners: what the solver found,
-    /// nothing averaged. `element_radiosity` holds one value an element.
+    /// nothing averaged. `element_radiosity` holds one value an element, W/m² per channel.
     pub fn per_element(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
         let mut out = VertexMesh::default();
         for (e, &radiosity) in element_radiosity.iter().enumerate().take(mesh.element_count()) {
@@ -152,6 +155,61 @@ impl VertexMesh {
         }
         out
     }
+}
+
+/// Means over the elements around each vertex, weighted by area.
+struct VertexAverage<'a> {
+    outlines: &'a ElementLoops,
+    /// Area of each element, and of all elements around each vertex, scene unit squared.
+    element_areas: Vec<f64>,
+    vertex_areas: Vec<f64>,
+}
+
+impl VertexAverage<'_> {
+    fn new<'a>(mesh: &Mesh, vertices: &'a Vertices) -> VertexAverage<'a> {
+        let outlines = &vertices.outlines;
+        let element_areas: Vec<f64> =
+            outlines.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
+        let mut vertex_areas = vec![0.0; vertices.positions.len()];
+        for (e, outline) in outlines.iter() {
+            for &v in outline {
+                vertex_areas[v as usize] += element_areas[e];
+            }
+        }
+        VertexAverage { outlines, element_areas, vertex_areas }
+    }
+
+    /// The mean at each vertex of what `value` has for an element and its outline.
+    fn mean(&self, value: impl Fn(usize, &[u32]) -> DVec3) -> Vec<DVec3> {
+        let mut sums = vec![DVec3::ZERO; self.vertex_areas.len()];
+        for (e, outline) in self.outlines.iter() {
+            let weighted = value(e, outline) * self.element_areas[e];
+            for &v in outline {
+                sums[v as usize] += weighted;
+            }
+        }
+        sums.into_iter().zip(&self.vertex_areas).map(|(sum, area)| sum / area).collect()
+    }
+}
+
+/// Radiosity at the vertices on boundaries of smooth surfaces, W/m² per channel, with the index of
+/// each: a linear fit to the elements there, corrected where surfaces meet. Vertices with too few
+/// elements, or all of them on a line, keep what they have in `averaged`.
+fn boundary_values(
+    mesh: &Mesh,
+    outlines: &ElementLoops,
+    positions: &[DVec3],
+    normals: &[DVec3],
+    element_radiosity: &[Rgb],
+    averaged: &[Rgb],
+) -> Vec<(usize, Rgb)> {
+    let boundary = boundary_fit::boundary_vertices(mesh, outlines, positions, normals);
+    let fitted: Vec<Rgb> =
+        boundary.iter().map(|b| b.fitted(element_radiosity, averaged[b.vertex])).collect();
+    let corrected =
+        corner_singularity::correct_corner_exchange(mesh, &boundary, element_radiosity, &fitted);
+    let values = boundary.iter().map(|b| b.vertex).zip(corrected);
+    values.filter(|(_, value)| value.is_finite()).collect()
 }
 
 #[cfg(test)]
@@ -273,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_keeps_every_element_its_own_value() {
+    fn per_element_keeps_element_values() {
         let m = mesh(&SQUARE, &[([0, 1, 2], 0, 0), ([0, 2, 3], 0, 0)], 0.8);
         let values: Vec<Rgb> = (0..m.element_count()).map(|e| Rgb::splat(e as f64)).collect();
         let s = VertexMesh::per_element(&m, &values);

@@ -1,15 +1,27 @@
-//! Lights: what emits, in pieces that are looked at one by one.
+//! Lights: connected emitters, which gatherers sample explicitly.
+//!
+//! Emitting triangles of one material that share corners are one light. From a gather point, the
+//! few lights that could contribute most are sampled one by one (rays to points on them, or a view
+//! that they fill), each scaled by its closed-form unoccluded form factor:
+//!
+//! ```text
+//!   direct irradiance = Σ_lights E · F(point → light) · visible share
+//! ```
+//!
+//! All others are left to the samples over the hemisphere, like any other surface.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use super::GatherPoint;
 use crate::form_factor::closed_form::point_to_polygon;
+use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::position_key;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene};
 
-/// Emitting triangles of one material that hang together by corners.
+/// Emitting triangles of one material that are connected by shared corners.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
     /// Its triangles, ascending.
@@ -19,7 +31,7 @@ pub(crate) struct Light {
     /// Exitance of all of them, W/m² per channel.
     pub exitance: Rgb,
     /// Whether no part of it can hide another: all of it lies behind each of its triangles' planes.
-    /// Then the closed forms of the triangles that face a place add up to the light's.
+    /// Then the closed forms of the triangles that face a point add up to the light's.
     pub convex: bool,
 }
 
@@ -27,90 +39,103 @@ pub(crate) struct Light {
 #[derive(Clone, Debug)]
 pub(crate) struct Lights {
     scene: Arc<Scene>,
-    /// Every light.
+    /// Every light, by its lowest triangle.
     pub lights: Vec<Light>,
     /// Light of each triangle, or [`NO_LIGHT`].
     pub of_triangle: Vec<u32>,
 }
 
-/// What a triangle that does not emit has for a light.
+/// In place of a light's index, for triangles that do not emit. Shaders know the value.
 pub(crate) const NO_LIGHT: u32 = u32::MAX;
 
-/// Lights that are looked at one by one from a place, at most: those that could give most. The
-/// others are seen with all else.
-pub(crate) const APART: usize = 8;
+/// Lights that are sampled explicitly from one point, at most. Shaders know the value. Chosen by
+/// hand: cost is linear in it.
+pub(crate) const MAX_EXPLICIT_LIGHTS: usize = 8;
 
-/// Nor are those that could not give this share of what all lights could.
-const LEAST: f64 = 1e-3;
+/// Lights whose unoccluded irradiance is below this share of that of all lights are not sampled
+/// explicitly. Chosen by hand; no measurement kept.
+const MIN_IRRADIANCE_SHARE: f64 = 1e-3;
+
+/// Triangles of a light, up to which it is tested for convexity, which takes quadratic time; larger
+/// lights count as not convex. Chosen by hand.
+const MAX_CONVEX_TRIANGLES: usize = 1024;
+
+/// How far a corner may lie in front of a triangle's plane in a convex light, in units of the
+/// light's extent: above the rounding of coordinates. Chosen by hand.
+const COPLANAR_TOLERANCE: f64 = 1e-9;
 
 impl Lights {
     /// Finds the lights of `scene`.
     pub fn new(scene: Arc<Scene>) -> Lights {
         let count = scene.triangles().len();
-        let emits = |t: &usize| scene.material(*t).exitance != Rgb::ZERO;
+        let emitters: Vec<usize> =
+            (0..count).filter(|&t| scene.material(t).exitance != Rgb::ZERO).collect();
+        let connected = connected_emitters(&scene, &emitters);
+        let mut lights: Vec<Vec<u32>> = vec![];
         let mut of_triangle = vec![NO_LIGHT; count];
-        let mut at: HashMap<([u64; 3], u32), Vec<usize>> = HashMap::new();
-        let keys = |t: usize| {
-            let material = scene.triangles()[t].material;
-            scene.corners(t).map(|p| (position_key(p), material))
-        };
-        for t in (0..count).filter(emits) {
-            keys(t).into_iter().for_each(|k| at.entry(k).or_default().push(t));
-        }
-        let mut lights = vec![];
-        for start in (0..count).filter(emits) {
-            if of_triangle[start] != NO_LIGHT {
-                continue;
+        for (&t, &first) in emitters.iter().zip(&connected) {
+            if first == t {
+                of_triangle[t] = lights.len() as u32;
+                lights.push(vec![]);
             }
-            let id = lights.len() as u32;
-            let (mut triangles, mut open) = (vec![], vec![start]);
-            of_triangle[start] = id;
-            while let Some(t) = open.pop() {
-                triangles.push(t as u32);
-                for s in keys(t).into_iter().flat_map(|k| &at[&k]) {
-                    if of_triangle[*s] == NO_LIGHT {
-                        of_triangle[*s] = id;
-                        open.push(*s);
-                    }
-                }
-            }
-            triangles.sort_unstable();
-            let convex = is_convex(&scene, &triangles);
-            let exitance = scene.material(start).exitance;
-            let surface = AreaSampler::new(triangles.iter().map(|&t| scene.area(t as usize)));
-            lights.push(Light { triangles, surface, exitance, convex });
+            of_triangle[t] = of_triangle[first];
+            lights[of_triangle[t] as usize].push(t as u32);
         }
+        let lights = lights.into_iter().map(|triangles| Light::new(&scene, triangles)).collect();
         Lights { scene, lights, of_triangle }
     }
 
-    /// The lights that are worth a look of their own from `place`, most first, each with the form
-    /// factor from there to the whole of it, as if nothing were in between.
-    pub fn importance_ranked(&self, place: &GatherPoint) -> Vec<(u32, f64)> {
+    /// The lights that are worth explicit samples from `point`, those with the largest unoccluded
+    /// irradiance first, each with the unoccluded form factor from there to it.
+    pub fn importance_ranked(&self, point: &GatherPoint) -> Vec<(u32, f64)> {
         let factor = |light: &Light| -> f64 {
             let corners = light.triangles.iter().map(|&t| self.scene.corners(t as usize));
-            corners.map(|c| point_to_polygon(place.position, place.normal, &c)).sum()
+            corners.map(|c| point_to_polygon(point.position, point.normal, &c)).sum()
         };
         let all = (0..).zip(&self.lights).map(|(k, light)| (k, factor(light)));
-        let mut seen: Vec<(u32, f64)> = all.filter(|l| l.1 > 0.0).collect();
-        let power = |l: &(u32, f64)| l.1 * self.lights[l.0 as usize].exitance.max_element();
-        let least = LEAST * seen.iter().map(power).sum::<f64>();
-        seen.retain(|l| power(l) > least);
-        seen.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0)));
-        seen.truncate(APART);
-        seen
+        let mut ranked: Vec<(u32, f64)> = all.filter(|l| l.1 > 0.0).collect();
+        let irradiance = |l: &(u32, f64)| l.1 * self.lights[l.0 as usize].exitance.max_element();
+        let least = MIN_IRRADIANCE_SHARE * ranked.iter().map(irradiance).sum::<f64>();
+        ranked.retain(|l| irradiance(l) > least);
+        ranked.sort_by(|a, b| irradiance(b).total_cmp(&irradiance(a)).then(a.0.cmp(&b.0)));
+        ranked.truncate(MAX_EXPLICIT_LIGHTS);
+        ranked
     }
 }
 
-/// Slack of the test for convexity, in units of the light's extent: rounding of its corners.
-const FLAT: f64 = 1e-9;
+impl Light {
+    /// The light with these `triangles`, ascending, of one material.
+    fn new(scene: &Scene, triangles: Vec<u32>) -> Light {
+        Light {
+            surface: AreaSampler::new(triangles.iter().map(|&t| scene.area(t as usize))),
+            exitance: scene.material(triangles[0] as usize).exitance,
+            convex: is_convex(scene, &triangles),
+            triangles,
+        }
+    }
+}
+
+/// For each of `emitters` (ascending), the lowest one of its material that it is connected to by
+/// shared corners: itself, if there is no lower one.
+fn connected_emitters(scene: &Scene, emitters: &[usize]) -> Vec<usize> {
+    let mut sets = UnionFind::new(emitters.len());
+    let mut first_at_corner: FxHashMap<([u64; 3], u32), usize> = FxHashMap::default();
+    for (k, &t) in emitters.iter().enumerate() {
+        let material = scene.triangles()[t].material;
+        for corner in scene.corners(t) {
+            let first = *first_at_corner.entry((position_key(corner), material)).or_insert(k);
+            sets.join(first, k);
+        }
+    }
+    (0..emitters.len()).map(|k| emitters[sets.find(k)]).collect()
+}
 
 fn is_convex(scene: &Scene, triangles: &[u32]) -> bool {
     let corners: Vec<_> = triangles.iter().flat_map(|&t| scene.corners(t as usize)).collect();
     let extent = corners.iter().map(|p| p.distance(corners[0])).fold(0.0, f64::max);
-    // Quadratic in the triangles of a light: more than this are looked at as they are.
-    triangles.len() <= 1024
+    triangles.len() <= MAX_CONVEX_TRIANGLES
         && triangles.iter().all(|&t| {
             let (normal, on) = (scene.normal(t as usize), scene.corners(t as usize)[0]);
-            corners.iter().all(|p| normal.dot(p - on) <= FLAT * extent)
+            corners.iter().all(|p| normal.dot(p - on) <= COPLANAR_TOLERANCE * extent)
         })
 }

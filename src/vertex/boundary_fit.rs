@@ -1,137 +1,128 @@
-//! Vertices at the boundary of a smooth surface: extrapolated, since all their elements lie to one
-//! side and a mean would be that of a place further in.
+//! Values at the boundary of a smooth surface, by a linear fit.
+//!
+//! All elements around a boundary vertex lie to one side of it, so their mean is the value at a
+//! point further in. Instead, a linear function is fitted to the elements around the vertex and
+//! around their vertices, and extrapolated:
+//!
+//! ```text
+//!   boundary ──v──●──●──   B ≈ a + g · (x − x_v) in the tangent plane at v,
+//!             │╲ ╱│╲ ╱│    least squares over element centroids x,
+//!             ●──●──●──    weights A / (|x − x_v|² + A) for elements of area A;
+//!             │╲ ╱│╲ ╱│    the value at v is a
+//! ```
+//!
+//! The solution is linear in the elements' values, so a fit is kept as one weight per element.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::corner_singularity;
 use super::keys::ElementLoops;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
-/// Elements that a plane is fitted to, at least: three would let it swing freely.
-const FEWEST: usize = 4;
+/// Elements that a plane is fitted to, at least: through three it passes exactly, and swings with
+/// their noise.
+const MIN_FIT_POINTS: usize = 4;
 
-/// How far the weights of a fit may be from a sum of one.
-const ROUNDING: f64 = 1e-6;
+/// How far the weights of a fit may be from a sum of one. More is a singular matrix: all centroids
+/// are close to one line. Far above the rounding of a regular one; chosen by hand.
+const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
-/// A vertex with as many elements around it is a hub. Six are usual, and the pole of a fine sphere
-/// has some hundred.
-const HUB: usize = 256;
+/// Vertices with at least this many elements around them are not grown across: every element there
+/// would have all others in its ring, which takes quadratic time. Six are usual, and the pole of a
+/// fine sphere has some hundred. Chosen by hand.
+const MAX_VALENCE: usize = 256;
 
-/// Replaces in `radiosity` the value of every boundary vertex by that of a linear fit to the
-/// elements around it and around its neighbours, weighted by area and nearness, mended by what it
-/// gets from surfaces that meet there. Vertices with too few elements, or all of them on a line,
-/// keep what they have. No value is let below zero.
-pub(super) fn extrapolate(
-    mesh: &Mesh,
-    rims: &ElementLoops,
-    positions: &[DVec3],
-    normals: &[DVec3],
-    element_radiosity: &[Rgb],
-    radiosity: &mut [Rgb],
-) {
-    let ends = ends(mesh, rims, positions, normals);
-    let fitted = |end: &BoundaryVertex| {
-        let terms = end.fit.iter().map(|&(e, weight)| element_radiosity[e as usize] * weight);
-        if end.fit.is_empty() { radiosity[end.vertex] } else { terms.sum() }
-    };
-    let fitted: Vec<Rgb> = ends.iter().map(fitted).collect();
-    let mended = corner_singularity::mend(mesh, &ends, element_radiosity, &fitted);
-    for (end, value) in ends.iter().zip(mended) {
-        if value.is_finite() {
-            radiosity[end.vertex] = value;
+/// A vertex on the boundary of a smooth surface.
+pub(super) struct BoundaryVertex {
+    /// Index of the vertex.
+    pub vertex: usize,
+    /// Its position, scene unit.
+    pub position: DVec3,
+    /// Elements and their weights in the linear fit, which sum to one; empty where there is no fit.
+    pub fit: Vec<(u32, f64)>,
+    /// Elements of this surface within three rings, ascending.
+    pub neighbourhood: Vec<u32>,
+}
+
+impl BoundaryVertex {
+    /// The fit's value for these values of elements; `fallback` where there is no fit.
+    pub fn fitted(&self, elements: &[Rgb], fallback: Rgb) -> Rgb {
+        if self.fit.is_empty() {
+            return fallback;
         }
+        self.fit.iter().map(|&(e, weight)| elements[e as usize] * weight).sum()
     }
 }
 
-/// A boundary vertex, where a surface ends.
-pub(super) struct BoundaryVertex {
-    pub vertex: usize,
-    pub position: DVec3,
-    /// Elements and their weights in the linear fit; nothing where there is no fit.
-    pub fit: Vec<(u32, f64)>,
-    /// Elements of this surface within three rings, ascending.
-    pub wide: Vec<u32>,
-}
-
-/// The ends of all surfaces, by ascending vertex.
-pub(super) fn ends(
+/// The boundary vertices of all smooth surfaces, by ascending vertex.
+pub(super) fn boundary_vertices(
     mesh: &Mesh,
-    rims: &ElementLoops,
+    outlines: &ElementLoops,
     positions: &[DVec3],
     normals: &[DVec3],
 ) -> Vec<BoundaryVertex> {
-    let around = elements_around(rims, positions.len());
-    let end = |vertex: usize| {
-        let near = ring(rims, &around, &around[vertex]);
-        let wide = ring(rims, &around, &near);
+    let around = outlines.elements_around(positions.len());
+    let boundary_vertex = |vertex: usize| {
+        let near = ring(outlines, &around, &around[vertex]);
+        let neighbourhood = ring(outlines, &around, &near);
         let position = positions[vertex];
-        BoundaryVertex { vertex, position, fit: fit(mesh, near, position, normals[vertex]), wide }
+        let fit = linear_fit(mesh, near, position, normals[vertex]);
+        BoundaryVertex { vertex, position, fit, neighbourhood }
     };
-    boundary(rims).into_par_iter().map(end).collect()
+    vertices_on_boundary(outlines).into_par_iter().map(boundary_vertex).collect()
 }
 
-/// Weights with which values at the centroids of `near` sum up to that of their linear fit at `at`;
-/// none if they do not define one.
-fn fit(mesh: &Mesh, near: Vec<u32>, at: DVec3, normal: DVec3) -> Vec<(u32, f64)> {
-    if near.len() < FEWEST {
+/// Weights with which values at the centroids of `elements` sum up to that of their linear fit at
+/// `position`; empty if they do not define one.
+fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -> Vec<(u32, f64)> {
+    if elements.len() < MIN_FIT_POINTS {
         return vec![];
     }
     let (tangent, bitangent) = normal.any_orthonormal_pair();
-    // Normal equations of B ≈ a + g·(x − x_v) in the tangent plane; a is what is wanted.
+    // Normal equations for (a, g); only a is wanted, which is the first row of the inverse.
     let mut matrix = DMat3::ZERO;
     let row_of = |e: u32| {
         let node = mesh.element(e as usize);
-        let (offset, area) = (mesh.centroid(node) - at, mesh.area(node));
+        let (offset, area) = (mesh.centroid(node) - position, mesh.area(node));
         let weight = area / (offset.length_squared() + area);
         let scale = 1.0 / area.sqrt();
         let x = DVec3::new(1.0, offset.dot(tangent) * scale, offset.dot(bitangent) * scale);
         matrix += DMat3::from_cols(x * x.x, x * x.y, x * x.z) * weight;
         (e, x * weight)
     };
-    let rows: Vec<(u32, DVec3)> = near.into_iter().map(row_of).collect();
+    let rows: Vec<(u32, DVec3)> = elements.into_iter().map(row_of).collect();
     let first = matrix.inverse().row(0);
     let weights: Vec<(u32, f64)> = rows.into_iter().map(|(e, x)| (e, first.dot(x))).collect();
-    // They sum to one, but for rounding, which is all that is left of centroids close to a line.
     let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    if (sum - 1.0).abs() < ROUNDING { weights } else { vec![] }
+    if (sum - 1.0).abs() < MAX_WEIGHT_SUM_ERROR { weights } else { vec![] }
 }
 
-/// The elements that share a vertex with one of `elements`, those included, ascending. Hubs do not
-/// count: all at a hub would have all others there in their rings.
-fn ring(rims: &ElementLoops, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
-    let vertices = elements.iter().flat_map(|&e| rims.of(e as usize));
-    let others = vertices.map(|&v| &around[v as usize]).filter(|others| others.len() < HUB);
-    let mut ring: Vec<u32> = others.flatten().chain(elements).copied().collect();
+/// The elements that share a vertex with one of `elements`, those included, ascending; see
+/// [`MAX_VALENCE`].
+fn ring(outlines: &ElementLoops, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
+    let vertices = elements.iter().flat_map(|&e| outlines.of(e as usize));
+    let neighbours = vertices.map(|&v| &around[v as usize]).filter(|n| n.len() < MAX_VALENCE);
+    let mut ring: Vec<u32> = neighbours.flatten().chain(elements).copied().collect();
     ring.sort_unstable();
     ring.dedup();
     ring
 }
 
 /// Vertices on a side that only one element has, ascending.
-fn boundary(rims: &ElementLoops) -> Vec<usize> {
-    let mut sides: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-    for (_, rim) in rims.iter() {
-        for (k, &a) in rim.iter().enumerate() {
-            let b = rim[(k + 1) % rim.len()];
-            *sides.entry((a.min(b), a.max(b))).or_default() += 1;
+fn vertices_on_boundary(outlines: &ElementLoops) -> Vec<usize> {
+    let mut occurrences: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    for (_, outline) in outlines.iter() {
+        for (k, &a) in outline.iter().enumerate() {
+            let b = outline[(k + 1) % outline.len()];
+            *occurrences.entry((a.min(b), a.max(b))).or_default() += 1;
         }
     }
-    let single = sides.into_iter().filter(|&(_, count)| count == 1);
+    let single = occurrences.into_iter().filter(|&(_, count)| count == 1);
     let mut vertices: Vec<usize> =
         single.flat_map(|((a, b), _)| [a as usize, b as usize]).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices
-}
-
-/// The elements around each vertex.
-fn elements_around(rims: &ElementLoops, vertices: usize) -> Vec<Vec<u32>> {
-    let mut around = vec![vec![]; vertices];
-    for (e, rim) in rims.iter() {
-        rim.iter().for_each(|&v| around[v as usize].push(e as u32));
-    }
-    around
 }

@@ -27,7 +27,7 @@ use super::sources::SourceBuffers;
 use super::split_float::SplitFloat;
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_projection::LightProjection;
-use crate::gather::lights::{APART, Lights, NO_LIGHT};
+use crate::gather::lights::{Lights, MAX_EXPLICIT_LIGHTS, NO_LIGHT};
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::Mesh;
@@ -95,7 +95,7 @@ impl HemicubeGather {
         hemicube::check_resolution(resolution)?;
         let scene = mesh.scene();
         let lights = Lights::new(mesh.shared_scene());
-        let tiles = lights.lights.len().min(APART) as u32;
+        let tiles = lights.lights.len().min(MAX_EXPLICIT_LIGHTS) as u32;
         let size = target_size(gpu.limits(), scene, resolution, tiles)?;
         let brightest = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
         let mut gather = HemicubeGather {
@@ -158,7 +158,7 @@ impl HemicubeGather {
         });
         let frame =
             Frame::new(point.normal, self.rotations.at(point.position, point.near) * FRAC_PI_2);
-        let mut ids = [NO_LIGHT; APART];
+        let mut ids = [NO_LIGHT; MAX_EXPLICIT_LIGHTS];
         for (id, light) in ids.iter_mut().zip(&lights) {
             *id = light.0;
         }

@@ -12,7 +12,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::gather::lights::APART;
+use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 
 /// A corner of a triangle, in two parts: see [`super::split_float`].
 #[repr(C)]
@@ -71,7 +71,7 @@ pub struct RadianceView {
     pub light_count: u32,
     pub eye_low: [f32; 3],
     pub padding: u32,
-    pub lights: [u32; APART],
+    pub lights: [u32; MAX_EXPLICIT_LIGHTS],
 }
 
 /// What a triangle emits, and which of the scene's it is.
@@ -122,7 +122,7 @@ pub struct Sums {
     pub back: f32,
     pub nearness: f32,
     pub padding: [f32; 2],
-    pub lights: [[f32; 2]; APART],
+    pub lights: [[f32; 2]; MAX_EXPLICIT_LIGHTS],
 }
 
 /// Pixels along an edge of a light's tile.
@@ -280,7 +280,7 @@ mod tests {
         let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
         assert_eq!(constant(&radiance, "INNER"), INNER);
         assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
-        assert_eq!(constant(&radiance, "MAX_EXPLICIT_LIGHTS"), APART as u32);
+        assert_eq!(constant(&radiance, "MAX_EXPLICIT_LIGHTS"), MAX_EXPLICIT_LIGHTS as u32);
         assert_eq!(constant(&gather, "TILE"), TILE);
         assert_eq!(constant(&gather, "LANES"), LANES);
         // The shader writes a point's numbers one after the other.
