@@ -1,4 +1,12 @@
-//! The camera image: radiance interpolated over the mesh, antialiased.
+//! Images of a solution: a pinhole camera, with the radiance of diffuse surfaces, B/π.
+//!
+//! ```text
+//!   pixel ── n × n primary rays ── nearest face ── radiosity interpolated from its vertices
+//!                                                └─ or gathered there: camera/gathered.rs
+//! ```
+//!
+//! Rays lie on a grid sheared by one sub-pixel per row and column (n-rooks), so that an edge along
+//! the pixels crosses them one by one, which makes n² levels of antialiasing instead of n.
 
 mod gathered;
 
@@ -13,11 +21,11 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 /// A pinhole camera. Up in the image is +y, or −z where the camera looks along y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where the camera stands.
+    /// Position of the pinhole, scene unit.
     pub eye: DVec3,
-    /// A point in the middle of the image.
+    /// A point that is seen in the middle of the image, scene unit.
     pub target: DVec3,
-    /// Angle between the lowest and the highest line of sight, degrees, in (0, 180).
+    /// Vertical field of view, from the image's lower to its upper edge: degrees, in (0, 180).
     pub vertical_fov: f64,
 }
 
@@ -32,15 +40,22 @@ pub struct RadianceImage {
     pub pixels: Vec<Rgb>,
 }
 
-/// Largest image side in pixels.
+/// Largest image side, pixels. Chosen by hand: memory for the pixels is 24 GiB there.
 const MAX_SIDE: u32 = 1 << 15;
 
+/// Primary rays along a pixel's side, at most. Chosen by hand.
+const MAX_SAMPLES: u32 = 256;
+
+/// Cosine between the view direction and ±y from which on −z is up in the image instead of +y.
+/// Chosen by hand.
+const VERTICAL_VIEW: f64 = 0.9999;
+
 impl Camera {
-    /// Draws `surface` with `width` × `height` pixels, each the mean of `samples` × `samples`
-    /// lines of sight (box filter) on a grid that is turned a little, so that an edge along pixels
-    /// does not meet a whole row of them at once: none has another beside or below it.
+    /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
+    /// `samples` primary rays on an n-rooks grid: no two in one row or column.
     ///
-    /// Radiance is radiosity over π. Backs of faces and the void are black.
+    /// Radiance is the interpolated radiosity over π. Backs of faces, and rays that meet nothing,
+    /// are black.
     ///
     /// # Errors
     /// Those of [`Camera::check`].
@@ -51,10 +66,10 @@ impl Camera {
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        let sight = PrimaryRays::new(self, surface, width, height, samples)?;
+        let rays = PrimaryRays::new(self, surface, width, height, samples)?;
         let pixel = |k: u32| {
-            let sum: Rgb = sight.hits(k).map(|hit| sight.at(&hit, &surface.radiosity)).sum();
-            sum * sight.share / std::f64::consts::PI
+            let sum: Rgb = rays.hits(k).map(|hit| rays.interpolate(&hit, &surface.radiosity)).sum();
+            sum * rays.weight / std::f64::consts::PI
         };
         let pixels = (0..width * height).into_par_iter().map(pixel).collect();
         Ok(RadianceImage { width, height, pixels })
@@ -63,7 +78,7 @@ impl Camera {
     /// Right, up and forward of the view, unit length.
     fn frame(&self) -> [DVec3; 3] {
         let forward = (self.target - self.eye).normalize();
-        let vertical = if forward.y.abs() > 0.9999 { DVec3::NEG_Z } else { DVec3::Y };
+        let vertical = if forward.y.abs() > VERTICAL_VIEW { DVec3::NEG_Z } else { DVec3::Y };
         let right = forward.cross(vertical).normalize();
         [right, right.cross(forward), forward]
     }
@@ -80,7 +95,7 @@ impl Camera {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return bad(format!("an image of {width} × {height}"), "use 1 to 32768 pixels a side");
         }
-        if !(1..=256).contains(&samples) {
+        if !(1..=MAX_SAMPLES).contains(&samples) {
             return bad(format!("{samples} samples"), "use 1 to 256 along a pixel's side");
         }
         if !(self.vertical_fov > 0.0 && self.vertical_fov < 180.0) {
@@ -96,20 +111,22 @@ impl Camera {
     }
 }
 
-/// The lines of sight through the pixels of an image, and what they meet.
+/// The primary rays through the pixels of an image, and the surface that they meet.
 struct PrimaryRays<'a> {
     surface: &'a VertexMesh,
-    rays: RayScene,
+    scene: RayScene,
     eye: DVec3,
-    /// A line of sight at the image's top left corner, and from there to the right and downwards by
-    /// a sample each.
+    /// Direction to the upper left corner of the image, at distance 1 along the view's axis.
     corner: DVec3,
+    /// Steps of a sub-pixel to the right and downwards there.
     right: DVec3,
     down: DVec3,
+    /// Pixels in a row.
     width: u32,
+    /// Rays along a pixel's side.
     samples: u32,
-    /// Of each line in its pixel.
-    share: f64,
+    /// Weight of each ray in its pixel: 1 / samples².
+    weight: f64,
 }
 
 impl PrimaryRays<'_> {
@@ -123,45 +140,46 @@ impl PrimaryRays<'_> {
         camera.check(width, height, samples)?;
         let [right, up, forward] = camera.frame();
         let corner = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let rays = RayScene::new(surface.faces.iter().map(corner));
+        let scene = RayScene::new(surface.faces.iter().map(corner));
         let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
         let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
         let (right, down) = (right * step, -up * step);
         let half = |pixels: u32| f64::from(pixels) * f64::from(samples) / 2.0;
         let corner = forward - right * half(width) - down * half(height);
-        let share = 1.0 / f64::from(samples * samples);
+        let weight = 1.0 / f64::from(samples * samples);
         Ok(PrimaryRays {
             surface,
-            rays,
+            scene,
             eye: camera.eye,
             corner,
             right,
             down,
             width,
             samples,
-            share,
+            weight,
         })
     }
 
-    /// The fronts that the lines of sight of pixel `k` meet. The other lines meet backs or nothing.
+    /// The fronts that the rays of pixel `k` hit first. The other rays hit backs or nothing.
     fn hits(&self, k: u32) -> impl Iterator<Item = Hit> {
         let n = self.samples;
-        let share = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
+        // Middle of row or column k of an n × n grid within a sub-pixel.
+        let middle = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
         (0..n * n).filter_map(move |s| {
             let (i, j) = (s % n, s / n);
-            let x = f64::from(k % self.width * n + i) + share(j);
-            let y = f64::from(k / self.width * n + j) + share(n - 1 - i);
+            let x = f64::from(k % self.width * n + i) + middle(j);
+            let y = f64::from(k / self.width * n + j) + middle(n - 1 - i);
             self.hit(self.corner + self.right * x + self.down * y)
         })
     }
 
-    /// The front that is met along `direction` from the eye, if that comes first.
+    /// The front that the ray along `direction` hits first, if it hits a front.
     fn hit(&self, direction: DVec3) -> Option<Hit> {
-        self.rays.closest_hit(self.eye, direction, 0.0, None).filter(|hit| hit.front)
+        self.scene.closest_hit(self.eye, direction, 0.0, None).filter(|hit| hit.front)
     }
 
-    /// What is interpolated where a line meets the surface from values at its vertices.
-    fn at(&self, hit: &Hit, values: &[DVec3]) -> DVec3 {
+    /// Values at the surface's vertices, interpolated linearly to a hit.
+    fn interpolate(&self, hit: &Hit, values: &[DVec3]) -> DVec3 {
         let [a, b, c] = self.surface.faces[hit.triangle].map(|v| values[v as usize]);
         a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
     }

@@ -1,4 +1,13 @@
-//! The camera image for the final picture: each pixel gathers the light where it looks.
+//! Images with gathered light: every pixel gathers the irradiance where it looks.
+//!
+//! ```text
+//!   pixel's primary rays ── group by smooth surface ── split groups with an edge of a shadow
+//!     └ each group gathers once, in its middle:  L = (E + ρ · irradiance) / π, weighted by rays
+//! ```
+//!
+//! Irradiance is smooth within a group, so one gather stands for all of its rays, while the edges
+//! of objects are antialiased by all of them. Edges of shadows show in the radiosity at vertices,
+//! which is interpolated at no cost: groups in which that varies are halved.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -17,62 +26,69 @@ use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 
-/// Lines of sight that are cast at once.
-const BAND: u32 = 1 << 16;
+/// Primary rays that are cast at once: bounds the memory for their hits, some 10 MiB. Chosen by
+/// hand.
+const RAYS_PER_BAND: u32 = 1 << 16;
 
-/// Lines of sight share a gather unless the vertices' values differ by more than this share among
-/// them: at edges of shadows.
-const VARIES: f64 = 0.1;
+/// Gather points in the first batch; later ones follow the clock. Chosen by hand: results do not
+/// depend on it.
+const FIRST_BATCH: usize = 64;
+
+/// Rays share a gather unless the interpolated radiosity differs among them by more than this share
+/// of its mean: there is an edge of a shadow between them. Chosen by hand; no measurement kept.
+const EDGE_CONTRAST: f64 = 0.1;
 
 impl Camera {
-    /// Draws `light` with the lines of sight of [`Camera::image`], but lets the pixels gather for
-    /// themselves: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr), with the
-    /// irradiance that `gather` finds there.
+    /// Draws `light` with the primary rays of [`Camera::image`], but with irradiance gathered where
+    /// they meet the surface: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr).
     ///
-    /// Lines of one pixel that meet the same smooth surface share one gather in their middle, unless
-    /// the vertices tell of an edge of a shadow between them. So most pixels gather once, while edges
-    /// are as clean as the lines are dense. What reflects nothing does not gather. `progress` is told
-    /// how many pixels are done, and of how many, several times a second. It may stop the work: then
-    /// there is no image.
+    /// Rays of one pixel that meet the same smooth surface share one gather in their middle, unless
+    /// the radiosity at the vertices shows an edge of a shadow between them. So most pixels gather
+    /// once, while edges are as clean as the rays are dense. Surfaces that reflect nothing do not
+    /// gather. `progress` is called with the number of pixels done and of all pixels, several times
+    /// a second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
-    /// Those of [`Camera::check`]; whatever `gather` fails with.
+    /// Those of [`Camera::check`] and of `gatherer`.
     pub fn gathered_image(
         &self,
         light: &GatheredMesh,
-        gather: &mut dyn Gather,
+        gatherer: &mut dyn Gather,
         width: u32,
         height: u32,
         samples: u32,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let sight = PrimaryRays::new(self, &light.surface, width, height, samples)?;
-        let view = View::new(sight, light);
+        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let view = GatheredView::new(rays, light);
+        let field = light.radiosity_field();
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
-        let (of, band) = (pixels.len(), (BAND / (samples * samples)).max(1));
-        let mut pace = BatchSizer::new(64);
+        let total = pixels.len();
+        let band = (RAYS_PER_BAND / (samples * samples)).max(1);
+        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
         for start in (0..width * height).step_by(band as usize) {
             let end = start.saturating_add(band).min(width * height);
-            let parts = view.parts(start..end);
-            let (gathers, others): (Vec<Part>, Vec<Part>) =
-                parts.into_iter().partition(|part| part.reflectance != Rgb::ZERO);
-            others.iter().for_each(|part| pixels[part.pixel] += part.known);
-            let mut left = &gathers[..];
-            while !left.is_empty() {
-                let done = pace.next(&mut left, |now| {
-                    let places: Vec<GatherPoint> = now.iter().map(|part| part.place).collect();
-                    let found = gather.gather(&light.radiosity_field(), &places)?;
-                    for (part, found) in now.iter().zip(&found) {
-                        pixels[part.pixel] += part.radiance(found);
+            let (gathering, others): (Vec<PixelPart>, Vec<PixelPart>) =
+                view.parts(start..end).into_iter().partition(|p| p.reflectance != Rgb::ZERO);
+            for part in others {
+                pixels[part.pixel] += part.interpolated;
+            }
+            let mut queue = &gathering[..];
+            while !queue.is_empty() {
+                let done = batch_sizer.next(&mut queue, |batch| {
+                    let points: Vec<GatherPoint> = batch.iter().map(|part| part.point).collect();
+                    let gathered = gatherer.gather(&field, &points)?;
+                    for (part, sample) in batch.iter().zip(&gathered) {
+                        pixels[part.pixel] += part.radiance(sample);
                     }
-                    // Of the last pixel, parts may be left.
-                    Ok::<_, Error>(now.last().map_or(0, |part| part.pixel))
+                    // Parts of the last pixel may be in the next batch.
+                    Ok::<_, Error>(batch.last().map_or(0, |part| part.pixel))
                 })?;
-                if progress(done, of).is_break() {
+                if progress(done, total).is_break() {
                     return Ok(None);
                 }
             }
-            if progress(end as usize, of).is_break() {
+            if progress(end as usize, total).is_break() {
                 return Ok(None);
             }
         }
@@ -80,119 +96,133 @@ impl Camera {
     }
 }
 
-/// What a pixel sees of one smooth surface.
-struct Part {
+/// A group of a pixel's rays that meet one smooth surface and share a gather.
+struct PixelPart {
     pixel: usize,
-    place: GatherPoint,
+    point: GatherPoint,
     /// Square root of the element's area, scene unit.
     size: f64,
-    /// Share of the pixel, in (0, 1].
-    share: f64,
+    /// Share of the pixel's rays, in (0, 1].
+    weight: f64,
     exitance: Rgb,
     reflectance: Rgb,
-    /// What it adds to the pixel by the values at vertices, W/(m² sr).
-    known: Rgb,
+    /// What it adds to the pixel by the radiosity at vertices, W/(m² sr).
+    interpolated: Rgb,
 }
 
-impl Part {
-    /// What it adds to the pixel by what was gathered, W/(m² sr).
-    fn radiance(&self, found: &IrradianceSample) -> Rgb {
-        if is_buried(found, self.size) {
-            return self.known;
+impl PixelPart {
+    /// What it adds to the pixel by the irradiance gathered at its point, W/(m² sr).
+    fn radiance(&self, sample: &IrradianceSample) -> Rgb {
+        if is_buried(sample, self.size) {
+            return self.interpolated;
         }
-        (self.exitance + self.reflectance * found.irradiance) * self.share / PI
+        (self.exitance + self.reflectance * sample.irradiance) * self.weight / PI
     }
 }
 
-/// Settled light, as it is looked at.
-struct View<'a> {
-    sight: PrimaryRays<'a>,
+/// A solution as the camera's rays meet it.
+struct GatheredView<'a> {
+    rays: PrimaryRays<'a>,
     light: &'a GatheredMesh,
-    above: SurfaceOffset,
-    /// Per triangle, the smooth surface that it is a part of.
+    offset: SurfaceOffset,
+    /// Per triangle of the scene, the smooth surface that it is a part of.
     surfaces: Vec<u32>,
 }
 
-impl View<'_> {
-    fn new<'a>(sight: PrimaryRays<'a>, light: &'a GatheredMesh) -> View<'a> {
+impl GatheredView<'_> {
+    fn new<'a>(rays: PrimaryRays<'a>, light: &'a GatheredMesh) -> GatheredView<'a> {
         let scene = light.mesh.scene();
-        View {
-            sight,
+        GatheredView {
+            rays,
             light,
-            above: SurfaceOffset::new(scene),
+            offset: SurfaceOffset::new(scene),
             surfaces: SurfaceTopology::new(scene).surfaces(),
         }
     }
 
-    /// What a range of pixels sees, in their order.
-    fn parts(&self, pixels: Range<u32>) -> Vec<Part> {
-        let parts: Vec<Vec<Part>> = pixels.into_par_iter().map(|k| self.parts_of(k)).collect();
+    /// The parts of a range of pixels, in their order.
+    fn parts(&self, pixels: Range<u32>) -> Vec<PixelPart> {
+        let parts: Vec<Vec<PixelPart>> =
+            pixels.into_par_iter().map(|k| self.parts_of_pixel(k)).collect();
         parts.into_iter().flatten().collect()
     }
 
-    fn parts_of(&self, pixel: u32) -> Vec<Part> {
-        let mut surfaces: Vec<(u32, Vec<Hit>)> = vec![];
-        for hit in self.sight.hits(pixel) {
-            let surface = self.surface(&hit);
-            match surfaces.iter_mut().find(|s| s.0 == surface) {
+    fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
+        let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
+        for hit in self.rays.hits(pixel) {
+            let surface = self.smooth_surface(&hit);
+            match groups.iter_mut().find(|group| group.0 == surface) {
                 Some((_, hits)) => hits.push(hit),
-                None => surfaces.push((surface, vec![hit])),
+                None => groups.push((surface, vec![hit])),
             }
         }
         let mut parts = vec![];
-        surfaces.iter().for_each(|(_, hits)| self.add_parts(pixel as usize, hits, &mut parts));
+        for (_, hits) in &groups {
+            self.add_parts(pixel as usize, hits, &mut parts);
+        }
         parts
     }
 
-    /// Adds what the lines that hit one surface see of it: one part, or more where the light varies.
-    fn add_parts(&self, pixel: usize, hits: &[Hit], parts: &mut Vec<Part>) {
-        let values = || hits.iter().map(|hit| self.sight.at(hit, &self.light.surface.radiosity));
-        let known: Rgb = values().sum();
-        let low = values().fold(Rgb::INFINITY, Rgb::min);
-        let spread = (values().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
-        if hits.len() > 1 && spread.length() > VARIES * known.length() {
-            let (above, below) = hits.split_at(hits.len() / 2);
-            self.add_parts(pixel, above, parts);
-            self.add_parts(pixel, below, parts);
+    /// Adds the hits on one smooth surface: as one part, or as several where the radiosity varies.
+    fn add_parts(&self, pixel: usize, hits: &[Hit], parts: &mut Vec<PixelPart>) {
+        let radiosity =
+            || hits.iter().map(|hit| self.rays.interpolate(hit, &self.light.surface.radiosity));
+        let sum: Rgb = radiosity().sum();
+        let low = radiosity().fold(Rgb::INFINITY, Rgb::min);
+        let spread = (radiosity().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
+        if hits.len() > 1 && spread.length() > EDGE_CONTRAST * sum.length() {
+            // Hits are in order of sub-pixel rows: the upper and the lower half.
+            let (upper, lower) = hits.split_at(hits.len() / 2);
+            self.add_parts(pixel, upper, parts);
+            self.add_parts(pixel, lower, parts);
             return;
         }
-        let hit = self.middle(hits);
+        let hit = self.middle_hit(hits);
         let (surface, mesh) = (&self.light.surface, &self.light.mesh);
         let node = mesh.element(self.element(&hit));
         let (size, material) = (mesh.area(node).sqrt(), mesh.material(node));
-        let normal = self.sight.at(&hit, &surface.normals).normalize_or(mesh.normal(node));
-        parts.push(Part {
+        let normal = self.rays.interpolate(&hit, &surface.normals).normalize_or(mesh.normal(node));
+        let position = self.rays.interpolate(&hit, &surface.positions);
+        parts.push(PixelPart {
             pixel,
-            place: self.above.gather_point(self.sight.at(&hit, &surface.positions), normal, size),
+            point: self.offset.gather_point(position, normal, size),
             size,
-            share: self.sight.share * hits.len() as f64,
+            weight: self.rays.weight * hits.len() as f64,
             exitance: material.exitance,
             reflectance: material.reflectance,
-            known: known * self.sight.share / PI,
+            interpolated: sum * self.rays.weight / PI,
         });
     }
 
-    /// Where the line of sight through the mean of `hits` meets their surface, or else the nearest of
-    /// them. Light that is linear over the surface has its mean there.
-    fn middle(&self, hits: &[Hit]) -> Hit {
-        let position = |hit: &Hit| self.sight.at(hit, &self.light.surface.positions);
+    /// The hit of the ray through the mean position of `hits`, if it is on their surface, or else
+    /// the one of them that is nearest to it. Light that is linear over the surface has its mean
+    /// there.
+    fn middle_hit(&self, hits: &[Hit]) -> Hit {
+        let position = |hit: &Hit| self.rays.interpolate(hit, &self.light.surface.positions);
         let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
-        let away = |hit: &Hit| position(hit).distance_squared(mean);
-        let first = (away(&hits[0]), hits[0]);
-        let nearest = hits
-            .iter()
-            .map(|hit| (away(hit), *hit))
-            .fold(first, |a, b| if b.0 < a.0 { b } else { a });
-        let met = self.sight.hit(mean - self.sight.eye);
-        met.filter(|hit| self.surface(hit) == self.surface(&hits[0])).unwrap_or(nearest.1)
+        let through_mean = self.rays.hit(mean - self.rays.eye);
+        let surface = self.smooth_surface(&hits[0]);
+        if let Some(hit) = through_mean.filter(|hit| self.smooth_surface(hit) == surface) {
+            return hit;
+        }
+        let distance = |hit: &Hit| position(hit).distance_squared(mean);
+        let mut nearest = (distance(&hits[0]), hits[0]);
+        for hit in &hits[1..] {
+            let candidate = (distance(hit), *hit);
+            if candidate.0 < nearest.0 {
+                nearest = candidate;
+            }
+        }
+        nearest.1
     }
 
+    /// The element of the gathered mesh that was hit.
     fn element(&self, hit: &Hit) -> usize {
         self.light.surface.elements[hit.triangle] as usize
     }
 
     /// The smooth surface that was hit.
-    fn surface(&self, hit: &Hit) -> u32 {
+    fn smooth_surface(&self, hit: &Hit) -> u32 {
         let mesh = &self.light.mesh;
         self.surfaces[mesh.triangle(mesh.element(self.element(hit)))]
     }
