@@ -11,6 +11,7 @@
 //! of a result is estimated. [`gather_at_vertices`] is the first of these, with refinement.
 
 pub(crate) mod adaptive;
+mod batch;
 mod buried;
 pub(crate) mod gather_points;
 mod gathered_mesh;
