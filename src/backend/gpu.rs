@@ -9,7 +9,7 @@ mod gather;
 mod hemisphere_sum;
 mod item_buffer;
 mod item_table;
-pub(in crate::backend) mod layout;
+pub(crate) mod layout;
 mod limits;
 mod memory;
 mod pipeline;

@@ -27,7 +27,7 @@ use crate::visibility::ray_scene::RayScene;
 pub struct RayRows {
     rays: RayScene,
     count: u32,
-    pub(in crate::backend) full_share: f64,
+    pub(crate) full_share: f64,
 }
 
 impl RayRows {

@@ -54,7 +54,7 @@ pub struct HemicubeRows {
     /// the order of shots.
     preferred_batch: u32,
     rotations: NonZeroU32,
-    pub(in crate::backend) full_share: f64,
+    pub(crate) full_share: f64,
     timings: Timings,
 }
 
