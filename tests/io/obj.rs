@@ -9,7 +9,7 @@ use radiosity::io::read_obj;
 use radiosity::{ErrorKind, GatheredMesh, Mesh, Rgb, VertexMesh, load_obj};
 use tempfile::TempDir;
 
-use super::obj_texts::{CHALK, SQUARE, area, load, obj, refused, warned, with_library};
+use super::obj_texts::{CHALK, SQUARE, area, load, name_of, obj, refused, warned, with_library};
 use crate::common::keep_going;
 
 #[test]
@@ -19,14 +19,14 @@ fn rejects_unreadable_files() {
     let source = std::error::Error::source(missing.as_ref().unwrap_err()).unwrap();
     let source = source.downcast_ref::<std::io::Error>().unwrap();
     assert_eq!(source.kind(), std::io::ErrorKind::NotFound);
-    refused(missing, ErrorKind::File, &["attic.obj"]);
-    refused(load_obj(folder.path()), ErrorKind::File, &["folder"]);
-    refused(load_obj(""), ErrorKind::File, &["cannot be read"]);
+    refused(missing, ErrorKind::File, "attic.obj", &[]);
+    refused(load_obj(folder.path()), ErrorKind::File, &name_of(folder.path()), &["folder"]);
+    refused(load_obj(""), ErrorKind::File, "", &["cannot be read"]);
     // Opens, but cannot be read from its start.
     #[cfg(target_os = "linux")]
-    refused(load_obj("/proc/self/mem"), ErrorKind::File, &["/proc/self/mem", "cannot be read"]);
+    refused(load_obj("/proc/self/mem"), ErrorKind::File, "/proc/self/mem", &["cannot be read"]);
     #[cfg(unix)]
-    refused(load_obj(Path::new("/dev/zero")), ErrorKind::File, &["/dev/zero", "regular"]);
+    refused(load_obj(Path::new("/dev/zero")), ErrorKind::File, "/dev/zero", &["regular"]);
 }
 
 #[test]
@@ -40,14 +40,14 @@ fn rejects_files_that_are_too_large() {
         path
     };
     let large = hollow("large.obj", MOST + 1);
-    refused(load_obj(large), ErrorKind::File, &["large.obj: ", "more than 1073741824 bytes"]);
+    refused(load_obj(large), ErrorKind::File, "large.obj", &["more than 1073741824 bytes"]);
     // The first library leaves less for the second.
     fs::write(folder.path().join("chalk.mtl"), CHALK).unwrap();
     hollow("large.mtl", MOST);
     let room = folder.path().join("room.obj");
     fs::write(&room, "mtllib chalk.mtl\nmtllib large.mtl\n").unwrap();
     let left = format!("more than {} bytes", MOST - CHALK.len() as u64);
-    refused(load_obj(&room), ErrorKind::File, &["room.obj:2: ", "'large.mtl'", &left]);
+    refused(load_obj(&room), ErrorKind::File, "room.obj:2", &["'large.mtl'", &left]);
 }
 
 #[test]
@@ -57,9 +57,9 @@ fn scenes_from_memory() {
     let scene = read_obj("room.obj", text.as_bytes(), &[library]).unwrap();
     assert_eq!((area(&scene), &*scene.material(0).name), (1.0, "chalk"));
     let gone = read_obj("room.obj", text.as_bytes(), &[]);
-    refused(gone, ErrorKind::File, &["room.obj:1: ", "'paints/a' cannot be read", "no .mtl"]);
+    refused(gone, ErrorKind::File, "room.obj:1", &["'paints/a' cannot be read", "no .mtl"]);
     let other = read_obj("room.obj", text.as_bytes(), &[("c.mtl", b"")]);
-    refused(other, ErrorKind::File, &["room.obj:1: ", "'paints/a' cannot be read", "has 'c.mtl'"]);
+    refused(other, ErrorKind::File, "room.obj:1", &["'paints/a' cannot be read", "has 'c.mtl'"]);
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn rejects_bad_coordinates() {
     {
         let text = format!("# a comment\nv {numbers}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
         let line = format!("v {numbers}").trim().to_string();
-        refused(obj(&text), ErrorKind::Scene, &["room.obj:2: ", &format!("{line:?}")]);
+        refused(obj(&text), ErrorKind::Scene, "room.obj:2", &[&format!("{line:?}")]);
     }
     let good = obj("v 0 0 0 0.1 0.2 0.3\nv 2 0 0 2\nv 0 1 0 # last\nf 1 2 3\n").unwrap();
     assert_eq!(area(&good), 0.5);
@@ -100,16 +100,21 @@ fn rejects_bad_coordinates() {
 #[test]
 fn rejects_scenes_without_area() {
     for text in ["", "\n\n", "# nothing\n", SQUARE, "mtllib room.obj\n"] {
-        refused(obj(text), ErrorKind::Scene, &["room.obj: ", "no face"]);
+        refused(obj(text), ErrorKind::Scene, "room.obj", &["no face"]);
     }
     let flat = format!("{SQUARE}v 2 0 0\nf 1 2 5\nf 1 1 2\nf 1 2\nf 3\nf 1 2 1 2\nf 1 2 5 2\n");
-    refused(obj(&flat), ErrorKind::Scene, &["room.obj: scene: ", "6 triangles, none with area"]);
+    refused(obj(&flat), ErrorKind::Scene, "room.obj: scene", &["6 triangles, none with area"]);
     let scene = obj(&format!("{flat}f 1 2 3\n")).unwrap();
     assert_eq!((scene.triangles().len(), scene.degenerate()), (1, 6));
     warned(&scene, "6 triangles without area");
     // Its area is a number, but that squared is not.
     let tiny = SQUARE.replace('1', "1e-80");
-    refused(obj(&format!("{tiny}f 1 2 3\n")), ErrorKind::Scene, &["none with area"]);
+    refused(
+        obj(&format!("{tiny}f 1 2 3\n")),
+        ErrorKind::Scene,
+        "room.obj: scene",
+        &["none with area"],
+    );
 }
 
 #[test]
@@ -117,20 +122,20 @@ fn rejects_bad_vertex_indices() {
     for (corner, found) in [("0", "index 0"), ("5", "index 5 of 4"), ("-5", "index -5 of 4")] {
         for form in ["", "/1", "//1", "/1/1"] {
             let text = format!("{SQUARE}f 1 2 {corner}{form}\n");
-            let parts = ["room.obj:5: ", &format!("'{corner}{form}'"), found];
-            refused(obj(&text), ErrorKind::Scene, &parts);
+            let parts = [&format!("'{corner}{form}'"), found];
+            refused(obj(&text), ErrorKind::Scene, "room.obj:5", &parts);
         }
     }
     for corner in ["9223372036854775807", "-9223372036854775808", "18446744073709551616", "1.5"] {
         let text = format!("{SQUARE}f 1 2 {corner}\n");
-        refused(obj(&text), ErrorKind::Scene, &["room.obj:5: ", corner]);
+        refused(obj(&text), ErrorKind::Scene, "room.obj:5", &[corner]);
     }
     for corner in ["x", "/1", "1/x", "1/2/x", "1/2/3/4", "1\\2"] {
         let text = format!("{SQUARE}f 1 2 {corner}\n");
-        refused(obj(&text), ErrorKind::Scene, &["room.obj:5: ", "v//vn"]);
+        refused(obj(&text), ErrorKind::Scene, "room.obj:5", &["v//vn"]);
     }
-    refused(obj("f 1 2 3\n"), ErrorKind::Scene, &["room.obj:1: ", "no vertex so far"]);
-    refused(obj(&format!("{SQUARE}f\n")), ErrorKind::Scene, &["room.obj:5: ", "without corners"]);
+    refused(obj("f 1 2 3\n"), ErrorKind::Scene, "room.obj:1", &["no vertex so far"]);
+    refused(obj(&format!("{SQUARE}f\n")), ErrorKind::Scene, "room.obj:5", &["without corners"]);
     // Counted back from where the face stands.
     let scene = obj(&format!("{SQUARE}f -4 -3 -2 -1\nv 9 9 9\nf -5 -4 -3\n")).unwrap();
     assert_eq!(area(&scene), 1.5);
@@ -161,8 +166,8 @@ fn survives_random_bytes() {
         };
         (0..n).map(byte).collect()
     };
-    refused(load(&[("room.obj", &noise(100_000))]), ErrorKind::Scene, &["room.obj", "no face"]);
-    refused(load(&[("room.obj", &[0; 100_000])]), ErrorKind::Scene, &["room.obj", "not OBJ"]);
+    refused(load(&[("room.obj", &noise(100_000))]), ErrorKind::Scene, "room.obj", &["no face"]);
+    refused(load(&[("room.obj", &[0; 100_000])]), ErrorKind::Scene, "room.obj", &["not OBJ"]);
     // Noise between words of the format: refused or taken, but never a panic.
     let words =
         ["v", "f", "l", "o", "g", "s", "usemtl", "mtllib", "1", "-1", "0.5", "/", "\\", "\n"];
@@ -212,7 +217,7 @@ fn reads_every_kind_of_white_space() {
         assert!(scene.warnings().is_empty(), "{form}: {:?}", scene.warnings());
         // The line number does not depend on the form either.
         let bad = change("v 0 0 0\n\nv 0 nan 0\n");
-        refused(load(&[("room.obj", bad.as_bytes())]), ErrorKind::Scene, &["room.obj:3: "]);
+        refused(load(&[("room.obj", bad.as_bytes())]), ErrorKind::Scene, "room.obj:3", &[]);
     }
     assert_eq!(area(&obj(&format!("{SQUARE}f 1 \\\n 2 3\\\r\n4")).unwrap()), 1.0);
 }
@@ -246,9 +251,8 @@ fn smoothing_group_lasts_until_next() {
 fn rejects_bad_smoothing_groups() {
     for group in ["-1", "1.0", "4294967296", "x", "nan", "1 2", "off 1", "on 1", "Off"] {
         let text = format!("{SQUARE}s {group}\nf 1 2 3\n");
-        let parts =
-            ["room.obj:5: ", &format!("smoothing group '{group}'"), "`s off`", "whole number"];
-        refused(obj(&text), ErrorKind::Scene, &parts);
+        let parts = [&format!("smoothing group '{group}'"), "`s off`", "whole number"];
+        refused(obj(&text), ErrorKind::Scene, "room.obj:5", &parts);
     }
 }
 

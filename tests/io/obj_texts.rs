@@ -1,6 +1,7 @@
 //! OBJ files written for a test, and what their errors and warnings must say.
 
 use std::fs;
+use std::path::Path;
 
 use radiosity::{Error, ErrorKind, Scene, load_obj};
 use tempfile::TempDir;
@@ -28,16 +29,31 @@ pub fn with_library(mtl: &str) -> Result<Scene, Error> {
     load(&[("room.obj", text.as_bytes()), ("room.mtl", mtl.as_bytes())])
 }
 
-/// The error is of `kind` and its message has all of `parts`.
+/// The error is of `kind` and at `place`, a file's name with its line, and names all of `parts`.
 #[track_caller]
-pub fn refused(result: Result<Scene, Error>, kind: ErrorKind, parts: &[&str]) {
+pub fn refused(result: Result<Scene, Error>, kind: ErrorKind, place: &str, parts: &[&str]) {
     let error = result.expect_err("must be refused");
     let message = error.to_string();
     assert_eq!(error.kind(), kind, "{message}");
+    assert!(is_at(error.place(), place), "not at {place}: {message}");
     for part in parts {
         assert!(message.contains(part), "'{part}' is not in: {message}");
     }
     assert!(message.lines().count() == 1 && message.len() < 600, "{message}");
+}
+
+/// Whether `found` is `place` in some folder, with or without more detail.
+fn is_at(found: &str, place: &str) -> bool {
+    found.match_indices(place).any(|(start, _)| {
+        let (folder, detail) = (&found[..start], &found[start + place.len()..]);
+        (folder.is_empty() || folder.ends_with(std::path::MAIN_SEPARATOR))
+            && (detail.is_empty() || detail.starts_with(": "))
+    })
+}
+
+/// The last part of a path.
+pub fn name_of(path: &Path) -> String {
+    path.file_name().unwrap().to_string_lossy().into_owned()
 }
 
 #[track_caller]
