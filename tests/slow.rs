@@ -19,5 +19,7 @@ mod slow {
     mod kill_and_resume;
     mod many_triangles;
     mod properties;
+    mod row_memory;
+    mod small_change;
     mod view_factors;
 }

@@ -8,6 +8,7 @@ use radiosity::{
     ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver, StopReason,
 };
 
+use crate::common::changes::by_elements;
 use crate::common::closed_forms::exact;
 use crate::common::fakes::{GivenRows, StoredRows};
 use crate::common::scenes::{self, walls};
@@ -20,11 +21,6 @@ fn material(reflectance: [f64; 3], exitance: [f64; 3]) -> Material {
 
 fn grey(reflectance: f64, exitance: f64) -> Material {
     material([reflectance; 3], [exitance; 3])
-}
-
-/// `method`, shooting by elements.
-fn by_elements(method: Method) -> Solver {
-    Solver { patch_tolerance: 0.0, ..Solver::new(method) }
 }
 
 /// Rays, as many for each row.
