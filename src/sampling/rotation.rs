@@ -6,7 +6,7 @@
 //! so that runs repeat, and the few points of one cell share their pattern.
 //!
 //! ```text
-//! cell edge = 8 to 16 × the point's near distance, doubling in steps
+//! cell edge = 5.2 to 10.4 × the point's near distance, a power of two of the scene's size
 //! ┌────┬────┬────┐
 //! │0.71│0.03│0.48│  offset of each cell, in turns
 //! ├────┼────┼────┤
@@ -44,9 +44,10 @@ impl CellRotation {
     /// The offset in [0, 1), in turns, at `position` for a point that sees nothing nearer than
     /// `near` (both scene unit).
     ///
-    /// Constant per cubic cell with an edge of 8 to 16 × `near`. Scale and translation of the scene
-    /// do not change it, up to rounding: a million scene sizes from the origin, rounding carries a
-    /// few points in a hundred thousand to another cell.
+    /// Constant per cubic cell, whose edge is a power of two of the scene's size and 2^2.377 to
+    /// 2^3.377 times `near`: 5.2 to 10.4. Scale and translation of the scene do not change it, up to
+    /// rounding: a million scene sizes from the origin, rounding carries a few points in a hundred
+    /// thousand to another cell.
     pub fn at(&self, position: DVec3, near: f64) -> f64 {
         let size_log2 = (near / self.size).log2() + DOUBLING_PHASE;
         let cells_per_unit =
@@ -82,12 +83,13 @@ mod tests {
     fn rotation_is_constant_per_cell() {
         let rotation = unit_box(1.0, DVec3::ZERO);
         let at = |k: i32| rotation.at(DVec3::X * f64::from(k) / 1000.0, 1e-3);
-        // 1000 points over cells with an edge of 8 to 16 thousandths: 63 to 126 values.
+        // 0.001 × 2^3.377 = 0.0104 and half of that bound the edge, and the power of two between is
+        // 1/128: 127 whole cells and two halves.
         let mut values: Vec<f64> = (0..1000).map(at).collect();
         values.dedup();
-        assert!((62..=127).contains(&values.len()), "{}", values.len());
+        assert_eq!(values.len(), 129);
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        // Three standard errors of a mean of 62 values that are even in [0, 1).
-        assert!((mean - 0.5).abs() < 3.0 / (12.0f64 * 62.0).sqrt(), "{mean}");
+        // Three standard errors of a mean of 129 values that are even in [0, 1).
+        assert!((mean - 0.5).abs() < 3.0 / (12.0f64 * 129.0).sqrt(), "{mean}");
     }
 }
