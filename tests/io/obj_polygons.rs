@@ -66,7 +66,7 @@ fn rejects_concave_polygons_above_10_000_corners() {
     refused(
         parabola(9_998),
         ErrorKind::Scene,
-        "room.obj:10003",
+        "room.obj:10002",
         &["10001 corners", "may have 10000 corners"],
     );
 }
