@@ -256,7 +256,8 @@ fn compare(baked: &BakeResult, reference: &BakeResult) -> Result<Comparison, Err
     })
 }
 
-/// Both at the centroids of faces, one for every so much area; none where other surfaces cover them.
+/// Both at the centroids of faces, one for every so much area; none where other surfaces cover
+/// them.
 fn pairs(light: &GatheredMesh, reference: &VertexMesh) -> Result<Vec<Pair>, Error> {
     let surface = &light.surface;
     let diagonal = light.mesh.scene().bounds().diagonal();

@@ -49,7 +49,8 @@ fn main() -> Result<(), Error> {
         let errors = truth::compare(&surface, TRUTH);
         let (area, edge) = (errors["area"], errors["edge"]);
         println!(
-            "{name:14} {rms:9.2e} {worst:9.2e} {correction:9.2e} | {:8} {seconds:6.1} | {:6.2}% {:6.2}% \
+            "{name:14} {rms:9.2e} {worst:9.2e} {correction:9.2e} | {:8} \
+             {seconds:6.1} | {:6.2}% {:6.2}% \
              {:6.2}% {:+6.2}%",
             rows.inner().drawn(),
             100.0 * area.rms,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
 ///
-/// DepthMode with `{}`, it is one line: `place: found; remedy`.
+/// Shown with `{}`, it is one line: `place: found; remedy`.
 #[derive(Clone)]
 pub struct Error(Arc<Inner>);
 

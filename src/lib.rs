@@ -1,8 +1,9 @@
 //! Bakes diffuse global illumination into mesh vertices.
 //!
-//! Form factors come from hemicubes drawn on the GPU with wgpu (Vulkan, Metal, DX12, software Vulkan
-//! too) or from rays on the CPU. A solver spreads the light between the elements of a mesh, vertices
-//! then gather it, the mesh is refined where the light bends, and the error that is left is estimated:
+//! Form factors come from hemicubes drawn on the GPU with wgpu (Vulkan, Metal, DX12, software
+//! Vulkan too) or from rays on the CPU. A solver spreads the light between the elements of a mesh,
+//! vertices then gather it, the mesh is refined where the light bends, and the error that is left
+//! is estimated:
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;
@@ -30,7 +31,7 @@
 //! | module | for |
 //! |---|---|
 //! | [`scene`], [`mesh`] | triangles and materials; elements, patches and clusters |
-//! | [`form_factor`] | rows of form factors: the contract of their makers, closed forms, corrections |
+//! | [`form_factor`] | rows: the contract of their makers, closed forms, corrections |
 //! | [`hemicube`] | faces, frames and pixel weights of a hemicube |
 //! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
@@ -48,7 +49,7 @@
 //! | quantity | name | unit | meaning |
 //! |---|---|---|---|
 //! | B | `radiosity` | W/m² per channel | flux leaving a surface per area: emitted plus reflected |
-//! | E | `exitance` | W/m² per channel | the emitted part of B; radiance of a diffuse surface is B/π |
+//! | E | `exitance` | W/m² per channel | emitted part of B; a diffuse surface has radiance B/π |
 //! | ρ | `reflectance` | 1, in [0, 1) | diffuse hemispherical reflectance per channel |
 //! | F_ij | form factor | 1 | fraction of the flux leaving i (first index) that arrives at j |
 //! | ΔB·A | `unshot` | W per channel | flux emitted or received and not yet passed on |
@@ -67,7 +68,7 @@
 //! Light leaves and arrives diffusely, and an emitter is a surface.
 
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.
-#![cfg_attr(not(feature = "gpu"), allow(dead_code))]
+#![cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
 
 pub mod backend;
 pub mod bake;

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench` runs what takes seconds, `RADIOSITY_BENCH=full cargo bench --bench NAME` all of
 //! one.
-#![allow(dead_code)] // each bench uses a part of it
+#![allow(dead_code, reason = "each bench uses a part of it")]
 
 #[path = "../../tests/common/scenes.rs"]
 pub mod scenes;

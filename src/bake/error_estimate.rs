@@ -111,7 +111,7 @@ struct Deviation {
 /// radiosity. What is darker is not worth most of the elements.
 pub(super) fn radiosity_floor(reflected: impl ExactSizeIterator<Item = Rgb>) -> f64 {
     let count = reflected.len().max(1) as f64;
-    let sum = reflected.map(|reflected| reflected.length()).sum::<f64>();
+    let sum = reflected.map(glam::DVec3::length).sum::<f64>();
     (model::RADIOSITY_FLOOR * sum / count).max(f64::MIN_POSITIVE)
 }
 

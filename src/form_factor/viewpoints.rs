@@ -28,16 +28,16 @@ const VIEWS_PER_PATCH: usize = 16;
 /// an occluder hides a receiver from a part of the patch only (the visibility assumption of Baum,
 /// Rushmeier and Winget 1989; several viewpoints are their remedy too). Here a patch is seen from
 /// the centroids of its four children as well: its row is the mean of theirs, whose areas are
-/// equal. Where that mean differs from the patch's own row by more than the tolerance, each child is
-/// seen from its children in turn, to a given depth or to the elements. Elements have no children:
-/// they keep the one view from their centroid, and so do patches that are elements.
+/// equal. Where that mean differs from the patch's own row by more than the tolerance, each child
+/// is seen from its children in turn, to a given depth or to the elements. Elements have no
+/// children: they keep the one view from their centroid, and so do patches that are elements.
 ///
 /// **What disagreement is**: half the sum over scene triangles of |own share − mean share|, with
-/// the shares that leave the scene and that meet backs: the part of the light, in [0, 1], that lands
-/// on another triangle. Single elements are often some pixels wide, and their noise would drown an
-/// occluder. The children are compared by their mean, not one by one, since a view that shifts
-/// evenly over the patch has the centroid's view for its mean and is no error. What an occluder
-/// moves about within one scene triangle goes unseen.
+/// the shares that leave the scene and that meet backs: the part of the light, in [0, 1], that
+/// lands on another triangle. Single elements are often some pixels wide, and their noise would
+/// drown an occluder. The children are compared by their mean, not one by one, since a view that
+/// shifts evenly over the patch has the centroid's view for its mean and is no error. What an
+/// occluder moves about within one scene triangle goes unseen.
 ///
 /// **What it costs**: the middle child of a patch has the patch's centroid, so the patch's row is
 /// the middle child's too. Three more rows a patch are made to compare; once made they are used,

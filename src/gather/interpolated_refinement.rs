@@ -82,8 +82,8 @@ fn candidates(
         if !samples.is_splittable(element) || samples.mesh.longest_edge(node) <= settings.min_edge {
             return None;
         }
-        let interpolant =
-            HierarchicalSurplus::of_parent(samples, element).filter(|s| s.is_smooth())?;
+        let interpolant = HierarchicalSurplus::of_parent(samples, element)
+            .filter(super::surplus::HierarchicalSurplus::is_smooth)?;
         let emitted = samples.mesh.material(node).exitance;
         let mean = interpolant.corner_mean();
         let radiosity = (mean + emitted).length().max(scale.radiosity_floor);

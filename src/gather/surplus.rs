@@ -149,7 +149,8 @@ pub(super) fn mean_preserving(samples: &SampledMesh) -> Vec<Rgb> {
     let mut sums = vec![(Rgb::ZERO, 0.0); samples.reflected.len()];
     for (e, corners) in samples.corners().iter().enumerate() {
         let area = samples.mesh.area(samples.mesh.element(e));
-        let surplus = HierarchicalSurplus::of_parent(samples, e).filter(|s| s.is_smooth());
+        let surplus =
+            HierarchicalSurplus::of_parent(samples, e).filter(HierarchicalSurplus::is_smooth);
         let shift = surplus.map_or(Rgb::ZERO, |s| s.child_mean_shift());
         for &v in corners {
             sums[v as usize].0 += shift * area;

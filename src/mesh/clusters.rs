@@ -313,9 +313,10 @@ mod tests {
             clusters.roots().len()
         };
         assert_eq!(roots(&disc()), 1);
-        // How many that leaves depends on the order of merging; bounds of it. Bands of 70° at most: six are needed around a cylinder, and greedy bands that are half as
-        // wide as they could be make twice that. Their height is free, but compact clusters that
-        // met first may stand in one another's way: as much again.
+        // How many that leaves depends on the order of merging; bounds of it. Bands of 70° at most:
+        // six are needed around a cylinder, and greedy bands that are half as wide as they could be
+        // make twice that. Their height is free, but compact clusters that met first may stand in
+        // one another's way: as much again.
         let (around, ball) = (roots(&cylinder()), roots(&sphere()));
         println!("cylinder {around}, sphere {ball}");
         assert!((6..=24).contains(&around), "{around}");

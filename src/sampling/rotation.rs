@@ -45,9 +45,9 @@ impl CellRotation {
     /// `near` (both scene unit).
     ///
     /// Constant per cubic cell, whose edge is a power of two of the scene's size and 2^2.377 to
-    /// 2^3.377 times `near`: 5.2 to 10.4. Scale and translation of the scene do not change it, up to
-    /// rounding: a million scene sizes from the origin, rounding carries a few points in a hundred
-    /// thousand to another cell.
+    /// 2^3.377 times `near`: 5.2 to 10.4. Scale and translation of the scene do not change it, up
+    /// to rounding: a million scene sizes from the origin, rounding carries a few points in a
+    /// hundred thousand to another cell.
     pub fn at(&self, position: DVec3, near: f64) -> f64 {
         let size_log2 = (near / self.size).log2() + DOUBLING_PHASE;
         let cells_per_unit =

@@ -64,6 +64,9 @@ impl SolveSession<'_> {
     }
 
     /// What [`SolveSession::save`] writes.
+    ///
+    /// # Panics
+    /// Never: a vector takes all bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let identity = Identity {
             mesh: self.mesh().fingerprint(),

@@ -297,7 +297,7 @@ mod tests {
         expect_refusal(shooting, "patches", |s| s.histories[0].1.importance = -1.0);
         expect_refusal(shooting, "patches", |s| s.histories[0].1.sent.x = f64::NAN);
         expect_refusal(shooting, "patches", |s| {
-            s.histories.push((NodeId(1 << 30), PatchHistory::default()))
+            s.histories.push((NodeId(1 << 30), PatchHistory::default()));
         });
     }
 

@@ -1,5 +1,6 @@
 //! A solve in progress: the state between one batch of rows and the next.
 
+use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -52,6 +53,14 @@ pub struct SolveSession<'m> {
     pub(super) stop: Option<StopReason>,
     /// [`FormFactors::fingerprint`] of the source of the last rows.
     pub(super) row_source: String,
+}
+
+impl fmt::Debug for SolveSession<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut session = f.debug_struct("SolveSession");
+        session.field("solver", &self.solver).field("ledger", self.ledger());
+        session.finish_non_exhaustive()
+    }
 }
 
 impl<'m> SolveSession<'m> {

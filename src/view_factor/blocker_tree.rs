@@ -62,8 +62,8 @@ impl BlockerTree {
         polygons
     }
 
-    /// The backs of all polygons, less what is hidden right there by a polygon of `fronts` that lies
-    /// on it: such a plate has two fronts.
+    /// The backs of all polygons, less what is hidden right there by a polygon of `fronts` that
+    /// lies on it: such a plate has two fronts.
     pub fn backs(&self, fronts: &BlockerTree) -> Vec<ConvexPolygon> {
         let mut backs = Vec::new();
         for &k in self.bvh.order() {

@@ -5,8 +5,9 @@
 /// The matrix of area-averaged form factors between the groups of a scene, sparse, with a standard
 /// error beside every factor.
 ///
-/// All vectors have one entry a group, in the order of [`Scene::groups`](crate::scene::Scene::groups). F_ij is the fraction of
-/// the flux leaving group i (the row) that arrives at fronts of group j (the column), 0 to 1.
+/// All vectors have one entry a group, in the order of
+/// [`Scene::groups`](crate::scene::Scene::groups). F_ij is the fraction of the flux leaving group i
+/// (the row) that arrives at fronts of group j (the column), 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewFactors {
     /// Names of the groups, in the order of rows and columns.

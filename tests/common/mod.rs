@@ -1,5 +1,5 @@
 //! What the tests share: scenes with known answers, sources of rows, and the graphics device.
-#![allow(dead_code)] // each test program uses a part of it
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 pub mod changes;
 pub mod closed_forms;
@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 
 use radiosity::Gpu;
 
-#[allow(unused_imports)]
+#[allow(unused_imports, reason = "each test program uses a part of it")]
 pub use scenes::{cornell_box, cube, quads};
 
 /// The graphics device. Tests that need one fail where there is none, and are ignored where

@@ -1,5 +1,5 @@
 //! Whether a surface of vertices is whole: no cracks, no vertex on another's side.
-#![allow(dead_code)]
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 use std::collections::HashMap;
 

@@ -1,5 +1,5 @@
 //! Radiosity at points against path-traced truth, per kind of point.
-#![allow(dead_code)]
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 use std::collections::BTreeMap;
 

@@ -115,7 +115,7 @@ fn check(solve: &SolveSession) {
 }
 
 /// Inputs that stand for real states: of every method, at its beginning and further on.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the fuzz target and the tests use a part each")]
 pub fn seeds() -> Vec<(String, Vec<u8>)> {
     let mut seeds = vec![];
     for (pick, method) in (0..).zip(Method::ALL) {

@@ -102,7 +102,7 @@ fn cancelled_solve_converges_to_same_light() {
             };
             match solve.run(&mut rows, every).unwrap() {
                 StopReason::Cancelled => {
-                    assert!(solve.solution().unwrap().ledger.imbalance() <= 1e-9)
+                    assert!(solve.solution().unwrap().ledger.imbalance() <= 1e-9);
                 }
                 stop => break stop,
             }

@@ -193,10 +193,12 @@ proptest! {
         let (mut rows, areas) = (exact_rows(&mesh), areas(&mesh));
         for i in 0..areas.len() {
             // Closed but for the rounding of each entry; nothing sees a back.
-            prop_assert!(Row::form_factor(row(&rows, &mesh, i).escaped) <= SHARE * areas.len() as f64);
+            let escaped = Row::form_factor(row(&rows, &mesh, i).escaped);
+            prop_assert!(escaped <= SHARE * areas.len() as f64);
             prop_assert_eq!(row(&rows, &mesh, i).backface, 0);
             for j in 0..i {
-                let both = [areas[i] * factor(&rows, &mesh, i, j), areas[j] * factor(&rows, &mesh, j, i)];
+                let exchange = |a: usize, b: usize| areas[a] * factor(&rows, &mesh, a, b);
+                let both = [exchange(i, j), exchange(j, i)];
                 prop_assert!((both[0] - both[1]).abs() <= SHARE * (areas[i] + areas[j]));
             }
         }
@@ -252,7 +254,8 @@ proptest! {
     #[ignore = "slow"]
     fn light_is_invariant_under_motion_and_order(
         room in rooms(0..1), axis in prop::array::uniform3(-1.0..1.0f64), angle in 0.0..6.3,
-        away in prop::array::uniform3(-1e3..1e3f64), decades in -9.0..9.0f64, shuffle in any::<u64>(),
+        away in prop::array::uniform3(-1e3..1e3f64), decades in -9.0..9.0f64,
+        shuffle in any::<u64>(),
     ) {
         let (faces, materials) = (room.faces(), room.materials());
         let here = room.mesh();
@@ -335,10 +338,13 @@ proptest! {
             for entry in &b.entries {
                 *sums.entry(entry.element.min(last as u32)).or_insert(0u32) += entry.share;
             }
-            let known: BTreeMap<u32, u32> = a.entries.iter().map(|e| (e.element, e.share)).collect();
+            let known: BTreeMap<u32, u32> =
+                a.entries.iter().map(|e| (e.element, e.share)).collect();
             // Ray k owns the shares from k·TOTAL/n on: the same rays in another order round
             // otherwise.
-            let off = known.iter().map(|(e, &share)| sums.get(e).map_or(share, |s| s.abs_diff(share)));
+            let off = known
+                .iter()
+                .map(|(e, &share)| sums.get(e).map_or(share, |s| s.abs_diff(share)));
             prop_assert!(off.max().unwrap_or(0) <= 1 && known.len() == sums.len());
             prop_assert_eq!((a.escaped, a.backface.abs_diff(b.backface) <= 1), (b.escaped, true));
         }

@@ -70,7 +70,8 @@ fn scenes() -> [(&'static str, Mesh); 5] {
 
 /// Largest difference of a radiosity from `judge`'s, of an element and channel, relative.
 fn off(s: &Solution, judge: &Solution) -> f64 {
-    let channels = |s: &Solution| s.radiosity.iter().flat_map(|b| b.to_array()).collect::<Vec<_>>();
+    let channels =
+        |s: &Solution| s.radiosity.iter().flat_map(glam::DVec3::to_array).collect::<Vec<_>>();
     let off = |(a, b): (f64, f64)| if a == b { 0.0 } else { (a / b - 1.0).abs() };
     let worst = channels(s).into_iter().zip(channels(judge)).map(off);
     worst.fold(0.0, |worst, off| if off.is_nan() { f64::INFINITY } else { off.max(worst) })

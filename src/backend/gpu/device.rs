@@ -189,7 +189,7 @@ impl Gpu {
 
     /// An error if the device was lost.
     fn check(&self) -> Result<(), Error> {
-        let lost = self.lost.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let lost = self.lost.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone();
         lost.map_or(Ok(()), |found| Err(self.device_error(ErrorKind::Device, found)))
     }
 
@@ -206,7 +206,7 @@ impl Gpu {
 
 /// Keeps the first message.
 fn record(slot: &Mutex<Option<String>>, message: String) {
-    slot.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(message);
+    slot.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(message);
 }
 
 #[cfg(test)]

@@ -80,7 +80,7 @@ impl DrawList {
             }
             match runs.last_mut() {
                 Some(run) if run.end == positions.start && run.len() < MAX_TRIANGLES_PER_DRAW => {
-                    run.end = positions.end
+                    run.end = positions.end;
                 }
                 _ => runs.push(positions.clone()),
             }
@@ -139,7 +139,7 @@ mod tests {
         let mut drawn = 0;
         for face in &faces {
             let runs = draw_list.in_view(DVec3::ZERO, face);
-            drawn += runs.iter().map(|r| r.len()).sum::<usize>();
+            drawn += runs.iter().map(std::iter::ExactSizeIterator::len).sum::<usize>();
             for t in 0..1000 {
                 let d = scene.corners(t)[0];
                 let w = d.dot(face.forward);

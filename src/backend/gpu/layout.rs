@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | `item_buffer.wgsl` | [`Corner`] ×3, [`TriangleCells`], [`FaceView`] | u32 a pixel |
 //! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
-//! | `radiance.wgsl` | [`Corner`] ×3, [`RadianceTriangle`], [`RadianceView`], [`Lattice`] | f32 ×4 |
+//! | `radiance.wgsl` | [`Corner`], [`RadianceTriangle`], [`RadianceView`], [`Lattice`] | f32 ×4 |
 //! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`], [`Summation`] | [`Sums`] a point |
 //!
 //! Members that a shader does not read pad the struct to WGSL's alignment.

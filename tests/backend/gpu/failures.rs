@@ -130,7 +130,10 @@ fn solve_falls_back_with_the_same_bits() {
         let drawn = [relay.first().inner.drawn(), relay.second().unwrap().drawn()];
         assert_eq!(drawn.iter().sum::<u64>(), undisturbed.rows_made);
         assert!(drawn.iter().all(|d| *d > 0), "{drawn:?}");
-        assert_eq!(errors.take().iter().map(|e| e.kind()).collect::<Vec<_>>(), [ErrorKind::Device]);
+        assert_eq!(
+            errors.take().iter().map(radiosity::Error::kind).collect::<Vec<_>>(),
+            [ErrorKind::Device]
+        );
     }
 }
 

@@ -36,8 +36,8 @@ fn cornell_box_matches_path_tracer() {
     // The bounds are the project's own goal for uniform elements: what is left is elements that
     // straddle a shadow or a block's foot.
     let mesh = scenes::cornell_box(30.0);
-    // Longest edges are halved until they are 30 mm at most: those of 14 triangles three times, of 8
-    // four times, of 10 five times.
+    // Longest edges are halved until they are 30 mm at most: those of 14 triangles three times, of
+    // 8 four times, of 10 five times.
     assert_eq!(mesh.element_count(), 14 * 4usize.pow(3) + 8 * 4usize.pow(4) + 10 * 4usize.pow(5));
     let rows =
         || ProximityCorrection::new(HemicubeRows::new(&gpu, &mesh, 128).unwrap(), &mesh, 1.0);
