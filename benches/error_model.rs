@@ -107,9 +107,7 @@ impl Bench {
             none,
             &[1.0, 2.0, 3.0],
             |e| e.truncation,
-            |gather, passes| {
-                gather.refinement.gather_passes = passes as u32;
-            },
+            |gather, passes| gather.refinement.gather_passes = passes as u32,
         )?;
         // A geometric series: the ratio of one pass to the next.
         let ratios: Vec<f64> = truncation.windows(2).map(|pair| pair[1].1 / pair[0].1).collect();

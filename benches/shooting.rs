@@ -30,13 +30,8 @@ impl FormFactors for Stored<'_> {
 struct Recording(RayRows, HashMap<NodeId, Row>);
 
 impl FormFactors for Recording {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
-        let rows = self.0.rows(mesh, patches, importance)?;
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
+        let rows = self.0.rows(mesh, patches, weight)?;
         self.1.extend(patches.iter().copied().zip(rows.iter().cloned()));
         Ok(rows)
     }

@@ -100,7 +100,8 @@ impl Backend {
     /// hardware, rays on the CPU otherwise.
     ///
     /// # Errors
-    /// Those of [`HemicubeGather::new`](crate::HemicubeGather::new) and [`RayGather::new`].
+    /// Those of [`HemicubeGather::new`](crate::backend::gpu::HemicubeGather::new) and
+    /// [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
     }

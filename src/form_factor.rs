@@ -27,7 +27,7 @@ pub use viewpoints::AdaptiveViewpoints;
 ///
 /// **What a source must do.** It returns one row for each patch that is asked for, in that order,
 /// each of which passes [`Row::check`]. A row depends on the mesh, the patch, the source's settings
-/// (what [`FormFactors::fingerprint`] names) and the importance alone: not on what was asked for
+/// (what [`FormFactors::fingerprint`] names) and the weight alone: not on what was asked for
 /// before, nor on the other patches of the batch. So a row can be thrown away and made again with
 /// the same bits, and a solve can be saved and resumed. Bits may differ between devices.
 ///
@@ -39,21 +39,20 @@ pub use viewpoints::AdaptiveViewpoints;
 pub trait FormFactors {
     /// The rows of `patches`, in their order.
     ///
-    /// `importance` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
+    /// `weight` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
     /// the worst channel, that one of `patches` is about to shoot. A source may use fewer samples
-    /// for rows of little importance; 1 asks for all it can do.
+    /// for rows of little weight; 1 asks for all it can do.
     ///
     /// # Errors
     /// What keeps the source from making them, [`ErrorKind::Device`] above all.
-    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], importance: f64)
-    -> Result<Vec<Row>, Error>;
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error>;
 
     /// How many rows are best asked for at once, 1 or more.
     fn preferred_batch_len(&self) -> usize {
         1
     }
 
-    /// Everything that the bits of its rows depend on beside mesh, patch and importance, in words:
+    /// Everything that the bits of its rows depend on beside mesh, patch and weight, in words:
     /// a saved solve is resumed only with rows of the same fingerprint.
     fn fingerprint(&self) -> String {
         "rows".into()
@@ -69,9 +68,9 @@ pub(crate) fn checked_rows(
     source: &mut (impl FormFactors + ?Sized),
     mesh: &Mesh,
     patches: &[NodeId],
-    importance: f64,
+    weight: f64,
 ) -> Result<Vec<Row>, Error> {
-    let rows = source.rows(mesh, patches, importance)?;
+    let rows = source.rows(mesh, patches, weight)?;
     if rows.len() != patches.len() {
         let found = format!("{} rows for {} patches", rows.len(), patches.len());
         let remedy = "FormFactors::rows must return one row a patch";

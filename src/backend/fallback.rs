@@ -63,15 +63,10 @@ impl<'a, A, B> Fallback<'a, A, B> {
 }
 
 impl<A: FormFactors, B: FormFactors> FormFactors for Fallback<'_, A, B> {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
         self.ask(
-            |first| first.rows(mesh, patches, importance),
-            |second| second.rows(mesh, patches, importance),
+            |first| first.rows(mesh, patches, weight),
+            |second| second.rows(mesh, patches, weight),
         )
     }
 

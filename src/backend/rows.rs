@@ -94,14 +94,9 @@ impl BackendRows {
 }
 
 impl FormFactors for BackendRows {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
-        let rows = self.source.rows(mesh, patches, importance);
+        let rows = self.source.rows(mesh, patches, weight);
         self.seconds += start.elapsed().as_secs_f64();
         rows
     }

@@ -15,7 +15,7 @@
 //! 1. *Before:* [`BakeSettings::for_error`](crate::BakeSettings::for_error) turns an error into
 //!    settings by the laws below, knob = scale · error^exponent, scaled by the scene's diagonal.
 //! 2. *After a pilot:* a few points that gather twice say how many rays it takes in this scene.
-//! 3. *After every estimate:* the parts that are too large are lowered to [`water_filling_cap`],
+//! 3. *After every estimate:* the parts that are too large are lowered to `water_filling_cap`,
 //!    each by its own law in one step of bounded size.
 //! 4. *Within a time:* cost = constant · error^−[`COST_EXPONENT`] says which error still fits in.
 //!

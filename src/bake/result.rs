@@ -28,7 +28,7 @@ pub struct BakeResult {
     /// were cast.
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
     /// Mean share of a row that the correction of near receivers moved:
-    /// [`crate::ProximityCorrection`].
+    /// [`crate::form_factor::ProximityCorrection`].
     pub mean_near_correction: f64,
     /// Why the graphics device failed, if it did; from then on rays were cast on the CPU.
     pub device_failure: Option<Error>,

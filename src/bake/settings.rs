@@ -47,11 +47,11 @@ pub struct SolveSettings {
     /// Hemicubes a viewpoint, averaged, each turned further about the normal.
     pub rotations: NonZeroU32,
     /// Receivers within this many patch diameters get closed-form factors
-    /// ([`crate::ProximityCorrection`]); below 0 none.
+    /// ([`crate::form_factor::ProximityCorrection`]); below 0 none.
     pub near_reach: f64,
     /// Patches of whose light more than this share lands on other elements when it is sent from
-    /// their parts are seen from those ([`crate::AdaptiveViewpoints`]); with none, each from its
-    /// centroid alone.
+    /// their parts are seen from those ([`crate::form_factor::AdaptiveViewpoints`]); with none,
+    /// each from its centroid alone.
     pub viewpoint_tolerance: Option<f64>,
     /// How light is spread, how far, and from how large patches.
     pub solver: Solver,

@@ -83,9 +83,9 @@ impl<M: FormFactors> ProximityCorrection<M> {
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        importance: f64,
+        weight: f64,
     ) -> Result<Vec<Row>, Error> {
-        checked_rows(&mut self.source, mesh, patches, importance)
+        checked_rows(&mut self.source, mesh, patches, weight)
     }
 
     /// Corrects `rows`, which are as seen from the centroids of `patches`.
@@ -103,13 +103,8 @@ impl<M: FormFactors> ProximityCorrection<M> {
 }
 
 impl<M: FormFactors> FormFactors for ProximityCorrection<M> {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
-        let mut rows = self.uncorrected(mesh, patches, importance)?;
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
+        let mut rows = self.uncorrected(mesh, patches, weight)?;
         self.correct(mesh, patches, &mut rows);
         Ok(rows)
     }

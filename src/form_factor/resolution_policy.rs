@@ -10,7 +10,7 @@
 //! N ∝ s^0.4,  so half of N is enough for 2^2.5 times less light
 //! ```
 //!
-//! N² rays in strata err alike. The share s is the row's importance.
+//! N² rays in strata err alike. The share s is the row's weight.
 //!
 //! Rows are kept and shot along again; since the brightest shoots first, not by more than the first
 //! time, and in all by some 1.2 times as much (the median in a Cornell box and in two rooms; five
@@ -23,12 +23,12 @@ pub(crate) const MAX_HALVINGS: u32 = 2;
 /// time worth having.
 pub(crate) const MIN_HALVED_RESOLUTION: u32 = 16;
 
-/// How often the resolution is halved for a row of `importance`, when it is full from
+/// How often the resolution is halved for a row of `weight`, when it is full from
 /// `full_resolution_share` on: as often as leaves it no lower than N ∝ s^0.4 asks for.
-pub(crate) fn halvings_for_importance(importance: f64, full_resolution_share: f64) -> u32 {
+pub(crate) fn halvings_for_importance(weight: f64, full_resolution_share: f64) -> u32 {
     // Half the resolution is enough for this many times less light.
     let fall = 2f64.powf(2.5);
-    let is_enough = |&k: &u32| importance * fall.powi(k as i32) < full_resolution_share;
+    let is_enough = |&k: &u32| weight * fall.powi(k as i32) < full_resolution_share;
     (1..=MAX_HALVINGS).take_while(is_enough).last().unwrap_or(0)
 }
 

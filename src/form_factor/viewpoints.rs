@@ -146,7 +146,7 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
         mesh: &Mesh,
         views: &mut [&mut ViewNode],
         level: u32,
-        importance: f64,
+        weight: f64,
     ) -> Result<(), Error> {
         if level < self.levels {
             for view in views.iter_mut() {
@@ -154,7 +154,7 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
             }
         }
         let are_patches = level == 0;
-        self.cast_missing_rows(mesh, views, are_patches, importance)?;
+        self.cast_missing_rows(mesh, views, are_patches, weight)?;
         self.correct_new_rows(mesh, views, are_patches);
         if level + 1 >= self.levels {
             return Ok(());
@@ -167,7 +167,7 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
         if children.is_empty() {
             return Ok(());
         }
-        self.refine(mesh, &mut children, level + 1, importance)
+        self.refine(mesh, &mut children, level + 1, weight)
     }
 
     /// Asks the source for the rows of `views`, if they are patches, and of their children, all at
@@ -177,14 +177,14 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
         mesh: &Mesh,
         views: &mut [&mut ViewNode],
         are_patches: bool,
-        importance: f64,
+        weight: f64,
     ) -> Result<(), Error> {
         let patches = if are_patches { views.len() } else { 0 };
         let mut nodes: Vec<NodeId> = views[..patches].iter().map(|view| view.node).collect();
         for view in views.iter() {
             nodes.extend(view.children.iter().take(3).map(|child| child.node));
         }
-        let mut rows = self.source.uncorrected(mesh, &nodes, importance)?.into_iter();
+        let mut rows = self.source.uncorrected(mesh, &nodes, weight)?.into_iter();
         self.extra_rows += (nodes.len() - patches) as u64;
         for view in views[..patches].iter_mut() {
             view.uncorrected = rows.next().unwrap_or_default();
@@ -221,14 +221,9 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
 }
 
 impl<M: FormFactors> FormFactors for AdaptiveViewpoints<M> {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
         let mut views: Vec<ViewNode> = patches.iter().map(|&patch| ViewNode::new(patch)).collect();
-        self.refine(mesh, &mut views.iter_mut().collect::<Vec<_>>(), 0, importance)?;
+        self.refine(mesh, &mut views.iter_mut().collect::<Vec<_>>(), 0, weight)?;
         Ok(views.par_iter().map(ViewNode::mean_row).collect())
     }
 

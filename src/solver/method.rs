@@ -27,7 +27,7 @@ pub enum Method {
         /// 1992): what they would receive and reflect if all that is unshot fell evenly on all
         /// surfaces. Saves shots where reflectance is high. What was shot too much is made up for
         /// by what comes in later, or shot as negative light; until then the ledger counts it as
-        /// [`overshot`](crate::Ledger::overshot).
+        /// [`overshot`](crate::solver::Ledger::overshot).
         overshoot: bool,
     },
     /// All elements at once pass on what they have: E, then E + ME, then E + ME + M²E …

@@ -26,7 +26,7 @@ pub struct Solver {
     /// uneven its light is. Patches are as large as this permits, from clusters of many triangles
     /// down to elements. 0 makes every patch as small as `min_patch_level` allows. Elements of
     /// emitters shoot by themselves where they are few. Rows are taken to be right for near
-    /// receivers: see [`ProximityCorrection`](crate::ProximityCorrection).
+    /// receivers: see [`ProximityCorrection`](crate::form_factor::ProximityCorrection).
     pub patch_tolerance: f64,
     /// For shooting: the smallest patches are this many quadtree levels above the elements: 4ᵏ
     /// elements, or a triangle.

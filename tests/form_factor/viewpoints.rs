@@ -155,9 +155,9 @@ fn rejects_missing_rows_by_name() {
             &mut self,
             mesh: &Mesh,
             patches: &[NodeId],
-            importance: f64,
+            weight: f64,
         ) -> Result<Vec<Row>, Error> {
-            self.0.rows(mesh, &patches[1..], importance)
+            self.0.rows(mesh, &patches[1..], weight)
         }
     }
     let mesh = Mesh::new(cube(&Material::grey("g", 0.5)), 1.0).unwrap();

@@ -86,13 +86,8 @@ impl RayRows {
 }
 
 impl FormFactors for RayRows {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
-        let halvings = resolution_policy::halvings_for_importance(importance, self.full_share);
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
+        let halvings = resolution_policy::halvings_for_importance(weight, self.full_share);
         let count = (self.count >> (2 * halvings))
             .max(resolution_policy::MIN_HALVED_RESOLUTION.pow(2))
             .min(self.count);

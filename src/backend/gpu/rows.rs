@@ -264,14 +264,8 @@ fn check_mesh_fits(limits: GpuLimits, mesh: &Mesh) -> Result<(), Error> {
 }
 
 impl FormFactors for HemicubeRows {
-    fn rows(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        importance: f64,
-    ) -> Result<Vec<Row>, Error> {
-        let halvings =
-            resolution_policy::halvings_for_importance(importance, self.full_share) as usize;
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
+        let halvings = resolution_policy::halvings_for_importance(weight, self.full_share) as usize;
         let at = halvings.min(self.batches.resolutions.len() - 1);
         let count = self.rotations.get();
         let step = FRAC_PI_2 / f64::from(count);
