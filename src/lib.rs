@@ -8,16 +8,17 @@
 //! ```no_run
 //! use std::ops::ControlFlow;
 //!
-//! use radiosity::{Backend, BakeTarget, load_obj, write_ply};
+//! use radiosity::{Backend, BakeProgress, BakeTarget, load_obj, write_ply};
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let backend = Backend::gpu(None)?; // or Backend::Cpu
 //! let baked = BakeTarget::Error(0.02).bake(load_obj("scene.obj")?, &backend, |progress| {
-//!     eprintln!("{progress:?}");
+//!     if let BakeProgress::Estimated(error) = progress {
+//!         eprintln!("error about {:.1} %", 100.0 * error.total);
+//!     }
 //!     ControlFlow::Continue(()) // Break(()) stops with what there is
 //! })?;
-//! eprintln!("off by about {:.2} %", 100.0 * baked.estimate.total);
-//! write_ply("scene.ply", &baked.light.surface)?;
+//! write_ply("scene.ply", &baked.light.surface)?; // positions, faces, radiosity, errors
 //! # Ok(())
 //! # }
 //! ```
@@ -120,4 +121,6 @@ mod pages {
     struct Incremental;
     #[doc = include_str!("../docs/robustness.md")]
     struct Robustness;
+    #[doc = include_str!("../docs/view_factors.md")]
+    struct ViewFactors;
 }

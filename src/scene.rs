@@ -14,7 +14,8 @@ use glam::{DAffine3, DVec3};
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
 
-/// One value per colour channel (r, g, b), linear; the unit is said where it is used.
+/// One value per colour channel (r, g, b), linear; the unit is said where it is used. Made by
+/// `Rgb::new(r, g, b)` or `Rgb::splat(grey)`.
 pub type Rgb = DVec3;
 
 /// How the front of a face reflects and emits. Backs only block light.
@@ -58,7 +59,22 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
+    /// Checks and takes a scene: `positions` in any length unit, `groups` by name. Whether groups
+    /// are wound inside out is looked at by [`Scene::check_winding`] only.
+    ///
+    /// ```
+    /// use radiosity::glam::DVec3;
+    /// use radiosity::{Material, Rgb, Scene, Triangle};
+    ///
+    /// # fn main() -> Result<(), radiosity::Error> {
+    /// let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y]; // counter-clockwise: the front is +z
+    /// let triangle = Triangle { corners: [0, 1, 2], group: 0, material: 0, smoothing: None };
+    /// let lamp = Material { exitance: Rgb::splat(100.0), ..Material::grey("lamp", 0.2) };
+    /// let scene = Scene::new(positions, vec![triangle], vec!["panel".into()], vec![lamp])?;
+    /// assert_eq!(scene.triangles().len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// Triangles without area are dropped and counted ([`Scene::degenerate`]). A triangle has no
     /// area when the cross product of two edges is lost in rounding: below 4 ε times its longest

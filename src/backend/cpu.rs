@@ -1,4 +1,5 @@
-//! Rays on the CPU: rows of form factors, and light gathered at points.
+//! Rays on the CPU: rows of form factors, and light gathered at points. Nothing of it needs a GPU;
+//! [`Backend::Cpu`](crate::Backend::Cpu) uses it for whole bakes.
 //!
 //! Beside them, for tests alone, a twin of every shader: the same entry points in plain sequential
 //! Rust, named as the WGSL files are, which the device's results are compared with pixel by pixel.

@@ -10,7 +10,10 @@ use crate::gather::Progress as GatherProgress;
 use crate::progress::{Timings, lap};
 use crate::solver::Progress;
 
-/// The stage that a bake is at, reported several times a second.
+/// The stage that a bake is at.
+///
+/// [`BakeProgress::Shooting`] comes after every row or shot, thousands in all, the others several
+/// times a second. Match on what you want to show; `{:?}` prints any of them.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum BakeProgress {

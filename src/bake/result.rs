@@ -12,11 +12,12 @@ use crate::solver::Solution;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct BakeResult {
-    /// The mesh that light was shot on.
+    /// The mesh that light was shot on; its [`scene`](Mesh::scene) is what was baked.
     pub mesh: Mesh,
     /// Radiosity of the elements of [`BakeResult::mesh`].
     pub solution: Solution,
-    /// Radiosity at vertices, each with its estimated error, on a mesh of its own.
+    /// Radiosity at vertices, each with its estimated error, on a mesh of its own. Most programs
+    /// need only [`GatheredMesh::surface`] of it: positions, faces, radiosity.
     pub light: GatheredMesh,
     /// Estimated error of [`BakeResult::light`].
     pub estimate: ErrorEstimate,
