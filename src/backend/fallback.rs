@@ -52,13 +52,14 @@ impl<'a, A, B> Fallback<'a, A, B> {
         first: impl FnOnce(&mut A) -> Result<T, Error>,
         second: impl FnOnce(&mut B) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        if self.second.is_none() {
-            match first(&mut self.first) {
-                Err(e) if e.is_device_error() => self.second = Some((self.make_second)(e)?),
+        let maker = match &mut self.second {
+            Some(maker) => maker,
+            None => match first(&mut self.first) {
+                Err(e) if e.is_device_error() => self.second.insert((self.make_second)(e)?),
                 done => return done,
-            }
-        }
-        second(self.second.as_mut().expect("set above"))
+            },
+        };
+        second(maker)
     }
 }
 
