@@ -19,7 +19,7 @@ mod interpolated_refinement;
 pub(crate) mod light_projection;
 pub(crate) mod lights;
 mod progress;
-mod refinement_indicator;
+pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
 mod surplus;

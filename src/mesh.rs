@@ -20,6 +20,7 @@ mod box_overlap;
 mod clusters;
 mod contacts;
 mod quadtree;
+pub(crate) mod sizing;
 mod topology;
 
 use std::collections::HashSet;
@@ -34,6 +35,7 @@ use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Rgb, Scene, longest_edge};
 pub(crate) use clusters::Clusters;
 pub(crate) use quadtree::Cell;
+pub(crate) use sizing::ElementSizing;
 pub(crate) use topology::{Side, SurfaceTopology};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
@@ -134,6 +136,38 @@ impl Mesh {
             ));
         }
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
+    }
+
+    /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
+    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes are
+    /// the same everywhere.
+    ///
+    /// # Errors
+    /// Those of [`Mesh::new`].
+    pub(crate) fn sized(
+        scene: Arc<Scene>,
+        sizing: &ElementSizing,
+        max_depth: u32,
+    ) -> Result<Mesh, Error> {
+        if sizing.is_uniform(&scene) {
+            return Mesh::new(scene, sizing.size);
+        }
+        let lengths: Vec<f64> =
+            (0..scene.triangles().len()).map(|t| longest_edge(scene.corners(t))).collect();
+        let is_inner = |t: usize, cell: Cell| {
+            let edge = lengths[t] / f64::from(1u32 << cell.level) * (1.0 - 1e-12);
+            cell.level < max_depth
+                && edge > sizing.size
+                && edge > sizing.size_at(&scene, t, &cell_corners(scene.corners(t), cell))
+        };
+        let wanted: usize = lengths.iter().enumerate().map(|(t, _)| leaves(t, &is_inner)).sum();
+        if wanted > Mesh::MAX_ELEMENTS {
+            let place = format!("element size {}", sizing.size);
+            let found = format!("asks for {wanted} elements");
+            let remedy = format!("at most {}: use a larger size", Mesh::MAX_ELEMENTS);
+            return Err(Error::new(ErrorKind::Setting, place, found, remedy));
+        }
+        Ok(Mesh::refined_where(scene.clone(), is_inner))
     }
 
     /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell
@@ -306,15 +340,18 @@ impl Mesh {
         self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
     }
 
-    /// Area of all elements, length unit squared.
-    pub(crate) fn total_area(&self) -> f64 {
-        self.elements.iter().map(|&node| self.area(node)).sum()
+    /// Area of all elements that reflect, length unit squared.
+    pub(crate) fn reflecting_area(&self) -> f64 {
+        let elements = self.elements.iter().filter(|&&node| self.material(node).reflects());
+        elements.map(|&node| self.area(node)).sum()
     }
 
-    /// Mean reflectance by area, per channel.
+    /// Mean reflectance by area of the elements that reflect, per channel; 0 where none does. What
+    /// reflects nothing is left out, since a black sky around a scene makes the scene no darker.
     pub(crate) fn mean_reflectance(&self) -> Rgb {
         let reflecting = |&node: &NodeId| self.material(node).reflectance * self.area(node);
-        self.elements.iter().map(reflecting).sum::<Rgb>() / self.total_area()
+        let area = self.reflecting_area().max(f64::MIN_POSITIVE);
+        self.elements.iter().map(reflecting).sum::<Rgb>() / area
     }
 
     /// Unit normal of `node`, on its front.
@@ -325,9 +362,7 @@ impl Mesh {
     /// Corners of `node`, counter-clockwise from the front.
     pub fn corners(&self, node: NodeId) -> [DVec3; 3] {
         let n = self.node(node);
-        let [a, b, c] = self.scene.corners(n.triangle as usize);
-        // Weights that sum to one exactly, so that corners of the triangle stay what they are.
-        n.cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
+        cell_corners(self.scene.corners(n.triangle as usize), n.cell)
     }
 
     /// Longest edge of `node`, scene unit.
@@ -344,6 +379,11 @@ impl Mesh {
     /// Material of `node`.
     pub fn material(&self, node: NodeId) -> &Material {
         self.scene.material(self.triangle(node))
+    }
+
+    /// Group of `node`, by its index in the scene.
+    pub(crate) fn group(&self, node: NodeId) -> u32 {
+        self.scene.triangles()[self.triangle(node)].group
     }
 
     /// The element at barycentric position (`u`, `v`) of triangle `t`: weights of its second and
@@ -384,4 +424,24 @@ impl Mesh {
     fn node(&self, id: NodeId) -> &Node {
         &self.nodes[id.0 as usize]
     }
+}
+
+/// Corners of `cell` in the triangle with corners `a`, `b`, `c`, scene unit.
+fn cell_corners([a, b, c]: [DVec3; 3], cell: Cell) -> [DVec3; 3] {
+    // Weights that sum to one exactly, so that corners of the triangle stay what they are.
+    cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
+}
+
+/// Leaves of the quadtree of triangle `t` whose inner cells `is_inner` tells; those beyond
+/// [`Mesh::MAX_ELEMENTS`] are not counted.
+fn leaves(t: usize, is_inner: &impl Fn(usize, Cell) -> bool) -> usize {
+    let mut pending = vec![Cell::ROOT];
+    let mut count = 0;
+    while let Some(cell) = pending.pop() {
+        if count > Mesh::MAX_ELEMENTS {
+            break;
+        }
+        if is_inner(t, cell) { pending.extend(cell.children()) } else { count += 1 }
+    }
+    count
 }

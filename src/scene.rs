@@ -278,6 +278,11 @@ impl Material {
         Material { name: name.into(), reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO }
     }
 
+    /// Whether any light is reflected, in any channel.
+    pub(crate) fn reflects(&self) -> bool {
+        self.reflectance != Rgb::ZERO
+    }
+
     /// Reflectance in [0, 1), exitance finite and not negative.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let place = || format!("material {}", quoted(&[&self.name]));

@@ -42,6 +42,7 @@ use std::time::Duration;
 use crate::error::{Error, ErrorKind};
 use crate::progress::StopReason;
 use crate::scene::Rgb;
+pub(crate) use flux_state::ReceivedLight;
 pub use ledger::Ledger;
 pub use method::Method;
 pub use session::SolveSession;

@@ -1,6 +1,6 @@
 //! What is refined after an estimate, by the [model](crate::bake::model) of error and cost.
 
-use crate::bake::error_estimate::ErrorEstimate;
+use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 
@@ -9,14 +9,50 @@ use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 pub(super) struct ErrorTarget<'a> {
     /// Root mean square error, relative, in (0, 1).
     pub error: f64,
+    /// Whether every group of the scene is to meet it, and not only the whole.
+    pub each_group: bool,
     /// Sets by hand what was chosen, after every choice.
     pub overrides: &'a dyn Fn(&mut BakeSettings),
 }
 
+/// The errors that a target judges.
+#[derive(Clone, Copy)]
+pub(super) struct Judged<'e> {
+    /// The measure that is asked for.
+    pub whole: &'e ErrorEstimate,
+    /// The same by light in the place of area: what is bright is to meet the target too.
+    pub by_light: &'e ErrorEstimate,
+    pub groups: &'e [GroupError],
+}
+
 impl ErrorTarget<'_> {
-    /// Whether `estimate` is below the target, safely.
-    pub fn is_met(&self, estimate: &ErrorEstimate) -> bool {
-        estimate.total <= model::SAFETY * self.error
+    /// Whether the estimate is below the target, safely: further rounds are not worth it.
+    pub fn is_met(&self, judged: Judged) -> bool {
+        let limit = model::SAFETY * self.error;
+        judged.by_light.total <= limit && self.is_below(limit, judged)
+    }
+
+    /// Whether the estimate is at most the target.
+    pub fn is_reached(&self, judged: Judged) -> bool {
+        self.is_below(self.error, judged)
+    }
+
+    fn is_below(&self, error: f64, Judged { whole, groups, .. }: Judged) -> bool {
+        whole.total <= error && self.judged(groups).all(|g| cautious(&g.estimate) <= error)
+    }
+
+    /// The groups that are to meet the error.
+    fn judged<'g>(&self, groups: &'g [GroupError]) -> impl Iterator<Item = &'g GroupError> {
+        groups.iter().filter(|_| self.each_group)
+    }
+
+    /// Whether the uncertainty leaves open whether the target is met.
+    pub fn is_undecided(&self, Judged { whole, groups, .. }: Judged) -> bool {
+        let limit = model::SAFETY * self.error;
+        let is_open = |least: f64, most: f64| least <= limit && limit < most;
+        // The whole has one standard error in it already.
+        is_open(whole.total - 2.0 * whole.uncertainty, whole.total)
+            || self.judged(groups).any(|g| is_open(g.estimate.total, cautious(&g.estimate)))
     }
 
     /// The two halves of `settings` after the overrides.
@@ -27,6 +63,12 @@ impl ErrorTarget<'_> {
         (self.overrides)(&mut settings);
         (settings.solve, settings.gather)
     }
+}
+
+/// The error of a group with one standard error added: the largest errors are at rare points. The
+/// whole has it already.
+fn cautious(estimate: &ErrorEstimate) -> f64 {
+    estimate.total + estimate.uncertainty
 }
 
 /// What has to be done for vertices to be as the settings say.
@@ -69,33 +111,89 @@ pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64)
     chosen
 }
 
-/// `gather` refined where parts of `estimate` are above the cap that meets the `target`.
+/// `gather` refined where parts of the estimate are above the cap that meets the `target`: for the
+/// whole and, where every group is to meet it, for those that do not.
 pub(super) fn refined(
     gather: &GatherSettings,
-    estimate: &ErrorEstimate,
-    target: f64,
+    Judged { whole, by_light, groups }: Judged,
+    target: &ErrorTarget,
 ) -> GatherSettings {
-    let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
-    let cap = model::water_filling_cap(
-        [sampling, mesh, truncation],
-        unshot,
-        model::allowed_error(target),
-    );
     let mut refined = gather.clone();
-    if truncation > cap {
+    let allowed = model::allowed_error(target.error);
+    let mut steps = Steps::default();
+    // Of the whole the one that is further off.
+    let worst = if by_light.total > whole.total { by_light } else { whole };
+    if worst.total > model::SAFETY * target.error {
+        steps = Steps::to(worst, allowed);
+        if let Some(step) = steps.gaps {
+            refined.refinement.gap_factor *= step;
+        }
+        if let Some(step) = steps.mesh {
+            refined.refinement.surplus_tolerance *= step;
+            refined.refinement.min_edge *= step;
+            refined.refinement.interpolation_tolerance *= step;
+        }
+    }
+    for group in target.judged(groups) {
+        if cautious(&group.estimate) <= model::SAFETY * target.error {
+            continue;
+        }
+        let own = Steps::to(&group.estimate, allowed);
+        steps = steps.both(own);
+        if let Some(step) = own.mesh.or(own.gaps) {
+            let factors = &mut refined.refinement.group_factors;
+            let k = group.group as usize;
+            factors.resize(factors.len().max(k + 1), 1.0);
+            // What the whole is refined by does for its groups too.
+            factors[k] *= (step / steps.mesh.unwrap_or(1.0)).min(1.0);
+        }
+    }
+    if steps.bounce {
         refined.refinement.gather_passes += 1;
     }
-    if sampling > cap {
-        refined.rays = (f64::from(gather.rays) * model::ray_step(sampling, cap)) as u32;
-        refined.noise_tolerance *= model::noise_step(sampling, cap);
-    }
-    if mesh > cap {
-        let step = model::mesh_step(mesh, cap);
-        refined.refinement.surplus_tolerance *= step;
-        refined.refinement.min_edge *= step;
-        refined.refinement.interpolation_tolerance *= step;
+    if let Some((rays, noise)) = steps.sampling {
+        refined.rays = (f64::from(gather.rays) * rays).min(*model::RAYS.end()) as u32;
+        refined.noise_tolerance *= noise;
     }
     refined
+}
+
+/// By how much settings are to be refined.
+#[derive(Clone, Copy, Debug, Default)]
+struct Steps {
+    /// Factors of the rays and of the noise tolerance.
+    sampling: Option<(f64, f64)>,
+    /// Factor of the tolerances and of the smallest edge.
+    mesh: Option<f64>,
+    /// Factor of the resolution of gaps.
+    gaps: Option<f64>,
+    /// Whether all vertices are to gather once more.
+    bounce: bool,
+}
+
+impl Steps {
+    /// What brings `estimate` to `allowed`. A further bounce shoots what was left unshot, too.
+    fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
+        let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
+        let bounces = truncation.hypot(unshot);
+        let cap = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
+        Steps {
+            sampling: (sampling > cap)
+                .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
+            mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
+            gaps: (gaps > cap).then(|| model::mesh_step(gaps, cap)),
+            bounce: bounces > cap,
+        }
+    }
+
+    /// The larger of the steps that concern all of the scene; the mesh is that of `self`.
+    fn both(self, other: Steps) -> Steps {
+        let sampling = match (self.sampling, other.sampling) {
+            (Some(a), Some(b)) => Some((a.0.max(b.0), a.1.min(b.1))),
+            (a, b) => a.or(b),
+        };
+        Steps { sampling, bounce: self.bounce || other.bounce, ..self }
+    }
 }
 
 #[cfg(test)]
@@ -114,6 +212,28 @@ mod tests {
         BakeSettings::for_error(0.02, &scene).gather.unwrap()
     }
 
+    fn target(error: f64, each_group: bool) -> ErrorTarget<'static> {
+        ErrorTarget { error, each_group, overrides: &|_| () }
+    }
+
+    fn judged<'e>(whole: &'e ErrorEstimate, groups: &'e [GroupError]) -> Judged<'e> {
+        Judged { whole, by_light: whole, groups }
+    }
+
+    #[test]
+    fn what_is_bright_meets_the_target_too() {
+        let gather = settings();
+        let [met, missed] =
+            [0.001, 0.1].map(|mesh| ErrorEstimate { total: mesh, mesh, ..Default::default() });
+        let target = target(0.02, false);
+        let by_light = Judged { whole: &met, by_light: &missed, groups: &[] };
+        assert!(!target.is_met(by_light) && target.is_reached(by_light));
+        let new = refined(&gather, by_light, &target);
+        assert!(new.refinement.min_edge < gather.refinement.min_edge);
+        let dark = Judged { whole: &missed, by_light: &met, groups: &[] };
+        assert!(!target.is_met(dark) && !target.is_reached(dark));
+    }
+
     #[test]
     fn only_parts_above_cap_are_refined() {
         let gather = settings();
@@ -128,7 +248,7 @@ mod tests {
             ),
         ];
         for (estimate, step) in cases {
-            let new = refined(&gather, &estimate, 0.02);
+            let new = refined(&gather, judged(&estimate, &[]), &target(0.02, false));
             assert_eq!(Step::between(&gather, &new), step, "{estimate:?}");
             let finer = new.refinement.surplus_tolerance < gather.refinement.surplus_tolerance;
             assert_eq!(finer, estimate.mesh > 0.0);
@@ -139,7 +259,36 @@ mod tests {
             );
         }
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
-        assert_eq!(refined(&gather, &met, 0.02), gather, "0.0112 is below 0.9 · 0.75 · 0.02");
+        let new = refined(&gather, judged(&met, &[]), &target(0.02, false));
+        assert_eq!(new, gather, "0.0112 is below 0.9 · 0.75 · 0.02");
+    }
+
+    #[test]
+    fn groups_above_target_are_refined_alone() {
+        let gather = settings();
+        let met = ErrorEstimate { total: 0.01, mesh: 0.01, ..ErrorEstimate::default() };
+        let missed = ErrorEstimate { total: 0.1, mesh: 0.1, ..met };
+        let group = |group, estimate| GroupError { group, area_share: 0.1, estimate };
+        let groups = [group(1, met), group(3, missed)];
+        for each_group in [false, true] {
+            let target = target(0.02, each_group);
+            assert_eq!(target.is_met(judged(&met, &groups)), !each_group);
+            let new = refined(&gather, judged(&met, &groups), &target);
+            if each_group {
+                let factors = &new.refinement.group_factors;
+                assert_eq!(factors[..], [1.0, 1.0, 1.0, model::MIN_MESH_STEP]);
+            } else {
+                assert_eq!(new, gather);
+            }
+        }
+        // What is uncertain takes more points, if these can decide.
+        let wide = ErrorEstimate { uncertainty: 0.02, ..met };
+        assert!(target(0.02, true).is_undecided(judged(&met, &[group(0, wide)])));
+        assert!(!target(0.02, true).is_undecided(judged(&met, &groups)));
+        assert!(!target(0.02, false).is_undecided(judged(&met, &[group(0, wide)])));
+        let close = ErrorEstimate { total: 0.0145, uncertainty: 0.001, ..met };
+        assert!(target(0.02, false).is_undecided(judged(&close, &[])));
+        assert!(!target(0.01, false).is_undecided(judged(&close, &[])));
     }
 
     #[test]

@@ -1,7 +1,21 @@
 //! The estimated error of a result: statistics of what random points observe.
 //!
-//! At each point the radiosity that the vertices interpolate to is compared with two independent
-//! gathers there, `a` and `b`, and with a gather `c` of the result itself (one more bounce):
+//! **The measure.** Over the area of all surfaces that reflect, the root mean square of
+//!
+//! ```text
+//!   e = |B − B_true| / max(|B_true|, floor)      floor: 5 % of the mean of |B_true| there
+//! ```
+//!
+//! with B the reflected radiosity (emission is known and has no error) and | | a length over the
+//! channels. Surfaces that reflect nothing have neither error nor weight. Places that nobody sees are
+//! left out: those that see backs in more than 95 % of their hemisphere, weighted by the cosine, or
+//! in more than half of it backs that nearly touch them. They are inside a solid or under what
+//! stands on them. A group of the scene has the same figure over its own area, with the floor of the
+//! scene.
+//!
+//! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
+//! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result
+//! itself (one more bounce):
 //!
 //! ```text
 //! interpolated − (a+b)/2   mesh + sampling + noise of the two gathers
@@ -9,27 +23,38 @@
 //!     c − a                what one more gather pass would change: truncation
 //! ```
 //!
-//! All are relative to the radiosity, and averaged over the points as squares. The squared error of
-//! mesh and sampling is the first, plus one standard error of that mean, less half the noise; that
-//! of truncation continues the change as a geometric series in the mean reflectance. Light not shot
-//! is added as if it fell like the ambient term. This file does no gathering: see
-//! [`estimator`](super::estimator).
+//! Points are spread over the groups as well as the area: each group is a stratum, and means are
+//! those of the strata, weighted by area. Within a stratum there are more points where errors are
+//! expected, each with the area that it stands for as its weight. The squared error of mesh and sampling is the first, plus
+//! one standard error of that mean, less half the noise; that of truncation continues the change as
+//! a geometric series in the mean reflectance. Light not shot is added as if it fell like the
+//! ambient term. Dim points that see surfaces nearer than their element is large are a part of their
+//! own, the gaps: what no mesh resolves is mostly there. This file does no gathering: see [`estimator`](super::estimator).
 
 use glam::DVec3;
 
 use crate::bake::model;
+use crate::gather::refinement_indicator::GAP_DIMNESS;
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// An estimate of the error of vertex radiosity: root mean square over the area, relative to the
-/// radiosity. The squares of the parts add up to that of the total.
+/// An estimate of the error of vertex radiosity.
+///
+/// Over the area of all surfaces that reflect, or those of one group: the root mean square of the
+/// error of the reflected radiosity, relative to it, where that counts as no less than 5 % of its
+/// mean over the scene. The squares of the parts add up to that of the total.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ErrorEstimate {
     /// All parts together.
     pub total: f64,
+    /// Standard error of the total, since it is found at random points.
+    pub uncertainty: f64,
     /// Radiosity is linear over the faces of the mesh, and light is not.
     pub mesh: f64,
+    /// The same at dim points that see surfaces nearer than their element is large, in a gap or at
+    /// its mouth: light changes there over lengths that a mesh of the whole scene does not resolve.
+    pub gaps: f64,
     /// Gathers take a finite number of pixels or rays: half the mean squared difference of two
     /// independently rotated gathers.
     pub sampling: f64,
@@ -38,28 +63,41 @@ pub struct ErrorEstimate {
     pub truncation: f64,
     /// Light that was not shot, if it fell as evenly as the ambient term.
     pub unshot: f64,
-    /// An exact upper bound: no more than this share of all radiosity times area is missing because
-    /// it was not shot, in the worst channel.
+    /// An upper bound: no more than this share of all radiosity times area is missing because it
+    /// was not shot, in the worst channel.
     pub unshot_bound: f64,
     /// Random points that were used.
     pub samples: usize,
 }
 
+/// The estimated error of one group of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct GroupError {
+    /// The group, as an index of [`Scene::groups`](crate::Scene::groups).
+    pub group: u32,
+    /// Its share of the area that reflects.
+    pub area_share: f64,
+    /// The error over its area. [`ErrorEstimate::unshot_bound`] is that of the scene.
+    pub estimate: ErrorEstimate,
+}
+
 /// What was found at a random point of the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Observation {
-    /// Radiosity that the vertices interpolate to, W/m².
+    /// Index of the stratum that the point stands for.
+    pub stratum: usize,
+    /// Area that the point stands for, up to a factor that is the same for all of the stratum.
+    pub weight: f64,
+    /// Reflected radiosity that the vertices interpolate to, W/m².
     pub interpolated: Rgb,
-    /// The part of it that is emitted, W/m².
-    pub emitted: Rgb,
-    /// Radiosity by two gathers there, rotated independently, W/m².
+    /// Reflected radiosity by two gathers there, rotated independently, W/m².
     pub gathered: [Rgb; 2],
-    /// Radiosity by a gather of the result itself, with the rays of the first, W/m².
+    /// Reflected radiosity by a gather of the result itself, with the rays of the first, W/m².
     pub next: Rgb,
     /// What the middle of the element may be off by, up to a common factor, W/m².
     pub element_residual: f64,
-    /// Whether the surface reflects nothing there, or the point is buried under another surface:
-    /// the error there is none, or cannot be known.
+    /// Whether the point is hidden by what touches its surface or encloses it: nobody sees it.
     pub excluded: bool,
     /// Share of the hemisphere in which nothing is seen.
     pub escaped: f64,
@@ -67,21 +105,31 @@ pub(super) struct Observation {
     pub backface: f64,
     /// Mean of 1/distance over the hemisphere, per scene unit.
     pub inverse_distance: f64,
+    /// Square root of the element's area, scene unit.
+    pub size: f64,
+}
+
+/// A part of the surfaces that reflect, over which points are spread evenly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stratum {
+    /// The group that it is; none for all the small ones together.
+    pub group: Option<u32>,
+    /// Length unit squared.
+    pub area: f64,
+    /// Mean square of the ambient term over the radiosity that it falls on, by area.
+    pub ambient: f64,
 }
 
 /// What is known of the scene and of the solve.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Conditions {
-    /// See [`radiosity_floor`], W/m².
+pub(super) struct Conditions<'a> {
+    pub strata: &'a [Stratum],
+    /// Radiosity below which errors are relative to this instead, W/m².
     pub radiosity_floor: f64,
-    /// Mean distance below which a dim or hidden point is in a gap, scene unit.
-    pub gap: f64,
-    /// Mean reflectance over the area, of the channel in which it is highest.
+    /// Mean reflectance over the area that reflects, of the channel in which it is highest.
     pub mean_reflectance: f64,
     /// Times that all vertices have gathered; none if the light is that of the elements.
     pub gather_passes: Option<u32>,
-    /// Root mean square of the ambient term over the radiosity it falls on.
-    pub ambient: f64,
     /// See [`ErrorEstimate::unshot_bound`].
     pub unshot_bound: f64,
 }
@@ -95,8 +143,22 @@ pub(super) struct ErrorSpread {
     pub even: f64,
 }
 
-/// A point's observation, relative to the radiosity there.
+/// The estimate of a result.
+pub(super) struct Estimate {
+    pub whole: ErrorEstimate,
+    /// The whole with every place weighted by the light that it reflects, beside its area: what is
+    /// bright counts however small it is, such as a lit room on a dark plane.
+    pub by_light: ErrorEstimate,
+    /// The same group by group, in the order of the strata.
+    pub groups: Vec<GroupError>,
+    pub spread: ErrorSpread,
+}
+
+/// A point's observation, relative to the reflected radiosity there.
+#[derive(Clone, Copy)]
 struct Deviation {
+    /// See [`Observation::weight`].
+    weight: f64,
     /// Of the interpolated radiosity from the gathered one.
     interpolation: DVec3,
     /// Squared noise of one gather.
@@ -105,46 +167,112 @@ struct Deviation {
     next: DVec3,
     /// Squared element residual.
     residual: f64,
+    /// Whether the point is in a gap.
+    in_gap: bool,
+    /// Reflected radiosity, W/m²: a length over the channels.
+    reflected: f64,
 }
 
-/// Radiosity below which errors are relative to this instead, W/m²: a share of the mean reflected
-/// radiosity. What is darker is not worth most of the elements.
-pub(super) fn radiosity_floor(reflected: impl ExactSizeIterator<Item = Rgb>) -> f64 {
-    let count = reflected.len().max(1) as f64;
-    let sum = reflected.map(glam::DVec3::length).sum::<f64>();
-    (model::RADIOSITY_FLOOR * sum / count).max(f64::MIN_POSITIVE)
+/// The deviations of a stratum that has some.
+struct StratumDeviations {
+    stratum: Stratum,
+    /// Its area less that of the excluded points; or the light on it.
+    area: f64,
+    deviations: Vec<Deviation>,
 }
 
-/// The error by what was observed at random points, spread evenly over the area.
-pub(super) fn estimate(
-    observations: &[Observation],
-    conditions: &Conditions,
-) -> (ErrorEstimate, ErrorSpread) {
-    let deviations: Vec<Deviation> =
-        observations.iter().filter_map(|o| o.deviation(conditions)).collect();
-    let used = deviations.len().max(1) as f64;
-    // Of points that reflect nothing all is known: their error is none.
-    let share = used / observations.len().max(1) as f64;
-    let (interpolation, sampling) = interpolation_and_sampling(&deviations);
-    let mesh = interpolation - sampling;
-    let unshot = unshot(observations, conditions) / share.max(1e-30);
-    // Light that was not shot is a part of what one more pass would change.
-    let truncation = (truncation(&deviations, conditions) - unshot).max(0.0);
-    let residual = mean(&deviations, |d| d.residual);
-    let estimate = ErrorEstimate {
-        total: ((interpolation + truncation + unshot) * share).sqrt(),
-        mesh: (mesh * share).sqrt(),
-        sampling: (sampling * share).sqrt(),
-        truncation: (truncation * share).sqrt(),
-        unshot: (unshot * share).sqrt(),
-        unshot_bound: conditions.unshot_bound,
-        samples: observations.len(),
+impl StratumDeviations {
+    /// The same with light in the place of area: every point by what it reflects.
+    fn by_light(&self) -> StratumDeviations {
+        let mean = mean(&self.deviations, &|d| d.reflected);
+        let lit = |d: &Deviation| Deviation { weight: d.weight * d.reflected, ..*d };
+        let deviations = self.deviations.iter().map(lit).collect();
+        StratumDeviations { stratum: self.stratum, area: self.area * mean, deviations }
+    }
+}
+
+/// The error by what was observed at random points, spread evenly over each stratum.
+pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) -> Estimate {
+    let mut observed = vec![0.0; conditions.strata.len()];
+    let mut all: Vec<StratumDeviations> = conditions
+        .strata
+        .iter()
+        .map(|&stratum| StratumDeviations { stratum, area: 0.0, deviations: vec![] })
+        .collect();
+    for observation in observations {
+        observed[observation.stratum] += observation.weight;
+        all[observation.stratum].deviations.extend(observation.deviation(conditions));
+    }
+    for (stratum, observed) in all.iter_mut().zip(observed) {
+        let used: f64 = stratum.deviations.iter().map(|d| d.weight).sum();
+        stratum.area = if used > 0.0 { stratum.stratum.area * used / observed } else { 0.0 };
+    }
+    all.retain(|stratum| stratum.area > 0.0);
+    let passed = passed_share(observations, conditions);
+    let bias = Means(&all).vector(|d| change(d, conditions));
+    let parts = |strata: &[StratumDeviations], standard_errors: f64| {
+        parts(strata, bias, passed, standard_errors, conditions)
     };
+    let whole = parts(&all, 1.0);
+    let mut lit: Vec<StratumDeviations> = all.iter().map(StratumDeviations::by_light).collect();
+    lit.retain(|stratum| stratum.area > 0.0);
+    let by_light = parts(&lit, 1.0);
+    let area: f64 = all.iter().map(|stratum| stratum.area).sum();
+    let groups = all.iter().filter_map(|one| {
+        let group = one.stratum.group?;
+        let estimate = parts(std::slice::from_ref(one), 0.0);
+        Some(GroupError { group, area_share: one.area / area, estimate })
+    });
+    let residual = Means(&all).of(|d| d.residual);
+    let even = whole.sampling.powi(2) + whole.truncation.powi(2) + whole.unshot.powi(2);
     let spread = ErrorSpread {
-        per_residual: (mesh / residual.max(1e-30)).sqrt(),
-        even: (sampling + truncation + unshot).sqrt(),
+        per_residual: whole.mesh.hypot(whole.gaps) / residual.max(1e-30).sqrt(),
+        even: even.sqrt(),
     };
-    (estimate, spread)
+    Estimate { groups: groups.collect(), whole, by_light, spread }
+}
+
+/// All parts over `strata`, with so many standard errors added to what scatters most. `bias` is the
+/// mean change under one more pass over the whole, and `passed` the share of the unshot light that
+/// the passes keep.
+fn parts(
+    strata: &[StratumDeviations],
+    bias: DVec3,
+    passed: f64,
+    standard_errors: f64,
+    conditions: &Conditions,
+) -> ErrorEstimate {
+    let means = Means(strata);
+    let share_of = |in_gap: bool| {
+        let noise = means.of(|d| if d.in_gap == in_gap { d.noise } else { 0.0 });
+        let square =
+            |d: &Deviation| if d.in_gap == in_gap { d.interpolation.length_squared() } else { 0.0 };
+        // The largest errors are at rare points.
+        let squares = means.of(square) + standard_errors * means.standard_error(square);
+        ((squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares), noise)
+    };
+    let (interpolation, noise) = share_of(false);
+    let (gaps, _) = share_of(true);
+    let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
+    let mesh = interpolation - sampling;
+    let area: f64 = strata.iter().map(|s| s.area).sum::<f64>().max(f64::MIN_POSITIVE);
+    let ambient = strata.iter().map(|s| s.stratum.ambient * s.area).sum::<f64>() / area;
+    let unshot = ambient * passed * passed;
+    // Light that was not shot is a part of what one more pass would change.
+    let truncation = (truncation(&means, bias, conditions) - unshot).max(0.0);
+    let total = (interpolation + gaps + truncation + unshot).sqrt();
+    let scatter = means.standard_error(|d| d.interpolation.length_squared());
+    ErrorEstimate {
+        total,
+        uncertainty: if total > 0.0 { scatter / (2.0 * total) } else { 0.0 },
+        mesh: mesh.sqrt(),
+        gaps: gaps.sqrt(),
+        sampling: sampling.sqrt(),
+        truncation: truncation.sqrt(),
+        unshot: unshot.sqrt(),
+        unshot_bound: conditions.unshot_bound,
+        samples: strata.iter().map(|s| s.deviations.len()).sum(),
+    }
 }
 
 impl Observation {
@@ -156,64 +284,93 @@ impl Observation {
         let floor = conditions.radiosity_floor;
         let [first, second] = self.gathered;
         let truth = (first + second) / 2.0;
-        let dim_or_behind = truth.length() < floor || self.backface > buried::HIDDEN_SAMPLE;
-        if dim_or_behind && self.inverse_distance * conditions.gap > 1.0 {
-            return None;
-        }
-        let scale = truth.length().max(self.interpolated.length()).max(floor);
+        let dim_or_behind =
+            truth.length() < GAP_DIMNESS * floor || self.backface > buried::NEAR_BACKS;
+        let scale = truth.length().max(floor);
         Some(Deviation {
+            weight: self.weight,
             interpolation: (self.interpolated - truth) / scale,
             noise: ((first - second) / scale).length_squared() / 2.0,
             next: (self.next - first) / scale,
             residual: (self.element_residual / scale).powi(2),
+            reflected: truth.length(),
+            in_gap: dim_or_behind && self.inverse_distance * self.size > 1.0,
         })
     }
 }
 
-fn mean(deviations: &[Deviation], value: impl Fn(&Deviation) -> f64) -> f64 {
-    deviations.iter().map(value).sum::<f64>() / deviations.len().max(1) as f64
+/// Means over strata, each weighted by its area.
+struct Means<'a>(&'a [StratumDeviations]);
+
+impl Means<'_> {
+    fn weighted(&self, of_stratum: impl Fn(&StratumDeviations) -> f64) -> f64 {
+        let area: f64 = self.0.iter().map(|s| s.area).sum();
+        let sum: f64 = self.0.iter().map(|s| s.area * of_stratum(s)).sum();
+        if area > 0.0 { sum / area } else { 0.0 }
+    }
+
+    /// Mean of `value`.
+    fn of(&self, value: impl Fn(&Deviation) -> f64) -> f64 {
+        self.weighted(|s| mean(&s.deviations, &value))
+    }
+
+    /// Mean of the vector `value`.
+    fn vector(&self, value: impl Fn(&Deviation) -> DVec3) -> DVec3 {
+        let axis = |k: usize| self.of(|d| value(d)[k]);
+        DVec3::new(axis(0), axis(1), axis(2))
+    }
+
+    /// Standard error of the mean of `value`, over points that are independent within each stratum.
+    fn standard_error(&self, value: impl Fn(&Deviation) -> f64) -> f64 {
+        let area: f64 = self.0.iter().map(|s| s.area).sum();
+        let variance = |s: &StratumDeviations| {
+            // A ratio of two sums over random points (Cochran 1977, equation 6.13).
+            let middle = mean(&s.deviations, &value);
+            let weight: f64 = s.deviations.iter().map(|d| d.weight).sum();
+            let square = |d: &Deviation| (d.weight / weight * (value(d) - middle)).powi(2);
+            (s.area / area).powi(2) * s.deviations.iter().map(square).sum::<f64>()
+        };
+        self.0.iter().map(variance).sum::<f64>().sqrt()
+    }
 }
 
-/// Squared error of mesh and sampling together, and of sampling alone.
-fn interpolation_and_sampling(deviations: &[Deviation]) -> (f64, f64) {
-    let count = deviations.len().max(1) as f64;
-    let noise = mean(deviations, |d| d.noise);
-    let squares = mean(deviations, |d| d.interpolation.length_squared());
-    // The largest errors are at rare points: one standard error of the mean is added to it.
-    let variance = mean(deviations, |d| (d.interpolation.length_squared() - squares).powi(2));
-    let squares = squares + (variance / count).sqrt();
-    let interpolation = (squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares);
-    let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
-    (interpolation, sampling)
+/// Mean of `value`, by weight.
+fn mean(deviations: &[Deviation], value: &impl Fn(&Deviation) -> f64) -> f64 {
+    let weight: f64 = deviations.iter().map(|d| d.weight).sum();
+    let sum: f64 = deviations.iter().map(|d| d.weight * value(d)).sum();
+    if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
-/// Squared error of stopping after some passes.
-fn truncation(deviations: &[Deviation], conditions: &Conditions) -> f64 {
-    let gathered = conditions.gather_passes.is_some();
+/// What one more pass would change at a point.
+fn change(deviation: &Deviation, conditions: &Conditions) -> DVec3 {
     // The elements' own light is changed by a first pass to what was gathered at the points.
-    let change = |d: &Deviation| if gathered { d.next } else { -d.interpolation };
-    let count = deviations.len().max(1) as f64;
-    let bias = deviations.iter().map(change).sum::<DVec3>() / count;
+    match conditions.gather_passes {
+        Some(_) => deviation.next,
+        None => -deviation.interpolation,
+    }
+}
+
+/// Squared error of stopping after some passes, where one more would change `bias` in the mean.
+fn truncation(means: &Means, bias: DVec3, conditions: &Conditions) -> f64 {
     let reflectance = conditions.mean_reflectance;
     let series = bias.length() / (1.0 - reflectance);
-    if gathered {
+    if conditions.gather_passes.is_some() {
         // Both gathers cast the same rays, so that their difference has little noise.
-        mean(deviations, |d| (change(d) - bias).length_squared()) + series * series
+        means.of(|d| (change(d, conditions) - bias).length_squared()) + series * series
     } else {
         (series * reflectance).powi(2)
     }
 }
 
-/// Squared error of light that was not shot, over all points: each gather pass keeps the share of
-/// it that is reflected and does not escape.
-fn unshot(observations: &[Observation], conditions: &Conditions) -> f64 {
+/// Share of the unshot light that is still missing after the passes: each keeps what is reflected
+/// of it and does not escape.
+fn passed_share(observations: &[Observation], conditions: &Conditions) -> f64 {
     let escaped = observations.iter().map(|o| o.escaped).sum::<f64>();
     let escaped = escaped / observations.len().max(1) as f64;
-    let passed = match conditions.gather_passes {
+    match conditions.gather_passes {
         Some(passes) => (conditions.mean_reflectance * (1.0 - escaped)).powi(passes as i32),
         None => 1.0,
-    };
-    (conditions.ambient * passed).powi(2)
+    }
 }
 
 #[cfg(test)]

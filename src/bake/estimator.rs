@@ -1,21 +1,25 @@
 //! Random points that observe how far off a result is.
 //!
-//! Points are spread evenly over the area of the result's faces. Each gathers twice what lit the
-//! result, the second time from a hair beside, where rays and hemicubes are rotated otherwise; and
-//! once the result itself. The [statistics](super::error_estimate) of that are the estimate; the
-//! share of each vertex follows the residuals of the elements around it.
+//! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
+//! the reflecting area of each: half of them evenly, half where the residuals of the elements say
+//! that the error is, since few places make up most of a root mean square. Each gathers twice what lit the result, the second time
+//! from a hair beside, where rays and hemicubes are rotated otherwise; and once the result itself.
+//! The [statistics](super::error_estimate) of that are the estimate; the share of each vertex
+//! follows the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
+use crate::bake::controller::Judged;
 use crate::bake::error_estimate::{
-    self, Conditions, ErrorEstimate, ErrorSpread, Observation, radiosity_floor,
+    self, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError, Observation, Stratum,
 };
 use crate::bake::model;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
-use crate::gather::gather_points::{SurfaceOffset, is_buried};
+use crate::gather::gather_points::SurfaceOffset;
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
@@ -23,6 +27,7 @@ use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::Rgb;
 use crate::solver::Ledger;
+use crate::visibility::buried;
 
 /// Points that are gathered at before progress is reported first: a bake that is stopped uses
 /// these.
@@ -31,6 +36,10 @@ const FIRST_BATCH: usize = 16;
 /// How far beside a point it gathers again, in units of the element's size; up to 1.5 times as far.
 /// Small enough that the light is the same, large enough to be another cell of the rotation.
 const JITTER: f64 = 1e-3;
+
+/// How far points are drawn towards the centroid of their face, a share of the way: on a side, where
+/// walls meet, it is undefined what is seen.
+const INSET: f64 = 0.03;
 
 /// A result whose error is to be estimated.
 pub(super) struct ErrorEstimator<'a> {
@@ -43,16 +52,49 @@ pub(super) struct ErrorEstimator<'a> {
     pub ledger: &'a Ledger,
     /// Times that all vertices have gathered.
     pub gather_passes: u32,
+    /// Diagonal of where the light is, scene unit.
+    pub diagonal: f64,
+}
+
+/// How many random points there are to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SampleCounts {
+    /// Over all.
+    pub total: usize,
+    /// On each group, at least, as far as there are not too many groups.
+    pub per_group: usize,
+}
+
+/// The estimated error of a result.
+pub(super) struct EstimatedError {
+    pub whole: ErrorEstimate,
+    /// The whole, by light instead of area.
+    pub by_light: ErrorEstimate,
+    /// Group by group; those too small to have points of their own are not in it.
+    pub groups: Vec<GroupError>,
+    /// Standard error of each vertex, W/m².
+    pub vertices: Vec<f64>,
+}
+
+impl EstimatedError {
+    /// What a target judges.
+    pub fn judged(&self) -> Judged<'_> {
+        Judged { whole: &self.whole, by_light: &self.by_light, groups: &self.groups }
+    }
 }
 
 /// A random point of the surface.
 struct Sample {
+    stratum: usize,
+    /// Share of the stratum's area that it stands for.
+    weight: f64,
     element: usize,
     reflectance: Rgb,
     point: GatherPoint,
-    /// Radiosity that the vertices interpolate to, W/m².
+    /// Step to the centroid of the face, scene unit.
+    inward: DVec3,
+    /// Reflected radiosity that the vertices interpolate to, W/m².
     interpolated: Rgb,
-    emitted: Rgb,
     /// Square root of the element's area, scene unit.
     size: f64,
     /// Rotation of the cell that the point is in, in [0, 1).
@@ -68,53 +110,75 @@ struct SampleGathers {
 }
 
 impl ErrorEstimator<'_> {
-    /// Gathers at `count` random points, and gives the estimate and the standard error of each
-    /// vertex, W/m². `progress` is told how many points are done, and may stop: they are enough
-    /// then.
+    /// Gathers at random points, and gives the estimate. `progress` is told how many points are done
+    /// of how many, and may stop: they are enough then.
     pub fn estimate(
         &self,
-        count: usize,
+        counts: SampleCounts,
         gatherer: &mut dyn Gather,
-        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<(ErrorEstimate, Vec<f64>), Error> {
-        let samples = self.samples(count);
+        progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<EstimatedError, Error> {
+        let radiosity_floor = self.radiosity_floor();
+        let (mut strata, samples) = self.samples(counts);
         let gathers = self.gather(&samples, gatherer, progress)?;
         let observed = samples.iter().zip(&gathers);
         let observations: Vec<Observation> = observed
-            .filter_map(|(sample, gathers)| Some(self.observation(sample, gathers.as_ref()?)))
+            .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)))
             .collect();
-        let reflected = observations.iter().map(|o| o.interpolated - o.emitted);
-        let radiosity_floor = radiosity_floor(reflected);
-        let (ambient, unshot_bound) = self.unshot(radiosity_floor);
+        let unshot_bound = self.unshot(radiosity_floor, &mut strata);
         let conditions = Conditions {
+            strata: &strata,
             radiosity_floor,
-            gap: model::GAP * self.light.mesh.scene().bounds().diagonal(),
             mean_reflectance: self.light.mesh.mean_reflectance().max_element(),
             gather_passes: self.lit_by.map(|_| self.gather_passes),
-            ambient,
             unshot_bound,
         };
-        let (estimate, spread) = error_estimate::estimate(&observations, &conditions);
-        Ok((estimate, self.vertex_errors(spread)))
+        let estimate = error_estimate::estimate(&observations, &conditions);
+        let vertices = self.vertex_errors(estimate.spread);
+        let Estimate { whole, by_light, groups, .. } = estimate;
+        Ok(EstimatedError { whole, by_light, groups, vertices })
     }
 
     /// Root mean square error, relative, of what vertices interpolate to because `gatherer` casts
     /// so many rays and not more; by `count` points.
     pub fn sampling_error(&self, count: usize, gatherer: &mut dyn Gather) -> Result<f64, Error> {
-        let samples = self.samples(count);
+        let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
+        let (strata, samples) = self.samples(counts);
         let points: Vec<GatherPoint> = samples.iter().map(|s| s.point).collect();
         let jittered: Vec<GatherPoint> = samples.iter().map(Sample::jittered).collect();
         let sources = self.sources().radiosity_field();
         let first = gatherer.gather(&sources, &points)?;
         let second = gatherer.gather(&sources, &jittered)?;
-        let floor = radiosity_floor(samples.iter().map(|s| s.interpolated - s.emitted));
-        let mut sum = 0.0;
+        let floor = self.radiosity_floor();
+        // By area and by light: the larger, so that a dark plane does not hide a lit room.
+        let mut sums = [(0.0, 0.0); 2];
         for (sample, (first, second)) in samples.iter().zip(first.iter().zip(&second)) {
-            let [a, b] = [first, second].map(|gathered| sample.radiosity(gathered));
-            let scale = a.length().max(sample.interpolated.length()).max(floor);
-            sum += ((a - b) / scale).length_squared() / 2.0;
+            let [a, b] = [first, second].map(|gathered| sample.reflected(gathered));
+            let light = a.length().max(sample.interpolated.length());
+            let square = ((a - b) / light.max(floor)).length_squared() / 2.0;
+            let area = sample.weight * strata[sample.stratum].area;
+            for (sum, weight) in sums.iter_mut().zip([area, area * light]) {
+                *sum = (sum.0 + weight * square, sum.1 + weight);
+            }
         }
-        Ok((model::HALF * (sum / samples.len().max(1) as f64)).sqrt())
+        let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
+        Ok((model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt())
+    }
+
+    /// Reflected radiosity below which errors are relative to this instead, W/m²: a share of its
+    /// mean over the area that reflects. What is darker is not worth most of the elements.
+    fn radiosity_floor(&self) -> f64 {
+        let mesh = &self.light.mesh;
+        let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
+        for (e, corners) in self.light.corners.iter().enumerate() {
+            let node = mesh.element(e);
+            if mesh.material(node).reflects() {
+                let reflected = corners.iter().map(|&v| self.light.reflected[v as usize]);
+                flux += mesh.area(node) * reflected.sum::<Rgb>().length() / 3.0;
+                area += mesh.area(node);
+            }
+        }
+        (model::RADIOSITY_FLOOR * flux / area).max(f64::MIN_POSITIVE)
     }
 
     /// What lights the vertices.
@@ -128,7 +192,7 @@ impl ErrorEstimator<'_> {
         &self,
         samples: &[Sample],
         gatherer: &mut dyn Gather,
-        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Vec<Option<SampleGathers>>, Error> {
         let sources = self.sources().radiosity_field();
         let mut gathers = vec![None; samples.len()];
@@ -152,31 +216,16 @@ impl ErrorEstimator<'_> {
                 }
                 Ok::<_, Error>(())
             })?;
-            if progress(samples.len() - remaining.len()).is_break() {
+            if progress(samples.len() - remaining.len(), samples.len()).is_break() {
                 break;
             }
         }
         Ok(gathers)
     }
 
-    fn observation(&self, sample: &Sample, gathers: &SampleGathers) -> Observation {
-        let SampleGathers { first, second, next } = gathers;
-        let buried = [first, second, next].iter().any(|g| is_buried(g, sample.size));
-        Observation {
-            interpolated: sample.interpolated,
-            emitted: sample.emitted,
-            gathered: [sample.radiosity(first), sample.radiosity(second)],
-            next: sample.radiosity(next),
-            element_residual: self.element_residual[sample.element],
-            excluded: buried || sample.reflectance == Rgb::ZERO,
-            escaped: first.escaped,
-            backface: first.backface,
-            inverse_distance: first.inverse_distance,
-        }
-    }
-
-    /// Points spread evenly over the area of the faces.
-    fn samples(&self, count: usize) -> Vec<Sample> {
+    /// Points spread over groups and evenly over the faces of each that reflect, and the strata
+    /// that they stand for.
+    fn samples(&self, counts: SampleCounts) -> (Vec<Stratum>, Vec<Sample>) {
         let (surface, mesh) = (&self.light.surface, &self.light.mesh);
         let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
         let area = |f: &[u32; 3]| {
@@ -185,54 +234,106 @@ impl ErrorEstimator<'_> {
         };
         let above = SurfaceOffset::new(mesh.scene());
         let rotations = CellRotation::new(&mesh.scene().bounds());
-        let sample = |place: SurfacePoint| {
-            let face = &surface.faces[place.triangle];
-            let [u, v] = place.barycentric;
+        let sample = |stratum: usize, weight: f64, face: usize, barycentric: [f64; 2]| {
+            let [u, v] = barycentric.map(|b| b + (1.0 / 3.0 - b) * INSET);
+            let element = surface.elements[face] as usize;
+            let face = &surface.faces[face];
             let mix = |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
-            let element = surface.elements[place.triangle] as usize;
             let node = mesh.element(element);
             let material = mesh.material(node);
             let size = mesh.area(node).sqrt();
-            let point = above.gather_point(mix(corners(face)), mesh.normal(node), size);
+            // Next to a side, another surface may be nearer than what a point of this size sees.
+            let inset = 3.0 * u.min(v).min(1.0 - u - v);
+            let position = mix(corners(face));
+            let point = above.gather_point(position, mesh.normal(node), size * inset);
+            let radiosity = mix(face.map(|v| surface.radiosity[v as usize]));
             Sample {
+                stratum,
+                weight,
                 element,
                 reflectance: material.reflectance,
                 point,
-                interpolated: mix(face.map(|v| surface.radiosity[v as usize])),
-                emitted: material.exitance,
+                inward: corners(face).iter().sum::<DVec3>() / 3.0 - position,
+                interpolated: radiosity - material.exitance,
                 size,
                 rotation: rotations.at(point.position, point.near),
             }
         };
-        AreaSampler::new(surface.faces.iter().map(area)).spread(count, 0.5).map(sample).collect()
+        let floor = self.radiosity_floor();
+        let faces = (0..surface.faces.len()).filter_map(|face| {
+            let element = surface.elements[face] as usize;
+            let node = mesh.element(element);
+            if !mesh.material(node).reflects() {
+                return None;
+            }
+            let corners = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
+            let reflected = (corners.iter().sum::<Rgb>() / 3.0).length();
+            let scale = reflected.max(floor);
+            let residual = self.element_residual.get(element).copied().unwrap_or(0.0) / scale;
+            let area = area(&surface.faces[face]);
+            Some(SampledFace {
+                face,
+                group: mesh.group(node),
+                area,
+                error: area * residual.powi(2),
+                flux: area * reflected,
+            })
+        });
+        let mut samples = vec![];
+        let mut strata = vec![];
+        for (k, stratum) in strata_of(faces.collect(), counts).into_iter().enumerate() {
+            let error: f64 = stratum.faces.iter().map(|face| face.error).sum();
+            let density = |face: &SampledFace| {
+                let even = face.area / stratum.area;
+                if error > 0.0 { (even + face.error / error) / 2.0 } else { even }
+            };
+            let sampler = AreaSampler::new(stratum.faces.iter().map(density));
+            let places = sampler.spread(stratum.samples, 0.5);
+            samples.extend(places.map(|SurfacePoint { triangle, barycentric }| {
+                let face = &stratum.faces[triangle];
+                let weight = face.area / density(face) / stratum.area / stratum.samples as f64;
+                sample(k, weight, face.face, barycentric)
+            }));
+            strata.push(Stratum { group: stratum.group, area: stratum.area, ambient: 0.0 });
+        }
+        (strata, samples)
     }
 
-    /// Root mean square of the ambient term over the radiosity, or over `floor` (W/m²) where that
-    /// is more; and the bound of [`ErrorEstimate::unshot_bound`].
-    fn unshot(&self, floor: f64) -> (f64, f64) {
+    /// Fills in the mean square of the ambient term over the radiosity, or over `floor` (W/m²) where
+    /// that is more, of each of `strata`; and gives [`ErrorEstimate::unshot_bound`].
+    fn unshot(&self, floor: f64, strata: &mut [Stratum]) -> f64 {
         let sources = self.sources();
         let mesh = &sources.mesh;
         let mut ambient = vec![Rgb::ZERO; mesh.element_count()];
         self.ledger.add_ambient(mesh, &mut ambient);
-        let (mut squares, mut area) = (0.0, 0.0);
+        let groups = mesh.scene().groups().len().max(1);
+        let (mut squares, mut areas) = (vec![0.0; groups], vec![0.0; groups]);
         let mut flux = Rgb::ZERO;
         let mut max_reflectance = Rgb::ZERO;
         for (e, ambient) in ambient.iter().enumerate() {
             let node = mesh.element(e);
             let material = mesh.material(node);
-            let reflected = sources.corners[e].iter().map(|&v| sources.reflected[v as usize]);
-            let radiosity = material.exitance + reflected.sum::<Rgb>() / 3.0;
-            let element_area = mesh.area(node);
-            let scale = (radiosity + *ambient).length().max(floor);
-            squares += (ambient.length() / scale).powi(2) * element_area;
-            area += element_area;
-            flux += radiosity * element_area;
+            if !material.reflects() {
+                continue;
+            }
+            let corners = sources.corners[e].iter().map(|&v| sources.reflected[v as usize]);
+            let reflected = corners.sum::<Rgb>() / 3.0;
+            let (element_area, group) = (mesh.area(node), mesh.group(node) as usize);
+            let scale = (reflected + *ambient).length().max(floor);
+            squares[group] += (ambient.length() / scale).powi(2) * element_area;
+            areas[group] += element_area;
+            flux += (reflected + material.exitance) * element_area;
             max_reflectance = max_reflectance.max(material.reflectance);
+        }
+        let mean = |squares: f64, area: f64| if area > 0.0 { squares / area } else { 0.0 };
+        let whole = mean(squares.iter().sum(), areas.iter().sum());
+        for stratum in strata {
+            let group = stratum.group.map(|g| g as usize);
+            stratum.ambient = group.map_or(whole, |g| mean(squares[g], areas[g]));
         }
         // Every bounce returns the largest reflectance of what is left, at most.
         let bound = self.ledger.unshot * max_reflectance / (Rgb::ONE - max_reflectance) / flux;
-        let bound = if flux == Rgb::ZERO { 0.0 } else { bound.max_element() };
-        ((squares / area).sqrt(), bound)
+        if flux == Rgb::ZERO { 0.0 } else { bound.max_element() }
     }
 
     /// Standard error of each vertex of the surface, W/m²: that of the mesh by the residuals of the
@@ -258,16 +359,98 @@ impl ErrorEstimator<'_> {
 }
 
 impl Sample {
-    /// Radiosity of the point by what was gathered there, W/m².
-    fn radiosity(&self, gathered: &IrradianceSample) -> Rgb {
-        self.emitted + self.reflectance * gathered.irradiance
+    /// Reflected radiosity of the point by what was gathered there, W/m².
+    fn reflected(&self, gathered: &IrradianceSample) -> Rgb {
+        self.reflectance * gathered.irradiance
+    }
+
+    fn observation(&self, estimator: &ErrorEstimator, gathers: &SampleGathers) -> Observation {
+        let SampleGathers { first, second, next } = gathers;
+        Observation {
+            stratum: self.stratum,
+            weight: self.weight,
+            interpolated: self.interpolated,
+            gathered: [self.reflected(first), self.reflected(second)],
+            next: self.reflected(next),
+            element_residual: estimator.element_residual[self.element],
+            excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal)),
+            escaped: first.escaped,
+            backface: first.backface,
+            inverse_distance: first.inverse_distance,
+            size: self.size,
+        }
     }
 
     /// A point a hair beside.
     fn jittered(&self) -> GatherPoint {
         let point = self.point;
-        let (tangent, _) = point.normal.any_orthonormal_pair();
         let step = JITTER * self.size * (0.5 + self.rotation);
-        GatherPoint { position: point.position + tangent * step, ..point }
+        let step = self.inward.normalize_or_zero() * step.min(self.inward.length());
+        GatherPoint { position: point.position + step, ..point }
     }
+}
+
+/// Whether a point is inside a solid, or under what nearly touches it; `diagonal` of where the light
+/// is, scene unit.
+fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
+    // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
+    let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
+    sample.backface > buried::HIDDEN
+        || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
+}
+
+/// A face that reflects.
+struct SampledFace {
+    face: usize,
+    group: u32,
+    /// Length unit squared.
+    area: f64,
+    /// The area times the squared relative residual of the element: up to a factor, what the face
+    /// is expected to add to the squared error.
+    error: f64,
+    /// The area times the reflected radiosity, W: a length over the channels.
+    flux: f64,
+}
+
+/// The faces of a stratum, and the points that it gets.
+struct StratumFaces {
+    group: Option<u32>,
+    faces: Vec<SampledFace>,
+    area: f64,
+    flux: f64,
+    samples: usize,
+}
+
+/// The strata of `faces`: the largest groups, and one for all others if there are too many.
+fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<StratumFaces> {
+    let mut by_group: Vec<StratumFaces> = vec![];
+    let mut index = FxHashMap::default();
+    for face in faces {
+        let k = *index.entry(face.group).or_insert_with(|| {
+            let group = Some(face.group);
+            let (faces, area, flux) = (vec![], 0.0, 0.0);
+            by_group.push(StratumFaces { group, faces, area, flux, samples: 0 });
+            by_group.len() - 1
+        });
+        by_group[k].area += face.area;
+        by_group[k].flux += face.flux;
+        by_group[k].faces.push(face);
+    }
+    let total: f64 = by_group.iter().map(|s| s.area).sum();
+    let total_flux: f64 = by_group.iter().map(|s| s.flux).sum::<f64>().max(f64::MIN_POSITIVE);
+    by_group.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.group.cmp(&b.group)));
+    let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
+    if by_group.len() > single.max(1) {
+        let small = by_group.split_off(single.min(by_group.len()));
+        let area = small.iter().map(|s| s.area).sum();
+        let flux = small.iter().map(|s| s.flux).sum();
+        let faces = small.into_iter().flat_map(|s| s.faces).collect();
+        by_group.push(StratumFaces { group: None, faces, area, flux, samples: 0 });
+    }
+    for stratum in &mut by_group {
+        let share = (stratum.area / total).max(stratum.flux / total_flux);
+        let even = (share * counts.total as f64).round() as usize;
+        stratum.samples = even.max(counts.per_group).max(1);
+    }
+    by_group
 }

@@ -14,11 +14,13 @@
 
 use std::ops::ControlFlow;
 
-use crate::bake::controller::{self, ErrorTarget, Step};
-use crate::bake::error_estimate::ErrorEstimate;
-use crate::bake::estimator::ErrorEstimator;
+use crate::bake::controller::{self, ErrorTarget, Judged, Step};
+use crate::bake::error_estimate::{ErrorEstimate, GroupError};
+use crate::bake::estimator::{ErrorEstimator, EstimatedError, SampleCounts};
 use crate::bake::fallback::ResilientBackend;
+use crate::bake::light_survey;
 use crate::bake::model;
+use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
@@ -46,6 +48,8 @@ pub(super) struct GatherPhase<'a> {
 struct Estimated {
     light: GatheredMesh,
     estimate: ErrorEstimate,
+    by_light: ErrorEstimate,
+    groups: Vec<GroupError>,
     /// Whether the callback stopped the bake.
     cancelled: bool,
 }
@@ -62,7 +66,7 @@ impl<'a> GatherPhase<'a> {
         backend: &'a ResilientBackend<'a>,
     ) -> Result<GatherPhase<'a>, Error> {
         let (solve, gather) = settings;
-        let state = AdaptiveGather::new(mesh, light);
+        let state = AdaptiveGather::new(mesh, light, gather.refinement.region);
         let gatherer = backend.gather(
             &shot.mesh,
             gather.rays,
@@ -85,15 +89,50 @@ impl<'a> GatherPhase<'a> {
     ) -> Result<BakedLight, Error> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
+        let mut previous_gathers = 0;
         loop {
             let stop = self.gather(step, reporter)?;
             let estimated = self.estimate(stop, reporter, clock)?;
-            let refinable =
-                stop == StopReason::Converged && !estimated.cancelled && rounds < model::MAX_ROUNDS;
-            let next = if refinable { self.refine_settings(&estimated.estimate)? } else { None };
-            let Some(next) = next else { return Ok(self.into_result(estimated)) };
-            step = next;
+            // A round for which next to nothing is gathered changes nothing: what is left is not for
+            // this mesh to resolve.
+            let gathers = estimated.light.gather_count;
+            let is_stuck = gathers < (model::MIN_PROGRESS * previous_gathers as f64) as u64;
+            let rounds_left = if is_stuck { 0 } else { model::MAX_ROUNDS - rounds };
+            match self.next_step(&estimated, rounds_left)? {
+                Ok(next) => step = next,
+                Err(outcome) => return Ok(self.into_result(estimated, outcome)),
+            }
+            previous_gathers = gathers;
             rounds += 1;
+        }
+    }
+
+    /// What is to be done next, with so many `rounds_left`; or how the bake ends.
+    fn next_step(
+        &mut self,
+        estimated: &Estimated,
+        rounds_left: u32,
+    ) -> Result<Result<Step, Outcome>, Error> {
+        let Estimated { light, estimate, by_light, groups, cancelled } = estimated;
+        let judged = Judged { whole: estimate, by_light, groups };
+        let Some(target) = self.target else { return Ok(Err(Outcome::Unasked)) };
+        let end = |obstacle| {
+            let reached = target.is_reached(judged);
+            Ok(Err(if reached { Outcome::Reached } else { Outcome::Missed(obstacle) }))
+        };
+        if *cancelled || light.stop == StopReason::Cancelled {
+            end(Obstacle::Cancelled)
+        } else if target.is_met(judged) {
+            end(Obstacle::Edges)
+        } else if light.stop == StopReason::Elements {
+            end(Obstacle::Elements)
+        } else if rounds_left == 0 {
+            end(Obstacle::largest_part(estimate))
+        } else {
+            match self.refine_settings(target, judged)? {
+                Some(step) => Ok(Ok(step)),
+                None => end(Obstacle::Settings),
+            }
         }
     }
 
@@ -155,20 +194,39 @@ impl<'a> GatherPhase<'a> {
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
             gather_passes: self.gather.refinement.gather_passes,
+            diagonal: self.diagonal(),
         };
-        let of = model::sample_count(light.gather_count);
+        let each_group = self.target.is_some_and(|target| target.each_group);
+        let mut counts = SampleCounts {
+            total: model::sample_count(light.gather_count),
+            per_group: match each_group {
+                true => model::SAMPLES_PER_JUDGED_GROUP,
+                false => model::SAMPLES_PER_GROUP,
+            },
+        };
         let mut cancelled = stop == StopReason::Cancelled;
-        let (estimate, vertex_error) =
-            estimator.estimate(of, &mut *self.gatherer, &mut |samples| {
+        let found = loop {
+            let found = estimator.estimate(counts, &mut *self.gatherer, &mut |samples, of| {
                 cancelled = cancelled
                     || reporter.report(BakeProgress::Estimating { samples, of }).is_break();
                 if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;
-        light.surface.error = vertex_error;
+            let undecided = |target: ErrorTarget| target.is_undecided(found.judged());
+            let most = counts.per_group.max(counts.total / model::SAMPLES_RATIO);
+            if cancelled
+                || most >= model::MAX_SAMPLES_PER_GROUP
+                || !self.target.is_some_and(undecided)
+            {
+                break found;
+            }
+            counts = SampleCounts { total: 2 * counts.total, per_group: 2 * counts.per_group };
+        };
+        let EstimatedError { whole: estimate, by_light, groups, vertices } = found;
+        light.surface.error = vertices;
         light.stop = stop;
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(estimate)).is_break();
-        Ok(Estimated { light, estimate, cancelled })
+        Ok(Estimated { light, estimate, by_light, groups, cancelled })
     }
 
     /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points.
@@ -179,6 +237,7 @@ impl<'a> GatherPhase<'a> {
             element_residual: &[],
             ledger: &self.shot.solution.ledger,
             gather_passes: 0,
+            diagonal: self.diagonal(),
         };
         // Rays are not doubled where they disagree: that is for what these few points do not show.
         let rays = self.gather.rays;
@@ -194,14 +253,14 @@ impl<'a> GatherPhase<'a> {
         Ok(())
     }
 
-    /// Refines the settings where `estimate` is too large for the target, and says what is to be
-    /// done again; nothing if there is no target, it is met, or overrides keep all settings as they
-    /// are.
-    fn refine_settings(&mut self, estimate: &ErrorEstimate) -> Result<Option<Step>, Error> {
-        let Some(target) = self.target.filter(|target| !target.is_met(estimate)) else {
-            return Ok(None);
-        };
-        let refined = controller::refined(&self.gather, estimate, target.error);
+    /// Refines the settings where the estimate is too large for the target, and says what is to be
+    /// done again; nothing if nothing can be refined, or overrides keep all settings as they are.
+    fn refine_settings(
+        &mut self,
+        target: ErrorTarget,
+        judged: Judged,
+    ) -> Result<Option<Step>, Error> {
+        let refined = controller::refined(&self.gather, judged, &target);
         let settings = BakeSettings { solve: self.solve.clone(), gather: Some(refined) };
         let (solve, Some(gather)) = target.overridden(settings) else { return Ok(None) };
         if (&solve, &gather) == (&self.solve, &self.gather) {
@@ -214,9 +273,14 @@ impl<'a> GatherPhase<'a> {
         Ok(Some(step))
     }
 
-    fn into_result(self, estimated: Estimated) -> BakedLight {
-        let Estimated { light, estimate, .. } = estimated;
+    /// Diagonal of where the light is, scene unit.
+    fn diagonal(&self) -> f64 {
+        light_survey::diagonal(self.solve.region.as_ref(), self.shot.mesh.scene())
+    }
+
+    fn into_result(self, estimated: Estimated, outcome: Outcome) -> BakedLight {
+        let Estimated { light, estimate, groups, .. } = estimated;
         let settings = BakeSettings { solve: self.solve, gather: Some(self.gather) };
-        BakedLight { light, estimate, settings }
+        BakedLight { light, estimate, groups, outcome, settings }
     }
 }

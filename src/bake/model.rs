@@ -136,6 +136,10 @@ pub(super) fn patch_tolerance(error: f64) -> f64 {
     error.min(PATCH_TOLERANCE_BASE + PATCH_TOLERANCE_SHARE * error)
 }
 
+/// Rays with which an element gathers the light that is not shot: its noise is averaged by those
+/// that gather next.
+pub const RECEIVED_RAYS: u32 = 128;
+
 /// Pixels along an edge of a hemicube's top face for `error`.
 pub(super) fn hemicube_resolution(error: f64) -> u32 {
     let [.., (_, finest)] = HEMICUBE_RESOLUTIONS;
@@ -183,13 +187,16 @@ pub const COARSE_RAY_DIVISOR: u32 = 4;
 
 /// The estimate has to be below this share of the error asked for: both scatter, since
 /// they are of random points.
-pub const SAFETY: f64 = 0.75;
+pub const SAFETY: f64 = 0.7;
 
 /// Share of [`SAFETY`] that a round aims at, since errors follow the laws only roughly.
 pub const TARGET_FRACTION: f64 = 0.9;
 
 /// Rounds of refinement after the first estimate.
 pub const MAX_ROUNDS: u32 = 8;
+
+/// A round after which not so many times the gathers were made as before it is the last.
+pub const MIN_PROGRESS: f64 = 1.01;
 
 /// A setting is changed by this factor at least: less is not worth a round.
 pub const MIN_STEP: f64 = 1.25;
@@ -225,7 +232,11 @@ pub(super) fn allowed_error(target: f64) -> f64 {
 /// This solves min Σ ln(part_i / new_i) under Σ new_i² = allowed² − fixed² and new_i ≤ part_i: the
 /// least product of refinement factors. Its Lagrange condition, new_i equal for all that are
 /// lowered, is that of reverse water-filling (Cover and Thomas 2006, section 10.3.3).
-pub(super) fn water_filling_cap(mut parts: [f64; 3], fixed: f64, allowed: f64) -> f64 {
+pub(super) fn water_filling_cap<const N: usize>(
+    mut parts: [f64; N],
+    fixed: f64,
+    allowed: f64,
+) -> f64 {
     parts.sort_by(f64::total_cmp);
     let mut budget = (allowed * allowed - fixed * fixed).max(MIN_BUDGET * allowed * allowed);
     for (k, part) in parts.iter().enumerate() {
@@ -315,9 +326,21 @@ pub const TAIL_FACTOR: f64 = 1.8;
 /// Errors of radiosity below this share of the mean reflected radiosity are relative to that.
 pub const RADIOSITY_FLOOR: f64 = 0.05;
 
-/// A point that is dim or behind surfaces and whose mean distance to what it sees is below this
-/// share of the scene's diagonal lies in a gap that nothing looks into. It is left out.
-pub const GAP: f64 = 0.1;
+/// Points on each group, at least: enough to see an error that is everywhere.
+pub const SAMPLES_PER_GROUP: usize = 8;
+
+/// The same where every group is asked for an error.
+pub const SAMPLES_PER_JUDGED_GROUP: usize = 48;
+
+/// Points on each group, at most, that it takes to decide whether its error is met.
+pub const MAX_SAMPLES_PER_GROUP: usize = 768;
+
+/// Points over all for one on each group: where the whole is undecided, it takes up to this many
+/// times [`MAX_SAMPLES_PER_GROUP`].
+pub const SAMPLES_RATIO: usize = 4;
+
+/// Groups that get points of their own: the largest. All others are judged together.
+pub const MAX_GROUPS: usize = 64;
 
 #[cfg(test)]
 mod tests {

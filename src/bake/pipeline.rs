@@ -52,7 +52,8 @@ pub(super) fn run(
     let shot_light = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
     let baked = match &settings.gather {
         Some(gather) if shot.solution.stop != StopReason::Cancelled => {
-            let mesh = Mesh::new(scene.clone(), gather.element_size)?
+            let sizing = shooting_phase::sizing(&settings.solve, scene, gather.element_size);
+            let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?
                 .split_at_contacts(gather.contact_levels);
             let halves = (settings.solve.clone(), gather.clone());
             GatherPhase::new(halves, target, mesh, &shot_light, &shot, backend)?
@@ -61,6 +62,7 @@ pub(super) fn run(
         _ => shooting_phase::estimate_elements(
             &shot,
             settings,
+            target,
             shot_light,
             backend,
             &mut reporter,
@@ -72,6 +74,8 @@ pub(super) fn run(
         solution: shot.solution,
         light: baked.light,
         estimate: baked.estimate,
+        groups: baked.groups,
+        outcome: baked.outcome,
         settings: baked.settings,
         hemicubes: shot.hemicubes,
         hemicubes_by_resolution: shot.hemicubes_by_resolution,

@@ -1,6 +1,7 @@
 //! What comes out of a bake.
 
-use crate::bake::error_estimate::ErrorEstimate;
+use crate::bake::error_estimate::{ErrorEstimate, GroupError};
+use crate::bake::outcome::Outcome;
 use crate::bake::settings::BakeSettings;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
@@ -21,6 +22,11 @@ pub struct BakeResult {
     pub light: GatheredMesh,
     /// Estimated error of [`BakeResult::light`].
     pub estimate: ErrorEstimate,
+    /// The same for each group of the scene that reflects, the largest first; those beyond the
+    /// largest 64 are judged together, as a part of the whole.
+    pub groups: Vec<GroupError>,
+    /// Whether the error that was asked for was met and, if not, what stood in the way.
+    pub outcome: Outcome,
     /// The settings that were used in the end.
     pub settings: BakeSettings,
     /// Hemicubes drawn, or rows of rays cast: those of all rotations and viewpoints.
@@ -41,5 +47,7 @@ pub struct BakeResult {
 pub(super) struct BakedLight {
     pub light: GatheredMesh,
     pub estimate: ErrorEstimate,
+    pub groups: Vec<GroupError>,
+    pub outcome: Outcome,
     pub settings: BakeSettings,
 }

@@ -3,11 +3,12 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use crate::bake::light_survey::LightSurvey;
 use crate::bake::model;
 use crate::error::Error;
 use crate::gather::RefinementSettings;
 use crate::mesh::Mesh;
-use crate::scene::Scene;
+use crate::scene::{Aabb, Scene};
 use crate::solver::{Method, Solver};
 
 /// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`]
@@ -35,6 +36,13 @@ pub struct BakeSettings {
 pub struct SolveSettings {
     /// Longest edge of the elements that light is shot on, scene unit.
     pub element_size: f64,
+    /// Where most of the light is, if that is a small part of the scene: elements are as given
+    /// there, and grow with the distance from it, 1 + distance/diagonal times. With none, as given
+    /// everywhere.
+    pub region: Option<Aabb>,
+    /// Materials, by their index, whose emission is not shot: each element gathers it. For lights
+    /// most of whose light falls on nothing that reflects, such as a sky.
+    pub gathered_materials: Vec<u32>,
     /// Quadtree levels by which elements are split that other surfaces touch.
     pub contact_levels: u32,
     /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a
@@ -106,8 +114,9 @@ impl BakeSettings {
     /// Settings for previews: elements of a 32nd of the scene's diagonal, 1e-4 unshot, and no
     /// vertex gathers.
     pub fn elements_only(scene: &Scene) -> BakeSettings {
-        let mut settings = BakeSettings::for_error(0.02, scene);
-        settings.solve.element_size = scene.bounds().diagonal() / 32.0;
+        let survey = LightSurvey::new(scene);
+        let mut settings = BakeSettings::by_survey(0.02, &survey);
+        settings.solve.element_size = survey.diagonal / 32.0;
         settings.solve.contact_levels = 3;
         settings.solve.hemicube_resolution = 128;
         settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
@@ -128,11 +137,18 @@ impl BakeSettings {
     }
 
     /// What the [model](crate::bake::model) of error and cost says it takes for vertices of `scene`
-    /// to be off by `error`: a share of their radiosity, root mean square over the area. Below 1e-4
-    /// and above 0.3 they are those of the nearest of these.
+    /// to be off by `error`: see [`ErrorEstimate`](crate::ErrorEstimate) for what that means. Below
+    /// 1e-4 and above 0.3 they are those of the nearest of these.
+    ///
+    /// Some hundred points look for the lights first, with rays on the CPU: lengths are shares of
+    /// the diagonal of where the light is, and lights that mostly miss are gathered.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
+        BakeSettings::by_survey(error, &LightSurvey::new(scene))
+    }
+
+    fn by_survey(error: f64, survey: &LightSurvey) -> BakeSettings {
         let e = model::clamped(error, model::ERRORS);
-        let diagonal = scene.bounds().diagonal();
+        let diagonal = survey.diagonal;
         let shooting_edge = model::SHOOTING_EDGE.setting(e);
         let solver = Solver {
             unshot: e / model::ERROR_OVER_UNSHOT,
@@ -141,6 +157,8 @@ impl BakeSettings {
         };
         let solve = SolveSettings {
             element_size: diagonal * shooting_edge.max(model::COARSE_SHOOTING_EDGE.setting(e)),
+            region: survey.region,
+            gathered_materials: survey.gathered_materials.clone(),
             contact_levels: model::shooting_contact_levels(e),
             hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
@@ -158,6 +176,8 @@ impl BakeSettings {
                 .min(model::MAX_SURPLUS_TOLERANCE),
             interpolation_tolerance: model::INTERPOLATION_TOLERANCE.setting(e),
             gather_passes: model::gather_passes(e),
+            gap_factor: 1.0,
+            region: survey.region,
             ..RefinementSettings::new(model::MIN_EDGE.times(diagonal).setting(e))
         };
         let gather = GatherSettings {

@@ -14,9 +14,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::bake::estimator::ErrorEstimator;
+use crate::bake::controller::ErrorTarget;
+use crate::bake::estimator::{ErrorEstimator, EstimatedError, SampleCounts};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
+use crate::bake::light_survey;
 use crate::bake::model;
+use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
@@ -24,14 +27,20 @@ use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::form_factor::viewpoints::AdaptiveViewpoints;
+use crate::gather::GatherPoint;
 use crate::gather::GatheredMesh;
-use crate::mesh::Mesh;
+use crate::gather::gather_points::SurfaceOffset;
+use crate::mesh::{ElementSizing, Mesh};
 use crate::progress::StopReason;
-use crate::scene::Scene;
-use crate::solver::{Progress, Solution, Solver};
+use crate::scene::{Material, Rgb, Scene};
+use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 
 /// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
 const CHECKPOINT_INTERVAL: u32 = 10;
+
+/// Levels that a triangle is split at most: where sizes grow with the distance, a huge triangle may
+/// reach into the region of the light, and a device keeps four to the power of this for each.
+const MAX_DEPTH: u32 = 8;
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {
@@ -52,8 +61,9 @@ pub(super) fn shoot(
     reporter: &mut Reporter,
     clock: &mut StageClock,
 ) -> Result<ShotLight, Error> {
+    let sizing = sizing(settings, scene, settings.element_size);
     let mesh =
-        Mesh::new(scene.clone(), settings.element_size)?.split_at_contacts(settings.contact_levels);
+        Mesh::sized(scene.clone(), &sizing, MAX_DEPTH)?.split_at_contacts(settings.contact_levels);
     let near = ProximityCorrection::new(backend.rows(&mesh, settings)?, &mesh, settings.near_reach);
     let mut rows = match settings.viewpoint_tolerance {
         Some(tolerance) => AdaptiveViewpoints::new(near, tolerance, u32::MAX),
@@ -61,7 +71,8 @@ pub(super) fn shoot(
     };
     clock.timings.mesh = clock.lap();
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Shooting(*p));
-    let mut solution = solve(settings, &mesh, &mut rows, &mut progress)?;
+    let received = received(settings, &mesh, backend)?;
+    let mut solution = solve(settings, &mesh, &received, &mut rows, &mut progress)?;
     if settings.ambient {
         solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
     }
@@ -84,25 +95,81 @@ pub(super) fn shoot(
 fn solve(
     settings: &SolveSettings,
     mesh: &Mesh,
+    received: &ReceivedLight,
     rows: &mut dyn FormFactors,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, Error> {
     let solver = settings.solver_for(mesh);
     match &settings.checkpoint {
-        Some(path) => solve_with_checkpoints(&solver, path, mesh, rows, progress),
-        None => solver.solve(mesh, rows, progress),
+        Some(path) => solve_with_checkpoints(&solver, path, mesh, received, rows, progress),
+        None => {
+            let mut session = solver.begin_after(mesh, received)?;
+            session.run(rows, progress)?;
+            session.into_solution()
+        }
     }
+}
+
+/// How large elements may be: `size` where the light is. What is black neither receives nor, if it
+/// does not emit or is gathered, shoots.
+pub(super) fn sizing(settings: &SolveSettings, scene: &Scene, size: f64) -> ElementSizing {
+    let is_idle = |(m, material): &(u32, &Material)| {
+        let shoots = material.exitance != Rgb::ZERO && !settings.gathered_materials.contains(m);
+        !material.reflects() && !shoots
+    };
+    let idle = (0..).zip(scene.materials()).filter(is_idle);
+    let unsplit_materials = idle.map(|(m, _)| m).collect();
+    ElementSizing { size, region: settings.region, unsplit_materials }
+}
+
+/// What the elements of `mesh` receive of the lights that are gathered.
+fn received(
+    settings: &SolveSettings,
+    mesh: &Mesh,
+    backend: &ResilientBackend,
+) -> Result<ReceivedLight, Error> {
+    let materials = &settings.gathered_materials;
+    if materials.is_empty() {
+        return Ok(ReceivedLight::default());
+    }
+    let scene = mesh.scene();
+    let mut lit = scene.materials().to_vec();
+    for (_, material) in (0..).zip(&mut lit).filter(|(m, _)| !materials.contains(m)) {
+        material.exitance = Rgb::ZERO;
+    }
+    let mesh = &mesh.with_scene(scene.with_materials(lit)?)?;
+    let above = SurfaceOffset::new(mesh.scene());
+    let elements = 0..mesh.element_count();
+    let reflecting: Vec<usize> =
+        elements.filter(|&e| mesh.material(mesh.element(e)).reflects()).collect();
+    let point = |&e: &usize| {
+        let node = mesh.element(e);
+        above.gather_point(mesh.centroid(node), mesh.normal(node), mesh.area(node).sqrt())
+    };
+    let points: Vec<GatherPoint> = reflecting.iter().map(point).collect();
+    let corners = vec![[0; 3]; mesh.element_count()];
+    let mut gatherer = backend.gather(mesh, model::RECEIVED_RAYS, f64::INFINITY, 0.0)?;
+    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &points)?;
+    let mut irradiance = vec![Rgb::ZERO; mesh.element_count()];
+    for (e, sample) in reflecting.into_iter().zip(samples) {
+        irradiance[e] = sample.irradiance;
+    }
+    Ok(ReceivedLight { irradiance, materials: materials.clone() })
 }
 
 fn solve_with_checkpoints(
     solver: &Solver,
     path: &Path,
     mesh: &Mesh,
+    received: &ReceivedLight,
     rows: &mut dyn FormFactors,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, Error> {
-    let mut session =
-        if path.exists() { solver.resume(mesh, rows, path)? } else { solver.begin(mesh)? };
+    let mut session = if path.exists() {
+        solver.resume_after(mesh, received, rows, path)?
+    } else {
+        solver.begin_after(mesh, received)?
+    };
     let mut saved = Instant::now();
     let mut saving_time = Duration::ZERO;
     loop {
@@ -123,6 +190,7 @@ fn solve_with_checkpoints(
 pub(super) fn estimate_elements(
     shot: &ShotLight,
     settings: &BakeSettings,
+    target: Option<ErrorTarget>,
     mut light: GatheredMesh,
     backend: &ResilientBackend,
     reporter: &mut Reporter,
@@ -136,19 +204,29 @@ pub(super) fn estimate_elements(
         element_residual: &corner_spread(&light),
         ledger: &shot.solution.ledger,
         gather_passes: 0,
+        diagonal: light_survey::diagonal(settings.solve.region.as_ref(), shot.mesh.scene()),
     };
-    let of = *model::SAMPLES.start();
+    let counts =
+        SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };
     let mut cancelled = shot.solution.stop == StopReason::Cancelled;
-    let (estimate, vertex_error) = estimator.estimate(of, &mut *gatherer, &mut |samples| {
+    let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled =
             cancelled || reporter.report(BakeProgress::Estimating { samples, of }).is_break();
         if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
-    light.surface.error = vertex_error;
+    let is_reached = target.is_some_and(|target| target.is_reached(found.judged()));
+    let EstimatedError { whole: estimate, groups, vertices, .. } = found;
+    light.surface.error = vertices;
     clock.timings.estimate = clock.lap();
     // The bake ends here, whatever the callback says.
     let _ = reporter.report(BakeProgress::Estimated(estimate));
-    Ok(BakedLight { light, estimate, settings: settings.clone() })
+    let outcome = match target {
+        None => Outcome::Unasked,
+        Some(_) if is_reached => Outcome::Reached,
+        Some(_) if cancelled => Outcome::Missed(Obstacle::Cancelled),
+        Some(_) => Outcome::Missed(Obstacle::Settings),
+    };
+    Ok(BakedLight { light, estimate, groups, outcome, settings: settings.clone() })
 }
 
 /// A quarter of the largest difference between the corners of each element, W/m²: what its middle

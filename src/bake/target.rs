@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
 use crate::bake::controller::ErrorTarget;
+use crate::bake::outcome::Outcome;
 use crate::bake::progress::{BakeProgress, ProgressCallback};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
@@ -28,10 +29,12 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BakeTarget {
-    /// Root mean square error of vertex radiosity over the area, as a share of it, in (0, 1). The
-    /// bake ends when the estimated error is well below, or where it will not fall any further: see
-    /// [`BakeResult::estimate`].
+    /// Root mean square error of the reflected radiosity over the area, as a share of it, in (0, 1):
+    /// [`ErrorEstimate`](crate::ErrorEstimate) has the definition. The bake ends when the estimated
+    /// error is well below, or where it will not fall any further: see [`BakeResult::outcome`].
     Error(f64),
+    /// The same for every group of the scene, however small its share of the area is.
+    ErrorEach(f64),
     /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long
     /// the one before took, for as long as another fits in. What is not done in time is stopped,
     /// and the last that was done is returned; if none was, what was reached.
@@ -90,8 +93,9 @@ impl BakeTarget {
     ) -> Result<BakeResult, Error> {
         let scene = &scene.into();
         match self {
-            BakeTarget::Error(error) => {
-                let target = ErrorTarget { error, overrides: &overrides };
+            BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => {
+                let each_group = matches!(self, BakeTarget::ErrorEach(_));
+                let target = ErrorTarget { error, each_group, overrides: &overrides };
                 bake_to_error(target, scene, backend, &mut progress)
             }
             BakeTarget::Time(time) => bake_in_time(time, scene, backend, &overrides, &mut progress),
@@ -140,7 +144,7 @@ fn bake_in_time(
     loop {
         let attempt_start = Instant::now();
         let mut stopped = false;
-        let target = ErrorTarget { error, overrides: &without_checkpoint };
+        let target = ErrorTarget { error, each_group: false, overrides: &without_checkpoint };
         let attempt = bake_to_error(target, scene, backend, &mut |stage| {
             stopped |= progress(stage).is_break() || start.elapsed() >= limit;
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -155,6 +159,8 @@ fn bake_in_time(
             }
             (attempt, _) => attempt?,
         };
+        // A time was asked for, and the errors that were tried are nobody's.
+        let baked = BakeResult { outcome: Outcome::Unasked, ..baked };
         let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
         let taken = attempt_start.elapsed().as_secs_f64();
         let improvement = model::affordable_improvement(remaining, taken);

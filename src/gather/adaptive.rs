@@ -18,7 +18,7 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::Gather;
-use super::batch::gather_batch;
+use super::batch::{VertexValues, gather_batch};
 use super::buried::extrapolate_into_buried;
 use super::gather_points::VertexGatherPoints;
 use super::gathered_mesh::GatheredMesh;
@@ -31,7 +31,7 @@ use super::surplus::mean_preserving;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::{BatchSizer, StopReason};
-use crate::scene::Rgb;
+use crate::scene::{Aabb, Rgb};
 
 /// Called with the progress after every batch; may stop the gather.
 pub(crate) type ProgressCallback<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
@@ -68,7 +68,7 @@ pub fn gather_at_vertices(
 ) -> Result<GatheredMesh, Error> {
     settings.check()?;
     source.check_scene(mesh)?;
-    let mut state = AdaptiveGather::new(mesh.clone(), source);
+    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region);
     let stop = state.run_passes(settings, gatherer, None, &mut progress)?;
     let result = if stop == StopReason::Cancelled {
         state.to_gathered_mesh()
@@ -96,10 +96,11 @@ pub(crate) struct AdaptiveGather<'a> {
 }
 
 impl<'a> AdaptiveGather<'a> {
-    /// Starts on `mesh` with the values that `source`, of the same scene, has at its vertices.
-    pub fn new(mesh: Mesh, source: &'a GatheredMesh) -> AdaptiveGather<'a> {
+    /// Starts on `mesh` with the values that `source`, of the same scene, has at its vertices. Most
+    /// of the light is in `region`.
+    pub fn new(mesh: Mesh, source: &'a GatheredMesh, region: Option<Aabb>) -> AdaptiveGather<'a> {
         let field = source.radiosity_field();
-        let scale = ErrorScale::new(&mesh, &field);
+        let scale = ErrorScale::new(&mesh, &field, region);
         AdaptiveGather {
             samples: SampledMesh::new(mesh, &field),
             source: Cow::Borrowed(source),
@@ -286,12 +287,14 @@ impl<'a> AdaptiveGather<'a> {
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
-        let SampledMesh { mesh, vertices: mesh_vertices, reflected, buried, .. } =
-            &mut self.samples;
-        let points = VertexGatherPoints::new(mesh, mesh_vertices);
+        let SampledMesh {
+            mesh, vertices: mesh_vertices, reflected, buried, inverse_distance, ..
+        } = &mut self.samples;
+        let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
         let source = self.source.radiosity_field();
         let previous = previous.map(GatheredMesh::radiosity_field);
-        let mut pending = gathering_vertices(vertices, &points, buried, previous.is_some());
+        let gathers = |&v: &u32| points.reflectance(v) != Rgb::ZERO;
+        let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
         let total = pending.len();
         let mut gathered = 0;
         let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
@@ -307,7 +310,11 @@ impl<'a> AdaptiveGather<'a> {
                 let unresolved = batch.unresolved(&points, attempt);
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
-                batch.apply(&points, reflected, buried);
+                batch.apply(
+                    &points,
+                    attempt,
+                    &mut VertexValues { reflected, buried, inverse_distance },
+                );
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {
                     pass: self.pass,
@@ -336,19 +343,6 @@ impl<'a> AdaptiveGather<'a> {
     }
 }
 
-/// Those of `vertices` that have something to gather: not where nothing is reflected, nor, for
-/// differences, where a value is extrapolated.
-fn gathering_vertices(
-    vertices: &[u32],
-    points: &VertexGatherPoints,
-    buried: &[bool],
-    differences: bool,
-) -> Vec<u32> {
-    let gathers =
-        |v: u32| points.reflectance(v) != Rgb::ZERO && !(differences && buried[v as usize]);
-    vertices.iter().copied().filter(|&v| gathers(v)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -365,7 +359,7 @@ mod tests {
         let settings = RefinementSettings::new(1e9);
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let mut proceed = |_: &Progress| ControlFlow::Continue(());
-        let mut by_difference = AdaptiveGather::new(mesh, &light);
+        let mut by_difference = AdaptiveGather::new(mesh, &light, None);
         by_difference.gather_pass(&settings, &mut rays, &mut proceed).unwrap();
         let first = by_difference.samples.reflected.clone();
         let mut in_full = by_difference.clone();

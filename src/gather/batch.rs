@@ -13,6 +13,15 @@ pub(super) struct Batch<'v> {
     previous: Option<Vec<IrradianceSample>>,
 }
 
+/// What is known at the vertices, by their number.
+pub(super) struct VertexValues<'s> {
+    /// Reflected radiosity, W/m² per channel.
+    pub reflected: &'s mut [Rgb],
+    pub buried: &'s mut [bool],
+    /// Mean of 1/distance, per scene unit.
+    pub inverse_distance: &'s mut [f64],
+}
+
 /// Gathers one point for each of `vertices`.
 pub(super) fn gather_batch<'v>(
     vertices: &'v [u32],
@@ -39,45 +48,27 @@ impl Batch<'_> {
             .collect()
     }
 
-    /// Writes what was gathered to the `reflected` radiosity of the vertices, and which of them are
-    /// `buried`.
-    pub fn apply(&self, points: &VertexGatherPoints, reflected: &mut [Rgb], buried: &mut [bool]) {
-        match &self.previous {
-            Some(previous) => self.apply_difference(previous, points, reflected),
-            None => self.apply_samples(points, reflected, buried),
-        }
-    }
-
-    /// ρ E where a vertex is not buried.
-    fn apply_samples(
-        &self,
-        points: &VertexGatherPoints,
-        reflected: &mut [Rgb],
-        buried: &mut [bool],
-    ) {
-        for (&v, sample) in self.vertices.iter().zip(&self.samples) {
-            let is_buried = points.is_buried(v, sample);
-            buried[v as usize] = is_buried;
-            if !is_buried {
-                reflected[v as usize] = points.reflectance(v) * sample.irradiance;
-            }
-        }
-    }
-
-    /// ρ (E − E_previous) added where a vertex is not buried; never below zero.
-    fn apply_difference(
-        &self,
-        previous: &[IrradianceSample],
-        points: &VertexGatherPoints,
-        reflected: &mut [Rgb],
-    ) {
+    /// Writes what was gathered at this `attempt` to the values of the vertices that it resolves.
+    pub fn apply(&self, points: &VertexGatherPoints, attempt: usize, values: &mut VertexValues) {
         for (k, (&v, sample)) in self.vertices.iter().zip(&self.samples).enumerate() {
-            if points.is_buried(v, sample) {
+            let is_buried = points.is_buried(v, sample);
+            if is_buried && points.has_more(v, attempt) {
                 continue;
             }
-            let difference = sample.irradiance - previous[k].irradiance;
-            let value = &mut reflected[v as usize];
-            *value = (*value + points.reflectance(v) * difference).max(Rgb::ZERO);
+            let reflected = &mut values.reflected[v as usize];
+            match &self.previous {
+                // ρ (E − E_previous) added; never below zero.
+                Some(previous) => {
+                    let difference = sample.irradiance - previous[k].irradiance;
+                    *reflected = (*reflected + points.reflectance(v) * difference).max(Rgb::ZERO);
+                }
+                // ρ E, which is darkness at a buried vertex.
+                None => {
+                    *reflected = points.reflectance(v) * sample.irradiance;
+                    values.buried[v as usize] = is_buried;
+                    values.inverse_distance[v as usize] = sample.inverse_distance;
+                }
+            }
         }
     }
 }

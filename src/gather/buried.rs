@@ -1,14 +1,15 @@
 //! Values at buried vertices: those under something that touches their surface.
 //!
-//! A vertex inside a box that stands on its floor sees no light. Its elements reach out of the box,
-//! though, and linear interpolation would carry its darkness there (a light or shadow leak). So it
-//! gets a value extrapolated from its neighbours outside:
+//! A vertex inside a box that stands on its floor sees no light. Where its elements reach out of the
+//! box, though, linear interpolation would carry its darkness there (a light or shadow leak). So it
+//! gets a value extrapolated from its neighbours outside; further inside vertices keep the darkness
+//! that they see:
 //!
 //! ```text
 //!            box            1. gradients at the vertices outside, from elements all outside
-//!         ┌───────┐         2. ring 1: value + gradient · step, mean weighted by 1/distance
-//!   o──o──┼─x──x──┼─o       3. rings 2 and 3: the mean alone, weighted by 1/distance
-//!         ring 1 2
+//!         ┌───────┐         2. x: value + gradient · step, mean weighted by 1/distance
+//!   o──o──┼─x──.──┼─o       3. .: what it gathered
+//!         └───────┘
 //! ```
 
 use glam::{DMat3, DVec3};
@@ -16,59 +17,39 @@ use glam::{DMat3, DVec3};
 use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
 
-/// Rings of buried vertices that get a value, counted from the vertices outside. An element that
-/// reaches outside has buried vertices of ring 1 only; two more were chosen by hand, no measurement
-/// kept.
-const MAX_RINGS: usize = 3;
-
 /// An extrapolated value is at least and at most this many times that of the neighbour that it is
 /// extrapolated from: gradients next to a contact are steep. Chosen by hand; no measurement kept.
 const MIN_RATIO: f64 = 0.5;
 const MAX_RATIO: f64 = 2.0;
 
-/// Gives buried vertices the values that their neighbours outside suggest, the nearest first.
+/// Gives buried vertices next to others the values that these suggest.
 pub(super) fn extrapolate_into_buried(samples: &mut SampledMesh) {
-    let mut has_value: Vec<bool> = samples.buried.iter().map(|buried| !buried).collect();
-    if has_value.iter().all(|&known| known) {
+    if !samples.buried.contains(&true) {
         return;
     }
     let gradients = vertex_gradients(samples);
-    for ring in 0..MAX_RINGS {
-        let gradients = if ring == 0 { Some(&gradients[..]) } else { None };
-        let sums = weighted_neighbours(samples, &has_value, gradients);
-        for (v, (sum, weight)) in sums.into_iter().enumerate() {
-            if weight > 0.0 {
-                samples.reflected[v] = sum / weight;
-                has_value[v] = true;
-            }
-        }
-    }
-}
-
-/// For every vertex without a value, the sum of the values that its neighbours with one suggest,
-/// each over its distance, and the sum of 1/distance. With `gradients`, the neighbours' values are
-/// extrapolated along them.
-fn weighted_neighbours(
-    samples: &SampledMesh,
-    has_value: &[bool],
-    gradients: Option<&[DMat3]>,
-) -> Vec<(Rgb, f64)> {
     let positions = &samples.vertices.positions;
-    let mut sums = vec![(Rgb::ZERO, 0.0); has_value.len()];
+    // For every buried vertex the sum of the values that its neighbours suggest, each over its
+    // distance, and the sum of 1/distance.
+    let mut sums = vec![(Rgb::ZERO, 0.0); samples.buried.len()];
     for (_, outline) in samples.vertices.outlines.iter() {
         let outline = || outline.iter().map(|&v| v as usize);
-        for v in outline().filter(|&v| !has_value[v]) {
-            for w in outline().filter(|&w| has_value[w]) {
+        for v in outline().filter(|&v| samples.buried[v]) {
+            for w in outline().filter(|&w| !samples.buried[w]) {
                 let step = positions[v] - positions[w];
                 let value = samples.reflected[w];
-                let rise = gradients.map_or(Rgb::ZERO, |gradients| gradients[w] * step);
-                let value = (value + rise).clamp(value * MIN_RATIO, value * MAX_RATIO);
+                let extrapolated = value + gradients[w] * step;
+                let value = extrapolated.clamp(value * MIN_RATIO, value * MAX_RATIO);
                 sums[v].0 += value / step.length();
                 sums[v].1 += 1.0 / step.length();
             }
         }
     }
-    sums
+    for (v, (sum, weight)) in sums.into_iter().enumerate() {
+        if weight > 0.0 {
+            samples.reflected[v] = sum / weight;
+        }
+    }
 }
 
 /// Gradient of the reflected radiosity at each vertex, W/m² per scene unit: a matrix that takes a

@@ -31,6 +31,7 @@ pub(super) struct VertexGatherPoints<'a> {
     /// Square root of the smallest element's area around each vertex, scene unit.
     sizes: Vec<f64>,
     offset: SurfaceOffset,
+    touching: f64,
 }
 
 /// How far gather points of a scene lie above its surfaces.
@@ -48,7 +49,8 @@ const CORNER_INSET: f64 = 0.02;
 const MAX_ATTEMPTS: usize = 6;
 
 impl<'a> VertexGatherPoints<'a> {
-    pub fn new(mesh: &'a Mesh, vertices: &'a Vertices) -> VertexGatherPoints<'a> {
+    /// For the `vertices` of `mesh`; surfaces nearer than `touching` (scene unit) touch.
+    pub fn new(mesh: &'a Mesh, vertices: &'a Vertices, touching: f64) -> VertexGatherPoints<'a> {
         let count = vertices.positions.len();
         let mut first = vec![0u32; count + 1];
         for (_, outline) in vertices.outlines.iter() {
@@ -77,7 +79,7 @@ impl<'a> VertexGatherPoints<'a> {
             *normal = normal.normalize_or(DVec3::Z);
         }
         let offset = SurfaceOffset::new(mesh.scene());
-        VertexGatherPoints { mesh, vertices, around, first, normals, sizes, offset }
+        VertexGatherPoints { mesh, vertices, around, first, normals, sizes, offset, touching }
     }
 
     fn around(&self, v: u32) -> &[u32] {
@@ -109,7 +111,7 @@ impl<'a> VertexGatherPoints<'a> {
 
     /// Whether `sample`, gathered for vertex `v`, is that of a buried point.
     pub fn is_buried(&self, v: u32, sample: &IrradianceSample) -> bool {
-        is_buried(sample, self.sizes[v as usize])
+        is_buried(sample, self.sizes[v as usize].min(self.touching))
     }
 }
 
@@ -130,10 +132,9 @@ impl SurfaceOffset {
     }
 }
 
-/// Whether a point on an element of `size` (square root of its area, scene unit) lies inside
-/// something that touches the surface: it sees almost nothing but backs, and those nearer than the
-/// element is large; or nothing else at all.
-pub(crate) fn is_buried(sample: &IrradianceSample, size: f64) -> bool {
-    let is_near = sample.inverse_distance * size > 1.0;
+/// Whether a point lies inside something that touches its surface: it sees almost nothing but backs,
+/// and those nearer than `touching` (scene unit); or nothing else at all.
+pub(crate) fn is_buried(sample: &IrradianceSample, touching: f64) -> bool {
+    let is_near = sample.inverse_distance * touching > 1.0;
     sample.backface > buried::BURIED && (is_near || sample.backface > buried::INSIDE)
 }

@@ -77,23 +77,23 @@ fn candidates(
     scale: &ErrorScale,
     settings: &RefinementSettings,
 ) -> Vec<Candidate> {
-    let candidate = |element: usize| {
-        let node = samples.mesh.element(element);
-        if !samples.is_splittable(element) || samples.mesh.longest_edge(node) <= settings.min_edge {
-            return None;
-        }
-        let interpolant = HierarchicalSurplus::of_parent(samples, element)
-            .filter(super::surplus::HierarchicalSurplus::is_smooth)?;
-        let emitted = samples.mesh.material(node).exitance;
-        let mean = interpolant.corner_mean();
-        let radiosity = (mean + emitted).length().max(scale.radiosity_floor);
-        let surplus = interpolant.predicted_child_surplus();
-        (surplus > settings.interpolation_tolerance * radiosity).then(|| Candidate {
-            element,
-            relative_surplus: surplus / radiosity,
-            interpolant,
-        })
-    };
+    let candidate =
+        |element: usize| {
+            let node = samples.mesh.element(element);
+            let size = samples.mesh.longest_edge(node) / scale.growth(&samples.mesh, node);
+            let group_factor = settings.group_factor(samples.mesh.group(node));
+            if !samples.is_splittable(element) || size <= settings.min_edge * group_factor {
+                return None;
+            }
+            let interpolant = HierarchicalSurplus::of_parent(samples, element)
+                .filter(super::surplus::HierarchicalSurplus::is_smooth)?;
+            let emitted = samples.mesh.material(node).exitance;
+            let mean = interpolant.corner_mean();
+            let radiosity = (mean + emitted).length().max(scale.radiosity_floor);
+            let surplus = interpolant.predicted_child_surplus();
+            (surplus > settings.interpolation_tolerance * group_factor * radiosity)
+                .then(|| Candidate { element, relative_surplus: surplus / radiosity, interpolant })
+        };
     let count = samples.mesh.element_count();
     let mut candidates: Vec<Candidate> = (0..count).filter_map(candidate).collect();
     candidates.sort_by(|a, b| {

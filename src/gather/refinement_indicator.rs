@@ -6,7 +6,8 @@
 //!   surplus_tolerance · (h_max / h)^¾ · max(B, floor)
 //! ```
 //!
-//! with h_max the longest edge of the mesh that refinement started on. An element is judged by its
+//! with h_max the longest edge of the mesh that refinement started on, larger away from the region
+//! of the light, as elements are. An element is judged by its
 //! parent's midsides, which have gathered. An element of the first mesh has no parent; it is judged
 //! by the differences of its corners, and by the light before the gather, if that is known more
 //! finely there.
@@ -17,8 +18,10 @@ use super::RadiosityField;
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::surplus::{HierarchicalSurplus, NodeValue};
-use crate::mesh::Mesh;
-use crate::scene::Rgb;
+use crate::mesh::sizing::size_growth;
+use crate::mesh::{Mesh, NodeId};
+use crate::scene::{Aabb, Rgb, longest_edge};
+use crate::visibility::buried;
 
 /// The tolerance of an element grows as its size to minus this power. 0 would make the errors of
 /// all elements equal and split contacts without end; 1 would make errors times edge length equal.
@@ -39,35 +42,67 @@ const PEAK_OVER_RMS: f64 = 2.0;
 /// measurement kept.
 const END_DIFFERENCE_SHARE: f64 = 0.25;
 
+/// Indicator of an element that has to be split because nothing is known of its middle: above those
+/// of all that is known.
+const UNKNOWN_INDICATOR: f64 = 1e3;
+
 /// Reflected radiosity below this share of the scene's mean counts as that much when errors are
 /// made relative, so that the insides of gaps do not take most of the elements. Chosen by hand.
 const RADIOSITY_FLOOR_SHARE: f64 = 0.05;
+
+/// A vertex is dim if it reflects less than this many times the floor: a quarter of the mean.
+pub(crate) const GAP_DIMNESS: f64 = 0.25 / RADIOSITY_FLOOR_SHARE;
 
 /// What errors are relative to, found once at the start of a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
-    /// Longest edge of the mesh that refinement starts on, scene unit.
+    /// Longest edge of an element that reflects in the mesh that refinement starts on, over the
+    /// growth of elements in its place; scene unit.
     pub max_edge: f64,
+    /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
+    pub touching: f64,
+    /// Where most of the light is: elements grow with the distance from it.
+    region: Option<Aabb>,
 }
 
 impl ErrorScale {
-    /// For a gather of `field` on `mesh`.
-    pub fn new(mesh: &Mesh, field: &RadiosityField) -> ErrorScale {
+    /// For a gather of `field` on `mesh`, whose light is mostly in `region`.
+    pub fn new(mesh: &Mesh, field: &RadiosityField, region: Option<Aabb>) -> ErrorScale {
         let mut flux = 0.0;
-        let mut area = 0.0;
+        let mut area = f64::MIN_POSITIVE;
         for (e, corners) in field.corners.iter().enumerate() {
+            if !field.mesh.material(field.mesh.element(e)).reflects() {
+                continue;
+            }
             let element_area = field.mesh.area(field.mesh.element(e));
             let mean = corners.iter().map(|&v| field.reflected[v as usize]).sum::<Rgb>() / 3.0;
             flux += mean.length() * element_area;
             area += element_area;
         }
-        let edge = |e| mesh.longest_edge(mesh.element(e));
-        ErrorScale {
-            radiosity_floor: RADIOSITY_FLOOR_SHARE * flux / area,
-            max_edge: (0..mesh.element_count()).map(edge).fold(0.0, f64::max),
+        let reflecting =
+            (0..mesh.element_count()).filter(|&e| mesh.material(mesh.element(e)).reflects());
+        let edge = |e| {
+            let corners = mesh.corners(mesh.element(e));
+            longest_edge(corners) / size_growth(region.as_ref(), &corners)
+        };
+        let mut bounds = Aabb::EMPTY;
+        for e in reflecting.clone() {
+            mesh.corners(mesh.element(e)).into_iter().for_each(|corner| bounds.include(corner));
         }
+        let diagonal = region.unwrap_or(bounds).diagonal().max(0.0);
+        ErrorScale {
+            touching: buried::NEAR_BACKS_DISTANCE * diagonal,
+            radiosity_floor: RADIOSITY_FLOOR_SHARE * flux / area,
+            max_edge: reflecting.map(edge).fold(0.0, f64::max),
+            region,
+        }
+    }
+
+    /// By how much larger elements are where `node` of `mesh` is.
+    pub fn growth(&self, mesh: &Mesh, node: NodeId) -> f64 {
+        self.region.map_or(1.0, |region| size_growth(Some(&region), &mesh.corners(node)))
     }
 }
 
@@ -81,13 +116,24 @@ pub(super) fn refinement_indicator(
     e: usize,
 ) -> f64 {
     let node = samples.mesh.element(e);
-    let size = samples.mesh.longest_edge(node);
-    if !samples.is_splittable(e) || size <= settings.min_edge {
+    if !samples.is_splittable(e) {
+        return 0.0;
+    }
+    let edge = samples.mesh.longest_edge(node);
+    let size = edge / scale.growth(&samples.mesh, node);
+    let group_factor = settings.group_factor(samples.mesh.group(node));
+    // Half a gap's distance from its mouth, parallel plates see the half of what they see there
+    // (Hottel's crossed strings): elements as long as the distance follow that.
+    let nearest = samples.nearest_dim(e, GAP_DIMNESS * scale.radiosity_floor);
+    let gap_factor = settings.gap_factor * group_factor;
+    let in_gap = edge * nearest > gap_factor;
+    if size <= settings.min_edge * group_factor && !in_gap {
         return 0.0;
     }
     let emitted = samples.mesh.material(node).exitance;
     let size_factor = (scale.max_edge / size).powf(ERROR_SIZE_EXPONENT);
-    let tolerance = settings.surplus_tolerance * size_factor;
+    let factor = if in_gap { gap_factor } else { group_factor };
+    let tolerance = settings.surplus_tolerance * factor * size_factor;
     // Difference of two values of reflected radiosity, relative to the first, over the tolerance.
     let error = |value: Rgb, other: Rgb| {
         let radiosity = (value + emitted).length().max(scale.radiosity_floor);
@@ -108,6 +154,8 @@ pub(super) fn refinement_indicator(
             let extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
             extrapolated.map(end_error).fold(indicator, f64::max)
         }
+        // Every corner sees something much nearer than the others are: what lies between is unknown.
+        None if gap_factor.is_finite() && samples.is_narrow(e) => UNKNOWN_INDICATOR,
         None => {
             let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
             // A vector over the channels as long as the root mean square.

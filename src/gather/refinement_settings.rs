@@ -1,6 +1,7 @@
 //! Settings of the adaptive gather, and what values they may have.
 
 use crate::error::{Error, ErrorKind};
+use crate::scene::Aabb;
 
 /// Settings of [`gather_at_vertices`](super::gather_at_vertices): where elements are split, how
 /// far, and how often all vertices gather.
@@ -21,9 +22,21 @@ pub struct RefinementSettings {
     pub max_elements: usize,
     /// Uniform subdivisions of all elements before adaptive refinement starts.
     pub initial_subdivisions: u32,
+    /// In gaps, elements may be as small as this times the mean distance to what is seen there,
+    /// whatever the smallest edge, and the tolerance is this times what it is elsewhere. A gap is
+    /// where a vertex is dim and sees mostly what is near; light changes over such lengths at its
+    /// mouth. Above 0; infinity for as elsewhere.
+    pub gap_factor: f64,
     /// How often all vertices gather: in the first pass the light given, in each further one what
     /// the pass before it found, so each adds a bounce. 0 counts as 1.
     pub gather_passes: u32,
+    /// Where most of the light is, if that is a small part of the mesh: `min_edge` holds there, and
+    /// grows with the distance from it, 1 + distance/diagonal times. With none, it holds
+    /// everywhere.
+    pub region: Option<Aabb>,
+    /// Factor of both tolerances and the smallest edge on the triangles of each group, above 0;
+    /// those beyond the end of the list have 1.
+    pub group_factors: Vec<f64>,
 }
 
 impl RefinementSettings {
@@ -38,8 +51,8 @@ impl RefinementSettings {
     /// Default of [`RefinementSettings::max_elements`], chosen by hand; no measurement kept.
     pub const DEFAULT_MAX_ELEMENTS: usize = 1 << 19;
 
-    /// Refines down to elements with edges of `min_edge` (scene unit), with the default tolerances,
-    /// no uniform subdivision and one pass.
+    /// Refines down to elements with edges of `min_edge` (scene unit), in gaps too, with the default
+    /// tolerances, no uniform subdivision and one pass.
     pub fn new(min_edge: f64) -> RefinementSettings {
         RefinementSettings {
             surplus_tolerance: RefinementSettings::DEFAULT_SURPLUS_TOLERANCE,
@@ -47,8 +60,16 @@ impl RefinementSettings {
             interpolation_tolerance: RefinementSettings::DEFAULT_INTERPOLATION_TOLERANCE,
             max_elements: RefinementSettings::DEFAULT_MAX_ELEMENTS,
             initial_subdivisions: 0,
+            gap_factor: f64::INFINITY,
             gather_passes: 1,
+            region: None,
+            group_factors: vec![],
         }
+    }
+
+    /// Factor of the tolerances on triangles of `group`.
+    pub(crate) fn group_factor(&self, group: u32) -> f64 {
+        self.group_factors.get(group as usize).copied().unwrap_or(1.0)
     }
 
     /// Whether [`gather_at_vertices`](super::gather_at_vertices) accepts these settings: worth
@@ -56,7 +77,7 @@ impl RefinementSettings {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a surplus tolerance outside (0, 1], or a smallest edge or an
-    /// interpolation tolerance that is not above 0.
+    /// interpolation tolerance, or a factor that is not above 0.
     pub fn check(&self) -> Result<(), Error> {
         let bad = |place: String, found: &str, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, place, found, remedy))
@@ -72,6 +93,14 @@ impl RefinementSettings {
         if self.interpolation_tolerance.is_nan() || self.interpolation_tolerance <= 0.0 {
             let place = format!("interpolation tolerance {}", self.interpolation_tolerance);
             return bad(place, "not above 0", "use a share above 0, or infinity for none");
+        }
+        if self.gap_factor.is_nan() || self.gap_factor <= 0.0 {
+            let place = format!("factor {} of gaps", self.gap_factor);
+            return bad(place, "not above 0", "use 1 for no change");
+        }
+        if let Some(k) = self.group_factors.iter().position(|f| f.is_nan() || *f <= 0.0) {
+            let place = format!("factor {} of group {k}", self.group_factors[k]);
+            return bad(place, "not above 0", "use 1 for no change");
         }
         Ok(())
     }

@@ -25,7 +25,13 @@ pub(crate) struct SampledMesh {
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
+    /// Mean of 1/distance to what each vertex sees, per scene unit; 0 where it has not gathered.
+    pub inverse_distance: Vec<f64>,
 }
+
+/// An element is narrow where its longest edge is this many times the mean distance to what its
+/// corners see.
+const MIN_NARROWNESS: f64 = 4.0;
 
 /// What splitting elements made.
 pub(super) struct NewParts {
@@ -43,7 +49,8 @@ impl SampledMesh {
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.reflected_at(t, u, v);
         let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
         let buried = vec![false; reflected.len()];
-        SampledMesh { mesh, topology, vertices, reflected, buried }
+        let inverse_distance = vec![0.0; reflected.len()];
+        SampledMesh { mesh, topology, vertices, reflected, buried, inverse_distance }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -59,6 +66,23 @@ impl SampledMesh {
             && self.mesh.material(node).reflectance != Rgb::ZERO
     }
 
+    /// Mean of 1/distance to what is seen from those corners of element `e` that reflect less than
+    /// `floor` (W/m²) without being buried, per scene unit; the largest, 0 where there are none.
+    pub fn nearest_dim(&self, e: usize, floor: f64) -> f64 {
+        let corners = self.vertices.corners[e].map(|v| v as usize);
+        let dim =
+            corners.into_iter().filter(|&v| !self.buried[v] && self.reflected[v].length() < floor);
+        dim.map(|v| self.inverse_distance[v]).fold(0.0, f64::max)
+    }
+
+    /// Whether all corners of element `e` see mostly what is nearer than a quarter of its longest
+    /// edge.
+    pub fn is_narrow(&self, e: usize) -> bool {
+        let edge = self.mesh.longest_edge(self.mesh.element(e));
+        let corners = self.vertices.corners[e].map(|v| v as usize);
+        corners.into_iter().all(|v| self.inverse_distance[v] * edge > MIN_NARROWNESS)
+    }
+
     /// Splits `elements` (ascending) into four each. Values of old vertices are kept.
     pub fn split(&mut self, elements: &[usize]) -> Result<NewParts, Error> {
         let finer = self.mesh.split(elements)?;
@@ -66,12 +90,14 @@ impl SampledMesh {
         let count = vertices.positions.len();
         let mut reflected = vec![Rgb::ZERO; count];
         let mut buried = vec![false; count];
+        let mut inverse_distance = vec![0.0; count];
         let mut is_new = vec![false; count];
         for (v, key) in vertices.keys.iter().enumerate() {
             match self.vertices.index_of(key) {
                 Some(old) => {
                     reflected[v] = self.reflected[old as usize];
                     buried[v] = self.buried[old as usize];
+                    inverse_distance[v] = self.inverse_distance[old as usize];
                 }
                 None => is_new[v] = true,
             }
@@ -94,6 +120,7 @@ impl SampledMesh {
         self.vertices = vertices;
         self.reflected = reflected;
         self.buried = buried;
+        self.inverse_distance = inverse_distance;
         let new_vertices = (0..count as u32).filter(|&v| is_new[v as usize]).collect();
         Ok(NewParts { vertices: new_vertices, elements: new_elements })
     }

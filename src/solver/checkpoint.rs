@@ -17,6 +17,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::flux_state::ReceivedLight;
 use super::method::saved_identity;
 use super::saved_state::{DAMAGED, SavedSession, refuse};
 use super::{SolveSession, Solver};
@@ -101,13 +102,24 @@ impl Solver {
         form_factors: &dyn FormFactors,
         path: impl AsRef<Path>,
     ) -> Result<SolveSession<'m>, Error> {
-        let path = path.as_ref();
+        self.resume_after(mesh, &ReceivedLight::default(), form_factors, path.as_ref())
+    }
+
+    /// The same where the elements had `received` light before.
+    pub(crate) fn resume_after<'m>(
+        &self,
+        mesh: &'m Mesh,
+        received: &ReceivedLight,
+        form_factors: &dyn FormFactors,
+        path: &Path,
+    ) -> Result<SolveSession<'m>, Error> {
         let bytes = fs::read(path).map_err(|e| {
             let place = path.display().to_string();
             Error::new(ErrorKind::File, place, e.to_string(), "name a file that can be read")
                 .with_source(e)
         })?;
-        self.resume_bytes(mesh, form_factors, &bytes).map_err(|e| e.inside(path))
+        let session = self.begin_after(mesh, received)?;
+        self.restore_bytes(session, form_factors, &bytes).map_err(|e| e.inside(path))
     }
 
     /// The same from bytes.
@@ -120,7 +132,17 @@ impl Solver {
         form_factors: &dyn FormFactors,
         bytes: &[u8],
     ) -> Result<SolveSession<'m>, Error> {
-        let session = self.begin(mesh)?;
+        self.restore_bytes(self.begin(mesh)?, form_factors, bytes)
+    }
+
+    /// What `bytes` say of `session`, which has just begun.
+    fn restore_bytes<'m>(
+        &self,
+        session: SolveSession<'m>,
+        form_factors: &dyn FormFactors,
+        bytes: &[u8],
+    ) -> Result<SolveSession<'m>, Error> {
+        let mesh = session.mesh();
         let content = verified_content(bytes)?;
         let (identity, content) = take_from::<Identity>(content)?;
         let hex = |mesh: u64| format!("{mesh:016x}");

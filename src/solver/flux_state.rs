@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 use super::ledger::{Ledger, largest_share};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
 /// Flux of the elements, W per channel.
 #[derive(Clone)]
 pub(super) struct Flux {
-    /// Emitted by all.
+    /// Emitted by all, or received of it where that is known beforehand.
     total: Rgb,
     /// Emitted by each.
     pub emitted: Vec<Rgb>,
@@ -41,18 +41,38 @@ impl Flux {
     /// # Errors
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
     pub fn emitted_by(mesh: &Mesh) -> Result<Flux, Error> {
+        Flux::after(mesh, &ReceivedLight::default())
+    }
+
+    /// What `mesh` emits and has `received`, what is reflected of that unshot. What it has received
+    /// counts as emitted in the place of all that the lights emit which it is from.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when the emitted flux is not finite.
+    pub fn after(mesh: &Mesh, received: &ReceivedLight) -> Result<Flux, Error> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
         let emitted: Vec<Rgb> =
             elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
-        let reflectance: Vec<Rgb> = elements.map(|n| mesh.material(n).reflectance).collect();
-        let total: Rgb = emitted.iter().sum();
+        let reflectance: Vec<Rgb> =
+            elements.clone().map(|n| mesh.material(n).reflectance).collect();
+        let mut unshot = emitted.clone();
+        let mut incident = vec![Rgb::ZERO; emitted.len()];
+        for (e, node) in elements.enumerate().filter(|_| !received.materials.is_empty()) {
+            if received.is_of(mesh, node) {
+                unshot[e] = Rgb::ZERO;
+            }
+            if reflectance[e] != Rgb::ZERO {
+                incident[e] = received.irradiance[e] * mesh.area(node);
+                unshot[e] += reflectance[e] * incident[e];
+            }
+        }
+        let lost = |e: usize| (Rgb::ONE - reflectance[e]) * incident[e];
+        let total: Rgb = unshot.iter().sum::<Rgb>() + (0..unshot.len()).map(lost).sum::<Rgb>();
         if !total.is_finite() {
             let remedy = "scale exitances down: sums of flux must stay finite in 64-bit floats";
             let found = format!("{total} W");
             return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
         }
-        let incident = vec![Rgb::ZERO; emitted.len()];
-        let unshot = emitted.clone();
         Ok(Flux { total, emitted, reflectance, incident, unshot })
     }
 
@@ -77,6 +97,24 @@ impl Flux {
     pub fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
         let sum_of = |run: &Range<usize>| run.clone().map(|e| self.leaving(e)).sum::<Rgb>();
         largest_share(elements.iter().map(sum_of).sum(), self.total)
+    }
+}
+
+/// Light that elements have received before any is shot: that of lights which were looked at from
+/// the elements, since most of what they emit goes elsewhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ReceivedLight {
+    /// Irradiance of each element, W/m² per channel; empty for none.
+    pub irradiance: Vec<Rgb>,
+    /// Materials, by their index, whose emission that is: they shoot none of it.
+    pub materials: Vec<u32>,
+}
+
+impl ReceivedLight {
+    /// Whether the emission of `node` is in it.
+    fn is_of(&self, mesh: &Mesh, node: NodeId) -> bool {
+        let material = mesh.scene().triangles()[mesh.triangle(node)].material;
+        self.materials.contains(&material)
     }
 }
 
@@ -143,13 +181,15 @@ pub(super) struct FluxState<'m> {
 const MAX_ENERGY_IMBALANCE: f64 = 1e-9;
 
 impl<'m> FluxState<'m> {
-    /// What `mesh` emits, all of it unshot.
+    /// What `mesh` emits and has `received`, none of it shot.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
-    pub fn new(mesh: &'m Mesh) -> Result<FluxState<'m>, Error> {
-        let flux = Flux::emitted_by(mesh)?;
-        let ledger = Ledger { emitted: flux.total, unshot: flux.total, ..Default::default() };
+    pub fn new(mesh: &'m Mesh, received: &ReceivedLight) -> Result<FluxState<'m>, Error> {
+        let flux = Flux::after(mesh, received)?;
+        let unshot = flux.unshot.iter().sum::<Rgb>();
+        let emitted = flux.total;
+        let ledger = Ledger { emitted, unshot, absorbed: emitted - unshot, ..Default::default() };
         Ok(FluxState { mesh, flux, ledger })
     }
 
@@ -202,5 +242,33 @@ impl<'m> FluxState<'m> {
     pub fn radiosity(&self) -> Vec<Rgb> {
         let area = |e| self.mesh.area(self.mesh.element(e));
         (0..self.mesh.element_count()).map(|e| self.flux.leaving(e) / area(e)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn received_light_takes_the_place_of_emission() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let light = mesh.scene().materials().iter().position(|m| m.exitance != Rgb::ZERO).unwrap();
+        let irradiance = vec![Rgb::new(1.0, 2.0, 3.0); mesh.element_count()];
+        let received = ReceivedLight { irradiance, materials: vec![light as u32] };
+        let state = FluxState::new(&mesh, &received).unwrap();
+        let area = mesh.reflecting_area();
+        let close = |a: Rgb, b: Rgb| (a - b).abs().max_element() < 1e-9 * b.max_element();
+        // All that the lamp sends to surfaces that reflect, of which the rest is unshot.
+        assert!(close(state.ledger.emitted, area * Rgb::new(1.0, 2.0, 3.0)), "{:?}", state.ledger);
+        let reflected = mesh.mean_reflectance() * area * Rgb::new(1.0, 2.0, 3.0);
+        assert!(close(state.ledger.unshot, reflected), "{:?} {reflected}", state.ledger);
+        assert!(state.ledger.imbalance() < 1e-12);
+        // What leaves is all of it, emission included.
+        for (e, radiosity) in state.radiosity().into_iter().enumerate() {
+            let material = mesh.material(mesh.element(e));
+            let leaving = material.exitance + material.reflectance * Rgb::new(1.0, 2.0, 3.0);
+            assert!(close(radiosity, leaving), "{e}: {radiosity} {leaving}");
+        }
     }
 }

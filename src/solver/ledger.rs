@@ -45,7 +45,7 @@ impl Ledger {
     }
 
     /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
-    /// fell evenly on all surfaces, again and again: the ambient term of Cohen, Chen, Wallace and
+    /// fell evenly on all surfaces that reflect, again and again: the ambient term of Cohen, Chen, Wallace and
     /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing
     /// of where that would have gone. Returns the ambient radiosity, W/m² per unit of reflectance.
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
@@ -60,7 +60,8 @@ impl Ledger {
     /// evenly.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
         let absorptance = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
-        (self.unshot - self.overshot) / mesh.total_area() / absorptance
+        let area = mesh.reflecting_area().max(f64::MIN_POSITIVE);
+        (self.unshot - self.overshot) / area / absorptance
     }
 
     /// Share of the emitted flux that is unshot or overshot: the worst channel. 0 when nothing is

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::flux_state::FluxState;
+use super::flux_state::{FluxState, ReceivedLight};
 use super::method_state::MethodState;
 use super::row_cache::RowCache;
 use super::staleness::tightened_unshot;
@@ -64,10 +64,14 @@ impl fmt::Debug for SolveSession<'_> {
 }
 
 impl<'m> SolveSession<'m> {
-    /// Nothing is shot yet. The settings are checked already.
-    pub(super) fn new(solver: Solver, mesh: &'m Mesh) -> Result<SolveSession<'m>, Error> {
+    /// Nothing is shot yet but what was `received`. The settings are checked already.
+    pub(super) fn new(
+        solver: Solver,
+        mesh: &'m Mesh,
+        received: &ReceivedLight,
+    ) -> Result<SolveSession<'m>, Error> {
         Ok(SolveSession {
-            state: FluxState::new(mesh)?,
+            state: FluxState::new(mesh, received)?,
             rows: RowCache::new(solver.row_memory),
             method: MethodState::new(&solver, mesh),
             counters: Counters::default(),

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::flux_state::ReceivedLight;
 use super::{Method, Progress, Solution, SolveSession};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
@@ -126,6 +127,15 @@ impl Solver {
     /// range or the mesh too large for it; [`ErrorKind::Scene`] when the emitted flux is not
     /// finite.
     pub fn begin<'m>(&self, mesh: &'m Mesh) -> Result<SolveSession<'m>, Error> {
+        self.begin_after(mesh, &ReceivedLight::default())
+    }
+
+    /// The same where the elements have `received` light already.
+    pub(crate) fn begin_after<'m>(
+        &self,
+        mesh: &'m Mesh,
+        received: &ReceivedLight,
+    ) -> Result<SolveSession<'m>, Error> {
         self.check()?;
         let (count, max) = (mesh.element_count(), Solver::DIRECT_MAX_ELEMENTS);
         if self.method == Method::Direct && count > max {
@@ -133,7 +143,7 @@ impl Solver {
             let found = format!("{count} elements");
             return Err(Error::new(ErrorKind::Setting, "direct solve", found, remedy));
         }
-        SolveSession::new(*self, mesh)
+        SolveSession::new(*self, mesh, received)
     }
 
     /// Whether all settings are in range.

@@ -7,7 +7,8 @@
 //! | constant | share | asked of | consequence |
 //! |---|---|---|---|
 //! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | another viewpoint is tried |
-//! | [`HIDDEN_SAMPLE`] | 0.5 | sample of the error estimate | left out, if surfaces are near too |
+//! | [`NEAR_BACKS`] | 0.5 | sample of the error estimate | left out, if they are very near too |
+//! | [`HIDDEN`] | 0.95 | sample of the error estimate | left out |
 //! | [`ENCLOSED`] | 0.75 | sample of the winding check | its back hits are no evidence |
 //! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
 //! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
@@ -24,8 +25,15 @@
 /// A patch's viewpoint that sees more than this share of backs is rejected.
 pub(crate) const VIEWPOINT: f64 = 0.5;
 
-/// A sample of the error estimate that sees more than this share of backs is behind something.
-pub(crate) const HIDDEN_SAMPLE: f64 = 0.5;
+/// A sample of the error estimate that sees more than this share of backs is left out if these are
+/// nearer than [`NEAR_BACKS_DISTANCE`].
+pub(crate) const NEAR_BACKS: f64 = 0.5;
+
+/// Share of the diagonal of where the light is.
+pub(crate) const NEAR_BACKS_DISTANCE: f64 = 0.002;
+
+/// A sample of the error estimate that sees more than this share of backs lies inside a solid.
+pub(crate) const HIDDEN: f64 = 0.95;
 
 /// A sample of the winding check that meets more than this share of backs is enclosed.
 pub(crate) const ENCLOSED: f64 = 0.75;

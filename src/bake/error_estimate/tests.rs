@@ -5,12 +5,13 @@ use crate::sampling::hash::split_mix64;
 
 const COUNT: usize = 1000;
 
+const STRATUM: Stratum = Stratum { group: Some(0), area: 3.0, ambient: 0.0 };
+
 const CONDITIONS: Conditions = Conditions {
+    strata: &[STRATUM],
     radiosity_floor: 0.05,
-    gap: 0.1,
     mean_reflectance: 0.5,
     gather_passes: Some(1),
-    ambient: 0.0,
     unshot_bound: 0.0,
 };
 
@@ -18,8 +19,9 @@ const CONDITIONS: Conditions = Conditions {
 /// channel is a relative error of x.
 fn exact() -> Observation {
     Observation {
+        stratum: 0,
+        weight: 1.0,
         interpolated: Rgb::ONE,
-        emitted: Rgb::ZERO,
         gathered: [Rgb::ONE; 2],
         next: Rgb::ONE,
         element_residual: 0.1,
@@ -27,11 +29,12 @@ fn exact() -> Observation {
         escaped: 0.0,
         backface: 0.0,
         inverse_distance: 1.0,
+        size: 0.1,
     }
 }
 
 fn estimate_of(make: impl FnMut(usize) -> Observation) -> ErrorEstimate {
-    estimate(&(0..COUNT).map(make).collect::<Vec<_>>(), &CONDITIONS).0
+    estimate(&(0..COUNT).map(make).collect::<Vec<_>>(), &CONDITIONS).whole
 }
 
 /// Standard normal numbers (Box and Muller 1958).
@@ -57,7 +60,7 @@ impl Normal {
 fn exact_light_has_no_error() {
     let found = estimate_of(|_| exact());
     assert_eq!(found, ErrorEstimate { samples: COUNT, ..ErrorEstimate::default() });
-    let none = estimate(&[], &CONDITIONS).0;
+    let none = estimate(&[], &CONDITIONS).whole;
     assert_eq!(none, ErrorEstimate::default());
 }
 
@@ -94,9 +97,7 @@ fn known_bias_counts_as_mesh_error() {
     for bias in [-0.1, 0.003, 0.2] {
         let found =
             estimate_of(|_| Observation { interpolated: (1.0 + bias) * Rgb::ONE, ..exact() });
-        // Relative to the larger of the two.
-        let truth = bias.abs() / (1.0 + bias).max(1.0);
-        assert!((found.mesh / truth - 1.0).abs() < 1e-12, "{found:?}");
+        assert!((found.mesh / bias.abs() - 1.0).abs() < 1e-12, "{found:?}");
         assert_eq!((found.sampling, found.truncation, found.unshot), (0.0, 0.0, 0.0));
         assert!((found.total - found.mesh).abs() < 1e-15);
     }
@@ -152,32 +153,97 @@ fn change_of_pass_extrapolates_geometrically() {
 fn unshot_light_is_counted_once() {
     let ambient = 0.08;
     for (gather_passes, passed) in [(None, 1.0), (Some(1), 0.375), (Some(2), 0.375 * 0.375)] {
-        let conditions = Conditions { ambient, gather_passes, ..CONDITIONS };
+        let strata = [Stratum { ambient: ambient * ambient, ..STRATUM }];
+        let conditions = Conditions { strata: &strata, gather_passes, ..CONDITIONS };
         let all = [Observation { escaped: 0.25, ..exact() }; 10];
-        let found = estimate(&all, &conditions).0;
+        let found = estimate(&all, &conditions).whole;
         assert!((found.unshot / (ambient * passed) - 1.0).abs() < 1e-12, "{found:?}");
         assert_eq!(found.truncation, 0.0);
     }
 }
 
 #[test]
-fn black_points_are_exact_and_gaps_left_out() {
+fn hidden_points_have_neither_error_nor_weight() {
     let off = Observation { interpolated: 0.9 * Rgb::ONE, ..exact() };
-    let black = Observation { excluded: true, ..off };
-    let found = estimate_of(|k| if k % 4 == 0 { off } else { black });
-    assert!((found.total - 0.1 / 2.0).abs() < 1e-12, "a quarter of the area: {found:?}");
-    let gap = Observation { backface: 0.6, inverse_distance: 11.0, ..black };
-    let gap = Observation { excluded: false, ..gap };
-    let found = estimate_of(|k| if k % 4 == 0 { exact() } else { gap });
-    assert_eq!(found.total, 0.0, "{found:?}");
-    let open = Observation { inverse_distance: 9.0, ..gap };
-    assert!(estimate_of(|_| open).total > 0.0);
+    let hidden = Observation { excluded: true, interpolated: Rgb::ZERO, ..off };
+    let found = estimate_of(|k| if k % 4 == 0 { off } else { hidden });
+    assert!((found.total - 0.1).abs() < 1e-12, "{found:?}");
+    assert_eq!(found.samples, COUNT / 4);
+}
+
+#[test]
+fn dim_points_near_surfaces_are_gaps() {
+    // Truth is a tenth of the mean, 20 floors of 0.05.
+    let dim = 0.1 / 3f64.sqrt() * Rgb::ONE;
+    let off = Observation { interpolated: 3.0 * dim, gathered: [dim; 2], next: dim, ..exact() };
+    let gap = Observation { inverse_distance: 11.0, ..off };
+    let open = Observation { inverse_distance: 9.0, ..off };
+    let [in_gap, in_open] = [gap, open].map(|point| estimate_of(|_| point));
+    assert!((in_gap.gaps - 2.0).abs() < 1e-12 && in_gap.mesh == 0.0, "{in_gap:?}");
+    assert!((in_open.mesh - 2.0).abs() < 1e-12 && in_open.gaps == 0.0, "{in_open:?}");
+    assert_eq!(in_gap.total, in_open.total);
+    let bright = Observation { inverse_distance: 11.0, interpolated: 0.9 * Rgb::ONE, ..exact() };
+    assert_eq!(estimate_of(|_| bright).gaps, 0.0);
+}
+
+#[test]
+fn floor_bounds_errors_of_what_is_dark() {
+    let dark = Observation {
+        interpolated: 0.01 * Rgb::X,
+        gathered: [Rgb::ZERO; 2],
+        next: Rgb::ZERO,
+        ..exact()
+    };
+    let found = estimate_of(|_| dark);
+    assert!((found.mesh - 0.01 / CONDITIONS.radiosity_floor).abs() < 1e-12, "{found:?}");
+}
+
+#[test]
+fn groups_have_their_own_error_and_their_area_as_weight() {
+    let strata = [(Some(4), 9.0), (Some(2), 1.0), (None, 2.0)].map(|(group, area)| Stratum {
+        group,
+        area,
+        ambient: 0.0,
+    });
+    let conditions = Conditions { strata: &strata, ..CONDITIONS };
+    let biases = [0.01, 0.2, 0.05];
+    // As many points on each, however small.
+    let point = |k: usize| Observation {
+        stratum: k % 3,
+        interpolated: (1.0 + biases[k % 3]) * Rgb::ONE,
+        ..exact()
+    };
+    let all: Vec<Observation> = (0..300).map(point).collect();
+    let Estimate { whole, groups, .. } = estimate(&all, &conditions);
+    let square = (9.0 * 1e-4 + 1.0 * 0.04 + 2.0 * 0.0025) / 12.0;
+    assert!((whole.total - f64::sqrt(square)).abs() < 1e-12, "{whole:?}");
+    let found: Vec<(u32, f64)> = groups.iter().map(|g| (g.group, g.estimate.total)).collect();
+    assert!(found[0].0 == 4 && (found[0].1 - 0.01).abs() < 1e-12, "{found:?}");
+    assert!(found[1].0 == 2 && (found[1].1 - 0.2).abs() < 1e-12, "{found:?}");
+    assert_eq!(found.len(), 2, "the small ones are judged as a part of the whole");
+    assert!((groups[0].area_share - 0.75).abs() < 1e-12);
+}
+
+#[test]
+fn weights_undo_uneven_densities() {
+    // One point in ten where the error is in truth on one hundredth of the area.
+    let found = estimate_of(|k| match k % 10 {
+        0 => Observation { weight: 0.1, interpolated: 2.0 * Rgb::ONE, ..exact() },
+        _ => Observation { weight: 1.1, ..exact() },
+    });
+    let mean_square = 0.01;
+    // One standard error of a ratio is added: 100 of 1000 points have each 1e-4 of the weight.
+    let standard_error =
+        (100.0 * (1e-4f64 * 0.99).powi(2) + 900.0 * (1.1e-3f64 * 0.01).powi(2)).sqrt();
+    let expected = (mean_square + standard_error).sqrt();
+    assert!((found.total - expected).abs() < 1e-6, "{found:?} {expected}");
+    assert!((found.uncertainty - standard_error / (2.0 * found.total)).abs() < 1e-6);
 }
 
 #[test]
 fn residuals_are_scaled_to_the_error_of_the_mesh() {
     let off = Observation { interpolated: 0.9 * Rgb::ONE, ..exact() };
-    let (found, spread) = estimate(&[off; 10], &CONDITIONS);
+    let Estimate { whole: found, spread, .. } = estimate(&[off; 10], &CONDITIONS);
     // The residual of 0.1 is relative to |(1, 1, 1)|.
     assert!((spread.per_residual * 0.1 / 3f64.sqrt() - found.mesh).abs() < 1e-12);
     assert_eq!(spread.even, 0.0);

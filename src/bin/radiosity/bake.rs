@@ -18,8 +18,8 @@ use crate::progress;
 use crate::report::Report;
 
 pub const USAGE: &str = "\
-usage: radiosity bake SCENE.obj [--out STEM] [--error X | --time SECONDS | --gather none|needed|all]
-            [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--pixel-gather]
+usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
+            [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--pixel-gather]
             [--elements] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and, with
@@ -27,8 +27,9 @@ a camera, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its
 given.
 
 How far to go:
-  --error X         until the estimated error of the vertices' radiosity is below this share, root
-                    mean square over the area: 0.02 for 2 %
+  --error X         until the estimated error of the vertices' reflected radiosity is below this
+                    share, root mean square over the area that reflects: 0.02 for 2 %
+  --error-each X    the same for each group of the scene, however small
   --time SECONDS    as exact as these seconds allow
   --gather WHICH    without either: vertices that gather the settled light: none, needed (elements
                     are split where the light is not linear in them), or all (of elements that are
@@ -102,6 +103,8 @@ pub enum Target {
     Settings(Gather),
     /// Until the error is estimated to be below this share.
     Error(f64),
+    /// The same for each group.
+    ErrorEach(f64),
     /// As far as these seconds allow.
     Seconds(f64),
 }
@@ -148,6 +151,9 @@ impl Bake {
                 Long("out") => out = Some(PathBuf::from(parser.value()?)),
                 Long("error") => {
                     bake.target = Target::Error(args::value(parser, "error", "a number")?);
+                }
+                Long("error-each") => {
+                    bake.target = Target::ErrorEach(args::value(parser, "error-each", "a number")?);
                 }
                 Long("time") => {
                     bake.target = Target::Seconds(args::value(parser, "time", "a number")?);
@@ -262,6 +268,9 @@ impl Bake {
             Target::Error(error) => {
                 BakeTarget::Error(error).bake_with(scene, device, overrides, progress)
             }
+            Target::ErrorEach(error) => {
+                BakeTarget::ErrorEach(error).bake_with(scene, device, overrides, progress)
+            }
             Target::Seconds(seconds) => {
                 BakeTarget::seconds(seconds)?.bake_with(scene, device, overrides, progress)
             }
@@ -335,9 +344,10 @@ fn comments(baked: &BakeResult) -> Vec<String> {
     }
     let ErrorEstimate { total, samples, .. } = baked.estimate;
     comments.push(format!(
-        "estimated error {:.3} % of radiosity, RMS over area, at {samples} places; vertices have \
-         their own",
-        100.0 * total
+        "estimated error {:.3} % of reflected radiosity, RMS over area, at {samples} places \
+         ({}); vertices have their own",
+        100.0 * total,
+        baked.outcome
     ));
     comments
 }

@@ -2,8 +2,9 @@
 //! and as a small table.
 
 use radiosity::backend::AdapterInfo;
+use radiosity::bake::{GroupError, Outcome};
 use radiosity::solver::Ledger;
-use radiosity::{BakeResult, Rgb};
+use radiosity::{BakeResult, ErrorEstimate, Rgb};
 use serde_json::{Map, Value, json};
 
 use crate::bake::{Target, settings};
@@ -36,7 +37,7 @@ impl Report {
     /// rest of the shooting, repairs of rows included.
     pub fn to_json(&self) -> Value {
         let baked = &self.baked;
-        let (s, error) = (baked.timings, baked.estimate);
+        let s = baked.timings;
         let AdapterInfo { name, kind, driver } = &self.adapter;
         let by_resolution = baked.hemicubes_by_resolution.iter();
         let by_resolution: Map<String, Value> =
@@ -47,6 +48,7 @@ impl Report {
             "goal": match self.target {
                 Target::Settings(_) => Value::Null,
                 Target::Error(error) => json!({ "error": error }),
+                Target::ErrorEach(error) => json!({ "error_each": error }),
                 Target::Seconds(seconds) => json!({ "seconds": seconds }),
             },
             "settings": settings::report(&baked.settings),
@@ -63,11 +65,8 @@ impl Report {
             "near_moved": baked.mean_near_correction,
             "stop": baked.solution.stop.to_string(),
             "ledger": ledger(&baked.solution.ledger),
-            "error": {
-                "total": error.total, "mesh": error.mesh, "sampling": error.sampling,
-                "settling": error.truncation, "unshot": error.unshot,
-                "unshot_bound": error.unshot_bound, "places": error.samples,
-            },
+            "error": self.errors(),
+            "outcome": baked.outcome.to_string(),
             "seconds": {
                 "load": self.load, "open": self.open, "mesh": s.mesh, "draw": s.draw,
                 "reduce": s.reduce, "readback": s.readback, "solve": s.solve,
@@ -76,6 +75,61 @@ impl Report {
             },
             "warnings": self.warnings,
         })
+    }
+
+    /// The estimated error, of the whole and of each group.
+    fn errors(&self) -> Value {
+        let baked = &self.baked;
+        let mut whole = parts(&baked.estimate);
+        let names = baked.mesh.scene().groups();
+        let groups = baked.groups.iter().map(|group| {
+            let mut entry = json!({
+                "group": names.get(group.group as usize),
+                "error": group.estimate.total,
+                "area": group.area_share,
+            });
+            merge(&mut entry, parts(&group.estimate));
+            entry
+        });
+        whole["unshot_bound"] = json!(baked.estimate.unshot_bound);
+        whole["groups"] = groups.collect();
+        whole
+    }
+
+    /// The groups that are furthest off, worst first, and how the bake ended.
+    fn verdict(&self) -> Vec<String> {
+        let baked = &self.baked;
+        let names = baked.mesh.scene().groups();
+        let mut worst: Vec<_> = baked.groups.iter().collect();
+        worst.sort_by(|a, b| b.estimate.total.total_cmp(&a.estimate.total));
+        let name = |group: u32| names.get(group as usize).map_or("", String::as_str);
+        let line = |g: &&GroupError| {
+            let ErrorEstimate { total, uncertainty, .. } = g.estimate;
+            format!("{} {:.1} ± {:.1} %", name(g.group), 100.0 * total, 100.0 * uncertainty)
+        };
+        let worst: Vec<String> = worst.iter().take(WORST_GROUPS).map(line).collect();
+        let mut lines = vec![];
+        if baked.groups.len() > 1 {
+            lines.push(format!("groups     worst: {}", worst.join(", ")));
+        }
+        let asked = match self.target {
+            Target::Error(error) => Some((error, "")),
+            Target::ErrorEach(error) => Some((error, " for each group")),
+            Target::Settings(_) | Target::Seconds(_) => None,
+        };
+        if let Some((error, each)) = asked {
+            let told = 100.0 * baked.estimate.total;
+            let remedy = match baked.outcome {
+                Outcome::Missed(obstacle) => {
+                    format!("; {}", obstacle.remedy(baked.settings.gather.as_ref()))
+                }
+                _ => String::new(),
+            };
+            let outcome = baked.outcome;
+            let asked = 100.0 * error;
+            lines.push(format!("{asked} %{each} {outcome} (about {told:.2} %){remedy}"));
+        }
+        lines
     }
 
     /// Why gathering stopped.
@@ -95,7 +149,7 @@ impl Report {
         let share = |flux: Rgb| {
             if emitted > 0.0 { 100.0 * flux.element_sum() / emitted } else { 0.0 }
         };
-        [
+        let mut lines = vec![
             format!("adapter    {name} ({kind}), {driver}"),
             format!(
                 "mesh       {} triangles, {} elements that shot, {} in the end, {} vertices",
@@ -122,10 +176,11 @@ impl Report {
                 share(ledger.unshot)
             ),
             format!(
-                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, \
-                 unshot {:.2}",
+                "error      about {:.2} %: mesh {:.2}, gaps {:.2}, sampling {:.2}, \
+                 truncation {:.2}, unshot {:.2}",
                 100.0 * error.total,
                 100.0 * error.mesh,
+                100.0 * error.gaps,
                 100.0 * error.sampling,
                 100.0 * error.truncation,
                 100.0 * error.unshot
@@ -146,8 +201,28 @@ impl Report {
                 self.write,
                 self.total
             ),
-        ]
-        .join("\n")
+        ];
+        lines.extend(self.verdict());
+        lines.join("\n")
+    }
+}
+
+/// Groups that the table names.
+const WORST_GROUPS: usize = 4;
+
+/// The parts of an estimate.
+fn parts(error: &ErrorEstimate) -> Value {
+    json!({
+        "total": error.total, "uncertainty": error.uncertainty, "mesh": error.mesh,
+        "gaps": error.gaps, "sampling": error.sampling, "settling": error.truncation,
+        "unshot": error.unshot, "places": error.samples,
+    })
+}
+
+/// Adds the fields of `other` to those of `object`.
+fn merge(object: &mut Value, other: Value) {
+    if let (Some(object), Value::Object(other)) = (object.as_object_mut(), other) {
+        object.extend(other);
     }
 }
 

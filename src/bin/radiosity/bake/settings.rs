@@ -110,6 +110,8 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
     let solver = &solve.solver;
     let mut report = json!({
         "element_size": solve.element_size,
+        "region": solve.region.map(|r| [r.low.to_array(), r.high.to_array()]),
+        "gathered_lights": solve.gathered_materials,
         "contacts": settings.solve.contact_levels,
         "hemicube": settings.solve.hemicube_resolution,
         "full_share": settings.solve.full_resolution_share,
@@ -134,6 +136,9 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
             max_elements: elements,
             initial_subdivisions: everywhere,
             gather_passes: sweeps,
+            region: _,
+            gap_factor,
+            group_factors,
         } = &gather.refinement;
         report["gather_size"] = json!(element_size);
         report["gather_contacts"] = json!(contact_levels);
@@ -145,6 +150,8 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
         report["max_elements"] = json!(elements);
         report["gather_levels"] = json!(everywhere);
         report["sweeps"] = json!(sweeps);
+        report["gap_factor"] = json!(gap_factor);
+        report["group_factors"] = json!(group_factors);
     }
     match report {
         Value::Object(map) => map,

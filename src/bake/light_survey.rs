@@ -1,0 +1,210 @@
+//! A quick look at where the light of a scene falls, before any is shot.
+//!
+//! Points all over the surfaces that reflect look for the lights. Two things follow:
+//!
+//! - *The region of the light.* Sizes of elements are shares of its diagonal. It is the box around
+//!   all surfaces that reflect, unless nearly all direct light falls within a much smaller one, as
+//!   in a lit room that stands on a wide plane.
+//! - *The lights that are to be gathered.* Of the light of a room's lamp, most falls on the room:
+//!   the lamp shoots it. Of a black box of a kilometre that stands for the sky, next to nothing
+//!   falls on the house in its middle, and no hemicube of its patches resolves the house. Where
+//!   less than half of a light falls on anything that reflects, each element looks for it instead.
+//!
+//! Both are by direct light alone: what is reflected seldom falls further.
+
+use glam::DVec3;
+
+use crate::backend::cpu::RayGather;
+use crate::gather::RadiosityField;
+use crate::gather::gather_points::SurfaceOffset;
+use crate::gather::{Gather, GatherPoint};
+use crate::mesh::Mesh;
+use crate::sampling::surface::{AreaSampler, SurfacePoint};
+use crate::scene::{Aabb, Material, Rgb, Scene};
+
+/// Where the light of a scene falls.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LightSurvey {
+    /// The box that nearly all direct light falls in, if it is much smaller than the scene.
+    pub region: Option<Aabb>,
+    /// Diagonal of the region, or of the box around all surfaces that reflect; scene unit.
+    pub diagonal: f64,
+    /// Materials, by their index and ascending, whose light is to be gathered instead of shot.
+    pub gathered_materials: Vec<u32>,
+}
+
+/// A point of a surface that reflects, and the area that it stands for.
+struct Place {
+    point: GatherPoint,
+    area: f64,
+}
+
+/// Lights that are looked at, the strongest first; all others are shot. Chosen by hand: a scene
+/// with more has no sky among the weaker ones.
+const MAX_LIGHTS: usize = 12;
+
+/// Points that look for the lights.
+const PLACES: usize = 512;
+
+/// Rays over the hemisphere of each.
+const RAYS: u32 = 32;
+
+/// A light is gathered if less than this share of its flux falls on surfaces that reflect: it is
+/// then less work to look for it than to send most of it nowhere.
+const MIN_LANDING_SHARE: f64 = 0.5;
+
+/// Share of the direct light that may lie outside of the region, at either end of each axis.
+const TRIMMED_SHARE: f64 = 0.01;
+
+/// The region has to be this many times smaller than the box around all surfaces that reflect: in
+/// an ordinary room the light fills the room.
+const MIN_CONCENTRATION: f64 = 4.0;
+
+impl LightSurvey {
+    /// Looks at `scene`.
+    pub fn new(scene: &Scene) -> LightSurvey {
+        let bounds = reflecting_bounds(scene);
+        let mut survey =
+            LightSurvey { region: None, diagonal: bounds.diagonal(), gathered_materials: vec![] };
+        let lights = strongest_lights(scene);
+        let places = places(scene);
+        if lights.is_empty() || places.is_empty() {
+            return survey;
+        }
+        // Direct light at each place: flux over the area that it stands for, W.
+        let mut flux = vec![0.0; places.len()];
+        for lights in lights.chunks(3) {
+            let factors = form_factors_to(scene, lights, &places);
+            for (channel, light) in lights.iter().enumerate() {
+                let exitance = scene.materials()[light.material as usize].exitance.length();
+                let mut landing = 0.0;
+                for ((flux, place), factors) in flux.iter_mut().zip(&places).zip(&factors) {
+                    landing += place.area * factors[channel];
+                    *flux += place.area * factors[channel] * exitance;
+                }
+                if landing < MIN_LANDING_SHARE * light.area {
+                    survey.gathered_materials.push(light.material);
+                }
+            }
+        }
+        survey.gathered_materials.sort_unstable();
+        if let Some(region) = region(&places, &flux)
+            && region.diagonal() * MIN_CONCENTRATION < bounds.diagonal()
+        {
+            survey.diagonal = region.diagonal();
+            survey.region = Some(region);
+        }
+        survey
+    }
+}
+
+/// Diagonal of the `region` of the light or, with none, of all surfaces that reflect; scene unit.
+pub(super) fn diagonal(region: Option<&Aabb>, scene: &Scene) -> f64 {
+    region.map_or_else(|| reflecting_bounds(scene).diagonal(), Aabb::diagonal)
+}
+
+/// The box around all triangles that reflect; around all, if none does.
+fn reflecting_bounds(scene: &Scene) -> Aabb {
+    let triangles = 0..scene.triangles().len();
+    let reflecting = triangles.filter(|&t| scene.material(t).reflects());
+    let bounds = Aabb::from_points(reflecting.flat_map(|t| scene.corners(t)));
+    if bounds.low.x <= bounds.high.x { bounds } else { scene.bounds() }
+}
+
+/// All triangles of one material that emits.
+struct MaterialLight {
+    material: u32,
+    /// Length unit squared.
+    area: f64,
+    /// W, a length over the channels.
+    flux: f64,
+}
+
+/// The lights with the largest flux, largest first.
+fn strongest_lights(scene: &Scene) -> Vec<MaterialLight> {
+    let mut areas = vec![0.0; scene.materials().len()];
+    for (t, triangle) in scene.triangles().iter().enumerate() {
+        areas[triangle.material as usize] += scene.area(t);
+    }
+    let light = |(material, area): (u32, f64)| {
+        let flux = scene.materials()[material as usize].exitance.length() * area;
+        MaterialLight { material, area, flux }
+    };
+    let mut lights: Vec<MaterialLight> =
+        (0..).zip(areas).map(light).filter(|light| light.flux > 0.0).collect();
+    lights.sort_by(|a, b| b.flux.total_cmp(&a.flux).then(a.material.cmp(&b.material)));
+    lights.truncate(MAX_LIGHTS);
+    lights
+}
+
+/// Points spread over all surfaces that reflect: half by area, half by triangles, so that small
+/// surfaces get some beside large ones.
+fn places(scene: &Scene) -> Vec<Place> {
+    let triangles: Vec<usize> =
+        (0..scene.triangles().len()).filter(|&t| scene.material(t).reflects()).collect();
+    let area: f64 = triangles.iter().map(|&t| scene.area(t)).sum();
+    let density = |t: usize| 0.5 * scene.area(t) / area + 0.5 / triangles.len() as f64;
+    let sampler = AreaSampler::new(triangles.iter().map(|&t| density(t)));
+    let above = SurfaceOffset::new(scene);
+    let place = |SurfacePoint { triangle, barycentric: [u, v] }: SurfacePoint| {
+        let t = triangles[triangle];
+        let [a, b, c] = scene.corners(t);
+        let position = a * (1.0 - u - v) + b * u + c * v;
+        let size = scene.area(t).sqrt();
+        let point = above.gather_point(position, scene.normal(t), size.min(area.sqrt() * 1e-3));
+        Place { point, area: scene.area(t) / density(t) / PLACES as f64 }
+    };
+    sampler.spread(PLACES, 0.5).map(place).collect()
+}
+
+/// The form factor from each of `places` to each of up to three `lights`: visible shares of the
+/// hemisphere, weighted by the cosine.
+fn form_factors_to(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<[f64; 3]> {
+    // Each light shines in a channel of its own.
+    let mut materials: Vec<Material> = scene.materials().to_vec();
+    for material in &mut materials {
+        material.exitance = Rgb::ZERO;
+    }
+    for (light, channel) in lights.iter().zip([Rgb::X, Rgb::Y, Rgb::Z]) {
+        materials[light.material as usize].exitance = channel;
+    }
+    let looked_at = scene.with_materials(materials).expect("as many materials, all in range");
+    let mesh = Mesh::new(looked_at, f64::INFINITY).expect("no splits");
+    let points: Vec<GatherPoint> = places.iter().map(|place| place.point).collect();
+    let corners = vec![[0; 3]; mesh.element_count()];
+    let mut rays = RayGather::new(&mesh, RAYS).expect("a number of rays in range");
+    let samples = rays.gather(&dark(&mesh, &corners), &points).expect("rays do not fail");
+    samples.iter().map(|sample| sample.irradiance.to_array()).collect()
+}
+
+/// The field of `mesh` in which nothing is reflected, so that only lights are seen; `corners` has
+/// three zeros for each element.
+pub(super) fn dark<'a>(mesh: &'a Mesh, corners: &'a [[u32; 3]]) -> RadiosityField<'a> {
+    RadiosityField { mesh, corners, reflected: &[Rgb::ZERO] }
+}
+
+/// The box that all but [`TRIMMED_SHARE`] of the `flux` at `places` falls in, at either end of each
+/// axis; none without light.
+fn region(places: &[Place], flux: &[f64]) -> Option<Aabb> {
+    let total: f64 = flux.iter().sum();
+    let end = |axis: usize, sign: f64| {
+        let along = |k: &usize| sign * places[*k].point.position[axis];
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by(|a, b| along(a).total_cmp(&along(b)));
+        let mut outside = 0.0;
+        let first_within = order.into_iter().find(|&k| {
+            outside += flux[k];
+            outside > TRIMMED_SHARE * total
+        });
+        first_within.map(|k| places[k].point.position[axis])
+    };
+    let ends = |sign: f64| {
+        let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
+        Some(DVec3::new(x?, y?, z?))
+    };
+    let (low, high) = (ends(1.0)?, ends(-1.0)?);
+    (total > 0.0 && low != high).then_some(Aabb { low, high })
+}
+
+#[cfg(test)]
+mod tests;

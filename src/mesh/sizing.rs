@@ -1,0 +1,104 @@
+//! How large elements may be, place by place.
+//!
+//! Elements are for light, and light may fill a small part of a scene: a lit room that stands on a
+//! ground plane of a kilometre. Within the region where the light is, elements have one size; away
+//! from it they grow with the distance, so that they look equally large from there:
+//!
+//! ```text
+//!  size · (1 + d/D)    d: distance from the region; D: the region's diagonal
+//! ```
+//!
+//! A plane of any size then adds a number of elements that grows as the logarithm of its size.
+
+use glam::DVec3;
+
+use crate::geometry::aabb::Aabb;
+use crate::scene::{Scene, Triangle};
+
+/// How large elements may be, place by place.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ElementSizing {
+    /// Longest edge of an element within the region, scene unit.
+    pub size: f64,
+    /// Where most of the light is; none for the whole scene.
+    pub region: Option<Aabb>,
+    /// Materials, by their index, whose triangles are not split: they neither receive nor shoot.
+    pub unsplit_materials: Vec<u32>,
+}
+
+impl ElementSizing {
+    /// Whether the size is the same everywhere in `scene`.
+    pub fn is_uniform(&self, scene: &Scene) -> bool {
+        let unsplit = |t: &Triangle| self.unsplit_materials.contains(&t.material);
+        self.region.is_none() && !scene.triangles().iter().any(unsplit)
+    }
+
+    /// Longest edge of an element with these `corners` in triangle `t`, scene unit.
+    pub fn size_at(&self, scene: &Scene, t: usize, corners: &[DVec3; 3]) -> f64 {
+        if self.unsplit_materials.contains(&scene.triangles()[t].material) {
+            return f64::INFINITY;
+        }
+        self.size * size_growth(self.region.as_ref(), corners)
+    }
+}
+
+/// By how much larger than in `region` an element with these `corners` may be.
+pub(crate) fn size_growth(region: Option<&Aabb>, corners: &[DVec3; 3]) -> f64 {
+    region.map_or(1.0, |region| {
+        let bounds = Aabb::from_points(*corners);
+        let gap = (region.low - bounds.high).max(bounds.low - region.high).max(DVec3::ZERO);
+        1.0 + gap.length() / region.diagonal().max(f64::MIN_POSITIVE)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::scene::Material;
+    use std::sync::Arc;
+
+    /// A square from −`half` to `half`, of two triangles.
+    fn plane(half: f64) -> Arc<Scene> {
+        let corner = |x: f64, y: f64| DVec3::new(x * half, y * half, 0.0);
+        let positions =
+            vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        let triangle = |corners| Triangle { corners, ..Default::default() };
+        let triangles = vec![triangle([0, 1, 2]), triangle([0, 2, 3])];
+        let materials = vec![Material::grey("grey", 0.5)];
+        Arc::new(Scene::new(positions, triangles, vec!["plane".into()], materials).unwrap())
+    }
+
+    #[test]
+    fn sizes_grow_with_distance_from_region() {
+        let region = Aabb { low: DVec3::splat(-1.0), high: DVec3::ONE };
+        let sizing = ElementSizing { size: 0.5, region: Some(region), ..Default::default() };
+        let count = |half: f64| {
+            let mesh = Mesh::sized(plane(half), &sizing, Mesh::MAX_DEPTH).unwrap();
+            for e in 0..mesh.element_count() {
+                let node = mesh.element(e);
+                let allowed = 0.5 * size_growth(Some(&region), &mesh.corners(node));
+                assert!(mesh.longest_edge(node) <= allowed * (1.0 + 1e-9));
+            }
+            mesh.element_count()
+        };
+        let [ten, hundred, thousand] = [8.0, 64.0, 512.0].map(count);
+        // The same number of elements for each ring of doubled size.
+        let (first, second) = (hundred - ten, thousand - hundred);
+        assert!(second < 2 * first, "{ten} {hundred} {thousand}");
+        assert!(thousand < 20 * ten, "{ten} {hundred} {thousand}");
+    }
+
+    #[test]
+    fn uniform_sizes_are_those_of_mesh_new() {
+        let sizing = ElementSizing { size: 0.3, ..Default::default() };
+        let sized = Mesh::sized(plane(4.0), &sizing, Mesh::MAX_DEPTH).unwrap();
+        let everywhere = Aabb { low: DVec3::splat(-4.0), high: DVec3::splat(4.0) };
+        let sizing = ElementSizing { region: Some(everywhere), ..sizing };
+        let in_region = Mesh::sized(plane(4.0), &sizing, Mesh::MAX_DEPTH).unwrap();
+        let new = Mesh::new(plane(4.0), 0.3).unwrap();
+        assert!(sized.has_elements_of(&new) && in_region.has_elements_of(&new));
+        let sizing = ElementSizing { unsplit_materials: vec![0], ..sizing };
+        assert_eq!(Mesh::sized(plane(4.0), &sizing, Mesh::MAX_DEPTH).unwrap().element_count(), 2);
+    }
+}
