@@ -3,7 +3,7 @@
 //! | format | function | content |
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`] | a scene |
-//! | PLY | [`write_ply`] | a mesh with radiosity at its vertices |
+//! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
@@ -14,6 +14,7 @@ mod files;
 mod mtl;
 mod obj;
 mod ply;
+mod ply_reader;
 #[cfg(feature = "png")]
 mod png;
 mod text;
@@ -32,6 +33,7 @@ pub use self::exr::write_exr;
 pub use self::png::write_png;
 pub use obj::{load_obj, read_obj};
 pub use ply::write_ply;
+pub use ply_reader::read_ply;
 pub use tone::ToneCurve;
 
 /// Creates `path` and hands it to `write`; any failure names the file.

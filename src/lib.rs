@@ -39,7 +39,8 @@
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`view_factor`] | area-averaged factors between groups, for heat transfer |
-//! | [`camera`], [`io`] | pictures; OBJ in, PLY, EXR, PNG and tables out |
+//! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
+//! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, EXR, PNG and tables out |
 //!
 //! Features: `gpu` (wgpu), `exr`, `png`, all on by default, and `cli` for the program `radiosity`.
 //! Long work takes a callback that is told of progress and answers with a
@@ -85,6 +86,7 @@ mod progress;
 mod sampling;
 pub mod scene;
 pub mod solver;
+pub mod verify;
 pub mod vertex;
 pub mod view_factor;
 mod visibility;
@@ -104,7 +106,7 @@ pub use gather::{Gather, GatheredMesh};
 pub use io::write_exr;
 #[cfg(feature = "png")]
 pub use io::write_png;
-pub use io::{load_obj, write_ply};
+pub use io::{load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
 pub use scene::{Material, Rgb, Scene, Triangle};
@@ -121,6 +123,8 @@ mod pages {
     struct Incremental;
     #[doc = include_str!("../docs/robustness.md")]
     struct Robustness;
+    #[doc = include_str!("../docs/verify.md")]
+    struct Verify;
     #[doc = include_str!("../docs/view_factors.md")]
     struct ViewFactors;
 }

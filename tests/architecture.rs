@@ -32,6 +32,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "backend error form_factor gather geometry mesh progress sampling scene solver vertex \
          visibility",
     ),
+    ("verify", "error geometry progress scene vertex visibility"),
     ("io", "camera error geometry scene vertex view_factor"),
 ];
 

@@ -68,8 +68,13 @@ impl LibrarySource<'_> {
     }
 }
 
-/// The whole of a regular file of at most `most` bytes; bytes that are not UTF-8 become U+FFFD.
+/// The text of a regular file of at most `most` bytes; bytes that are not UTF-8 become U+FFFD.
 pub(super) fn read(path: &Path, most: u64) -> io::Result<String> {
+    limited(read_bytes(path, most)?.into(), most)
+}
+
+/// The whole of a regular file of at most `most` bytes.
+pub(super) fn read_bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let about = fs::metadata(path)?;
     if about.is_dir() {
         return Err(io::Error::new(ErrorKind::IsADirectory, "it is a folder"));
@@ -84,7 +89,7 @@ pub(super) fn read(path: &Path, most: u64) -> io::Result<String> {
     // Some files are longer than they say, or grow.
     let mut bytes = Vec::with_capacity(about.len() as usize);
     File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
-    limited(bytes.into(), most)
+    if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
 }
 
 /// `bytes` as text, if they are not too many.

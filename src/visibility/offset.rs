@@ -13,12 +13,17 @@
 //! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element | gather points |
 //! | [`MIN_LIFT_ULPS`] | 1024 | steps of coordinates | gather points of tiny elements |
 //! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather |
+//! | [`PATH_CONTACT`] | 1e-9 | the scene's diagonal | paths from points on triangles |
+//! | [`PATH_CONTACT_ULPS`] | 64 | steps of coordinates | paths far from the origin |
 //!
 //! Why they differ: rays in 64 bits need only be above rounding, 1e-6 of a patch in scenes up to
 //! 1e9 patch sizes from the origin; at the end of a segment only the target itself must not count.
 //! Hemicubes have 32-bit coordinates, and skip the patch's own triangle anyway. Gather points skip
 //! no triangle, and their lift must exceed what a device confuses: a quarter of 1024 steps is four
 //! times the 2⁻⁴⁸ of its split floats.
+//!
+//! Paths ignore the triangle that they start from, so that only rounding and what lies in its plane
+//! is left: plates 1e-5 of a scene apart stay two plates.
 //!
 //! The shares were chosen by hand within these bounds; no measurement was kept.
 
@@ -44,3 +49,9 @@ pub(crate) const MIN_LIFT_ULPS: f64 = 1024.0;
 
 /// A gather point sees nothing nearer than this share of its height.
 pub(crate) const NEAR_OF_LIFT: f64 = 0.25;
+
+/// What a path meets within this share of the scene's diagonal is in contact with where it starts.
+pub(crate) const PATH_CONTACT: f64 = 1e-9;
+
+/// And what it meets within this many steps between 64-bit coordinates of the scene.
+pub(crate) const PATH_CONTACT_ULPS: f64 = 64.0;

@@ -4,6 +4,7 @@
 //! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, JSON, EXR, PNG
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
+//! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
@@ -14,6 +15,7 @@ mod bake;
 mod progress;
 mod report;
 mod trade_off;
+mod verify;
 mod view_factors;
 
 use std::process::ExitCode;
@@ -27,6 +29,7 @@ usage: radiosity COMMAND SCENE.obj… [options]
   bake          the radiosity of a scene, at the vertices of a mesh
   view-factors  view factors between the groups of scenes
   trade-off     what a bake of a scene costs and how far it is off, over its settings
+  verify        how far off a solution of a scene is, by path tracing
 
 Options of a command: radiosity COMMAND --help. Of the program: --help, --version.";
 
@@ -37,10 +40,11 @@ struct Command {
     run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
 }
 
-const COMMANDS: [Command; 3] = [
+const COMMANDS: [Command; 4] = [
     Command { name: "bake", usage: bake::USAGE, run: bake::run },
     Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
     Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
+    Command { name: "verify", usage: verify::USAGE, run: verify::run },
 ];
 
 fn main() -> ExitCode {

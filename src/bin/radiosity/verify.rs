@@ -1,0 +1,301 @@
+//! `radiosity verify`: how far off a solution is, by path tracing the user's own scene.
+
+mod points;
+
+use std::fmt::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use lexopt::prelude::*;
+use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
+use radiosity::{Error, Scene, load_obj, read_ply};
+use serde_json::Value as Json;
+
+use crate::args::{self, Stop};
+use crate::progress;
+use points::Points;
+
+pub const USAGE: &str = "\
+usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] [--places N]
+                    [--seed N] [--csv FILE] [--points-ply FILE]
+       radiosity verify SCENE.obj --points FILE.json [--paths N] [--seed N] [--csv FILE]
+
+Measures how far off SOLUTION.ply is, independently of what made it: path traces SCENE.obj at random
+points of its surfaces, and prints for each group, and for all, the root mean square over the area
+of |B - true B| / max(|true B|, 5 % of its mean): B is the reflected radiosity, lengths are over
+the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there.
+
+  --precision X     go on until the standard error is below this share of the error [0.1]
+  --time SECONDS    begin no round that would end later; inf for no limit [120]
+  --places N        points that each group has at least [16]
+  --seed N          another seed, other points and paths [0]
+  --csv FILE        write the table, all groups, as CSV
+  --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
+                    (the error of all) to red (four times that or more)
+Radiosity at given points, to judge this instrument itself:
+  --points FILE     JSON: {\"points\": [{\"p\": [x,y,z], \"n\": [x,y,z]}, …]}; with \"B\" and \"se\",
+                    radiosity and its standard error, prints how far the paths are off in units of
+                    the standard error of both; with --csv writes radiosity and standard error
+  --paths N         paths a point [16384]";
+
+/// Groups in the printed table at most.
+const MAX_PRINTED: usize = 20;
+
+/// Paths a point for given points, where no number is asked for.
+const DEFAULT_PATHS: usize = 16384;
+
+/// What is asked of the command.
+struct Options {
+    scene: PathBuf,
+    settings: Settings,
+    csv: Option<PathBuf>,
+    what: What,
+}
+
+enum What {
+    Solution { ply: PathBuf, points_ply: Option<PathBuf> },
+    Points { json: PathBuf, paths: usize },
+}
+
+/// Runs the command.
+pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
+    let options = Options::parse(parser)?;
+    Ok(options.run()?)
+}
+
+impl Options {
+    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
+        let (mut files, mut csv, mut points_ply) = (vec![], None, None);
+        let (mut points, mut paths) = (None, None);
+        let (mut only_solution, mut settings) = (false, Settings::default());
+        while let Some(arg) = parser.next()? {
+            only_solution |= matches!(arg, Long("precision" | "time" | "places" | "points-ply"));
+            match arg {
+                Long("help") | Short('h') => return Err(Stop::Help),
+                Long("precision") => {
+                    settings.precision = args::value(parser, "precision", "a number")?;
+                }
+                Long("time") => settings.time = time(parser)?,
+                Long("places") => {
+                    settings.points_per_group = args::value(parser, "places", "a whole number")?;
+                }
+                Long("seed") => settings.seed = args::value(parser, "seed", "a whole number")?,
+                Long("csv") => csv = Some(PathBuf::from(parser.value()?)),
+                Long("points-ply") => points_ply = Some(PathBuf::from(parser.value()?)),
+                Long("points") => points = Some(PathBuf::from(parser.value()?)),
+                Long("paths") => paths = Some(args::value(parser, "paths", "a whole number")?),
+                Value(path) => files.push(PathBuf::from(path)),
+                _ => return Err(arg.unexpected().into()),
+            }
+        }
+        let what = match points {
+            Some(json) => {
+                if only_solution {
+                    let options = "--precision, --time, --places and --points-ply";
+                    return Err(Stop::usage(format!("{options} are for a solution")));
+                }
+                What::Points { json, paths: paths.unwrap_or(DEFAULT_PATHS) }
+            }
+            None if paths.is_some() => return Err(Stop::usage("--paths is for --points")),
+            None if files.len() < 2 => {
+                return Err(Stop::usage("give an OBJ file and the PLY file of its solution"));
+            }
+            None => What::Solution { ply: files.remove(1), points_ply },
+        };
+        Ok(Options { scene: args::only_scene(files)?, settings, csv, what })
+    }
+
+    fn run(&self) -> Result<(), Error> {
+        let points_ply = match &self.what {
+            What::Solution { points_ply, .. } => points_ply.as_ref(),
+            What::Points { .. } => None,
+        };
+        for file in self.csv.iter().chain(points_ply) {
+            args::check_writable(file)?;
+        }
+        let scene = load_obj(&self.scene)?;
+        for warning in scene.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        match &self.what {
+            What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),
+            What::Points { json, paths } => {
+                let points = Points::read(json)?;
+                let traced = points.trace(&scene, *paths, self.settings.seed, json)?;
+                println!("{}", traced.summary());
+                self.csv.iter().try_for_each(|f| args::write_file(f, traced.csv().as_bytes()))
+            }
+        }
+    }
+
+    fn verify(&self, scene: &Scene, ply: &Path, points_ply: Option<&Path>) -> Result<(), Error> {
+        let start = Instant::now();
+        let solution = read_ply(ply)?;
+        let found = progress::of_count("points", |report| {
+            verify(scene, &solution, &self.settings, |progress| {
+                report(progress.done, progress.of)?;
+                ControlFlow::Continue(())
+            })
+        })?;
+        let told = Told::beside(ply);
+        let lines = lines(scene, &found, &told);
+        println!("{}", table(&lines));
+        println!("{}", self.end(&found, start.elapsed()));
+        if let Some(file) = &self.csv {
+            args::write_file(file, csv(&lines).as_bytes())?;
+        }
+        points_ply
+            .map_or(Ok(()), |file| args::write_file(file, points::coloured_ply(&found).as_bytes()))
+    }
+
+    /// How it ended, and what deserves a look.
+    fn end(&self, found: &Verification, spent: Duration) -> String {
+        let why = match (found.stop, self.settings.time) {
+            (Reason::Precise, _) => {
+                format!("known to {} % of itself", 100.0 * self.settings.precision)
+            }
+            (Reason::Negligible, _) => "negligible".into(),
+            (Reason::Time, Some(time)) => {
+                format!("less exact than asked for: the limit of {} s was hit", time.as_secs_f64())
+            }
+            (reason, _) => format!("less exact than asked for: {reason:?}").to_lowercase(),
+        };
+        let (points, paths) = (found.points.len(), found.paths);
+        let mut end = format!(
+            "{why}; {points} points, {paths} paths each, {:.1} s, seed {}",
+            spent.as_secs_f64(),
+            self.settings.seed
+        );
+        if found.missing > 0 {
+            let _ = write!(
+                end,
+                "\n{} points lie on no face of the solution and were left out",
+                found.missing
+            );
+        }
+        end
+    }
+}
+
+/// The limit of `--time`; none for inf.
+fn time(parser: &mut lexopt::Parser) -> Result<Option<Duration>, Stop> {
+    let expected = "seconds, or inf";
+    let seconds: f64 = args::value(parser, "time", expected)?;
+    if seconds == f64::INFINITY {
+        return Ok(None);
+    }
+    let time = Duration::try_from_secs_f64(seconds);
+    time.map(Some).map_err(|_| args::wrong_value("time", &seconds.to_string(), expected))
+}
+
+/// What the report of a bake says of its error.
+#[derive(Default)]
+struct Told(Json);
+
+impl Told {
+    /// From the JSON file of the same name, if there is one.
+    fn beside(ply: &Path) -> Told {
+        let text = std::fs::read(ply.with_extension("json")).unwrap_or_default();
+        Told(serde_json::from_slice(&text).unwrap_or_default())
+    }
+
+    fn total(&self) -> Option<f64> {
+        self.0["error"]["total"].as_f64()
+    }
+
+    fn group(&self, name: &str) -> Option<f64> {
+        let groups = self.0["error"]["groups"].as_array()?;
+        groups.iter().find(|group| group["group"] == name)?["error"].as_f64()
+    }
+}
+
+/// A line of the table.
+struct Line {
+    name: String,
+    area_share: f64,
+    points: usize,
+    told: Option<f64>,
+    error: Option<Estimate>,
+}
+
+/// Groups, the worst first, and all together.
+fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
+    let line = |group: &GroupError| {
+        let name = &scene.groups()[group.group];
+        Line {
+            name: name.clone(),
+            area_share: group.area_share,
+            points: group.points,
+            told: told.group(name),
+            error: group.error,
+        }
+    };
+    let mut lines: Vec<Line> = found.groups.iter().map(line).collect();
+    let key = |line: &Line| line.error.map_or(-1.0, |error| error.value);
+    lines.sort_by(|a, b| key(b).total_cmp(&key(a)));
+    let (points, error) = (found.points.len(), found.error);
+    lines.push(Line { name: "all".into(), area_share: 1.0, points, told: told.total(), error });
+    lines
+}
+
+/// The table as text, cut after [`MAX_PRINTED`] groups.
+fn table(lines: &[Line]) -> String {
+    let Some((all, groups)) = lines.split_last() else { return String::new() };
+    let (shown, rest) = groups.split_at(groups.len().min(MAX_PRINTED));
+    let lengths = shown.iter().map(|line| line.name.chars().count());
+    let width = lengths.max().unwrap_or(0).clamp(5, 40);
+    let percent = |share: Option<f64>| share.map_or("–".into(), |x| format!("{:.2}", 100.0 * x));
+    let row = |line: &Line| {
+        let measured = line.error.map_or("–".into(), |Estimate { value, standard_error }| {
+            format!("{:.2} ± {:.2}", 100.0 * value, 100.0 * standard_error)
+        });
+        let ratio = line.ratio().map_or("–".into(), |ratio| format!("{ratio:.2}"));
+        let name: String = line.name.chars().take(width).collect();
+        format!(
+            "{name:<width$} {:>7.2} {:>7} {:>7} {measured:>15} {ratio:>13}",
+            100.0 * line.area_share,
+            line.points,
+            percent(line.told)
+        )
+    };
+    let mut out = format!(
+        "{:<width$} {:>7} {:>7} {:>7} {:>15} {:>13}\n",
+        "group", "area %", "points", "told %", "measured %", "told/measured"
+    );
+    shown.iter().for_each(|line| out += &(row(line) + "\n"));
+    if !rest.is_empty() {
+        let _ = writeln!(out, "{} groups more, none measured worse", rest.len());
+    }
+    out + &row(all)
+}
+
+/// The table as CSV, errors as shares.
+fn csv(lines: &[Line]) -> String {
+    let mut out =
+        "group,area_share,points,told,measured,standard_error,told/measured\n".to_string();
+    let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+    for line in lines {
+        let quoted = format!("\"{}\"", line.name.replace('"', "\"\""));
+        let name = if line.name.contains([',', '"', '\n', '\r']) { &quoted } else { &line.name };
+        let _ = writeln!(
+            out,
+            "{name},{},{},{},{},{},{}",
+            line.area_share,
+            line.points,
+            number(line.told),
+            number(line.error.map(|error| error.value)),
+            number(line.error.map(|error| error.standard_error)),
+            number(line.ratio())
+        );
+    }
+    out
+}
+
+impl Line {
+    /// What was told over what was measured, where that is not zero.
+    fn ratio(&self) -> Option<f64> {
+        let measured = self.error.map(|error| error.value).filter(|&value| value > 0.0)?;
+        Some(self.told? / measured)
+    }
+}

@@ -1,0 +1,258 @@
+//! Reflected radiosity at points, by path tracing: unbiased, and independent of the solver.
+//!
+//! ```text
+//!      light ●                    B(x) − E(x) = ρ(x) · ∫ L(x, ω) cos θ dω        (Kajiya 1986)
+//!            ┊╲
+//!    next    ┊ ╲  a light that     At every vertex light is asked for twice: at a point of an
+//!    event   ┊  ╲ the path meets   emitter, and where the path goes on. Each counts with its
+//!            ┊   ╲                 share of both densities, the balance heuristic (Veach and
+//!   ─────────x────╲──────          Guibas 1995). Paths end by Russian roulette (Arvo and Kirk
+//!             ╲    y               1990), never at a depth.
+//! ```
+//!
+//! With the balance heuristic a light adds at most E times the path's throughput at a vertex: as
+//! good for a lamp of a millimetre as for a sky all around.
+
+use std::cell::Cell;
+use std::f64::consts::{PI, TAU};
+use std::ops::ControlFlow;
+
+use fastrand::Rng;
+use glam::DVec3;
+use rayon::prelude::*;
+use xxhash_rust::xxh3::xxh3_64_with_seed;
+
+use super::emitters::{Emitters, Weights};
+use crate::progress::BatchSizer;
+use crate::scene::{Rgb, Scene};
+use crate::visibility::offset;
+use crate::visibility::ray_scene::{Hit, RayScene};
+
+/// Paths go on with this probability at most. What reflects more ends as often and counts the more:
+/// still unbiased, and a room that reflects all but nothing does not keep a path for ever.
+const MAX_SURVIVAL: f64 = 0.999;
+
+/// Points further off a surface than this share of the scene's diagonal are not on it. Points from
+/// files have 32 bits or six digits; of several surfaces within it the nearest counts.
+const LOOKUP_REACH: f64 = 1e-4;
+
+/// Surfaces whose normals agree by this cosine face alike.
+const ALIKE: f64 = 0.8;
+
+/// Path traces the light of a scene.
+#[derive(Debug)]
+pub struct PathTracer<'a> {
+    scene: &'a Scene,
+    rays: RayScene,
+    normals: Vec<DVec3>,
+    emitters: Emitters,
+    /// Surfaces within this distance of each other are in one place, scene unit.
+    contact: f64,
+    diagonal: f64,
+}
+
+/// A point on the front of a triangle of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Index of the triangle.
+    pub triangle: usize,
+    /// Where on it, scene unit.
+    pub position: DVec3,
+}
+
+/// What a point reflects, estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reflected {
+    /// Reflected radiosity: radiosity without the material's exitance, W/m² per channel.
+    pub radiosity: Rgb,
+    /// Its standard error per channel, W/m².
+    pub standard_error: Rgb,
+}
+
+impl<'a> PathTracer<'a> {
+    /// For the light of `scene`.
+    pub fn new(scene: &'a Scene) -> PathTracer<'a> {
+        let diagonal = scene.bounds().diagonal();
+        PathTracer {
+            scene,
+            rays: RayScene::of_scene(scene),
+            normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
+            emitters: Emitters::new(scene),
+            contact: (offset::PATH_CONTACT * diagonal)
+                .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
+            diagonal,
+        }
+    }
+
+    /// The point of the scene nearest to `position`, along `normal` (unit length), on a triangle
+    /// that faces alike; none where there is none within 1e-4 of the scene's diagonal.
+    pub fn locate(&self, position: DVec3, normal: DVec3) -> Option<SurfacePoint> {
+        let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
+        let [a, b, c] = self.scene.corners(hit.triangle);
+        let position = a + hit.u * (b - a) + hit.v * (c - a);
+        Some(SurfacePoint { triangle: hit.triangle, position })
+    }
+
+    /// The reflected radiosity at `points`, from `paths` paths each. `progress` hears now and then
+    /// how many points are done, of how many; with a break the rest are left out.
+    ///
+    /// The same seed gives the same numbers, whatever the number of threads.
+    pub fn reflected(
+        &self,
+        points: &[SurfacePoint],
+        paths: usize,
+        seed: u64,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Vec<Reflected> {
+        let numbered: Vec<(usize, &SurfacePoint)> = points.iter().enumerate().collect();
+        let (mut remaining, mut done) = (&numbered[..], vec![]);
+        let mut batches = BatchSizer::new(rayon::current_num_threads());
+        while !remaining.is_empty() {
+            let batch = batches.next(&mut remaining, |batch| {
+                let point = |&(k, point): &(usize, &SurfacePoint)| {
+                    let mut rng = random_numbers(&[seed, k as u64]);
+                    self.mean(point, paths, &mut rng)
+                };
+                batch.par_iter().map(point).collect::<Vec<_>>()
+            });
+            done.extend(batch);
+            if progress(done.len(), points.len()).is_break() {
+                break;
+            }
+        }
+        done
+    }
+
+    /// The mean of `paths` paths, and its standard error from their spread.
+    fn mean(&self, point: &SurfacePoint, paths: usize, rng: &mut Rng) -> Reflected {
+        let (mut mean, mut squares) = (Rgb::ZERO, Rgb::ZERO);
+        for k in 0..paths {
+            // Welford's (1962) sums, which do not cancel.
+            let value = self.path(point, rng);
+            let off = value - mean;
+            mean += off / (k + 1) as f64;
+            squares += off * (value - mean);
+        }
+        let count = paths as f64;
+        let variance = squares / (count - 1.0).max(1.0) / count.max(1.0);
+        Reflected { radiosity: mean, standard_error: variance.map(f64::sqrt) }
+    }
+
+    /// The sum of what `paths` paths find.
+    pub(super) fn sum(&self, point: &SurfacePoint, paths: usize, rng: &mut Rng) -> Rgb {
+        (0..paths).map(|_| self.path(point, rng)).sum()
+    }
+
+    /// Reflected radiosity at `point` as one path finds it, W/m².
+    fn path(&self, point: &SurfacePoint, rng: &mut Rng) -> Rgb {
+        let mut at = *point;
+        let mut throughput = self.scene.material(at.triangle).reflectance;
+        let mut reflected = Rgb::ZERO;
+        loop {
+            let weights = self.emitters.weights(at.position);
+            reflected += throughput * self.next_event(&at, &weights, rng);
+            let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
+            let Some(hit) = self.next_hit(&at, direction).filter(|hit| hit.front) else {
+                return reflected;
+            };
+            let material = self.scene.material(hit.triangle);
+            if material.exitance != Rgb::ZERO {
+                let facing = self.normals[hit.triangle].dot(direction).abs();
+                let by_area = self.emitters.density(&weights, hit.triangle);
+                let light = by_area * hit.distance * hit.distance / facing;
+                let balance = cosine / PI / (cosine / PI + light);
+                reflected += throughput * material.exitance * balance;
+            }
+            let survival = material.reflectance.max_element().min(MAX_SURVIVAL);
+            if rng.f64() >= survival {
+                return reflected;
+            }
+            throughput *= material.reflectance / survival;
+            at = SurfacePoint {
+                triangle: hit.triangle,
+                position: at.position + hit.distance * direction,
+            };
+        }
+    }
+
+    /// Irradiance at `at` from one point of an emitter, W/m², with the share that the balance
+    /// heuristic leaves to it.
+    fn next_event(&self, at: &SurfacePoint, weights: &Weights, rng: &mut Rng) -> Rgb {
+        let Some(light) = self.emitters.choose(weights, rng) else { return Rgb::ZERO };
+        let to = random_point(self.scene.corners(light), rng) - at.position;
+        let (direction, distance) = to.normalize_and_length();
+        let cosine = self.normals[at.triangle].dot(direction);
+        let facing = -self.normals[light].dot(direction);
+        // Written so that NaN, of a light that is met, sees nothing.
+        if !(cosine > 0.0 && facing > 0.0) {
+            return Rgb::ZERO;
+        }
+        let between = self.contact..distance - self.contact;
+        let blocked = self.rays.occluded(at.position, direction, between, |hit| {
+            hit.triangle != at.triangle && hit.triangle != light
+        });
+        if blocked {
+            return Rgb::ZERO;
+        }
+        let density = self.emitters.density(weights, light) * distance * distance / facing;
+        self.scene.material(light).exitance / PI * cosine / (density + cosine / PI)
+    }
+
+    /// What a ray along `direction` (unit length) meets first. What lies in one place with the
+    /// surface it starts from is passed.
+    fn next_hit(&self, at: &SurfacePoint, direction: DVec3) -> Option<Hit> {
+        let from =
+            |start, ignored| self.rays.closest_hit(at.position, direction, start, Some(ignored));
+        let hit = from(self.contact, at.triangle)?;
+        if hit.front {
+            return Some(hit);
+        }
+        // Of two faces back to back in one place the front is met.
+        let twin = from((hit.distance - self.contact).max(self.contact), hit.triangle);
+        let same_place = |twin: &Hit| twin.front && twin.distance < hit.distance + self.contact;
+        Some(twin.filter(same_place).unwrap_or(hit))
+    }
+}
+
+/// The hit nearest to `position` along the line of `normal` (unit length), before and behind, of
+/// triangles that face alike by their `normals`, within [`LOOKUP_REACH`] of `diagonal`.
+pub(super) fn nearest_surface(
+    rays: &RayScene,
+    normals: &[DVec3],
+    position: DVec3,
+    normal: DVec3,
+    diagonal: f64,
+) -> Option<Hit> {
+    let reach = LOOKUP_REACH * diagonal;
+    let nearest: Cell<Option<Hit>> = Cell::new(None);
+    let key = |hit: Hit| ((hit.distance - reach).abs(), hit.triangle);
+    rays.occluded(position - reach * normal, normal, 0.0..2.0 * reach, |hit| {
+        let alike = normals[hit.triangle].dot(normal) > ALIKE;
+        if alike && nearest.get().is_none_or(|best| key(*hit) < key(best)) {
+            nearest.set(Some(*hit));
+        }
+        false
+    });
+    nearest.get()
+}
+
+/// Random numbers of their own for everything that `words` tell apart.
+pub(super) fn random_numbers(words: &[u64]) -> Rng {
+    let hash = |seed, word: &u64| xxh3_64_with_seed(&word.to_le_bytes(), seed);
+    Rng::with_seed(words.iter().fold(0, hash))
+}
+
+/// A point of a triangle, uniform over its area (Osada et al. 2002).
+pub(super) fn random_point([a, b, c]: [DVec3; 3], rng: &mut Rng) -> DVec3 {
+    let (root, v) = (rng.f64().sqrt(), rng.f64());
+    a + root * (1.0 - v) * (b - a) + root * v * (c - a)
+}
+
+/// A direction with density cos θ / π about `normal`, and cos θ, above zero.
+fn cosine_weighted(normal: DVec3, rng: &mut Rng) -> (DVec3, f64) {
+    let (square, turn) = (rng.f64(), TAU * rng.f64());
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    let cosine = (1.0 - square).sqrt();
+    let across = turn.cos() * tangent + turn.sin() * bitangent;
+    ((square.sqrt() * across + cosine * normal).normalize(), cosine)
+}
