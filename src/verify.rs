@@ -22,6 +22,12 @@
 //! group's error is the same root mean square over the group's own reflecting area, with the
 //! scene's m.
 //!
+//! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in more
+//! than 95 % of their hemisphere, weighted by the cosine, or in more than half of it backs nearer
+//! than 0.2 % of the diagonal of all that reflects. They lie inside a solid, under what stands on
+//! them or right behind a plate; nobody sees them, and bakes tell there what would be seen without
+//! it. The mean m is over all points.
+//!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
 //! has the mean |B_told − B_true|², however noisy they are.
 
@@ -38,6 +44,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind, quoted};
+use crate::geometry::aabb::Aabb;
 use crate::progress::BatchSizer;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
@@ -53,6 +60,18 @@ const FIRST_POINTS: usize = 512;
 
 /// Paths a point in the first round.
 const FIRST_PATHS: usize = 64;
+
+/// A point is hidden where more than this share of its rays meets backs first,
+const HIDDEN: f64 = 0.95;
+
+/// or more than this share meets backs that are near:
+const HIDDEN_NEAR: f64 = 0.5;
+
+/// nearer than this share of the diagonal of all that reflects.
+const NEAR: f64 = 0.002;
+
+/// Rays that find that out.
+const HIDDEN_RAYS: usize = 128;
 
 /// An error surely below this share is negligible, however well it is known.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -72,12 +91,14 @@ pub struct Settings {
     pub points_per_group: usize,
     /// No round is begun that would end later; the first always is.
     pub time: Option<Duration>,
+    /// Whether points count that are hidden: see the measure.
+    pub hidden: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
         let time = Some(Duration::from_secs(120));
-        Settings { seed: 0, precision: 0.1, points_per_group: 16, time }
+        Settings { seed: 0, precision: 0.1, points_per_group: 16, time, hidden: false }
     }
 }
 
@@ -131,6 +152,10 @@ pub struct Verification {
     /// The error of all that reflects, and its standard error, as shares (0.01 for 1 %); none if
     /// the first round was cancelled.
     pub error: Option<Estimate>,
+    /// The same with what is hidden.
+    pub error_with_hidden: Option<Estimate>,
+    /// Share of the area that reflects which is hidden.
+    pub hidden_share: f64,
     /// The groups that reflect, in the scene's order.
     pub groups: Vec<GroupError>,
     /// The points, group by group.
@@ -153,9 +178,11 @@ pub struct GroupError {
     pub group: usize,
     /// The group's share of the area that reflects.
     pub area_share: f64,
-    /// Points of the group.
+    /// Points of the group, hidden ones too.
     pub points: usize,
-    /// The error and its standard error, as shares; none of fewer than two points.
+    /// The share of them that is hidden.
+    pub hidden_share: f64,
+    /// The error and its standard error, as shares; none of fewer than two points that count.
     pub error: Option<Estimate>,
 }
 
@@ -177,6 +204,8 @@ pub struct PointError {
     pub standard_error: f64,
     /// The error e, as a share: zero where less than noise is left.
     pub error: f64,
+    /// Whether the point is hidden: see the measure.
+    pub hidden: bool,
 }
 
 /// Measures how far `solution` is off on `scene`. `progress` hears several times a second how far
@@ -207,7 +236,7 @@ pub fn verify(
             break Stop::Cancelled;
         }
         verification = sampler.verification();
-        let all = sampler.mean_square();
+        let all = sampler.mean_square(settings.hidden);
         let error = all.root();
         // What a biased mean square adds to its root.
         let biased = all.bias > settings.precision * all.value;
@@ -245,6 +274,8 @@ struct Sampler<'a> {
     tracer: PathTracer<'a>,
     solution: SolutionLookup<'a>,
     strata: Vec<Stratum>,
+    /// Backs nearer than this hide what is behind them, scene unit.
+    near: f64,
     /// Paths done at every point but the new ones.
     paths: usize,
 }
@@ -264,6 +295,8 @@ struct TracedPoint {
     index: usize,
     point: SurfacePoint,
     told: Rgb,
+    /// Known with the first paths.
+    hidden: bool,
     paths: usize,
     /// What the paths found, part by part: sums, W/m².
     sums: [Rgb; PARTS],
@@ -276,10 +309,14 @@ impl<'a> Sampler<'a> {
         settings: &'a Settings,
     ) -> Result<Sampler<'a>, Error> {
         let stratum = |surface| Stratum { surface, drawn: 0, points: vec![] };
+        let reflecting =
+            (0..scene.triangles().len()).filter(|&t| scene.material(t).reflectance != Rgb::ZERO);
+        let reflecting = Aabb::from_points(reflecting.flat_map(|t| scene.corners(t)));
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             solution: SolutionLookup::new(solution, scene.bounds().diagonal())?,
             tracer: PathTracer::new(scene),
+            near: NEAR * reflecting.diagonal(),
             scene,
             settings,
             paths: 0,
@@ -302,6 +339,7 @@ impl<'a> Sampler<'a> {
                         index: *drawn,
                         point,
                         told: told - exitance,
+                        hidden: false,
                         paths: 0,
                         sums: [Rgb::ZERO; PARTS],
                     }),
@@ -375,6 +413,14 @@ impl<'a> Sampler<'a> {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, part, before]);
             *sum += self.tracer.sum(&point.point, (paths - point.paths) / PARTS, &mut rng);
         }
+        if point.paths == 0 {
+            let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
+            let backs = self.tracer.backs(&point.point, HIDDEN_RAYS, &mut rng);
+            let share = |nearer: f64| {
+                backs.iter().filter(|&&d| d < nearer).count() as f64 / HIDDEN_RAYS as f64
+            };
+            traced.hidden = share(f64::INFINITY) > HIDDEN || share(self.near) > HIDDEN_NEAR;
+        }
         traced.paths = paths;
         traced
     }
@@ -388,34 +434,34 @@ impl<'a> Sampler<'a> {
         self.strata.iter().map(mean).sum()
     }
 
-    /// The mean square error of every group.
-    fn by_group(&self) -> Vec<Option<MeanSquare>> {
+    /// The mean square error of every group, and the share that it counts with.
+    fn by_group(&self, hidden: bool) -> Vec<Option<(f64, MeanSquare)>> {
         let floor = FLOOR * self.mean_reflected();
         let group = |s: &Stratum| {
+            let counting = s.points.iter().filter(|p| hidden || !p.hidden);
             let squares: Vec<SquareError> =
-                s.points.iter().map(|p| p.sample().square_error(floor)).collect();
-            MeanSquare::of_group(&squares)
+                counting.map(|p| p.sample().square_error(floor)).collect();
+            let share = s.surface.share * squares.len() as f64 / s.points.len() as f64;
+            Some((share, MeanSquare::of_group(&squares)?))
         };
         self.strata.iter().map(group).collect()
     }
 
     /// The mean square error of all that reflects.
-    fn mean_square(&self) -> MeanSquare {
-        let groups = self.by_group();
-        let known = |(stratum, group): (&Stratum, &Option<MeanSquare>)| {
-            Some((stratum.surface.share, (*group)?))
-        };
-        MeanSquare::stratified(self.strata.iter().zip(&groups).filter_map(known))
+    fn mean_square(&self, hidden: bool) -> MeanSquare {
+        MeanSquare::stratified(self.by_group(hidden).into_iter().flatten())
     }
 
     /// What is known so far.
     fn verification(&self) -> Verification {
         let mean_reflected = self.mean_reflected();
-        let group = |(s, error): (&Stratum, Option<MeanSquare>)| GroupError {
+        let by_group = self.by_group(self.settings.hidden);
+        let group = |(s, error): (&Stratum, Option<(f64, MeanSquare)>)| GroupError {
             group: s.surface.group,
             area_share: s.surface.share,
             points: s.points.len(),
-            error: error.map(|error| error.root()),
+            hidden_share: s.hidden_share(),
+            error: error.map(|(_, error)| error.root()),
         };
         let point = |(group, traced): (usize, TracedPoint)| {
             let sample = traced.sample();
@@ -427,17 +473,29 @@ impl<'a> Sampler<'a> {
                 found: sample.found(),
                 standard_error: sample.variance().sqrt(),
                 error: sample.square_error(FLOOR * mean_reflected).value.max(0.0).sqrt(),
+                hidden: traced.hidden,
             }
         };
+        let error = |hidden| (self.paths > 0).then(|| self.mean_square(hidden).root());
         Verification {
-            error: (self.paths > 0).then(|| self.mean_square().root()),
-            groups: self.strata.iter().zip(self.by_group()).map(group).collect(),
+            error: error(self.settings.hidden),
+            error_with_hidden: error(true),
+            hidden_share: self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum(),
+            groups: self.strata.iter().zip(by_group).map(group).collect(),
             points: self.traced().map(point).collect(),
             mean_reflected,
             paths: self.paths,
             missing: self.missing(),
             stop: Stop::Cancelled,
         }
+    }
+}
+
+impl Stratum {
+    /// The share of the points that is hidden.
+    fn hidden_share(&self) -> f64 {
+        let hidden = self.points.iter().filter(|point| point.hidden).count();
+        hidden as f64 / (self.points.len() as f64).max(1.0)
     }
 }
 

@@ -18,7 +18,7 @@ use points::Points;
 
 pub const USAGE: &str = "\
 usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] [--places N]
-                    [--seed N] [--csv FILE] [--points-ply FILE]
+                    [--hidden] [--seed N] [--csv FILE] [--points-ply FILE]
        radiosity verify SCENE.obj --points FILE.json [--paths N] [--seed N] [--csv FILE]
 
 Measures how far off SOLUTION.ply is, independently of what made it: path traces SCENE.obj at random
@@ -29,6 +29,8 @@ the channels. Beside it stands what the bake told, from SOLUTION.json, if that i
   --precision X     go on until the standard error is below this share of the error [0.1]
   --time SECONDS    begin no round that would end later; inf for no limit [120]
   --places N        points that each group has at least [16]
+  --hidden          count what nobody sees too: points that look at backs of surfaces, as the
+                    ground under a box or a wall right behind a plate; said, and left out if not
   --seed N          another seed, other points and paths [0]
   --csv FILE        write the table, all groups, as CSV
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
@@ -70,7 +72,8 @@ impl Options {
         let (mut points, mut paths) = (None, None);
         let (mut only_solution, mut settings) = (false, Settings::default());
         while let Some(arg) = parser.next()? {
-            only_solution |= matches!(arg, Long("precision" | "time" | "places" | "points-ply"));
+            only_solution |=
+                matches!(arg, Long("precision" | "time" | "places" | "hidden" | "points-ply"));
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
                 Long("precision") => {
@@ -80,6 +83,7 @@ impl Options {
                 Long("places") => {
                     settings.points_per_group = args::value(parser, "places", "a whole number")?;
                 }
+                Long("hidden") => settings.hidden = true,
                 Long("seed") => settings.seed = args::value(parser, "seed", "a whole number")?,
                 Long("csv") => csv = Some(PathBuf::from(parser.value()?)),
                 Long("points-ply") => points_ply = Some(PathBuf::from(parser.value()?)),
@@ -92,7 +96,7 @@ impl Options {
         let what = match points {
             Some(json) => {
                 if only_solution {
-                    let options = "--precision, --time, --places and --points-ply";
+                    let options = "--precision, --time, --places, --hidden and --points-ply";
                     return Err(Stop::usage(format!("{options} are for a solution")));
                 }
                 What::Points { json, paths: paths.unwrap_or(DEFAULT_PATHS) }
@@ -167,6 +171,16 @@ impl Options {
             spent.as_secs_f64(),
             self.settings.seed
         );
+        if found.hidden_share > 0.0 && !self.settings.hidden {
+            let with_it = found.error_with_hidden.map_or(0.0, |error| error.value);
+            let _ = write!(
+                end,
+                "\n{:.2} % of the area is hidden behind backs and left out: with it the error is \
+                 {:.2} %",
+                100.0 * found.hidden_share,
+                100.0 * with_it
+            );
+        }
         if found.missing > 0 {
             let _ = write!(
                 end,
@@ -214,6 +228,7 @@ impl Told {
 struct Line {
     name: String,
     area_share: f64,
+    hidden_share: f64,
     points: usize,
     told: Option<f64>,
     error: Option<Estimate>,
@@ -226,6 +241,7 @@ fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
         Line {
             name: name.clone(),
             area_share: group.area_share,
+            hidden_share: group.hidden_share,
             points: group.points,
             told: told.group(name),
             error: group.error,
@@ -234,8 +250,14 @@ fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
     let mut lines: Vec<Line> = found.groups.iter().map(line).collect();
     let key = |line: &Line| line.error.map_or(-1.0, |error| error.value);
     lines.sort_by(|a, b| key(b).total_cmp(&key(a)));
-    let (points, error) = (found.points.len(), found.error);
-    lines.push(Line { name: "all".into(), area_share: 1.0, points, told: told.total(), error });
+    lines.push(Line {
+        name: "all".into(),
+        area_share: 1.0,
+        hidden_share: found.hidden_share,
+        points: found.points.len(),
+        told: told.total(),
+        error: found.error,
+    });
     lines
 }
 
@@ -253,15 +275,16 @@ fn table(lines: &[Line]) -> String {
         let ratio = line.ratio().map_or("–".into(), |ratio| format!("{ratio:.2}"));
         let name: String = line.name.chars().take(width).collect();
         format!(
-            "{name:<width$} {:>7.2} {:>7} {:>7} {measured:>15} {ratio:>13}",
+            "{name:<width$} {:>7.2} {:>8.2} {:>7} {:>7} {measured:>15} {ratio:>13}",
             100.0 * line.area_share,
+            100.0 * line.hidden_share,
             line.points,
             percent(line.told)
         )
     };
     let mut out = format!(
-        "{:<width$} {:>7} {:>7} {:>7} {:>15} {:>13}\n",
-        "group", "area %", "points", "told %", "measured %", "told/measured"
+        "{:<width$} {:>7} {:>8} {:>7} {:>7} {:>15} {:>13}\n",
+        "group", "area %", "hidden %", "points", "told %", "measured %", "told/measured"
     );
     shown.iter().for_each(|line| out += &(row(line) + "\n"));
     if !rest.is_empty() {
@@ -280,8 +303,9 @@ fn csv(lines: &[Line]) -> String {
         let name = if line.name.contains([',', '"', '\n', '\r']) { &quoted } else { &line.name };
         let _ = writeln!(
             out,
-            "{name},{},{},{},{},{},{}",
+            "{name},{},{},{},{},{},{},{}",
             line.area_share,
+            line.hidden_share,
             line.points,
             number(line.told),
             number(line.error.map(|error| error.value)),

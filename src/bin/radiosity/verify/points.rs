@@ -95,7 +95,8 @@ impl TracedPoints {
             let Some((known, known_error)) = point.known else { continue };
             let off = *found - known;
             let deviation = (error * error + known_error * known_error).map(f64::sqrt);
-            let each = (0..3).filter(|&c| deviation[c] > 0.0).map(|c| (off[c] / deviation[c], k));
+            // What reflects nothing is known.
+            let each = (0..3).filter(|&c| error[c] > 0.0).map(|c| (off[c] / deviation[c], k));
             differences.extend(each);
         }
         let Some(&(worst, at)) = differences.iter().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
