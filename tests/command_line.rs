@@ -173,10 +173,89 @@ fn view_factors_writes_a_matrix_a_file() {
 }
 
 #[test]
+fn verify_prints_what_was_told_beside_what_it_measures() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    write(
+        folder.path(),
+        "lit.mtl",
+        "newmtl lamp\nKd 0 0 0\nKe 5 5 5\nnewmtl grey\nKd 0.5 0.5 0.5\n",
+    );
+    let plates = "mtllib lit.mtl\nusemtl grey\no floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
+                  f 1 2 3 4\nusemtl lamp\no lamp\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
+    write(folder.path(), "lit.obj", plates);
+    // The floor sees a fifth of the lamp's light at its middle, a seventh at its corners.
+    let vertex = |p: &str, b: f64| format!("{p} {b} {b} {b}\n");
+    let corners: String = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"].map(|p| vertex(p, 1.1)).concat();
+    let lamp: String = ["0 0 1", "0 1 1", "1 1 1", "1 0 1"].map(|p| vertex(p, 15.7)).concat();
+    let header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n\
+                  property float z\nproperty float radiosity_r\nproperty float radiosity_g\n\
+                  property float radiosity_b\nelement face 2\n\
+                  property list uchar int vertex_indices\nend_header\n";
+    let faces = "4 0 1 2 3\n4 4 5 6 7\n";
+    write(folder.path(), "lit.ply", &format!("{header}{corners}{lamp}{faces}"));
+    let told =
+        "{\"error\": {\"total\": 0.25, \"groups\": [{\"group\": \"floor\", \"error\": 0.125}]}}";
+    write(folder.path(), "lit.json", told);
+    let (csv, ply) = (place("table.csv"), place("points.ply"));
+    let mut args = vec![place("lit.obj"), place("lit.ply"), "--seed".into(), "3".into()];
+    args.extend(["--csv".into(), csv.clone(), "--points-ply".into(), ply.clone()]);
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let out = run("verify", &args);
+    let table = String::from_utf8_lossy(&out.stdout);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let lines: Vec<Vec<&str>> = table.lines().map(|l| l.split_whitespace().collect()).collect();
+    assert_eq!(lines[1][..3], ["floor", "100.00", "0.00"], "{table}");
+    assert_eq!((lines[1][4], lines[2][4], lines[2][0]), ("12.50", "25.00", "all"), "{table}");
+    assert!(lines[3].starts_with(&["known", "to"]) && !table.contains("lamp"), "{table}");
+    let text = std::fs::read_to_string(csv).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    let measured: f64 = rows[2][5].parse().unwrap();
+    assert!(rows[1][5] == rows[2][5] && (0.1..1.0).contains(&measured), "{text}");
+    let points = std::fs::read_to_string(ply).unwrap();
+    let count: usize = lines[2][3].parse().unwrap();
+    assert!(points.contains(&format!("element vertex {count}\n")), "{points}");
+    assert_eq!(points.lines().skip_while(|l| *l != "end_header").count(), count + 1);
+    // The same numbers again; and radiosity at the middle, π · 5 · 0.5 · 0.2395 by the closed form.
+    let again = run("verify", &args[..4]);
+    let cut = |text: &[u8]| String::from_utf8_lossy(text).lines().take(3).collect::<String>();
+    assert_eq!(cut(&again.stdout), cut(&out.stdout));
+    let point = "{\"p\": [0.5, 0.5, 0], \"n\": [0, 0, 1], \"B\": [1.8817, 1.8817, 1.8817], \
+                 \"se\": [1e-4, 1e-4, 1e-4]}";
+    write(folder.path(), "p.json", &format!("{{\"points\": [{point}]}}"));
+    let out = run("verify", &[args[0], "--points", &place("p.json"), "--csv", &place("p.csv")]);
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("3 channels: mean") && out.status.success(), "{said}");
+    let text = std::fs::read_to_string(place("p.csv")).unwrap();
+    let row: Vec<f64> =
+        text.lines().nth(1).unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    assert!((row[3] - 1.8817).abs() < 4.0 * row[6] && row[6] < 0.02, "{text}");
+    // What cannot be.
+    let wrong = |args: &[&str], words: &[&str]| {
+        let out = run("verify", args);
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{error}");
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    };
+    wrong(&[args[0], "no.ply"], &["no.ply"]);
+    wrong(&[args[0], args[0]], &["lit.obj", "PLY"]);
+    wrong(&[cornell(), args[1]], &["solution", "of this scene"]);
+    wrong(&[args[0], args[1], "--precision", "0"], &["precision", "above 0"]);
+    wrong(&[args[0], args[1], "--csv", "no/such/folder/x"], &["no/such/folder"]);
+    wrong(&[args[0], "--points", args[1]], &["lit.ply", "points"]);
+    write(folder.path(), "off.json", "{\"points\": [{\"p\": [5, 5, 5], \"n\": [0, 0, 1]}]}");
+    wrong(&[args[0], "--points", &place("off.json")], &["off.json: point 1", "no surface"]);
+}
+
+#[test]
 fn help_and_version_succeed() {
-    for args in
-        [&["--help"][..], &["bake", "-h"], &["view-factors", "--help"], &["trade-off", "-h"]]
-    {
+    for args in [
+        &["--help"][..],
+        &["bake", "-h"],
+        &["view-factors", "--help"],
+        &["trade-off", "-h"],
+        &["verify", "--help"],
+    ] {
         let out = run(args[0], &args[1..]);
         let text = String::from_utf8_lossy(&out.stdout);
         assert!(out.status.success() && text.starts_with("usage: radiosity"), "{args:?}: {text}");
@@ -188,7 +267,7 @@ fn help_and_version_succeed() {
 #[test]
 fn wrong_usage_has_status_2_and_says_what_would_be_right() {
     for (args, words) in [
-        (&["fry"][..], &["'fry'", "bake, view-factors, trade-off", "radiosity --help"][..]),
+        (&["fry"][..], &["'fry'", "bake, view-factors, trade-off, verify", "radiosity --help"][..]),
         (&["--what"], &["--what"]),
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
         (&["bake", "a.obj", "b.obj"], &["b.obj", "one at a time"]),
@@ -197,6 +276,12 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy"]),
         (&["view-factors", "a.obj", "--cpu"], &["--cpu need --sampled"]),
         (&["view-factors", "a.obj", "--sampled", "--error", "1"], &["not for --sampled"]),
+        (&["verify", "a.obj"], &["PLY file of its solution", "usage: radiosity verify"]),
+        (&["verify", "a.obj", "b.ply", "c.ply"], &["'c.ply'", "one at a time"]),
+        (&["verify", "a.obj", "b.ply", "--time", "soon"], &["--time", "'soon'", "inf"]),
+        (&["verify", "a.obj", "b.ply", "--time", "-1"], &["--time", "'-1'"]),
+        (&["verify", "a.obj", "b.ply", "--paths", "1"], &["--paths is for --points"]),
+        (&["verify", "a.obj", "--points", "p", "--places", "9"], &["--places", "a solution"]),
         (&["trade-off", "--slow"], &["--slow", "usage: radiosity trade-off"]),
     ] {
         let out = run(args[0], &args[1..]);

@@ -19,5 +19,6 @@ mod io;
 mod mesh;
 mod scene;
 mod solver;
+mod verify;
 mod vertex;
 mod view_factor;

@@ -4,5 +4,6 @@ mod obj;
 mod obj_polygons;
 mod obj_texts;
 mod ply;
+mod ply_reader;
 mod tone;
 mod view_factors;

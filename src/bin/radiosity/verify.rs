@@ -34,7 +34,7 @@ the channels. Beside it stands what the bake told, from SOLUTION.json, if that i
   --seed N          another seed, other points and paths [0]
   --csv FILE        write the table, all groups, as CSV
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
-                    (the error of all) to red (four times that or more)
+                    (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:
   --points FILE     JSON: {\"points\": [{\"p\": [x,y,z], \"n\": [x,y,z]}, …]}; with \"B\" and \"se\",
                     radiosity and its standard error, prints how far the paths are off in units of

@@ -143,7 +143,7 @@ pub fn coloured_ply(found: &Verification) -> String {
     );
     let names = "x y z nx ny nz error told_r told_g told_b found_r found_g found_b standard_error";
     names.split(' ').for_each(|name| out += &format!("property float {name}\n"));
-    for name in ["red", "green", "blue"] {
+    for name in ["red", "green", "blue", "hidden"] {
         out += &format!("property uchar {name}\n");
     }
     out += "end_header\n";
@@ -153,8 +153,8 @@ pub fn coloured_ply(found: &Verification) -> String {
         let light = [point.told, point.found].map(|v| v.to_array()).concat();
         let words = [places, vec![point.error], light, vec![point.standard_error]].concat();
         let words: Vec<String> = words.iter().map(|x| (*x as f32).to_string()).collect();
-        let [r, g, b] = colour(point.error, usual);
-        let _ = writeln!(out, "{} {r} {g} {b}", words.join(" "));
+        let [r, g, b] = if point.hidden { [128; 3] } else { colour(point.error, usual) };
+        let _ = writeln!(out, "{} {r} {g} {b} {}", words.join(" "), u8::from(point.hidden));
     }
     out
 }

@@ -1,0 +1,243 @@
+//! The measured error of solutions whose error is known.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use glam::DVec3;
+use radiosity::verify::{Progress, Settings, Stop, Verification, verify};
+use radiosity::{ErrorKind, Material, Rgb, Scene, Triangle, VertexMesh};
+
+use crate::common::keep_going;
+use crate::common::scenes::{facing_down, facing_up, lamp, paint, quads, standing_block, walls};
+
+/// A solution with a radiosity for each triangle.
+fn solution(scene: &Scene, radiosity: impl Fn(&Triangle) -> Rgb) -> VertexMesh {
+    let mut mesh = VertexMesh::default();
+    for (t, triangle) in scene.triangles().iter().enumerate() {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(scene.corners(t));
+        mesh.normals.extend([scene.normal(t); 3]);
+        mesh.radiosity.extend([radiosity(triangle); 3]);
+        mesh.faces.push([first, first + 1, first + 2]);
+    }
+    mesh
+}
+
+/// Closed cubes side by side, each a group: its side, and its material.
+fn cubes(cubes: &[(f64, Material)]) -> Scene {
+    let (mut all, mut x) = (vec![], 0.0);
+    for (side, material) in cubes {
+        let box_of = walls([x, 0.0, 0.0], [x + side, *side, *side]);
+        all.extend(box_of.map(|wall| (wall, material.clone())));
+        x += side + 1.0;
+    }
+    let scene = quads(&all);
+    let mut triangles = scene.triangles().to_vec();
+    triangles.iter_mut().for_each(|t| t.group /= 6);
+    let names = (0..cubes.len()).map(|k| format!("cube{k}")).collect();
+    Scene::new(scene.positions().to_vec(), triangles, names, scene.materials().to_vec()).unwrap()
+}
+
+/// Radiosity E / (1 − ρ) of a cube with the reflected part multiplied by `factor`.
+fn furnace(scene: &Scene, triangle: &Triangle, factor: f64) -> Rgb {
+    let Material { reflectance, exitance, .. } = &scene.materials()[triangle.material as usize];
+    exitance + factor * reflectance * exitance / (Rgb::ONE - reflectance)
+}
+
+fn settings(precision: f64) -> Settings {
+    let mut settings = Settings::default();
+    settings.precision = precision;
+    settings
+}
+
+/// `value` within four standard errors, which are below `most`.
+fn check(found: Option<radiosity::verify::Estimate>, value: f64, most: f64) {
+    let found = found.expect("an error");
+    assert!(found.standard_error < most, "{found:?}, not {value}");
+    assert!((found.value - value).abs() < 4.0 * found.standard_error, "{found:?}, not {value}");
+}
+
+/// Measures until the standard error is below `wanted`.
+fn until(scene: &Scene, solution: &VertexMesh, wanted: f64) -> Verification {
+    let enough = |progress: &Progress| match progress.error {
+        Some(error) if error.standard_error < wanted => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    };
+    verify(scene, solution, &settings(1e-6), enough).unwrap()
+}
+
+#[test]
+fn an_exact_solution_has_no_error() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let exact = solution(&scene, |t| furnace(&scene, t, 1.0));
+    let found = until(&scene, &exact, 0.006);
+    assert_eq!(found.stop, Stop::Cancelled);
+    // Near zero the standard error of the root is that of the square's root.
+    let error = found.error.unwrap();
+    assert!(error.value < 2.0 * error.standard_error && error.standard_error < 0.006, "{error:?}");
+    assert!((found.mean_reflected - 3f64.sqrt()).abs() < 0.01);
+}
+
+#[test]
+fn a_tenth_too_much_is_ten_percent() {
+    let bright = Material { reflectance: Rgb::new(0.2, 0.5, 0.8), ..paint(0.0, 1.0) };
+    let scene = cubes(&[(1.0, bright)]);
+    for factor in [1.1, 0.9] {
+        let wrong = solution(&scene, |t| furnace(&scene, t, factor));
+        let found = verify(&scene, &wrong, &settings(0.05), keep_going).unwrap();
+        assert_eq!((found.stop, found.missing), (Stop::Precise, 0));
+        check(found.error, 0.1, 0.0051);
+    }
+}
+
+#[test]
+fn groups_weigh_by_their_area() {
+    // Areas 6 and 24: the error of the whole is that of the second times √(4/5).
+    let scene = cubes(&[(1.0, paint(0.5, 1.0)), (2.0, paint(0.5, 1.0))]);
+    let half = solution(&scene, |t| furnace(&scene, t, if t.group == 0 { 1.0 } else { 1.3 }));
+    let found = verify(&scene, &half, &settings(0.05), keep_going).unwrap();
+    check(found.error, 0.3 * 0.8f64.sqrt(), 0.02);
+    assert_eq!(found.groups.len(), 2);
+    assert!(found.groups[0].error.unwrap().value < 0.1);
+    check(found.groups[1].error, 0.3, 0.02);
+    for (group, share) in found.groups.iter().zip([0.2, 0.8]) {
+        assert!((group.area_share - share).abs() < 1e-12 && group.hidden_share == 0.0);
+        assert!((group.points as f64 / found.points.len() as f64 - share).abs() < 0.01);
+    }
+}
+
+#[test]
+fn a_small_group_has_points_of_its_own() {
+    // A millionth of the area, and of the points that an even spread would give it.
+    let scene = cubes(&[(1000.0, paint(0.5, 1.0)), (1.0, paint(0.5, 1.0))]);
+    let wrong = solution(&scene, |t| furnace(&scene, t, if t.group == 0 { 1.1 } else { 3.0 }));
+    let found = verify(&scene, &wrong, &settings(0.1), keep_going).unwrap();
+    assert_eq!(found.groups[1].points, 16);
+    check(found.groups[1].error, 2.0, 0.2);
+    check(found.error, 0.1, 0.011);
+}
+
+#[test]
+fn dark_surfaces_count_by_the_mean() {
+    // Two cubes of one area that reflect 1 and 0.001: told none, the dark one is off by 0.001 of a
+    // floor of 5 % of the mean.
+    let scene = cubes(&[(1.0, paint(0.5, 1.0)), (1.0, paint(0.5, 0.001))]);
+    let dark = solution(&scene, |t| furnace(&scene, t, if t.group == 0 { 1.2 } else { 0.0 }));
+    let found = verify(&scene, &dark, &settings(0.05), keep_going).unwrap();
+    check(found.groups[1].error, 0.001 / (0.05 * 0.5005), 0.002);
+    check(found.groups[0].error, 0.2, 0.02);
+}
+
+#[test]
+fn what_only_emits_has_no_weight() {
+    let floor = facing_up([0.0, 1.0], [0.0, 1.0], 0.0);
+    let light = facing_down([-99.0, 100.0], [-99.0, 100.0], 1.0);
+    let scene = quads(&[(floor, paint(0.5, 0.0)), (light, lamp([1.0; 3]))]);
+    let off_at_the_lamp = |by: f64| {
+        // The floor sees nearly nothing but the lamp: all but 1e-4.
+        let told = |t: &Triangle| Rgb::splat(if t.group == 0 { 1.0 } else { 1.0 + by });
+        let solution = solution(&scene, told);
+        verify(&scene, &solution, &settings(0.1), keep_going).unwrap()
+    };
+    let (none, much) = (off_at_the_lamp(0.0), off_at_the_lamp(1e9));
+    assert_eq!(none.error, much.error);
+    assert_eq!(much.groups.len(), 1);
+    assert_eq!(much.groups[0].group, 0);
+    check(much.error, 1.0, 0.11);
+}
+
+#[test]
+fn what_is_hidden_is_left_out_and_said() {
+    let mut all = vec![(facing_up([0.0, 1.0], [0.0, 1.0], 0.0), paint(0.5, 0.0))];
+    let block = standing_block([0.2, 0.7], [0.3, 0.8], 0.0, 0.4);
+    all.extend(block.map(|side| (side, paint(0.5, 0.0))));
+    all.push((facing_down([-9.0, 10.0], [-9.0, 10.0], 2.0), lamp([1.0; 3])));
+    let scene = quads(&all);
+    let lit = solution(&scene, |_| Rgb::splat(0.5));
+    let mut settings = settings(0.1);
+    let found = verify(&scene, &lit, &settings, keep_going).unwrap();
+    // A quarter of the floor, of n random points.
+    let floor = found.groups[0];
+    let deviation = (0.25 * 0.75 / floor.points as f64).sqrt();
+    assert!((floor.hidden_share - 0.25).abs() < 4.0 * deviation, "{floor:?}");
+    assert!(found.groups[1..].iter().all(|group| group.hidden_share == 0.0));
+    let inside = |p: DVec3| p.x > 0.2 && p.x < 0.7 && p.y > 0.3 && p.y < 0.8 && p.z == 0.0;
+    assert!(found.points.iter().all(|point| point.hidden == inside(point.position)));
+    // Told 0.5 where there is no light: more than twice the mean, above a floor of 5 % of it.
+    let (without, with) = (found.error.unwrap(), found.error_with_hidden.unwrap());
+    assert!(without.value < 1.0 && with.value > 5.0, "{without:?} {with:?}");
+    settings.hidden = true;
+    let all = verify(&scene, &lit, &settings, keep_going).unwrap();
+    assert_eq!(all.error, all.error_with_hidden);
+    assert!(all.groups[0].error.unwrap().value > 10.0);
+}
+
+#[test]
+fn seeds_not_threads_make_the_points() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0)), (2.0, paint(0.5, 1.0))]);
+    let wrong = solution(&scene, |t| furnace(&scene, t, 1.5));
+    let measure = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut settings = settings(0.1);
+        settings.seed = seed;
+        let found = pool.install(|| verify(&scene, &wrong, &settings, keep_going)).unwrap();
+        let points = found.points.iter().map(|p| (p.position, p.found)).collect::<Vec<_>>();
+        (found.error, points)
+    };
+    assert!(measure(1, 1) == measure(3, 1));
+    assert!(measure(1, 1) != measure(1, 2));
+}
+
+#[test]
+fn it_stops_when_told_and_when_time_is_up() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let exact = solution(&scene, |t| furnace(&scene, t, 1.0));
+    let mut settings = settings(0.01);
+    let stopped = verify(&scene, &exact, &settings, |_| ControlFlow::Break(())).unwrap();
+    assert_eq!((stopped.stop, stopped.error), (Stop::Cancelled, None));
+    settings.time = Some(Duration::ZERO);
+    let first = verify(&scene, &exact, &settings, keep_going).unwrap();
+    assert_eq!((first.stop, first.paths), (Stop::Time, 64));
+    assert!(first.error.is_some() && first.points.len() >= 512);
+    // Nothing is lit, nothing is told to be: no error, surely.
+    let dark = quads(&[
+        (facing_up([0.0, 1.0], [0.0, 1.0], 0.0), paint(0.5, 0.0)),
+        (facing_up([0.0, 1.0], [0.0, 1.0], 1.0), lamp([1.0; 3])),
+    ]);
+    let none = verify(&dark, &solution(&dark, |_| Rgb::ZERO), &settings, keep_going).unwrap();
+    assert_eq!((none.stop, none.error.unwrap().value), (Stop::Negligible, 0.0));
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let good = solution(&scene, |_| Rgb::ONE);
+    let refused = |scene: &Scene, solution: &VertexMesh, words: &[&str]| {
+        let error = verify(scene, solution, &Settings::default(), keep_going).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Scene);
+        assert!(words.iter().all(|word| error.to_string().contains(word)), "{error}");
+    };
+    let changed = |change: fn(&mut VertexMesh)| {
+        let mut mesh = good.clone();
+        change(&mut mesh);
+        mesh
+    };
+    let shifted = changed(|mesh| mesh.positions.iter_mut().for_each(|p| p.x += 0.5));
+    refused(&scene, &shifted, &["random points", "none of its faces", "'cube0'", "this scene"]);
+    let turned = changed(|mesh| mesh.faces.iter_mut().for_each(|face| face.swap(0, 1)));
+    refused(&scene, &turned, &["none of its faces"]);
+    refused(&scene, &changed(|mesh| mesh.faces[3][1] = 99), &["face 4", "99"]);
+    refused(&scene, &changed(|mesh| mesh.radiosity[5].y = f64::NAN), &["vertex 6", "NaN"]);
+    refused(&scene, &changed(|mesh| mesh.positions[0].x = f64::INFINITY), &["vertex 1", "inf"]);
+    refused(&scene, &changed(|mesh| mesh.radiosity.truncate(4)), &["4 values"]);
+    refused(&scene, &VertexMesh::default(), &["no faces"]);
+    refused(&cubes(&[(1.0, paint(0.0, 1.0))]), &good, &["reflects"]);
+    refused(&cubes(&[(1.0, paint(0.5, 0.0))]), &good, &["emits"]);
+    for precision in [0.0, -1.0, f64::NAN, 2.0] {
+        let error = verify(&scene, &good, &settings(precision), keep_going).unwrap_err();
+        assert_eq!((error.kind(), error.place()), (ErrorKind::Setting, "precision"));
+    }
+    let mut few = Settings::default();
+    few.points_per_group = 1;
+    assert_eq!(verify(&scene, &good, &few, keep_going).unwrap_err().kind(), ErrorKind::Setting);
+}

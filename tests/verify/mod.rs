@@ -1,0 +1,2 @@
+mod measure;
+mod path_tracer;
