@@ -3,6 +3,7 @@
 mod points;
 
 use std::fmt::Write;
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -88,7 +89,10 @@ impl Options {
                 Long("csv") => csv = Some(PathBuf::from(parser.value()?)),
                 Long("points-ply") => points_ply = Some(PathBuf::from(parser.value()?)),
                 Long("points") => points = Some(PathBuf::from(parser.value()?)),
-                Long("paths") => paths = Some(args::value(parser, "paths", "a whole number")?),
+                Long("paths") => {
+                    let expected = "a whole number above 0";
+                    paths = Some(args::value::<NonZeroUsize>(parser, "paths", expected)?);
+                }
                 Value(path) => files.push(PathBuf::from(path)),
                 _ => return Err(arg.unexpected().into()),
             }
@@ -99,7 +103,7 @@ impl Options {
                     let options = "--precision, --time, --places, --hidden and --points-ply";
                     return Err(Stop::usage(format!("{options} are for a solution")));
                 }
-                What::Points { json, paths: paths.unwrap_or(DEFAULT_PATHS) }
+                What::Points { json, paths: paths.map_or(DEFAULT_PATHS, NonZeroUsize::get) }
             }
             None if paths.is_some() => return Err(Stop::usage("--paths is for --points")),
             None if files.len() < 2 => {
