@@ -22,7 +22,8 @@ pub(super) struct Sample {
 pub(super) struct SquareError {
     /// Without bias; below zero at times.
     pub value: f64,
-    /// The variance of it that comes from the noise of the paths.
+    /// The variance of it that comes from the noise of the paths; up to three times that where the
+    /// error is far below the noise.
     pub noise: f64,
     /// About how much too large it is, because the true radiosity that divides it is noisy too.
     pub bias: f64,
@@ -168,14 +169,14 @@ mod tests {
 
     #[test]
     fn noise_of_paths_is_no_error() {
-        // Noise of 8 % in a part, 5 % in the three that divide nothing of it: an error of 3 % is
-        // found, and none where there is none.
+        // Noise of 8 % in each part: an error of 3 % is found, and none where there is none.
         for told in [1.0, 1.03, 0.97] {
             let mean = measured(&samples(told, 1.0, 0.08), 0.05);
             let (truth, off) = ((told - 1.0).powi(2), mean.variance.sqrt());
             assert!((mean.value - mean.bias - truth).abs() < 4.0 * off, "{told}: {mean:?}");
-            // All that varies here is noise. A jackknife is within some of it.
-            assert!((0.8..1.4).contains(&(mean.noise / mean.variance)), "{told}: {mean:?}");
+            // All that varies here is noise: told right by a jackknife where the estimate is linear
+            // in it, threefold where it is but a product of noise with noise (pairs of four parts).
+            assert!((0.9..3.3).contains(&(mean.noise / mean.variance)), "{told}: {mean:?}");
         }
     }
 
