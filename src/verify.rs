@@ -22,11 +22,11 @@
 //! group's error is the same root mean square over the group's own reflecting area, with the
 //! scene's m.
 //!
-//! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in more
-//! than 95 % of their hemisphere, weighted by the cosine, or in more than half of it backs nearer
-//! than 0.2 % of the diagonal of all that reflects. They lie inside a solid, under what stands on
-//! them or right behind a plate; nobody sees them, and bakes tell there what would be seen without
-//! it. The mean m is over all points.
+//! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
+//! more than 95 % of their hemisphere, weighted by the cosine, or in more than half of it backs
+//! nearer than 0.2 % of the diagonal of all that reflects. They lie inside a solid, under what
+//! stands on them or right behind a plate; nobody sees them, and bakes tell there what would be
+//! seen without it. The mean m is over all points.
 //!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
 //! has the mean |B_told − B_true|², however noisy they are.

@@ -25,10 +25,10 @@ const NEEDED: usize = 6;
 
 /// Reads a mesh as [`write_ply`](super::write_ply) writes it, in ASCII or binary of either order.
 ///
-/// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz error`, numbers
-/// of any type; faces have a list `vertex_indices` or `vertex_index`, and become fans of triangles.
-/// Other properties and elements are skipped. The file may come from anywhere: memory stays within
-/// a multiple of its length, whatever its header claims.
+/// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz error`,
+/// numbers of any type; faces have a list `vertex_indices` or `vertex_index`, and become fans of
+/// triangles. Other properties and elements are skipped. The file may come from anywhere: memory
+/// stays within a multiple of its length, whatever its header claims.
 ///
 /// # Errors
 /// - [`ErrorKind::File`] when the file cannot be read, or has more than 4 GiB.

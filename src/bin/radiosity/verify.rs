@@ -37,9 +37,10 @@ the channels. Beside it stands what the bake told, from SOLUTION.json, if that i
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:
-  --points FILE     JSON: {\"points\": [{\"p\": [x,y,z], \"n\": [x,y,z]}, …]}; with \"B\" and \"se\",
-                    radiosity and its standard error, prints how far the paths are off in units of
-                    the standard error of both; with --csv writes radiosity and standard error
+  --points FILE     JSON: {\"points\": [{\"p\": [x,y,z], \"n\": [x,y,z]}, …]}; where \"B\" is given,
+                    radiosity, and \"se\", its standard error, prints how far the paths are off in
+                    units of the standard error of both; with --csv writes radiosity and standard
+                    error
   --paths N         paths a point [16384]";
 
 /// Groups in the printed table at most.
