@@ -11,7 +11,8 @@
 //!            F(patch's centroid → whole receiver)
 //! ```
 //!
-//! So what the source found hidden stays hidden. All other entries are scaled alike, so that the
+//! So what the source found hidden stays hidden. Receivers much larger than the patch are left as
+//! they are: there the centroid of the patch is the better one. All other entries are scaled alike, so that the
 //! row still sums to one.
 
 use glam::DVec3;
@@ -25,6 +26,10 @@ use crate::mesh::{Mesh, NodeId};
 /// Distances within this factor of the reach are near. On grids many receivers are just at the
 /// reach: rounding must not decide which of them are near.
 const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
+
+/// Receivers this many times as large as the patch keep their entries: their own centroid stands for
+/// them worse than the patch's for the patch.
+const MAX_RECEIVER_SIZE: f64 = 2.0;
 
 /// Rows of another source, with the entries of near receivers corrected by closed forms.
 ///
@@ -128,7 +133,8 @@ impl NearField {
         let mut corrected: Vec<(usize, f64)> = vec![];
         for (k, entry) in row.entries.iter().enumerate() {
             let sphere = self.spheres[entry.element as usize];
-            if sphere.gap(&around) > self.reach * 2.0 * around.radius * REACH_TOLERANCE {
+            let is_far = sphere.gap(&around) > self.reach * 2.0 * around.radius * REACH_TOLERANCE;
+            if is_far || sphere.radius > MAX_RECEIVER_SIZE * around.radius {
                 continue;
             }
             let element = mesh.element(entry.element as usize);

@@ -1,2 +1,4 @@
 pub mod cornell_box;
+mod outcome;
+mod surroundings;
 mod target;

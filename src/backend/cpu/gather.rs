@@ -58,6 +58,9 @@ const MAX_OVERSAMPLING: u32 = 16;
 /// Rays over the hemisphere for one shadow ray to each light. Chosen by hand; no measurement kept.
 const RAYS_PER_SHADOW_RAY: u32 = 4;
 
+/// The second rotation is the rest of the first behind its 16 leading bits.
+const SECOND_ROTATION: f64 = (1u32 << 16) as f64;
+
 impl RayGather {
     /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
@@ -197,9 +200,12 @@ impl RayGather {
         let Light { triangles, surface, .. } = &self.lights.lights[light as usize];
         let area = surface.total_area();
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
+        // Both coordinates are rotated: where only a strip of the light is seen, points that are the
+        // same for all places would be off in the same direction everywhere.
+        let second_rotation = (rotation * SECOND_ROTATION).fract();
         for i in range {
             let [x, y] = sobol_02_point(i);
-            let (k, across) = surface.locate(x);
+            let (k, across) = surface.locate((x + second_rotation).fract());
             let triangle = triangles[k] as usize;
             let [a, b, c] = scene.corners(triangle);
             // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).

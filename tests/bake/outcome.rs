@@ -1,0 +1,67 @@
+//! Whether a target was met, for the whole or each group, and what stood in the way.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use radiosity::bake::{Obstacle, Outcome};
+use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Scene};
+
+use crate::common::{cornell_box, keep_going};
+
+fn cornell() -> Scene {
+    cornell_box(f64::INFINITY).scene().clone()
+}
+
+#[test]
+fn each_group_meets_its_error() {
+    let target = BakeTarget::ErrorEach(0.1);
+    let baked = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
+    println!("{} {:?}", baked.outcome, baked.estimate);
+    assert_eq!(baked.groups.len(), cornell().groups().len());
+    let shares: f64 = baked.groups.iter().map(|group| group.area_share).sum();
+    assert!((shares - 1.0).abs() < 1e-9, "{shares}");
+    let worst = baked.groups.iter().map(|g| g.estimate.total).fold(0.0, f64::max);
+    assert!(worst <= 0.1, "{worst}");
+    assert_eq!(baked.outcome, Outcome::Reached);
+    // More points on a small group than its area would give it.
+    assert!(baked.groups.iter().all(|group| group.estimate.samples >= 16));
+}
+
+#[test]
+fn misses_are_called_by_their_obstacle() {
+    let bake = |error: f64, overrides: &dyn Fn(&mut BakeSettings)| {
+        let target = BakeTarget::Error(error);
+        target.bake_with(cornell(), &Backend::Cpu, overrides, keep_going).unwrap()
+    };
+    let few = bake(0.01, &|s| {
+        if let Some(gather) = &mut s.gather {
+            gather.refinement.max_elements = 1000;
+        }
+    });
+    assert_eq!(few.outcome, Outcome::Missed(Obstacle::Elements));
+    assert!(few.estimate.total > 0.01);
+    let fixed = bake(0.01, &|s| {
+        let coarse = BakeSettings::for_error(0.2, &cornell()).gather;
+        s.gather = coarse;
+    });
+    assert_eq!(fixed.outcome, Outcome::Missed(Obstacle::Settings));
+    let none = bake(0.01, &|s| s.gather = None);
+    assert_eq!(none.outcome, Outcome::Missed(Obstacle::Settings));
+    let stop = |stage: &BakeProgress| match stage {
+        BakeProgress::Gathering(_) => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    };
+    let stopped = BakeTarget::Error(0.01).bake(cornell(), &Backend::Cpu, stop).unwrap();
+    assert_eq!(stopped.outcome, Outcome::Missed(Obstacle::Cancelled));
+    assert_eq!(stopped.outcome.to_string(), "missed: it was stopped");
+}
+
+#[test]
+fn without_an_error_there_is_nothing_to_miss() {
+    let settings = BakeSettings::for_error(0.1, &cornell());
+    let baked = settings.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
+    assert_eq!(baked.outcome, Outcome::Unasked);
+    let target = BakeTarget::Time(Duration::from_nanos(1));
+    let baked = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
+    assert_eq!(baked.outcome, Outcome::Unasked);
+}
