@@ -2,8 +2,8 @@
 //! given settings go.
 //!
 //! ```text
-//! BakeTarget ──► BakeSettings::for_error          all settings, by the model of error and cost
-//!                      │
+//! BakeTarget ──► BakeSettings::for_error          all settings, by the model of error and cost and
+//!                      │                          a survey of where the light falls
 //!                      ▼
 //!                shooting phase                   light is shot on a mesh of fine elements
 //!                      │                          (form factors, solver)
@@ -15,7 +15,8 @@
 //!                      │                      │   with what the vertices interpolate to
 //!                      ├─ too large ──────────┘   more of what the largest parts of the error
 //!                      ▼                          follow: rays, passes, smaller elements
-//!                  BakeResult
+//!                  BakeResult                     the light, its error by groups, and whether the
+//!                                                 target was reached
 //! ```
 //!
 //! Shooting is done once; its error is chosen small beforehand. Rows and gathers come from a

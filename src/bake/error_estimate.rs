@@ -146,8 +146,9 @@ pub(super) struct ErrorSpread {
 /// The estimate of a result.
 pub(super) struct Estimate {
     pub whole: ErrorEstimate,
-    /// The whole with every place weighted by the light that it reflects, beside its area: what is
-    /// bright counts however small it is, such as a lit room on a dark plane.
+    /// The whole where the light is: with a floor that is relative to the mean radiosity by light and
+    /// not by area, below which places weigh less. However much there is of a dark plane, a lit
+    /// room on it counts as it does without; in ordinary scenes it is about the whole.
     pub by_light: ErrorEstimate,
     /// The same group by group, in the order of the strata.
     pub groups: Vec<GroupError>,
@@ -171,23 +172,37 @@ struct Deviation {
     in_gap: bool,
     /// Reflected radiosity, W/m²: a length over the channels.
     reflected: f64,
+    /// What all is relative to: that, or the floor where this is more, W/m².
+    scale: f64,
 }
 
 /// The deviations of a stratum that has some.
 struct StratumDeviations {
     stratum: Stratum,
-    /// Its area less that of the excluded points; or the light on it.
+    /// Its area less that of the excluded points.
     area: f64,
     deviations: Vec<Deviation>,
 }
 
 impl StratumDeviations {
-    /// The same with light in the place of area: every point by what it reflects.
-    fn by_light(&self) -> StratumDeviations {
-        let mean = mean(&self.deviations, &|d| d.reflected);
-        let lit = |d: &Deviation| Deviation { weight: d.weight * d.reflected, ..*d };
+    /// The same by light: places dimmer than `floor` (W/m²) weigh less in proportion, and their
+    /// errors are relative to it.
+    fn by_light(&self, floor: f64) -> StratumDeviations {
+        let weight = |d: &Deviation| (d.reflected / floor).min(1.0);
+        let lit = |d: &Deviation| {
+            let scale = d.scale / d.reflected.max(floor);
+            Deviation {
+                weight: d.weight * weight(d),
+                interpolation: d.interpolation * scale,
+                noise: d.noise * scale * scale,
+                next: d.next * scale,
+                residual: d.residual * scale * scale,
+                ..*d
+            }
+        };
+        let area = self.area * mean(&self.deviations, &weight);
         let deviations = self.deviations.iter().map(lit).collect();
-        StratumDeviations { stratum: self.stratum, area: self.area * mean, deviations }
+        StratumDeviations { stratum: self.stratum, area, deviations }
     }
 }
 
@@ -214,7 +229,8 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
         parts(strata, bias, passed, standard_errors, conditions)
     };
     let whole = parts(&all, 1.0);
-    let mut lit: Vec<StratumDeviations> = all.iter().map(StratumDeviations::by_light).collect();
+    let lit_floor = lit_floor(&Means(&all));
+    let mut lit: Vec<StratumDeviations> = all.iter().map(|s| s.by_light(lit_floor)).collect();
     lit.retain(|stratum| stratum.area > 0.0);
     let by_light = parts(&lit, 1.0);
     let area: f64 = all.iter().map(|stratum| stratum.area).sum();
@@ -230,6 +246,14 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
         even: even.sqrt(),
     };
     Estimate { groups: groups.collect(), whole, by_light, spread }
+}
+
+/// [`StratumDeviations::by_light`]'s floor, W/m²: as that of the measure, of the mean radiosity that a
+/// reflected photon leaves.
+fn lit_floor(means: &Means) -> f64 {
+    let (flux, square) = (means.of(|d| d.reflected), means.of(|d| d.reflected.powi(2)));
+    let mean = if flux > 0.0 { square / flux } else { 0.0 };
+    (model::RADIOSITY_FLOOR * mean).max(f64::MIN_POSITIVE)
 }
 
 /// All parts over `strata`, with so many standard errors added to what scatters most. `bias` is the
@@ -294,6 +318,7 @@ impl Observation {
             next: (self.next - first) / scale,
             residual: (self.element_residual / scale).powi(2),
             reflected: truth.length(),
+            scale,
             in_gap: dim_or_behind && self.inverse_distance * self.size > 1.0,
         })
     }

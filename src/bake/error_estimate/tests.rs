@@ -248,3 +248,26 @@ fn residuals_are_scaled_to_the_error_of_the_mesh() {
     assert!((spread.per_residual * 0.1 / 3f64.sqrt() - found.mesh).abs() < 1e-12);
     assert_eq!(spread.even, 0.0);
 }
+
+#[test]
+fn by_light_a_dark_plane_changes_nothing() {
+    let off = |k: usize| Observation {
+        stratum: 0,
+        interpolated: (1.0 + if k % 2 == 0 { 0.1 } else { 0.02 }) * Rgb::ONE,
+        ..exact()
+    };
+    let dim = 1e-9 * Rgb::ONE;
+    let dark =
+        Observation { stratum: 1, interpolated: dim, gathered: [dim; 2], next: dim, ..exact() };
+    let strata = [STRATUM, Stratum { group: Some(1), area: 1e6 * STRATUM.area, ambient: 0.0 }];
+    let conditions = Conditions { strata: &strata, radiosity_floor: 1e-7, ..CONDITIONS };
+    let room: Vec<Observation> = (0..100).map(off).collect();
+    let both: Vec<Observation> = room.iter().copied().chain([dark; 100]).collect();
+    let alone = estimate(&room, &CONDITIONS);
+    let with_plane = estimate(&both, &conditions);
+    assert!(with_plane.whole.total < 1e-3, "{:?}", with_plane.whole);
+    let (found, expected) = (with_plane.by_light.total, alone.whole.total);
+    // The plane reflects 1e-9 of the light of each place, and has 1e6 times the area.
+    assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+    assert!((alone.by_light.total / expected - 1.0).abs() < 1e-9, "{:?}", alone.by_light);
+}

@@ -23,6 +23,9 @@ pub struct TruthPoint {
     radiosity: Rgb,
 }
 
+/// Errors are relative to no less than this share of the mean radiosity.
+pub const FLOOR: f64 = 0.05;
+
 /// How far off a face a truth point may lie, as a share of the scene's diagonal: points are
 /// rounded, and faces may be a little bent.
 const OFF_FACE: f64 = 1e-3;
@@ -57,10 +60,13 @@ impl Reference {
         };
         let (low, high) = super::surface_points::bounds(surface);
         let limit = OFF_FACE * (high - low).length();
+        let spread = points.iter().filter(|point| point.is_over_area());
+        let lengths: Vec<f64> = spread.map(|point| point.radiosity.length()).collect();
+        let dim = FLOOR * lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
         let (mut area, mut all) = (vec![], vec![]);
         for (k, point) in points.iter().enumerate() {
             let error = point
-                .error(surface, limit)
+                .error(surface, limit, dim)
                 .ok_or_else(|| format!("truth point {} lies on no face of the scene", k + 1))?;
             all.push(error);
             if point.is_over_area() {
@@ -76,9 +82,9 @@ impl TruthPoint {
         self.kind == "area"
     }
 
-    /// The error of `surface` at the point, as a share of its radiosity, in the nearest face within
-    /// `limit` that faces alike.
-    fn error(&self, surface: &VertexMesh, limit: f64) -> Option<f64> {
+    /// The error of `surface` at the point, as a share of its radiosity or of `dim` (W/m²) where that
+    /// is more, in the nearest face within `limit` that faces alike.
+    fn error(&self, surface: &VertexMesh, limit: f64, dim: f64) -> Option<f64> {
         let mut nearest: Option<Location> = None;
         for face in &surface.faces {
             let face = Face::new(surface, face);
@@ -88,7 +94,7 @@ impl TruthPoint {
             }
         }
         let nearest = nearest.filter(|location| location.distance < limit)?;
-        Some(nearest.radiosity.distance(self.radiosity) / self.radiosity.length())
+        Some(nearest.radiosity.distance(self.radiosity) / self.radiosity.length().max(dim))
     }
 }
 

@@ -1,11 +1,12 @@
-//! Points spread evenly over a surface, with the radiosity there, to compare other surfaces with.
+//! Points spread evenly over what reflects of a surface, with the radiosity there, to compare other
+//! surfaces with: by the measure of error that the bake's estimate has.
 
 use glam::DVec3;
 use radiosity::gather::GatherPoint;
 use radiosity::{Backend, Error, GatheredMesh, Rgb, VertexMesh};
 
 use super::face::Face;
-use super::reference::rms;
+use super::reference::{FLOOR, rms};
 
 /// A point and what leaves it.
 struct SurfacePoint {
@@ -13,6 +14,8 @@ struct SurfacePoint {
     normal: DVec3,
     /// W/m² per channel.
     radiosity: Rgb,
+    /// The reflected part of it, W/m²: a length over the channels.
+    reflected: f64,
 }
 
 /// Points in the cells of a uniform grid.
@@ -35,14 +38,14 @@ const COUNT: usize = 4096;
 /// Cells of the grid along each axis.
 const CELLS: usize = 32;
 
-/// Errors are relative to no less than this share of the mean radiosity.
-const DIM: f64 = 0.05;
+/// Points that see more backs than this share of their hemisphere are inside a solid.
+const HIDDEN: f64 = 0.95;
 
-/// Points in gaps narrower than this share of the diagonal are left out.
-const NARROW: f64 = 0.002;
+/// Points that see more backs than this share, and nearer ones than [`NEAR`], are under something.
+const NEAR_BACKS: f64 = 0.5;
 
-/// Dim points in gaps narrower than this share of the diagonal are left out.
-const DIM_GAP: f64 = 0.1;
+/// Share of the diagonal of all that reflects.
+const NEAR: f64 = 0.002;
 
 /// Rays of a point that find out how wide the gap is that it lies in.
 const RAYS: u32 = 64;
@@ -53,21 +56,21 @@ const REACH: f64 = 1e-4;
 /// How far above the surface rays start, as a share of the diagonal.
 const OFFSET: f64 = 1e-5;
 
-/// A point whose rays meet more backs of surfaces than this share lies inside a solid.
-const INSIDE: f64 = 0.5;
-
 impl SurfacePoints {
-    /// On all of the surface that can be looked at: not under what touches it, nor in narrow gaps.
+    /// On all of the surface that reflects and can be looked at: not under what touches it.
     pub fn new(light: &GatheredMesh, device: &Backend) -> Result<SurfacePoints, Error> {
         let surface = &light.surface;
         let (low, high) = bounds(surface);
         let diagonal = (high - low).length();
         let reach = REACH * diagonal;
         let (low, high) = (low - reach, high + reach);
-        let mut points = spread(surface);
-        let mean = points.iter().map(|p| p.radiosity.length()).sum::<f64>();
+        let mut points = spread(light);
+        let mean = points.iter().map(|p| p.reflected).sum::<f64>();
         let mean = mean / points.len().max(1) as f64;
-        let dim = (DIM * mean).max(f64::MIN_POSITIVE);
+        let dim = (FLOOR * mean).max(f64::MIN_POSITIVE);
+        let lowest = points.iter().fold(DVec3::INFINITY, |low, p| low.min(p.position));
+        let highest = points.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(p.position));
+        let near = NEAR_BACKS / (NEAR * (highest - lowest).length());
         let offset = OFFSET * diagonal;
         let above = |point: &SurfacePoint| GatherPoint {
             position: point.position + offset * point.normal,
@@ -77,12 +80,10 @@ impl SurfacePoints {
         let above: Vec<GatherPoint> = points.iter().map(above).collect();
         let samples = device.gather(&light.mesh, RAYS)?.gather(&light.radiosity_field(), &above)?;
         let mut samples = samples.iter();
-        points.retain(|point| {
+        points.retain(|_| {
             let sample = samples.next().expect("a sample for every point");
-            let nearness = sample.inverse_distance * diagonal;
-            sample.backface < INSIDE
-                && nearness * NARROW < 1.0
-                && (nearness * DIM_GAP < 1.0 || point.radiosity.length() >= dim)
+            let is_covered = sample.backface > NEAR_BACKS && sample.inverse_distance > near;
+            !is_covered && sample.backface <= HIDDEN
         });
         let size = (high - low) / CELLS as f64;
         let cells = vec![vec![]; CELLS * CELLS * CELLS];
@@ -120,7 +121,7 @@ impl SurfacePoints {
         let located = nearest.iter().zip(&self.points).filter(|(n, _)| n.0.is_finite());
         let errors: Vec<f64> = located
             .map(|((_, radiosity), point)| {
-                radiosity.distance(point.radiosity) / point.radiosity.length().max(self.dim)
+                radiosity.distance(point.radiosity) / point.reflected.max(self.dim)
             })
             .collect();
         rms(&errors)
@@ -147,13 +148,18 @@ pub fn bounds(surface: &VertexMesh) -> (DVec3, DVec3) {
     surface.positions.iter().fold(start, |(low, high), &p| (low.min(p), high.max(p)))
 }
 
-/// [`COUNT`] points, as many on each face as its share of the area.
-fn spread(surface: &VertexMesh) -> Vec<SurfacePoint> {
+/// [`COUNT`] points, as many on each face that reflects as its share of the area.
+fn spread(light: &GatheredMesh) -> Vec<SurfacePoint> {
+    let surface = &light.surface;
+    let material = |f: usize| light.mesh.material(light.mesh.element(surface.elements[f] as usize));
+    let faces: Vec<(Face, Rgb)> = (0..surface.faces.len())
+        .filter(|&f| material(f).reflectance != Rgb::ZERO)
+        .map(|f| (Face::new(surface, &surface.faces[f]), material(f).exitance))
+        .collect();
     let mut points = Vec::with_capacity(COUNT);
-    let total: f64 = surface.faces.iter().map(|f| Face::new(surface, f).area()).sum();
+    let total: f64 = faces.iter().map(|(face, _)| face.area()).sum();
     let mut area = 0.0;
-    for face in &surface.faces {
-        let face = Face::new(surface, face);
+    for (face, exitance) in faces {
         area += face.area();
         while points.len() < COUNT {
             let k = points.len() as f64;
@@ -164,10 +170,12 @@ fn spread(surface: &VertexMesh) -> Vec<SurfacePoint> {
             let u = (0.5 + k * 0.754_877_666_246_693).fract();
             let v = (0.5 + k * 0.569_840_290_998_053_2).fract();
             let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let radiosity = face.radiosity(u, v);
             points.push(SurfacePoint {
                 position: face.position(u, v),
                 normal: face.unit_normal(),
-                radiosity: face.radiosity(u, v),
+                radiosity,
+                reflected: (radiosity - exitance).length(),
             });
         }
     }
