@@ -23,8 +23,8 @@ use super::{FormFactors, Row, checked_rows};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
-/// Distances within this factor of the reach are near. On grids many receivers are just at the
-/// reach: rounding must not decide which of them are near.
+/// Lengths within this factor of a bound are below it. On grids many receivers are just at the
+/// reach, or just twice as large: rounding must not decide which of them are corrected.
 const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
 
 /// Receivers this many times as large as the patch keep their entries: their own centroid stands for
@@ -134,7 +134,7 @@ impl NearField {
         for (k, entry) in row.entries.iter().enumerate() {
             let sphere = self.spheres[entry.element as usize];
             let is_far = sphere.gap(&around) > self.reach * 2.0 * around.radius * REACH_TOLERANCE;
-            if is_far || sphere.radius > MAX_RECEIVER_SIZE * around.radius {
+            if is_far || sphere.radius > MAX_RECEIVER_SIZE * around.radius * REACH_TOLERANCE {
                 continue;
             }
             let element = mesh.element(entry.element as usize);
