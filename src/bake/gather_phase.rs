@@ -89,14 +89,16 @@ impl<'a> GatherPhase<'a> {
     ) -> Result<BakedLight, Error> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
-        let mut previous_gathers = 0;
+        let (mut previous_gathers, mut idle_rounds) = (0, 0);
         loop {
             let stop = self.gather(step, reporter)?;
             let estimated = self.estimate(stop, reporter, clock)?;
-            // A round for which next to nothing is gathered changes nothing: what is left is not for
+            // Rounds for which next to nothing is gathered change nothing: what is left is not for
             // this mesh to resolve.
             let gathers = estimated.light.gather_count;
-            let is_stuck = gathers < (model::MIN_PROGRESS * previous_gathers as f64) as u64;
+            let has_progress = gathers as f64 >= model::MIN_PROGRESS * previous_gathers as f64;
+            idle_rounds = if has_progress { 0 } else { idle_rounds + 1 };
+            let is_stuck = idle_rounds >= model::MAX_IDLE_ROUNDS;
             let rounds_left = if is_stuck { 0 } else { model::MAX_ROUNDS - rounds };
             match self.next_step(&estimated, rounds_left)? {
                 Ok(next) => step = next,

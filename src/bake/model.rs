@@ -198,8 +198,11 @@ pub const TARGET_FRACTION: f64 = 0.9;
 /// Rounds of refinement after the first estimate.
 pub const MAX_ROUNDS: u32 = 8;
 
-/// A round after which not so many times the gathers were made as before it is the last.
+/// A round is idle after which not so many times the gathers were made as before it.
 pub const MIN_PROGRESS: f64 = 1.01;
+
+/// So many idle rounds one after the other are the last.
+pub const MAX_IDLE_ROUNDS: u32 = 2;
 
 /// A setting is changed by this factor at least: less is not worth a round.
 pub const MIN_STEP: f64 = 1.25;

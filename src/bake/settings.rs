@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
-use crate::bake::light_survey::LightSurvey;
+use crate::bake::light_survey::{self, LightSurvey};
 use crate::bake::model;
 use crate::error::Error;
 use crate::gather::RefinementSettings;
@@ -144,6 +144,24 @@ impl BakeSettings {
     /// the diagonal of where the light is, and lights that mostly miss are gathered.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
         BakeSettings::by_survey(error, &LightSurvey::new(scene))
+    }
+
+    /// Lengths on each group as shares of its own diagonal, where that is smaller than that of where
+    /// the light is: for an error that every group is to meet.
+    pub(super) fn scale_groups(&mut self, scene: &Scene) {
+        let diagonal = light_survey::diagonal(self.solve.region.as_ref(), scene);
+        let mut bounds = vec![Aabb::EMPTY; scene.groups().len()];
+        for (t, triangle) in scene.triangles().iter().enumerate() {
+            let bounds = &mut bounds[triangle.group as usize];
+            scene.corners(t).into_iter().for_each(|corner| bounds.include(corner));
+        }
+        let scale = |bounds: Aabb| {
+            let share = bounds.diagonal() / diagonal;
+            if share > 0.0 && share < 1.0 && bounds.low.x <= bounds.high.x { share } else { 1.0 }
+        };
+        if let Some(gather) = &mut self.gather {
+            gather.refinement.group_scales = bounds.into_iter().map(scale).collect();
+        }
     }
 
     fn by_survey(error: f64, survey: &LightSurvey) -> BakeSettings {

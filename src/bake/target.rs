@@ -120,6 +120,9 @@ fn bake_to_error(
         return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
     }
     let mut settings = BakeSettings::for_error(target.error, scene);
+    if target.each_group {
+        settings.scale_groups(scene);
+    }
     (target.overrides)(&mut settings);
     pipeline::run(&settings, scene, backend, Some(target), progress)
 }

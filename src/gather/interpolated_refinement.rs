@@ -80,7 +80,9 @@ fn candidates(
     let candidate =
         |element: usize| {
             let node = samples.mesh.element(element);
-            let size = samples.mesh.longest_edge(node) / scale.growth(&samples.mesh, node);
+            let group_scale = settings.group_scale(samples.mesh.group(node));
+            let size =
+                samples.mesh.longest_edge(node) / scale.growth(&samples.mesh, node) / group_scale;
             let group_factor = settings.group_factor(samples.mesh.group(node));
             if !samples.is_splittable(element) || size <= settings.min_edge * group_factor {
                 return None;

@@ -120,7 +120,8 @@ pub(super) fn refinement_indicator(
         return 0.0;
     }
     let edge = samples.mesh.longest_edge(node);
-    let size = edge / scale.growth(&samples.mesh, node);
+    let group_scale = settings.group_scale(samples.mesh.group(node));
+    let size = edge / scale.growth(&samples.mesh, node) / group_scale;
     let group_factor = settings.group_factor(samples.mesh.group(node));
     // Half a gap's distance from its mouth, parallel plates see the half of what they see there
     // (Hottel's crossed strings): elements as long as the distance follow that.

@@ -34,6 +34,10 @@ pub struct RefinementSettings {
     /// grows with the distance from it, 1 + distance/diagonal times. With none, it holds
     /// everywhere.
     pub region: Option<Aabb>,
+    /// Factor of the smallest edge, and of the longest of the first mesh as elements are judged by it,
+    /// on the triangles of each group, above 0: for small objects in a large scene that are to be
+    /// as right as it. Those beyond the end of the list have 1.
+    pub group_scales: Vec<f64>,
     /// Factor of both tolerances and the smallest edge on the triangles of each group, above 0;
     /// those beyond the end of the list have 1.
     pub group_factors: Vec<f64>,
@@ -63,8 +67,14 @@ impl RefinementSettings {
             gap_factor: f64::INFINITY,
             gather_passes: 1,
             region: None,
+            group_scales: vec![],
             group_factors: vec![],
         }
+    }
+
+    /// Factor of lengths on triangles of `group`.
+    pub(crate) fn group_scale(&self, group: u32) -> f64 {
+        self.group_scales.get(group as usize).copied().unwrap_or(1.0)
     }
 
     /// Factor of the tolerances on triangles of `group`.
@@ -98,9 +108,11 @@ impl RefinementSettings {
             let place = format!("factor {} of gaps", self.gap_factor);
             return bad(place, "not above 0", "use 1 for no change");
         }
-        if let Some(k) = self.group_factors.iter().position(|f| f.is_nan() || *f <= 0.0) {
-            let place = format!("factor {} of group {k}", self.group_factors[k]);
-            return bad(place, "not above 0", "use 1 for no change");
+        for factors in [&self.group_factors, &self.group_scales] {
+            if let Some(k) = factors.iter().position(|f| f.is_nan() || *f <= 0.0) {
+                let place = format!("factor {} of group {k}", factors[k]);
+                return bad(place, "not above 0", "use 1 for no change");
+            }
         }
         Ok(())
     }

@@ -132,3 +132,18 @@ fn faint_sky_is_told_apart_from_the_lamp() {
     assert_eq!(baked.settings.solve.gathered_materials.len(), 1);
     assert!(baked.estimate.total > 0.01 && baked.estimate.total <= 0.05, "{:?}", baked.estimate);
 }
+
+#[test]
+fn each_group_meets_its_error_on_a_plane_under_a_sky() {
+    let scene = with(&with(&cornell(), &ground(5e5, -1.0)), &sky(5e5, 1.0));
+    let target = BakeTarget::ErrorEach(0.1);
+    let baked = target.bake(scene.clone(), &Backend::Cpu, keep_going).unwrap();
+    assert_eq!(baked.outcome, Outcome::Reached);
+    // The ground and all groups of the room, which has a millionth of the area.
+    assert_eq!(baked.groups.len(), cornell().groups().len() + 1);
+    assert_eq!(scene.groups()[baked.groups[0].group as usize], "ground");
+    for group in &baked.groups[1..] {
+        assert!(group.area_share < 1e-5, "{group:?}");
+        assert!(group.estimate.total <= 0.1 && group.estimate.samples >= 32, "{group:?}");
+    }
+}

@@ -138,6 +138,7 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
             gather_passes: sweeps,
             region: _,
             gap_factor,
+            group_scales,
             group_factors,
         } = &gather.refinement;
         report["gather_size"] = json!(element_size);
@@ -151,6 +152,7 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
         report["gather_levels"] = json!(everywhere);
         report["sweeps"] = json!(sweeps);
         report["gap_factor"] = json!(gap_factor);
+        report["group_scales"] = json!(group_scales);
         report["group_factors"] = json!(group_factors);
     }
     match report {
