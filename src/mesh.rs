@@ -139,8 +139,8 @@ impl Mesh {
     }
 
     /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
-    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes are
-    /// the same everywhere.
+    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes
+    /// are the same everywhere.
     ///
     /// # Errors
     /// Those of [`Mesh::new`].

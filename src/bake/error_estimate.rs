@@ -7,11 +7,11 @@
 //! ```
 //!
 //! with B the reflected radiosity (emission is known and has no error) and | | a length over the
-//! channels. Surfaces that reflect nothing have neither error nor weight. Places that nobody sees are
-//! left out: those that see backs in more than 95 % of their hemisphere, weighted by the cosine, or
-//! in more than half of it backs that nearly touch them. They are inside a solid or under what
-//! stands on them. A group of the scene has the same figure over its own area, with the floor of the
-//! scene.
+//! channels. Surfaces that reflect nothing have neither error nor weight. Places that nobody sees
+//! are left out: those that see backs in more than 95 % of their hemisphere, weighted by the
+//! cosine, or in more than half of it backs that nearly touch them. They are inside a solid or
+//! under what stands on them. A group of the scene has the same figure over its own area, with the
+//! floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result
@@ -25,11 +25,12 @@
 //!
 //! Points are spread over the groups as well as the area: each group is a stratum, and means are
 //! those of the strata, weighted by area. Within a stratum there are more points where errors are
-//! expected, each with the area that it stands for as its weight. The squared error of mesh and sampling is the first, plus
-//! one standard error of that mean, less half the noise; that of truncation continues the change as
-//! a geometric series in the mean reflectance. Light not shot is added as if it fell like the
-//! ambient term. Dim points that see surfaces nearer than their element is large are a part of their
-//! own, the gaps: what no mesh resolves is mostly there. This file does no gathering: see [`estimator`](super::estimator).
+//! expected, each with the area that it stands for as its weight. The squared error of mesh and
+//! sampling is the first, plus one standard error of that mean, less half the noise; that of
+//! truncation continues the change as a geometric series in the mean reflectance. Light not shot is
+//! added as if it fell like the ambient term. Dim points that see surfaces nearer than their
+//! element is large are a part of their own, the gaps: what no mesh resolves is mostly there. This
+//! file does no gathering: see [`estimator`](super::estimator).
 
 use glam::DVec3;
 
@@ -146,8 +147,8 @@ pub(super) struct ErrorSpread {
 /// The estimate of a result.
 pub(super) struct Estimate {
     pub whole: ErrorEstimate,
-    /// The whole where the light is: with a floor that is relative to the mean radiosity by light and
-    /// not by area, below which places weigh less. However much there is of a dark plane, a lit
+    /// The whole where the light is: with a floor that is relative to the mean radiosity by light
+    /// and not by area, below which places weigh less. However much there is of a dark plane, a lit
     /// room on it counts as it does without; in ordinary scenes it is about the whole.
     pub by_light: ErrorEstimate,
     /// The same group by group, in the order of the strata.
@@ -248,8 +249,8 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     Estimate { groups: groups.collect(), whole, by_light, spread }
 }
 
-/// [`StratumDeviations::by_light`]'s floor, W/m²: as that of the measure, of the mean radiosity that a
-/// reflected photon leaves.
+/// [`StratumDeviations::by_light`]'s floor, W/m²: as that of the measure, of the mean radiosity
+/// that a reflected photon leaves.
 fn lit_floor(means: &Means) -> f64 {
     let (flux, square) = (means.of(|d| d.reflected), means.of(|d| d.reflected.powi(2)));
     let mean = if flux > 0.0 { square / flux } else { 0.0 };

@@ -2,10 +2,10 @@
 //!
 //! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
 //! the reflecting area of each: half of them evenly, half where the residuals of the elements say
-//! that the error is, since few places make up most of a root mean square. Each gathers twice what lit the result, the second time
-//! from a hair beside, where rays and hemicubes are rotated otherwise; and once the result itself.
-//! The [statistics](super::error_estimate) of that are the estimate; the share of each vertex
-//! follows the residuals of the elements around it.
+//! that the error is, since few places make up most of a root mean square. Each gathers twice what
+//! lit the result, the second time from a hair beside, where rays and hemicubes are rotated
+//! otherwise; and once the result itself. The [statistics](super::error_estimate) of that are the
+//! estimate; the share of each vertex follows the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 
@@ -37,8 +37,8 @@ const FIRST_BATCH: usize = 16;
 /// Small enough that the light is the same, large enough to be another cell of the rotation.
 const JITTER: f64 = 1e-3;
 
-/// How far points are drawn towards the centroid of their face, a share of the way: on a side, where
-/// walls meet, it is undefined what is seen.
+/// How far points are drawn towards the centroid of their face, a share of the way: on a side,
+/// where walls meet, it is undefined what is seen.
 const INSET: f64 = 0.03;
 
 /// A result whose error is to be estimated.
@@ -110,8 +110,8 @@ struct SampleGathers {
 }
 
 impl ErrorEstimator<'_> {
-    /// Gathers at random points, and gives the estimate. `progress` is told how many points are done
-    /// of how many, and may stop: they are enough then.
+    /// Gathers at random points, and gives the estimate. `progress` is told how many points are
+    /// done of how many, and may stop: they are enough then.
     pub fn estimate(
         &self,
         counts: SampleCounts,
@@ -299,8 +299,8 @@ impl ErrorEstimator<'_> {
         (strata, samples)
     }
 
-    /// Fills in the mean square of the ambient term over the radiosity, or over `floor` (W/m²) where
-    /// that is more, of each of `strata`; and gives [`ErrorEstimate::unshot_bound`].
+    /// Fills in the mean square of the ambient term over the radiosity, or over `floor` (W/m²)
+    /// where that is more, of each of `strata`; and gives [`ErrorEstimate::unshot_bound`].
     fn unshot(&self, floor: f64, strata: &mut [Stratum]) -> f64 {
         let sources = self.sources();
         let mesh = &sources.mesh;
@@ -390,8 +390,8 @@ impl Sample {
     }
 }
 
-/// Whether a point is inside a solid, or under what nearly touches it; `diagonal` of where the light
-/// is, scene unit.
+/// Whether a point is inside a solid, or under what nearly touches it; `diagonal` of where the
+/// light is, scene unit.
 fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
     // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
     let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);

@@ -188,8 +188,9 @@ pub const COARSE_RAY_DIVISOR: u32 = 4;
 // ---- 3. Rounds of refinement -------------------------------------------------------------------
 
 /// The estimate has to be below this share of the error asked for. Errors at points that are chosen
-/// for being difficult (edges, contacts, penumbrae), as users compare them, were up to 1.5 times the
-/// estimate in `scenes/cornell_box.obj`, a room lit from the next room and one lit through a window.
+/// for being difficult (edges, contacts, penumbrae), as users compare them, were up to 1.5 times
+/// the estimate in `scenes/cornell_box.obj`, a room lit from the next room and one lit through a
+/// window.
 pub const SAFETY: f64 = 0.7;
 
 /// Share of [`SAFETY`] that a round aims at, since errors follow the laws only roughly.

@@ -146,8 +146,8 @@ impl BakeSettings {
         BakeSettings::by_survey(error, &LightSurvey::new(scene))
     }
 
-    /// Lengths on each group as shares of its own diagonal, where that is smaller than that of where
-    /// the light is: for an error that every group is to meet.
+    /// Lengths on each group as shares of its own diagonal, where that is smaller than that of
+    /// where the light is: for an error that every group is to meet.
     pub(super) fn scale_groups(&mut self, scene: &Scene) {
         let diagonal = light_survey::diagonal(self.solve.region.as_ref(), scene);
         let mut bounds = vec![Aabb::EMPTY; scene.groups().len()];

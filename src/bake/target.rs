@@ -29,9 +29,10 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BakeTarget {
-    /// Root mean square error of the reflected radiosity over the area, as a share of it, in (0, 1):
-    /// [`ErrorEstimate`](crate::ErrorEstimate) has the definition. The bake ends when the estimated
-    /// error is well below, or where it will not fall any further: see [`BakeResult::outcome`].
+    /// Root mean square error of the reflected radiosity over the area, as a share of it, in (0,
+    /// 1): [`ErrorEstimate`](crate::ErrorEstimate) has the definition. The bake ends when the
+    /// estimated error is well below, or where it will not fall any further: see
+    /// [`BakeResult::outcome`].
     Error(f64),
     /// The same for every group of the scene, however small its share of the area is.
     ErrorEach(f64),

@@ -12,8 +12,8 @@
 //! ```
 //!
 //! So what the source found hidden stays hidden. Receivers much larger than the patch are left as
-//! they are: there the centroid of the patch is the better one. All other entries are scaled alike, so that the
-//! row still sums to one.
+//! they are: there the centroid of the patch is the better one. All other entries are scaled alike,
+//! so that the row still sums to one.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -27,8 +27,8 @@ use crate::mesh::{Mesh, NodeId};
 /// reach, or just twice as large: rounding must not decide which of them are corrected.
 const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
 
-/// Receivers this many times as large as the patch keep their entries: their own centroid stands for
-/// them worse than the patch's for the patch.
+/// Receivers this many times as large as the patch keep their entries: their own centroid stands
+/// for them worse than the patch's for the patch.
 const MAX_RECEIVER_SIZE: f64 = 2.0;
 
 /// Rows of another source, with the entries of near receivers corrected by closed forms.

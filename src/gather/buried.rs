@@ -1,9 +1,9 @@
 //! Values at buried vertices: those under something that touches their surface.
 //!
-//! A vertex inside a box that stands on its floor sees no light. Where its elements reach out of the
-//! box, though, linear interpolation would carry its darkness there (a light or shadow leak). So it
-//! gets a value extrapolated from its neighbours outside; further inside vertices keep the darkness
-//! that they see:
+//! A vertex inside a box that stands on its floor sees no light. Where its elements reach out of
+//! the box, though, linear interpolation would carry its darkness there (a light or shadow leak).
+//! So it gets a value extrapolated from its neighbours outside; further inside vertices keep the
+//! darkness that they see:
 //!
 //! ```text
 //!            box            1. gradients at the vertices outside, from elements all outside

@@ -132,8 +132,8 @@ impl SurfaceOffset {
     }
 }
 
-/// Whether a point lies inside something that touches its surface: it sees almost nothing but backs,
-/// and those nearer than `touching` (scene unit); or nothing else at all.
+/// Whether a point lies inside something that touches its surface: it sees almost nothing but
+/// backs, and those nearer than `touching` (scene unit); or nothing else at all.
 pub(crate) fn is_buried(sample: &IrradianceSample, touching: f64) -> bool {
     let is_near = sample.inverse_distance * touching > 1.0;
     sample.backface > buried::BURIED && (is_near || sample.backface > buried::INSIDE)

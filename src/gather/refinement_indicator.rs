@@ -155,7 +155,8 @@ pub(super) fn refinement_indicator(
             let extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
             extrapolated.map(end_error).fold(indicator, f64::max)
         }
-        // Every corner sees something much nearer than the others are: what lies between is unknown.
+        // Every corner sees something much nearer than the others are: what lies between is
+        // unknown.
         None if gap_factor.is_finite() && samples.is_narrow(e) => UNKNOWN_INDICATOR,
         None => {
             let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;

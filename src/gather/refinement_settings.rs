@@ -34,9 +34,9 @@ pub struct RefinementSettings {
     /// grows with the distance from it, 1 + distance/diagonal times. With none, it holds
     /// everywhere.
     pub region: Option<Aabb>,
-    /// Factor of the smallest edge, and of the longest of the first mesh as elements are judged by it,
-    /// on the triangles of each group, above 0: for small objects in a large scene that are to be
-    /// as right as it. Those beyond the end of the list have 1.
+    /// Factor of the smallest edge, and of the longest of the first mesh as elements are judged by
+    /// it, on the triangles of each group, above 0: for small objects in a large scene that are to
+    /// be as right as it. Those beyond the end of the list have 1.
     pub group_scales: Vec<f64>,
     /// Factor of both tolerances and the smallest edge on the triangles of each group, above 0;
     /// those beyond the end of the list have 1.
@@ -55,8 +55,8 @@ impl RefinementSettings {
     /// Default of [`RefinementSettings::max_elements`], chosen by hand; no measurement kept.
     pub const DEFAULT_MAX_ELEMENTS: usize = 1 << 19;
 
-    /// Refines down to elements with edges of `min_edge` (scene unit), in gaps too, with the default
-    /// tolerances, no uniform subdivision and one pass.
+    /// Refines down to elements with edges of `min_edge` (scene unit), in gaps too, with the
+    /// default tolerances, no uniform subdivision and one pass.
     pub fn new(min_edge: f64) -> RefinementSettings {
         RefinementSettings {
             surplus_tolerance: RefinementSettings::DEFAULT_SURPLUS_TOLERANCE,

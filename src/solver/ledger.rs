@@ -45,9 +45,10 @@ impl Ledger {
     }
 
     /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
-    /// fell evenly on all surfaces that reflect, again and again: the ambient term of Cohen, Chen, Wallace and
-    /// Greenberg (1988). For early pictures, or to correct for what was not shot; it knows nothing
-    /// of where that would have gone. Returns the ambient radiosity, W/m² per unit of reflectance.
+    /// fell evenly on all surfaces that reflect, again and again: the ambient term of Cohen, Chen,
+    /// Wallace and Greenberg (1988). For early pictures, or to correct for what was not shot; it
+    /// knows nothing of where that would have gone. Returns the ambient radiosity, W/m² per unit of
+    /// reflectance.
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
         let ambient = self.ambient(mesh);
         for (e, b) in radiosity.iter_mut().enumerate() {

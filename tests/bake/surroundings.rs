@@ -116,7 +116,8 @@ fn sky_of_a_black_box_lights_a_plane_evenly() {
         let light = mean_light(&baked) / 3.0;
         assert!((light - 0.5).abs() < 1e-3, "{half}: {light}");
         assert_eq!(baked.outcome, Outcome::Reached);
-        // The sky reflects nothing: it has neither error nor weight, nor more elements than it must.
+        // The sky reflects nothing: it has neither error nor weight, nor more elements than it
+        // must.
         assert_eq!(baked.groups.len(), 1);
         assert_eq!(baked.groups[0].area_share, 1.0);
         assert!(baked.estimate.total < 0.01, "{:?}", baked.estimate);

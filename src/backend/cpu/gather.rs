@@ -200,8 +200,8 @@ impl RayGather {
         let Light { triangles, surface, .. } = &self.lights.lights[light as usize];
         let area = surface.total_area();
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        // Both coordinates are rotated: where only a strip of the light is seen, points that are the
-        // same for all places would be off in the same direction everywhere.
+        // Both coordinates are rotated: where only a strip of the light is seen, points that are
+        // the same for all places would be off in the same direction everywhere.
         let second_rotation = (rotation * SECOND_ROTATION).fract();
         for i in range {
             let [x, y] = sobol_02_point(i);

@@ -253,7 +253,7 @@ fn residuals_are_scaled_to_the_error_of_the_mesh() {
 fn by_light_a_dark_plane_changes_nothing() {
     let off = |k: usize| Observation {
         stratum: 0,
-        interpolated: (1.0 + if k % 2 == 0 { 0.1 } else { 0.02 }) * Rgb::ONE,
+        interpolated: (1.0 + if k.is_multiple_of(2) { 0.1 } else { 0.02 }) * Rgb::ONE,
         ..exact()
     };
     let dim = 1e-9 * Rgb::ONE;

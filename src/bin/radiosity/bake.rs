@@ -19,8 +19,8 @@ use crate::report::Report;
 
 pub const USAGE: &str = "\
 usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
-            [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--image W,H] [--pixel-gather]
-            [--elements] [--adapter NAME | --cpu]
+            [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
+            [--image W,H] [--pixel-gather] [--elements] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and, with
 a camera, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless

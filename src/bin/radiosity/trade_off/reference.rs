@@ -82,8 +82,8 @@ impl TruthPoint {
         self.kind == "area"
     }
 
-    /// The error of `surface` at the point, as a share of its radiosity or of `dim` (W/m²) where that
-    /// is more, in the nearest face within `limit` that faces alike.
+    /// The error of `surface` at the point, as a share of its radiosity or of `dim` (W/m²) where
+    /// that is more, in the nearest face within `limit` that faces alike.
     fn error(&self, surface: &VertexMesh, limit: f64, dim: f64) -> Option<f64> {
         let mut nearest: Option<Location> = None;
         for face in &surface.faces {
