@@ -35,6 +35,7 @@ mod progress;
 mod result;
 mod settings;
 mod shooting_phase;
+mod strata;
 mod target;
 
 pub use error_estimate::{ErrorEstimate, GroupError};

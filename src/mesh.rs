@@ -138,38 +138,6 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
-    /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
-    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes
-    /// are the same everywhere.
-    ///
-    /// # Errors
-    /// Those of [`Mesh::new`].
-    pub(crate) fn sized(
-        scene: Arc<Scene>,
-        sizing: &ElementSizing,
-        max_depth: u32,
-    ) -> Result<Mesh, Error> {
-        if sizing.is_uniform(&scene) {
-            return Mesh::new(scene, sizing.size);
-        }
-        let lengths: Vec<f64> =
-            (0..scene.triangles().len()).map(|t| longest_edge(scene.corners(t))).collect();
-        let is_inner = |t: usize, cell: Cell| {
-            let edge = lengths[t] / f64::from(1u32 << cell.level) * (1.0 - 1e-12);
-            cell.level < max_depth
-                && edge > sizing.size
-                && edge > sizing.size_at(&scene, t, &cell_corners(scene.corners(t), cell))
-        };
-        let wanted: usize = lengths.iter().enumerate().map(|(t, _)| leaves(t, &is_inner)).sum();
-        if wanted > Mesh::MAX_ELEMENTS {
-            let place = format!("element size {}", sizing.size);
-            let found = format!("asks for {wanted} elements");
-            let remedy = format!("at most {}: use a larger size", Mesh::MAX_ELEMENTS);
-            return Err(Error::new(ErrorKind::Setting, place, found, remedy));
-        }
-        Ok(Mesh::refined_where(scene.clone(), is_inner))
-    }
-
     /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell
     /// has children.
     fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
@@ -430,18 +398,4 @@ impl Mesh {
 fn cell_corners([a, b, c]: [DVec3; 3], cell: Cell) -> [DVec3; 3] {
     // Weights that sum to one exactly, so that corners of the triangle stay what they are.
     cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
-}
-
-/// Leaves of the quadtree of triangle `t` whose inner cells `is_inner` tells; those beyond
-/// [`Mesh::MAX_ELEMENTS`] are not counted.
-fn leaves(t: usize, is_inner: &impl Fn(usize, Cell) -> bool) -> usize {
-    let mut pending = vec![Cell::ROOT];
-    let mut count = 0;
-    while let Some(cell) = pending.pop() {
-        if count > Mesh::MAX_ELEMENTS {
-            break;
-        }
-        if is_inner(t, cell) { pending.extend(cell.children()) } else { count += 1 }
-    }
-    count
 }

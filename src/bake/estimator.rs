@@ -10,13 +10,13 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 
 use crate::bake::controller::Judged;
 use crate::bake::error_estimate::{
     self, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError, Observation, Stratum,
 };
 use crate::bake::model;
+use crate::bake::strata::{SampleCounts, SampledFace, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
@@ -54,15 +54,6 @@ pub(super) struct ErrorEstimator<'a> {
     pub gather_passes: u32,
     /// Diagonal of where the light is, scene unit.
     pub diagonal: f64,
-}
-
-/// How many random points there are to be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SampleCounts {
-    /// Over all.
-    pub total: usize,
-    /// On each group, at least, as far as there are not too many groups.
-    pub per_group: usize,
 }
 
 /// The estimated error of a result.
@@ -397,60 +388,4 @@ fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
     let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
     sample.backface > buried::HIDDEN
         || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
-}
-
-/// A face that reflects.
-struct SampledFace {
-    face: usize,
-    group: u32,
-    /// Length unit squared.
-    area: f64,
-    /// The area times the squared relative residual of the element: up to a factor, what the face
-    /// is expected to add to the squared error.
-    error: f64,
-    /// The area times the reflected radiosity, W: a length over the channels.
-    flux: f64,
-}
-
-/// The faces of a stratum, and the points that it gets.
-struct StratumFaces {
-    group: Option<u32>,
-    faces: Vec<SampledFace>,
-    area: f64,
-    flux: f64,
-    samples: usize,
-}
-
-/// The strata of `faces`: the largest groups, and one for all others if there are too many.
-fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<StratumFaces> {
-    let mut by_group: Vec<StratumFaces> = vec![];
-    let mut index = FxHashMap::default();
-    for face in faces {
-        let k = *index.entry(face.group).or_insert_with(|| {
-            let group = Some(face.group);
-            let (faces, area, flux) = (vec![], 0.0, 0.0);
-            by_group.push(StratumFaces { group, faces, area, flux, samples: 0 });
-            by_group.len() - 1
-        });
-        by_group[k].area += face.area;
-        by_group[k].flux += face.flux;
-        by_group[k].faces.push(face);
-    }
-    let total: f64 = by_group.iter().map(|s| s.area).sum();
-    let total_flux: f64 = by_group.iter().map(|s| s.flux).sum::<f64>().max(f64::MIN_POSITIVE);
-    by_group.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.group.cmp(&b.group)));
-    let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
-    if by_group.len() > single.max(1) {
-        let small = by_group.split_off(single.min(by_group.len()));
-        let area = small.iter().map(|s| s.area).sum();
-        let flux = small.iter().map(|s| s.flux).sum();
-        let faces = small.into_iter().flat_map(|s| s.faces).collect();
-        by_group.push(StratumFaces { group: None, faces, area, flux, samples: 0 });
-    }
-    for stratum in &mut by_group {
-        let share = (stratum.area / total).max(stratum.flux / total_flux);
-        let even = (share * counts.total as f64).round() as usize;
-        stratum.samples = even.max(counts.per_group).max(1);
-    }
-    by_group
 }

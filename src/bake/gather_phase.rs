@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
-use crate::bake::estimator::{ErrorEstimator, EstimatedError, SampleCounts};
+use crate::bake::estimator::{ErrorEstimator, EstimatedError};
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::light_survey;
 use crate::bake::model;
@@ -25,6 +25,7 @@ use crate::bake::progress::{BakeProgress, Reporter, StageClock};
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase::ShotLight;
+use crate::bake::strata::SampleCounts;
 use crate::error::Error;
 use crate::gather::Gather;
 use crate::gather::adaptive::AdaptiveGather;

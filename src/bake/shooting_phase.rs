@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::bake::controller::ErrorTarget;
-use crate::bake::estimator::{ErrorEstimator, EstimatedError, SampleCounts};
+use crate::bake::estimator::{ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
 use crate::bake::light_survey;
 use crate::bake::model;
@@ -23,6 +23,7 @@ use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
+use crate::bake::strata::SampleCounts;
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;

@@ -10,10 +10,14 @@
 //!
 //! A plane of any size then adds a number of elements that grows as the logarithm of its size.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
+use super::{Cell, Mesh, cell_corners};
+use crate::error::{Error, ErrorKind};
 use crate::geometry::aabb::Aabb;
-use crate::scene::{Scene, Triangle};
+use crate::scene::{Scene, Triangle, longest_edge};
 
 /// How large elements may be, place by place.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,6 +46,54 @@ impl ElementSizing {
     }
 }
 
+impl Mesh {
+    /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
+    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes
+    /// are the same everywhere.
+    ///
+    /// # Errors
+    /// Those of [`Mesh::new`].
+    pub(crate) fn sized(
+        scene: Arc<Scene>,
+        sizing: &ElementSizing,
+        max_depth: u32,
+    ) -> Result<Mesh, Error> {
+        if sizing.is_uniform(&scene) {
+            return Mesh::new(scene, sizing.size);
+        }
+        let lengths: Vec<f64> =
+            (0..scene.triangles().len()).map(|t| longest_edge(scene.corners(t))).collect();
+        let is_inner = |t: usize, cell: Cell| {
+            let edge = lengths[t] / f64::from(1u32 << cell.level) * (1.0 - 1e-12);
+            cell.level < max_depth
+                && edge > sizing.size
+                && edge > sizing.size_at(&scene, t, &cell_corners(scene.corners(t), cell))
+        };
+        let wanted: usize = lengths.iter().enumerate().map(|(t, _)| leaves(t, &is_inner)).sum();
+        if wanted > Mesh::MAX_ELEMENTS {
+            let place = format!("element size {}", sizing.size);
+            let found = format!("asks for {wanted} elements");
+            let remedy = format!("at most {}: use a larger size", Mesh::MAX_ELEMENTS);
+            return Err(Error::new(ErrorKind::Setting, place, found, remedy));
+        }
+        Ok(Mesh::refined_where(scene.clone(), is_inner))
+    }
+}
+
+/// Leaves of the quadtree of triangle `t` whose inner cells `is_inner` tells; those beyond
+/// [`Mesh::MAX_ELEMENTS`] are not counted.
+fn leaves(t: usize, is_inner: &impl Fn(usize, Cell) -> bool) -> usize {
+    let mut pending = vec![Cell::ROOT];
+    let mut count = 0;
+    while let Some(cell) = pending.pop() {
+        if count > Mesh::MAX_ELEMENTS {
+            break;
+        }
+        if is_inner(t, cell) { pending.extend(cell.children()) } else { count += 1 }
+    }
+    count
+}
+
 /// By how much larger than in `region` an element with these `corners` may be.
 pub(crate) fn size_growth(region: Option<&Aabb>, corners: &[DVec3; 3]) -> f64 {
     region.map_or(1.0, |region| {
@@ -54,9 +106,7 @@ pub(crate) fn size_growth(region: Option<&Aabb>, corners: &[DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Mesh;
     use crate::scene::Material;
-    use std::sync::Arc;
 
     /// A square from −`half` to `half`, of two triangles.
     fn plane(half: f64) -> Arc<Scene> {

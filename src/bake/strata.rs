@@ -1,0 +1,107 @@
+//! The groups of a scene as strata: how many random points each gets.
+//!
+//! Every group has some points however small it is, and the rest follow its share of the area or of
+//! the light, whichever is larger. Where there are very many groups the small ones are one stratum.
+
+use rustc_hash::FxHashMap;
+
+use crate::bake::model;
+
+/// How many random points there are to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SampleCounts {
+    /// Over all.
+    pub total: usize,
+    /// On each group, at least, as far as there are not too many groups.
+    pub per_group: usize,
+}
+
+/// A face that reflects.
+pub(super) struct SampledFace {
+    pub face: usize,
+    pub group: u32,
+    /// Length unit squared.
+    pub area: f64,
+    /// The area times the squared relative residual of the element: up to a factor, what the face
+    /// is expected to add to the squared error.
+    pub error: f64,
+    /// The area times the reflected radiosity, W: a length over the channels.
+    pub flux: f64,
+}
+
+/// The faces of a stratum, and the points that it gets.
+pub(super) struct StratumFaces {
+    pub group: Option<u32>,
+    pub faces: Vec<SampledFace>,
+    pub area: f64,
+    pub flux: f64,
+    pub samples: usize,
+}
+
+/// The strata of `faces`: the largest groups, and one for all others if there are too many.
+pub(super) fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<StratumFaces> {
+    let mut by_group: Vec<StratumFaces> = vec![];
+    let mut index = FxHashMap::default();
+    for face in faces {
+        let k = *index.entry(face.group).or_insert_with(|| {
+            let group = Some(face.group);
+            let (faces, area, flux) = (vec![], 0.0, 0.0);
+            by_group.push(StratumFaces { group, faces, area, flux, samples: 0 });
+            by_group.len() - 1
+        });
+        by_group[k].area += face.area;
+        by_group[k].flux += face.flux;
+        by_group[k].faces.push(face);
+    }
+    let total: f64 = by_group.iter().map(|s| s.area).sum();
+    let total_flux: f64 = by_group.iter().map(|s| s.flux).sum::<f64>().max(f64::MIN_POSITIVE);
+    by_group.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.group.cmp(&b.group)));
+    let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
+    if by_group.len() > single.max(1) {
+        let small = by_group.split_off(single.min(by_group.len()));
+        let area = small.iter().map(|s| s.area).sum();
+        let flux = small.iter().map(|s| s.flux).sum();
+        let faces = small.into_iter().flat_map(|s| s.faces).collect();
+        by_group.push(StratumFaces { group: None, faces, area, flux, samples: 0 });
+    }
+    for stratum in &mut by_group {
+        let share = (stratum.area / total).max(stratum.flux / total_flux);
+        let even = (share * counts.total as f64).round() as usize;
+        stratum.samples = even.max(counts.per_group).max(1);
+    }
+    by_group
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn face(group: u32, area: f64, flux: f64) -> SampledFace {
+        SampledFace { face: group as usize, group, area, error: 0.0, flux }
+    }
+
+    #[test]
+    fn small_and_bright_groups_have_points() {
+        let faces = vec![face(0, 1e6, 1.0), face(1, 1.0, 99.0), face(2, 1.0, 0.0)];
+        let strata = strata_of(faces, SampleCounts { total: 200, per_group: 8 });
+        let found: Vec<_> = strata.iter().map(|s| (s.group, s.samples)).collect();
+        // By area, by light, and the least.
+        assert_eq!(found, [(Some(0), 200), (Some(1), 198), (Some(2), 8)]);
+    }
+
+    #[test]
+    fn groups_beyond_the_largest_are_one_stratum() {
+        let count = model::MAX_GROUPS as u32 + 10;
+        let faces = (0..count).map(|g| face(g, f64::from(g + 1), 1.0)).collect();
+        let strata = strata_of(faces, SampleCounts { total: 100, per_group: 1 });
+        assert_eq!(strata.len(), model::MAX_GROUPS + 1);
+        assert_eq!(strata[0].group, Some(count - 1), "the largest first");
+        let rest = &strata[model::MAX_GROUPS];
+        assert_eq!((rest.group, rest.faces.len(), rest.area), (None, 10, 55.0));
+        let all = strata_of(
+            vec![face(3, 1.0, 0.0), face(4, 1.0, 0.0)],
+            SampleCounts { total: 64, per_group: 0 },
+        );
+        assert_eq!((all.len(), all[0].group, all[0].samples), (1, None, 64), "for a pilot");
+    }
+}
