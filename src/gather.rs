@@ -115,7 +115,27 @@ impl<G: Gather + ?Sized> Gather for Box<G> {
     }
 }
 
+/// Reflected radiosity below this share of its mean over the area that reflects counts as that much
+/// when errors are made relative, so that the insides of gaps do not take most of the elements.
+/// Chosen by hand.
+pub(crate) const RADIOSITY_FLOOR_SHARE: f64 = 0.05;
+
 impl RadiosityField<'_> {
+    /// Reflected radiosity below which errors are relative to this instead, W/m²: a length over the
+    /// channels. What is darker is not worth most of the elements.
+    pub(crate) fn radiosity_floor(&self) -> f64 {
+        let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
+        for (e, corners) in self.corners.iter().enumerate() {
+            let node = self.mesh.element(e);
+            if self.mesh.material(node).reflects() {
+                let mean = corners.iter().map(|&v| self.reflected[v as usize]).sum::<Rgb>() / 3.0;
+                flux += mean.length() * self.mesh.area(node);
+                area += self.mesh.area(node);
+            }
+        }
+        RADIOSITY_FLOOR_SHARE * flux / area
+    }
+
     /// Reflected radiosity at barycentric position (`u`, `v`) of the scene's triangle `t`, W/m²
     /// per channel: `u` and `v` are the weights of its second and third corner.
     pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {

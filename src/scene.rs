@@ -205,6 +205,13 @@ impl Scene {
         Aabb::from_points((0..self.triangles.len()).flat_map(|t| self.corners(t)))
     }
 
+    /// The axis-aligned box around all triangles that reflect; around all, if none does.
+    pub(crate) fn reflecting_bounds(&self) -> Aabb {
+        let reflecting = (0..self.triangles.len()).filter(|&t| self.material(t).reflects());
+        let mut corners = reflecting.flat_map(|t| self.corners(t)).peekable();
+        if corners.peek().is_some() { Aabb::from_points(corners) } else { self.bounds() }
+    }
+
     /// The step between 64-bit coordinates of the scene's largest size, scene unit: points of one
     /// plane may be off it by a few of these.
     pub(crate) fn coordinate_ulp(&self) -> f64 {

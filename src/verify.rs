@@ -44,7 +44,6 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind, quoted};
-use crate::geometry::aabb::Aabb;
 use crate::progress::BatchSizer;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
@@ -309,14 +308,11 @@ impl<'a> Sampler<'a> {
         settings: &'a Settings,
     ) -> Result<Sampler<'a>, Error> {
         let stratum = |surface| Stratum { surface, drawn: 0, points: vec![] };
-        let reflecting =
-            (0..scene.triangles().len()).filter(|&t| scene.material(t).reflectance != Rgb::ZERO);
-        let reflecting = Aabb::from_points(reflecting.flat_map(|t| scene.corners(t)));
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             solution: SolutionLookup::new(solution, scene.bounds().diagonal())?,
             tracer: PathTracer::new(scene),
-            near: NEAR * reflecting.diagonal(),
+            near: NEAR * scene.reflecting_bounds().diagonal(),
             scene,
             settings,
             paths: 0,

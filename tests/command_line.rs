@@ -121,18 +121,19 @@ fn bake_goes_on_from_a_saved_state_with_the_same_bytes() {
     refused(&[cornell(), "--cpu", "--solver", "newton"], &["'newton'", "gauss-seidel"]);
 }
 
+/// Writes lit.obj: a grey square, and a lamp of its size above it.
+fn lit_plates(folder: &Path) -> PathBuf {
+    write(folder, "lit.mtl", "newmtl lamp\nKd 0 0 0\nKe 5 5 5\nnewmtl grey\nKd 0.5 0.5 0.5\n");
+    let plates = "mtllib lit.mtl\nusemtl grey\no floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
+                  f 1 2 3 4\nusemtl lamp\no lamp\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
+    write(folder, "lit.obj", plates)
+}
+
 #[test]
 fn bake_gathers_without_a_gpu() {
     let folder = tempfile::tempdir().unwrap();
     let stem = folder.path().join("lit");
-    write(
-        folder.path(),
-        "lit.mtl",
-        "newmtl lamp\nKd 0 0 0\nKe 5 5 5\nnewmtl grey\nKd 0.5 0.5 0.5\n",
-    );
-    let plates = "mtllib lit.mtl\nusemtl grey\no floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
-                  f 1 2 3 4\nusemtl lamp\no lamp\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
-    let scene = write(folder.path(), "lit.obj", plates);
+    let scene = lit_plates(folder.path());
     let mut args = vec![scene.to_str().unwrap(), "--out", stem.to_str().unwrap(), "--cpu"];
     args.extend(["--element-size", "0.4", "--hemicube", "16", "--gather", "needed"]);
     args.extend(["--smallest", "0.2"]);
@@ -176,14 +177,7 @@ fn view_factors_writes_a_matrix_a_file() {
 fn verify_prints_what_was_told_beside_what_it_measures() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).display().to_string();
-    write(
-        folder.path(),
-        "lit.mtl",
-        "newmtl lamp\nKd 0 0 0\nKe 5 5 5\nnewmtl grey\nKd 0.5 0.5 0.5\n",
-    );
-    let plates = "mtllib lit.mtl\nusemtl grey\no floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
-                  f 1 2 3 4\nusemtl lamp\no lamp\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
-    write(folder.path(), "lit.obj", plates);
+    lit_plates(folder.path());
     // The floor sees a fifth of the lamp's light at its middle, a seventh at its corners.
     let vertex = |p: &str, b: f64| format!("{p} {b} {b} {b}\n");
     let corners: String = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"].map(|p| vertex(p, 1.1)).concat();

@@ -110,7 +110,7 @@ impl ErrorEstimator<'_> {
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<EstimatedError, Error> {
         let radiosity_floor = self.radiosity_floor();
-        let (mut strata, samples) = self.samples(counts);
+        let (mut strata, samples) = self.samples(counts, radiosity_floor);
         let gathers = self.gather(&samples, gatherer, progress)?;
         let observed = samples.iter().zip(&gathers);
         let observations: Vec<Observation> = observed
@@ -134,13 +134,13 @@ impl ErrorEstimator<'_> {
     /// so many rays and not more; by `count` points.
     pub fn sampling_error(&self, count: usize, gatherer: &mut dyn Gather) -> Result<f64, Error> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
-        let (strata, samples) = self.samples(counts);
+        let floor = self.radiosity_floor();
+        let (strata, samples) = self.samples(counts, floor);
         let points: Vec<GatherPoint> = samples.iter().map(|s| s.point).collect();
         let jittered: Vec<GatherPoint> = samples.iter().map(Sample::jittered).collect();
         let sources = self.sources().radiosity_field();
         let first = gatherer.gather(&sources, &points)?;
         let second = gatherer.gather(&sources, &jittered)?;
-        let floor = self.radiosity_floor();
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mut sums = [(0.0, 0.0); 2];
         for (sample, (first, second)) in samples.iter().zip(first.iter().zip(&second)) {
@@ -156,20 +156,9 @@ impl ErrorEstimator<'_> {
         Ok((model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt())
     }
 
-    /// Reflected radiosity below which errors are relative to this instead, W/m²: a share of its
-    /// mean over the area that reflects. What is darker is not worth most of the elements.
+    /// Reflected radiosity below which errors are relative to this instead, W/m².
     fn radiosity_floor(&self) -> f64 {
-        let mesh = &self.light.mesh;
-        let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
-        for (e, corners) in self.light.corners.iter().enumerate() {
-            let node = mesh.element(e);
-            if mesh.material(node).reflects() {
-                let reflected = corners.iter().map(|&v| self.light.reflected[v as usize]);
-                flux += mesh.area(node) * reflected.sum::<Rgb>().length() / 3.0;
-                area += mesh.area(node);
-            }
-        }
-        (model::RADIOSITY_FLOOR * flux / area).max(f64::MIN_POSITIVE)
+        self.light.radiosity_field().radiosity_floor().max(f64::MIN_POSITIVE)
     }
 
     /// What lights the vertices.
@@ -215,8 +204,8 @@ impl ErrorEstimator<'_> {
     }
 
     /// Points spread over groups and evenly over the faces of each that reflect, and the strata
-    /// that they stand for.
-    fn samples(&self, counts: SampleCounts) -> (Vec<Stratum>, Vec<Sample>) {
+    /// that they stand for. Residuals are relative to no less than `floor`, W/m².
+    fn samples(&self, counts: SampleCounts, floor: f64) -> (Vec<Stratum>, Vec<Sample>) {
         let (surface, mesh) = (&self.light.surface, &self.light.mesh);
         let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
         let area = |f: &[u32; 3]| {
@@ -250,7 +239,6 @@ impl ErrorEstimator<'_> {
                 rotation: rotations.at(point.position, point.near),
             }
         };
-        let floor = self.radiosity_floor();
         let faces = (0..surface.faces.len()).filter_map(|face| {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);

@@ -63,12 +63,14 @@ const MIN_CONCENTRATION: f64 = 4.0;
 impl LightSurvey {
     /// Looks at `scene`.
     pub fn new(scene: &Scene) -> LightSurvey {
-        let bounds = reflecting_bounds(scene);
+        let bounds = scene.reflecting_bounds();
         let mut survey =
             LightSurvey { region: None, diagonal: bounds.diagonal(), gathered_materials: vec![] };
         let lights = strongest_lights(scene);
         let places = places(scene);
-        if lights.is_empty() || places.is_empty() {
+        // A scene with more triangles than a mesh may have elements is refused when it is cut.
+        let is_too_large = scene.triangles().len() > Mesh::MAX_ELEMENTS;
+        if lights.is_empty() || places.is_empty() || is_too_large {
             return survey;
         }
         // Direct light at each place: flux over the area that it stands for, W.
@@ -100,15 +102,7 @@ impl LightSurvey {
 
 /// Diagonal of the `region` of the light or, with none, of all surfaces that reflect; scene unit.
 pub(super) fn diagonal(region: Option<&Aabb>, scene: &Scene) -> f64 {
-    region.map_or_else(|| reflecting_bounds(scene).diagonal(), Aabb::diagonal)
-}
-
-/// The box around all triangles that reflect; around all, if none does.
-fn reflecting_bounds(scene: &Scene) -> Aabb {
-    let triangles = 0..scene.triangles().len();
-    let reflecting = triangles.filter(|&t| scene.material(t).reflects());
-    let bounds = Aabb::from_points(reflecting.flat_map(|t| scene.corners(t)));
-    if bounds.low.x <= bounds.high.x { bounds } else { scene.bounds() }
+    region.map_or_else(|| scene.reflecting_bounds().diagonal(), Aabb::diagonal)
 }
 
 /// All triangles of one material that emits.

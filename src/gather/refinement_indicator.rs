@@ -14,10 +14,10 @@
 
 use glam::DVec2;
 
-use super::RadiosityField;
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::surplus::{HierarchicalSurplus, NodeValue};
+use super::{RADIOSITY_FLOOR_SHARE, RadiosityField};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Aabb, Rgb, longest_edge};
@@ -46,10 +46,6 @@ const END_DIFFERENCE_SHARE: f64 = 0.25;
 /// of all that is known.
 const UNKNOWN_INDICATOR: f64 = 1e3;
 
-/// Reflected radiosity below this share of the scene's mean counts as that much when errors are
-/// made relative, so that the insides of gaps do not take most of the elements. Chosen by hand.
-const RADIOSITY_FLOOR_SHARE: f64 = 0.05;
-
 /// A vertex is dim if it reflects less than this many times the floor: a quarter of the mean.
 pub(crate) const GAP_DIMNESS: f64 = 0.25 / RADIOSITY_FLOOR_SHARE;
 
@@ -70,31 +66,16 @@ pub(crate) struct ErrorScale {
 impl ErrorScale {
     /// For a gather of `field` on `mesh`, whose light is mostly in `region`.
     pub fn new(mesh: &Mesh, field: &RadiosityField, region: Option<Aabb>) -> ErrorScale {
-        let mut flux = 0.0;
-        let mut area = f64::MIN_POSITIVE;
-        for (e, corners) in field.corners.iter().enumerate() {
-            if !field.mesh.material(field.mesh.element(e)).reflects() {
-                continue;
-            }
-            let element_area = field.mesh.area(field.mesh.element(e));
-            let mean = corners.iter().map(|&v| field.reflected[v as usize]).sum::<Rgb>() / 3.0;
-            flux += mean.length() * element_area;
-            area += element_area;
-        }
         let reflecting =
             (0..mesh.element_count()).filter(|&e| mesh.material(mesh.element(e)).reflects());
         let edge = |e| {
             let corners = mesh.corners(mesh.element(e));
             longest_edge(corners) / size_growth(region.as_ref(), &corners)
         };
-        let mut bounds = Aabb::EMPTY;
-        for e in reflecting.clone() {
-            mesh.corners(mesh.element(e)).into_iter().for_each(|corner| bounds.include(corner));
-        }
-        let diagonal = region.unwrap_or(bounds).diagonal().max(0.0);
+        let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
             touching: buried::NEAR_BACKS_DISTANCE * diagonal,
-            radiosity_floor: RADIOSITY_FLOOR_SHARE * flux / area,
+            radiosity_floor: field.radiosity_floor(),
             max_edge: reflecting.map(edge).fold(0.0, f64::max),
             region,
         }
