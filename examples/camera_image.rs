@@ -16,6 +16,7 @@ fn main() -> Result<(), Error> {
     let camera = Camera {
         eye: DVec3::new(278.0, 273.0, -800.0),
         target: DVec3::new(278.0, 273.0, 0.0),
+        up: DVec3::Y,
         vertical_fov: 39.3077,
     };
     let mut gather = backend.gather(&baked.light.mesh, 512)?; // rays a pixel

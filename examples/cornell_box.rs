@@ -29,6 +29,7 @@ fn main() -> Result<(), radiosity::Error> {
     let camera = Camera {
         eye: DVec3::new(278.0, 273.0, -800.0), // millimetres, as the scene
         target: DVec3::new(278.0, 273.0, 0.0),
+        up: DVec3::Y,
         vertical_fov: 39.3077, // degrees
     };
     let image = camera.image(surface, 512, 512, 4)?; // 4 × 4 rays a pixel

@@ -8,7 +8,10 @@
 //! Rays lie on a grid sheared by one sub-pixel per row and column (n-rooks), so that an edge along
 //! the pixels crosses them one by one, which makes n² levels of antialiasing instead of n.
 
+mod framing;
 mod gathered;
+mod up_axis;
+mod view_score;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -18,13 +21,16 @@ use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// A pinhole camera. Up in the image is +y, or −z where the camera looks along y.
+/// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Position of the pinhole, scene unit.
     pub eye: DVec3,
     /// A point that is seen in the middle of the image, scene unit.
     pub target: DVec3,
+    /// The direction that is up in the image, of any length; only its part across the view counts.
+    /// Where the camera looks along it −z takes its place, or +y where it is not ±y.
+    pub up: DVec3,
     /// Vertical field of view, from the image's lower to its upper edge: degrees, in (0, 180).
     pub vertical_fov: f64,
 }
@@ -46,8 +52,8 @@ const MAX_SIDE: u32 = 1 << 15;
 /// Primary rays along a pixel's side, at most. Chosen by hand.
 const MAX_SAMPLES: u32 = 256;
 
-/// Cosine between the view direction and ±y from which on −z is up in the image instead of +y.
-/// Chosen by hand.
+/// Cosine between the view direction and the camera's up from which on another direction is up in
+/// the image. Chosen by hand.
 const VERTICAL_VIEW: f64 = 0.9999;
 
 impl Camera {
@@ -78,7 +84,14 @@ impl Camera {
     /// Right, up and forward of the view, unit length.
     fn frame(&self) -> [DVec3; 3] {
         let forward = (self.target - self.eye).normalize();
-        let vertical = if forward.y.abs() > VERTICAL_VIEW { DVec3::NEG_Z } else { DVec3::Y };
+        let up = self.up.normalize();
+        let vertical = if forward.dot(up).abs() <= VERTICAL_VIEW {
+            up
+        } else if up.y.abs() > VERTICAL_VIEW {
+            DVec3::NEG_Z
+        } else {
+            DVec3::Y
+        };
         let right = forward.cross(vertical).normalize();
         [right, right.cross(forward), forward]
     }
@@ -87,7 +100,7 @@ impl Camera {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a size of 0 or above 32768, no samples, a field of view outside
-    /// (0, 180), or an eye that is not finite or is the target itself.
+    /// (0, 180), an eye that is not finite or is the target itself, or no direction up.
     pub fn check(&self, width: u32, height: u32, samples: u32) -> Result<(), Error> {
         let bad = |found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, "camera", found, remedy))
@@ -106,6 +119,9 @@ impl Camera {
         if !finite || (self.target - self.eye).try_normalize().is_none() {
             let found = format!("eye {} and target {}", self.eye, self.target);
             return bad(found, "both must be finite, and apart");
+        }
+        if !self.up.is_finite() || self.up.try_normalize().is_none() {
+            return bad(format!("up {}", self.up), "give a direction that is not zero");
         }
         Ok(())
     }

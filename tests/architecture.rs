@@ -26,7 +26,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "backend",
         "error form_factor gather geometry hemicube mesh progress sampling scene visibility",
     ),
-    ("camera", "error gather geometry mesh progress scene vertex visibility"),
+    ("camera", "error gather geometry mesh progress sampling scene vertex visibility"),
     (
         "bake",
         "backend error form_factor gather geometry mesh progress sampling scene solver vertex \

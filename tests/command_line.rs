@@ -92,6 +92,36 @@ fn bake_writes_all_it_says() {
     }
 }
 
+/// Without `--camera` there is a picture too, and the camera that is told draws it again.
+#[test]
+fn bake_chooses_a_camera_that_can_be_typed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lit_plates(folder.path());
+    let bake = |stem: &str, more: &[&str]| {
+        let out = folder.path().join(stem);
+        let mut args = vec![scene.to_str().unwrap(), "--out", out.to_str().unwrap(), "--cpu"];
+        args.extend(["--element-size", "0.4", "--hemicube", "16", "--image", "24,16"]);
+        args.extend(more);
+        let out = run("bake", &args);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let read = |name: &str| std::fs::read(folder.path().join(name));
+    let said = bake("chosen", &[]);
+    let camera = said.split_whitespace().skip_while(|word| *word != "--camera").nth(1).unwrap();
+    assert!(bake("typed", &["--camera", camera, "--write", "png"]).contains(camera));
+    assert!(read("typed.png").unwrap() == read("chosen.png").unwrap(), "{camera}");
+    assert!(
+        read("typed.ply").is_err() && read("typed.json").is_err() && read("typed.exr").is_err()
+    );
+    // Seen from z: the same picture with another direction up is turned.
+    let [up_y, up_x] =
+        ["", ",1,0,0"].map(|up| ["--camera", "0.5,0.5,0.9,0.5,0.5,0,60"].join("=") + up);
+    bake("up_y", &[&up_y]);
+    bake("up_x", &[&up_x]);
+    assert!(read("up_y.exr").unwrap() != read("up_x.exr").unwrap());
+}
+
 #[test]
 fn bake_goes_on_from_a_saved_state_with_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
@@ -266,6 +296,8 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
         (&["bake", "a.obj", "b.obj"], &["b.obj", "one at a time"]),
         (&["bake", "a.obj", "--rays", "many"], &["--rays", "'many'", "whole number"]),
+        (&["bake", "a.obj", "--camera", "1,2,3"], &["--camera", "'1,2,3'", "7 numbers", "or 10"]),
+        (&["bake", "a.obj", "--write", "ply,gif"], &["--write", "'ply,gif'", "json"]),
         (&["view-factors", "--error", "1e-3"], &["no scene", "usage: radiosity view-factors"]),
         (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy"]),
         (&["view-factors", "a.obj", "--cpu"], &["--cpu need --sampled"]),

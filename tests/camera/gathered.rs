@@ -40,6 +40,7 @@ fn lamp_over_floor(floor: Rgb) -> GatheredMesh {
 const CAMERA: Camera = Camera {
     eye: DVec3::new(2.5, 1.0, -2.0),
     target: DVec3::new(1.5, 0.8, 1.5),
+    up: DVec3::Y,
     vertical_fov: 60.0,
 };
 
@@ -146,7 +147,7 @@ fn edge_coverage_resolves_every_sample() {
         let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
         // One unit is one pixel.
         let eye = DVec3::new(0.0, 0.0, f64::from(size) / 2.0);
-        let camera = Camera { eye, target: DVec3::ZERO, vertical_fov: 90.0 };
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, vertical_fov: 90.0 };
         let image = camera.image(&light.surface, size, size, n).unwrap();
         for row in image.pixels.chunks(size as usize) {
             let off = row[2].x - (3.0 - x);

@@ -70,7 +70,7 @@ fn black_pixels_do_not_count() {
 #[test]
 fn picture_is_independent_of_exitance() {
     let [eye, target] = [[0.9, 0.2, 0.5], [0.2, 0.5, 0.4]].map(|p| HERE.place(p).into());
-    let camera = Camera { eye, target, vertical_fov: 60.0 };
+    let camera = Camera { eye, target, up: Rgb::Y, vertical_fov: 60.0 };
     let of = |radiosity: f64| {
         let image = camera.image(&framed::even_surface(HERE, radiosity), 16, 16, 1).unwrap();
         let tone = ToneCurve::fit(&image.pixels);

@@ -1,16 +1,14 @@
 //! `radiosity bake`: from a scene file to radiosity at vertices, a report and a picture.
 
+pub mod files;
 pub mod settings;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use glam::DVec3;
+use files::Files;
 use lexopt::prelude::*;
-use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorEstimate, RadianceImage,
-    Scene, VertexMesh, load_obj, write_exr, write_ply, write_png,
-};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene, load_obj};
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
@@ -20,10 +18,11 @@ use crate::report::Report;
 pub const USAGE: &str = "\
 usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
             [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--pixel-gather] [--elements] [--adapter NAME | --cpu]
+            [--image W,H] [--pixel-gather] [--write FORMATS] [--elements]
+            [--adapter NAME | --cpu]
 
-Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and, with
-a camera, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless
+Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and a
+picture, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless
 given.
 
 How far to go:
@@ -70,7 +69,10 @@ Files and devices:
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
-  --camera ...      eye, target, vertical field of view in degrees
+  --out STEM        where the files go, and how they begin [the scene without its ending]
+  --write FORMATS   only these: some of ply, json, exr, png, with commas between them [all]
+  --camera ...      eye, target, vertical field of view in degrees; three more numbers are the
+                    direction up [0,1,0]; the report names the camera that is chosen otherwise
   --image W,H       size of the picture in pixels [512,512]
   --pixel-gather    every pixel of the picture gathers the settled light for itself
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
@@ -81,18 +83,10 @@ Files and devices:
 /// What is asked of a bake.
 pub struct Bake {
     pub scene: PathBuf,
-    /// Path of the output without its ending.
-    out: PathBuf,
     pub target: Target,
     /// Settings made by hand, in their order.
     adjustments: Vec<Adjustment>,
-    camera: Option<Camera>,
-    /// Pixels of the picture: width and height.
-    image: (u32, u32),
-    /// Whether the pixels of the picture gather.
-    pixel_gather: bool,
-    /// Whether to write the elements' own values too.
-    elements: bool,
+    files: Files,
     device: Device,
 }
 
@@ -117,12 +111,6 @@ pub enum Gather {
     All,
 }
 
-/// Rays along a pixel's side.
-const SAMPLES: u32 = 4;
-
-/// Rays of a pixel that gathers where no vertex does.
-const PIXEL_RAYS: u32 = 2048;
-
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let report = Bake::parse(parser)?.run()?;
@@ -133,22 +121,17 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
 impl Bake {
     fn parse(parser: &mut lexopt::Parser) -> Result<Bake, Stop> {
         let mut scenes = vec![];
-        let (mut out, mut gather, mut state) = (None, None, false);
+        let (mut gather, mut state) = (None, false);
         let mut bake = Bake {
             scene: PathBuf::new(),
-            out: PathBuf::new(),
             target: Target::Settings(Gather::None),
             adjustments: vec![],
-            camera: None,
-            image: (512, 512),
-            pixel_gather: false,
-            elements: false,
+            files: Files::new(),
             device: Device::Gpu(None),
         };
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
-                Long("out") => out = Some(PathBuf::from(parser.value()?)),
                 Long("error") => {
                     bake.target = Target::Error(args::value(parser, "error", "a number")?);
                 }
@@ -168,20 +151,16 @@ impl Bake {
                     bake.adjustments
                         .push(Box::new(move |s| s.solve.checkpoint = Some(path.clone())));
                 }
-                Long("camera") => bake.camera = Some(camera(parser)?),
-                Long("image") => {
-                    let expected = "2 whole numbers with a comma between them";
-                    let [width, height] = args::numbers(parser, "image", expected)?;
-                    bake.image = (width, height);
-                }
-                Long("pixel-gather") => bake.pixel_gather = true,
-                Long("elements") => bake.elements = true,
                 Long("adapter") => bake.device = Device::named(parser)?,
                 Long("cpu") => bake.device = Device::Cpu,
-                Long(name) => match Setting::named(name) {
-                    Some(setting) => bake.adjustments.push(setting.adjustment(parser)?),
-                    None => return Err(arg.unexpected().into()),
-                },
+                Long(name) => {
+                    let name = name.to_string();
+                    if let Some(setting) = Setting::named(&name) {
+                        bake.adjustments.push(setting.adjustment(parser)?);
+                    } else if !bake.files.option(&name, parser)? {
+                        return Err(Long(&name).unexpected().into());
+                    }
+                }
                 Value(path) => scenes.push(path.into()),
                 Short(_) => return Err(arg.unexpected().into()),
             }
@@ -193,7 +172,7 @@ impl Bake {
             bake.set_gather(gather);
         }
         bake.scene = args::only_scene(scenes)?;
-        bake.out = out.unwrap_or_else(|| bake.scene.with_extension(""));
+        bake.files = bake.files.named_after(&bake.scene);
         Ok(bake)
     }
 
@@ -210,14 +189,10 @@ impl Bake {
         }));
     }
 
-    /// From the scene file to STEM.ply, STEM.json and, with a camera, STEM.exr and STEM.png.
+    /// From the scene file to all files that are asked for.
     fn run(self) -> Result<Report, Error> {
         let start = Instant::now();
-        args::check_writable(&self.out)?;
-        let (width, height) = self.image;
-        if let Some(camera) = &self.camera {
-            camera.check(width, height, SAMPLES)?;
-        }
+        self.files.check()?;
         let mut scene = load_obj(&self.scene)?;
         scene.check_winding();
         for warning in scene.warnings() {
@@ -230,12 +205,7 @@ impl Bake {
         let open = opening.elapsed().as_secs_f64();
         let baked = progress::of_bake(|report| self.bake(scene, &device, report))?;
         let writing = Instant::now();
-        self.write_surface(&baked)?;
-        if let Some(camera) = self.camera {
-            let image = self.picture(&camera, &baked, &device)?;
-            write_exr(self.out.with_added_extension("exr"), &image)?;
-            write_png(self.out.with_added_extension("png"), &image)?;
-        }
+        let camera = self.files.write(&baked, &device)?;
         let report = Report {
             scene: self.scene.display().to_string(),
             adapter: device.adapter(),
@@ -246,10 +216,10 @@ impl Bake {
             write: writing.elapsed().as_secs_f64(),
             total: start.elapsed().as_secs_f64(),
             warnings,
+            camera,
             baked,
         };
-        let json = format!("{:#}\n", report.to_json());
-        args::write_file(&self.out.with_added_extension("json"), json.as_bytes())?;
+        self.files.write_report(&report.to_json())?;
         Ok(report)
     }
 
@@ -284,37 +254,6 @@ impl Bake {
             }
         }
     }
-
-    /// Writes the vertices and, if asked for, the elements.
-    fn write_surface(&self, baked: &BakeResult) -> Result<(), Error> {
-        let mut surface = baked.light.surface.clone();
-        surface.comments = comments(baked);
-        write_ply(self.out.with_added_extension("ply"), &surface)?;
-        if self.elements {
-            let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
-            write_ply(self.out.with_added_extension("elements.ply"), &flat)?;
-        }
-        Ok(())
-    }
-
-    /// The picture, interpolated between vertices or gathered by its pixels.
-    fn picture(
-        &self,
-        camera: &Camera,
-        baked: &BakeResult,
-        device: &Backend,
-    ) -> Result<RadianceImage, Error> {
-        let (width, height) = self.image;
-        if !self.pixel_gather {
-            return camera.image(&baked.light.surface, width, height, SAMPLES);
-        }
-        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
-        let mut gather = device.gather(&baked.light.mesh, rays)?;
-        let image = progress::of_count("pixels of the picture", |report| {
-            camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
-        })?;
-        Ok(image.expect("its progress never stops it"))
-    }
 }
 
 impl std::str::FromStr for Gather {
@@ -328,26 +267,4 @@ impl std::str::FromStr for Gather {
             _ => Err(()),
         }
     }
-}
-
-fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
-    let expected = "7 numbers with commas between them: eye, target, degrees";
-    let [a, b, c, d, e, f, vertical_fov] = args::numbers(parser, "camera", expected)?;
-    Ok(Camera { eye: DVec3::new(a, b, c), target: DVec3::new(d, e, f), vertical_fov })
-}
-
-/// What the PLY file says of itself.
-fn comments(baked: &BakeResult) -> Vec<String> {
-    let mut comments = vec![];
-    if baked.settings.solve.ambient {
-        comments.push("ambient term of the unshot light added to the elements".into());
-    }
-    let ErrorEstimate { total, samples, .. } = baked.estimate;
-    comments.push(format!(
-        "estimated error {:.3} % of reflected radiosity, RMS over area, at {samples} places \
-         ({}); vertices have their own",
-        100.0 * total,
-        baked.outcome
-    ));
-    comments
 }

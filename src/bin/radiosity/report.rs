@@ -4,9 +4,10 @@
 use radiosity::backend::AdapterInfo;
 use radiosity::bake::{GroupError, Outcome};
 use radiosity::solver::Ledger;
-use radiosity::{BakeResult, ErrorEstimate, Rgb};
+use radiosity::{BakeResult, Camera, ErrorEstimate, Rgb};
 use serde_json::{Map, Value, json};
 
+use crate::bake::files::camera_value;
 use crate::bake::{Target, settings};
 
 /// What the report tells of.
@@ -29,6 +30,8 @@ pub struct Report {
     pub total: f64,
     /// What deserves a look.
     pub warnings: Vec<String>,
+    /// Camera of the picture, if there is one.
+    pub camera: Option<Camera>,
     pub baked: BakeResult,
 }
 
@@ -73,6 +76,10 @@ impl Report {
                 "vertices": s.vertices, "certificate": s.estimate, "write": self.write,
                 "total": self.total,
             },
+            "camera": self.camera.map(|camera| json!({
+                "eye": camera.eye.to_array(), "target": camera.target.to_array(),
+                "up": camera.up.to_array(), "vertical_fov": camera.vertical_fov,
+            })),
             "warnings": self.warnings,
         })
     }
@@ -202,6 +209,9 @@ impl Report {
                 self.total
             ),
         ];
+        if let Some(camera) = &self.camera {
+            lines.push(format!("picture    --camera {}", camera_value(camera)));
+        }
         lines.extend(self.verdict());
         lines.join("\n")
     }

@@ -1,0 +1,214 @@
+//! The files that a bake writes: STEM with the ending of each.
+
+use std::path::{Path, PathBuf};
+
+use lexopt::prelude::*;
+use radiosity::glam::DVec3;
+use radiosity::{
+    Backend, BakeResult, Camera, Error, ErrorEstimate, RadianceImage, VertexMesh, write_exr,
+    write_ply, write_png,
+};
+
+use crate::args::{self, Stop};
+use crate::progress;
+
+/// Rays along a pixel's side.
+pub const SAMPLES: u32 = 4;
+
+/// Rays of a pixel that gathers where no vertex does.
+const PIXEL_RAYS: u32 = 2048;
+
+/// A kind of file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Format {
+    Ply,
+    Json,
+    Exr,
+    Png,
+}
+
+const FORMATS: [(&str, Format); 4] =
+    [("ply", Format::Ply), ("json", Format::Json), ("exr", Format::Exr), ("png", Format::Png)];
+
+/// What to write, and where.
+pub struct Files {
+    /// Path of the files without their ending.
+    stem: PathBuf,
+    formats: Vec<Format>,
+    /// The camera of the picture; one is chosen where none is given.
+    camera: Option<Camera>,
+    /// Pixels of the picture: width and height.
+    image: (u32, u32),
+    /// Whether the pixels of the picture gather.
+    pixel_gather: bool,
+    /// Whether to write the elements' own values too.
+    elements: bool,
+}
+
+impl Files {
+    /// All formats, at the place that is named after the scene later.
+    pub fn new() -> Files {
+        Files {
+            stem: PathBuf::new(),
+            formats: FORMATS.map(|(_, format)| format).to_vec(),
+            camera: None,
+            image: (512, 512),
+            pixel_gather: false,
+            elements: false,
+        }
+    }
+
+    /// Takes an option, if it is one of files.
+    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
+        match name {
+            "out" => self.stem = PathBuf::from(parser.value()?),
+            "write" => self.formats = formats(parser)?,
+            "camera" => self.camera = Some(camera(parser)?),
+            "image" => {
+                let expected = "2 whole numbers with a comma between them";
+                let [width, height] = args::numbers(parser, "image", expected)?;
+                self.image = (width, height);
+            }
+            "pixel-gather" => self.pixel_gather = true,
+            "elements" => self.elements = true,
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Names the files after the scene, if they have no name yet.
+    pub fn named_after(mut self, scene: &Path) -> Files {
+        if self.stem.as_os_str().is_empty() {
+            self.stem = scene.with_extension("");
+        }
+        self
+    }
+
+    /// Whether all of it can be written, before any work is done for it.
+    pub fn check(&self) -> Result<(), Error> {
+        args::check_writable(&self.stem)?;
+        let (width, height) = self.image;
+        // The one that will be chosen is good; sizes are checked with any.
+        let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
+        let any = Camera { eye, target, up, vertical_fov: 90.0 };
+        self.camera.unwrap_or(any).check(width, height, SAMPLES)
+    }
+
+    fn writes(&self, format: Format) -> bool {
+        self.formats.contains(&format)
+    }
+
+    fn path(&self, ending: &str) -> PathBuf {
+        self.stem.with_added_extension(ending)
+    }
+
+    /// Writes meshes and pictures, and gives the camera of the picture, if there is one.
+    pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Camera>, Error> {
+        if self.writes(Format::Ply) {
+            let mut surface = baked.light.surface.clone();
+            surface.comments = comments(baked);
+            write_ply(self.path("ply"), &surface)?;
+        }
+        if self.elements {
+            let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
+            write_ply(self.path("elements.ply"), &flat)?;
+        }
+        if !self.writes(Format::Exr) && !self.writes(Format::Png) {
+            return Ok(None);
+        }
+        let (width, height) = self.image;
+        let camera = self
+            .camera
+            .unwrap_or_else(|| Camera::framing(&baked.light, f64::from(width) / f64::from(height)));
+        let image = self.picture(&camera, baked, device)?;
+        if self.writes(Format::Exr) {
+            write_exr(self.path("exr"), &image)?;
+        }
+        if self.writes(Format::Png) {
+            write_png(self.path("png"), &image)?;
+        }
+        Ok(Some(camera))
+    }
+
+    /// Writes the report.
+    pub fn write_report(&self, json: &serde_json::Value) -> Result<(), Error> {
+        if !self.writes(Format::Json) {
+            return Ok(());
+        }
+        args::write_file(&self.path("json"), format!("{json:#}\n").as_bytes())
+    }
+
+    /// The picture, interpolated between vertices or gathered by its pixels.
+    fn picture(
+        &self,
+        camera: &Camera,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<RadianceImage, Error> {
+        let (width, height) = self.image;
+        if !self.pixel_gather {
+            return camera.image(&baked.light.surface, width, height, SAMPLES);
+        }
+        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
+        let mut gather = device.gather(&baked.light.mesh, rays)?;
+        let image = progress::of_count("pixels of the picture", |report| {
+            camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
+        })?;
+        Ok(image.expect("its progress never stops it"))
+    }
+}
+
+/// The formats that `--write` names.
+fn formats(parser: &mut lexopt::Parser) -> Result<Vec<Format>, Stop> {
+    let text = parser.value()?.string()?;
+    let format = |name: &str| FORMATS.iter().find(|(n, _)| *n == name).map(|(_, format)| *format);
+    let named: Option<Vec<Format>> = text.split(',').map(format).collect();
+    named.ok_or_else(|| {
+        let names = FORMATS.map(|(name, _)| name).join(", ");
+        args::wrong_value("write", &text, &format!("some of {names}, with commas between them"))
+    })
+}
+
+/// Eye, target, degrees and, if there are three more numbers, the direction up.
+fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
+    let text = parser.value()?.string()?;
+    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    let (numbers, up) = match numbers.as_deref() {
+        Some([numbers @ .., x, y, z]) if numbers.len() == 7 => (numbers, [*x, *y, *z]),
+        Some(numbers) if numbers.len() == 7 => (numbers, [0.0, 1.0, 0.0]),
+        _ => {
+            let expected = "7 numbers with commas between them, eye, target and degrees, or 10: \
+                            the direction up behind them";
+            return Err(args::wrong_value("camera", &text, expected));
+        }
+    };
+    let point = |k: usize| DVec3::from_slice(&numbers[k..k + 3]);
+    Ok(Camera { eye: point(0), target: point(3), up: up.into(), vertical_fov: numbers[6] })
+}
+
+/// `camera` as the value of `--camera`.
+pub fn camera_value(camera: &Camera) -> String {
+    let Camera { eye, target, up, vertical_fov } = camera;
+    let mut numbers = [eye.to_array(), target.to_array()].concat();
+    numbers.push(*vertical_fov);
+    if up.to_array() != [0.0, 1.0, 0.0] {
+        numbers.extend(up.to_array());
+    }
+    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+}
+
+/// What the PLY file says of itself.
+fn comments(baked: &BakeResult) -> Vec<String> {
+    let mut comments = vec![];
+    if baked.settings.solve.ambient {
+        comments.push("ambient term of the unshot light added to the elements".into());
+    }
+    let ErrorEstimate { total, samples, .. } = baked.estimate;
+    comments.push(format!(
+        "estimated error {:.3} % of reflected radiosity, RMS over area, at {samples} places \
+         ({}); vertices have their own",
+        100.0 * total,
+        baked.outcome
+    ));
+    comments
+}
