@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`] | a scene |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
+//! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups and materials, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
@@ -11,6 +12,8 @@
 #[cfg(feature = "exr")]
 mod exr;
 mod files;
+#[cfg(feature = "glb")]
+mod glb;
 mod mtl;
 mod obj;
 mod ply;
@@ -29,10 +32,12 @@ use crate::error::{Error, ErrorKind};
 
 #[cfg(feature = "exr")]
 pub use self::exr::write_exr;
+#[cfg(feature = "glb")]
+pub use self::glb::write_glb;
 #[cfg(feature = "png")]
 pub use self::png::write_png;
 pub use obj::{load_obj, read_obj};
-pub use ply::write_ply;
+pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;
 pub use tone::ToneCurve;
 

@@ -40,9 +40,9 @@
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`view_factor`] | area-averaged factors between groups, for heat transfer |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
-//! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, EXR, PNG and tables out |
+//! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
-//! Features: `gpu` (wgpu), `exr`, `png`, all on by default, and `cli` for the program `radiosity`.
+//! Features: `gpu` (wgpu), `exr`, `glb`, `png`, all on by default, and `cli` for the program `radiosity`.
 //! Long work takes a callback that is told of progress and answers with a
 //! [`ControlFlow`](std::ops::ControlFlow): `Break(())` stops it with what there is.
 //!
@@ -104,6 +104,8 @@ pub use form_factor::FormFactors;
 pub use gather::{Gather, GatheredMesh};
 #[cfg(feature = "exr")]
 pub use io::write_exr;
+#[cfg(feature = "glb")]
+pub use io::write_glb;
 #[cfg(feature = "png")]
 pub use io::write_png;
 pub use io::{load_obj, read_ply, write_ply};

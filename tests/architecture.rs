@@ -33,7 +33,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
          visibility",
     ),
     ("verify", "error geometry progress scene vertex visibility"),
-    ("io", "camera error geometry scene vertex view_factor"),
+    ("io", "camera error gather geometry mesh scene vertex view_factor"),
 ];
 
 /// Files below `folder`, the program's left out: it is a user of the library.

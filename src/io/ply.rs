@@ -24,7 +24,19 @@ use crate::vertex::VertexMesh;
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
 pub fn write_ply(path: impl AsRef<Path>, surface: &VertexMesh) -> Result<(), Error> {
-    let tone = ToneCurve::fit(&surface.radiosity);
+    write_ply_with_tone(path, surface, &ToneCurve::fit(&surface.radiosity))
+}
+
+/// [`write_ply`] with a tone curve of radiosity for `red green blue`, such as that of a picture:
+/// [`ToneCurve::of_radiosity`].
+///
+/// # Errors
+/// Those of [`write_ply`].
+pub fn write_ply_with_tone(
+    path: impl AsRef<Path>,
+    surface: &VertexMesh,
+    tone: &ToneCurve,
+) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
         writeln!(out, "comment radiosity in W/m2 per channel, linear BT.709")?;

@@ -1,35 +1,59 @@
 //! Linear light to display colours.
 
+use std::f64::consts::PI;
+
 use crate::scene::Rgb;
 
-/// A tone curve fitted to a scene: exposure from its mean, highlights rolled off.
+/// A tone curve: exposure from the light's own histogram, highlights rolled off.
 ///
-/// Reinhard, Stark, Shirley, Ferwerda (2002), equations 1, 2 and 4, on luminance.
+/// The median luminance of what is not black is shown at one level, whatever its unit and scale, so
+/// that a lamp in view, or a deep shadow, changes nothing for the rest. Highlights are rolled off
+/// by Reinhard, Stark, Shirley, Ferwerda (2002), equation 4, on luminance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToneCurve {
     exposure: f64,
-    white: f64,
 }
 
-/// Luminance that the logarithmic mean is mapped to.
-const KEY: f64 = 0.24;
+/// Exposed luminance of the median. Chosen by hand: the curve makes it 0.23, middle grey or a
+/// little above on the display, sRGB 0.52.
+const KEY: f64 = 0.28;
+
+/// Exposed luminance that is shown white: 8 medians, three stops above. Chosen by hand.
+const WHITE: f64 = 8.0 * KEY;
 
 impl ToneCurve {
     /// Fits the curve to linear `colours`; black ones do not count.
     pub fn fit(colours: &[Rgb]) -> ToneCurve {
-        let luminances = || colours.iter().map(|&c| luminance(c)).filter(|&l| l > 0.0);
-        let (sum, count) = luminances().fold((0.0, 0.0), |(s, n), l| (s + l.ln(), n + 1.0));
-        let exposure = if count > 0.0 { KEY / (sum / count).exp() } else { 1.0 };
-        // A lamp may burn out: white is not farther than 8 times the mean, three stops.
-        let white = luminances().fold(0.0, f64::max) * exposure;
-        ToneCurve { exposure, white: white.clamp(1.0, 8.0 * KEY) }
+        let mut luminances: Vec<f64> =
+            colours.iter().map(|&c| luminance(c)).filter(|&l| l > 0.0).collect();
+        if luminances.is_empty() {
+            return ToneCurve { exposure: 1.0 };
+        }
+        let middle = luminances.len() / 2;
+        let (_, median, _) = luminances.select_nth_unstable_by(middle, f64::total_cmp);
+        ToneCurve { exposure: KEY / median.max(f64::MIN_POSITIVE) }
     }
 
-    /// 8-bit sRGB of a linear colour (BT.709 primaries).
-    pub fn display(&self, colour: Rgb) -> [u8; 3] {
+    /// The curve that shows a radiosity B as this one shows the radiance of diffuse surfaces, B/π.
+    pub fn of_radiosity(self) -> ToneCurve {
+        ToneCurve { exposure: self.exposure / PI }
+    }
+
+    /// What a linear value is multiplied with before highlights are rolled off.
+    pub fn exposure(&self) -> f64 {
+        self.exposure
+    }
+
+    /// The colour as it is shown: linear, each channel in [0, 1] (BT.709 primaries).
+    pub fn linear(&self, colour: Rgb) -> Rgb {
         let l = luminance(colour) * self.exposure;
-        let mapped = (1.0 + l / (self.white * self.white)) / (1.0 + l);
-        (colour * self.exposure * mapped).to_array().map(srgb)
+        let mapped = (1.0 + l / (WHITE * WHITE)) / (1.0 + l);
+        (colour * self.exposure * mapped).clamp(Rgb::ZERO, Rgb::ONE)
+    }
+
+    /// The colour as it is shown, as 8-bit sRGB.
+    pub fn display(&self, colour: Rgb) -> [u8; 3] {
+        self.linear(colour).to_array().map(srgb)
     }
 }
 
@@ -38,9 +62,8 @@ fn luminance(c: Rgb) -> f64 {
     c.dot(Rgb::new(0.2126, 0.7152, 0.0722))
 }
 
-/// IEC 61966-2-1, to 8 bits; out of range is clipped.
-fn srgb(linear: f64) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
+/// IEC 61966-2-1, to 8 bits, of a value in [0, 1].
+fn srgb(x: f64) -> u8 {
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8
 }

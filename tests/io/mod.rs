@@ -1,3 +1,4 @@
+mod glb;
 mod image;
 mod mtl;
 mod obj;

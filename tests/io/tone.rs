@@ -1,4 +1,4 @@
-//! The tone curve: exposure from the logarithmic mean, highlights rolled off, sRGB.
+//! The tone curve: exposure from the median, highlights rolled off, sRGB.
 
 use radiosity::io::ToneCurve;
 use radiosity::{Camera, Rgb};
@@ -18,43 +18,52 @@ fn shown<const N: usize>(radiances: [f64; N]) -> [u8; N] {
 
 #[test]
 fn even_picture_is_shown_at_the_key() {
-    // Reinhard et al. (2002), equation 1: the logarithmic mean is exposed to the key, 0.24. White
-    // is at 1 then, and equation 4 leaves 0.24 (1 + 0.24/1²)/(1 + 0.24) = 0.24. In sRGB (IEC
-    // 61966-2-1) that is 1.055 · 0.24^(1/2.4) − 0.055 = 0.5271, 134.4 of 255.
+    // The median is exposed to the key, 0.28, and white is at 8 · 0.28 = 2.24. Reinhard et al.
+    // (2002), equation 4, makes that 0.28 (1 + 0.28/2.24²)/(1 + 0.28) = 0.23096. In sRGB (IEC
+    // 61966-2-1) that is 1.055 · 0.23096^(1/2.4) − 0.055 = 0.51784, 132.05 of 255.
     for radiance in [1e-6, 1.0, 7.0, 1e6] {
-        assert_eq!(shown([radiance]), [134], "{radiance}");
+        assert_eq!(shown([radiance]), [132], "{radiance}");
     }
 }
 
 #[test]
-fn curve_is_linear_up_to_white_at_one() {
-    // The logarithmic mean is 1: exposed 0.06 and 0.96, below white at 1, so that nothing is rolled
-    // off. In sRGB 0.2717 and 0.9822: 69.3 and 250.5 of 255.
-    assert_eq!(shown([0.25, 4.0]), [69, 250]);
+fn median_is_exposed_to_the_key_whatever_else_is_in_view() {
+    // A lamp and a deep shadow, each on up to half of the picture less one, of any radiance.
+    for other in [1e-300, 1e-6, 1e6, 1e300] {
+        assert_eq!(shown([1.0, 1.0, 1.0, other, other])[0], 132, "{other}");
+    }
+    // Of an even number the upper one of the two in the middle.
+    assert_eq!(shown([0.5, 1.0])[1], 132);
 }
 
 #[test]
-fn highlights_roll_off_to_white() {
-    // Exposed 0.03 and 1.92, which is white: 1.92 (1 + 1.92/1.92²)/(1 + 1.92) = 1 exactly. The dark
-    // one: 0.03 (1 + 0.03/1.92²)/1.03 = 0.02936, in sRGB 0.1876, 47.8 of 255.
-    assert_eq!(shown([0.125, 8.0]), [48, 255]);
-}
-
-#[test]
-fn lamps_burn_out_beyond_eight_means() {
-    // Exposed 0.0024 and 24: white stays at 8 · 0.24 = 1.92 and the lamp is clipped. The dark one:
-    // 0.0024 (1 + 0.0024/1.92²)/1.0024 = 0.002396, in the straight part of sRGB: 12.92 times that,
-    // 7.9 of 255.
-    assert_eq!(shown([0.01, 100.0]), [8, 255]);
+fn highlights_roll_off_to_white_at_eight_medians() {
+    // Exposed 2.24, which is white: 2.24 (1 + 2.24/2.24²)/(1 + 2.24) = 1 exactly. At four medians,
+    // 1.12: 1.12 (1 + 1.12/5.0176)/2.12 = 0.64622, in sRGB 0.82457, 210.3 of 255. An eighth of the
+    // median, 0.035: 0.035 (1 + 0.035/5.0176)/1.035 = 0.03405, in sRGB 0.20291, 51.7 of 255.
+    assert_eq!(shown([1.0, 1.0, 1.0, 8.0, 80.0])[3..], [255, 255]);
+    assert_eq!(shown([1.0, 1.0, 1.0, 4.0, 0.125])[3..], [210, 52]);
 }
 
 #[test]
 fn exposure_weighs_channels_by_luminance() {
-    // BT.709: green has 0.7152 of the luminance, so that 0.24/0.7152 = 0.3356 of it is shown, in
-    // sRGB 0.6144, 156.7 of 255. As dark as that, red would be shown at 0.24/0.2126 > 1: clipped.
-    for (colour, display) in [(Rgb::Y, [0, 157, 0]), (Rgb::X, [255, 0, 0])] {
+    // BT.709: green has 0.7152 of the luminance, so that 0.23096/0.7152 = 0.32293 of it is shown,
+    // in sRGB 0.60370, 153.9 of 255. As dark as that, red would be shown at 0.23096/0.2126 > 1:
+    // clipped.
+    for (colour, display) in [(Rgb::Y, [0, 154, 0]), (Rgb::X, [255, 0, 0])] {
         assert_eq!(ToneCurve::fit(&[colour]).display(colour), display);
     }
+}
+
+#[test]
+fn radiosity_is_shown_as_its_radiance() {
+    let tone = ToneCurve::fit(&[Rgb::splat(2.0)]);
+    let radiance = Rgb::new(0.3, 1.0, 4.0);
+    let (a, b) =
+        (tone.linear(radiance), tone.of_radiosity().linear(radiance * std::f64::consts::PI));
+    // Two roundings.
+    assert!((a - b).abs().max_element() < 1e-15, "{a} {b}");
+    assert!(a.cmpge(Rgb::ZERO).all() && a.cmple(Rgb::ONE).all());
 }
 
 #[test]
@@ -64,6 +73,12 @@ fn black_pixels_do_not_count() {
     assert_eq!(ToneCurve::fit(&[grey]).display(Rgb::ZERO), [0; 3]);
     for none in [&[][..], &[Rgb::ZERO]] {
         assert_eq!(ToneCurve::fit(none).display(Rgb::ZERO), [0; 3]);
+    }
+    // As dark as numbers get, and as bright: no division by zero, nothing that is not a number.
+    for radiance in [f64::from_bits(1), f64::MIN_POSITIVE, f64::MAX / 4.0] {
+        let grey = Rgb::splat(radiance);
+        let tone = ToneCurve::fit(&[grey]);
+        assert!(tone.exposure().is_finite() && tone.linear(grey).is_finite(), "{radiance}");
     }
 }
 
@@ -77,8 +92,12 @@ fn picture_is_independent_of_exitance() {
         image.pixels.iter().map(|&c| tone.display(c)).collect::<Vec<_>>()
     };
     assert!(of(1.0).iter().any(|c| c[0] > 50));
+    // Scaled by a power of two nothing is rounded: the same bytes.
+    for scale in [2f64.powi(-20), 2f64.powi(20)] {
+        assert_eq!(of(scale), of(1.0));
+    }
     // The tone curve has no unit of light: the same but for rounding, which a byte hardly shows.
-    for radiosity in [1e-30, 1e30] {
+    for radiosity in [1e-30, 1e-6, 1e6, 1e30] {
         let pairs = of(1.0).into_iter().zip(of(radiosity));
         assert!(pairs.into_iter().all(|(a, b)| (0..3).all(|k| a[k].abs_diff(b[k]) <= 1)));
     }

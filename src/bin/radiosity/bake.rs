@@ -3,12 +3,13 @@
 pub mod files;
 pub mod settings;
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use files::Files;
 use lexopt::prelude::*;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene, load_obj};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene, Solver, load_obj};
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
@@ -21,9 +22,9 @@ usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --tim
             [--image W,H] [--pixel-gather] [--write FORMATS] [--elements]
             [--adapter NAME | --cpu]
 
-Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.json (a report) and a
-picture, STEM.exr (linear radiance) and STEM.png. STEM is the scene without its ending, unless
-given.
+Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.glb (the same for viewers
+of glTF), STEM.json (a report) and a picture, STEM.exr (linear radiance) and STEM.png. STEM is the
+scene without its ending, unless given.
 
 How far to go:
   --error X         until the estimated error of the vertices' reflected radiosity is below this
@@ -70,7 +71,7 @@ Files and devices:
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
   --out STEM        where the files go, and how they begin [the scene without its ending]
-  --write FORMATS   only these: some of ply, json, exr, png, with commas between them [all]
+  --write FORMATS   only these: some of ply, glb, json, exr, png, with commas between them [all]
   --camera ...      eye, target, vertical field of view in degrees; three more numbers are the
                     direction up [0,1,0]; the report names the camera that is chosen otherwise
   --image W,H       size of the picture in pixels [512,512]
@@ -193,21 +194,29 @@ impl Bake {
     fn run(self) -> Result<Report, Error> {
         let start = Instant::now();
         self.files.check()?;
-        let mut scene = load_obj(&self.scene)?;
-        scene.check_winding();
+        let name = self.scene.display().to_string();
+        let scene = progress::of_stage(&format!("reading {name}"), || {
+            let mut scene = load_obj(&self.scene)?;
+            scene.check_winding();
+            Ok::<_, Error>(scene)
+        })?;
         for warning in scene.warnings() {
             eprintln!("warning: {warning}");
         }
         let (warnings, triangles) = (scene.warnings().to_vec(), scene.triangles().len());
         let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
-        let device = self.device.open()?;
+        let device = progress::of_stage("opening the device", || self.device.open())?;
         let open = opening.elapsed().as_secs_f64();
-        let baked = progress::of_bake(|report| self.bake(scene, &device, report))?;
+        let unshot_goal = Cell::new(Solver::default().unshot);
+        let baked = progress::of_bake(
+            || unshot_goal.get(),
+            |report| self.bake(scene, &device, &unshot_goal, report),
+        )?;
         let writing = Instant::now();
         let camera = self.files.write(&baked, &device)?;
         let report = Report {
-            scene: self.scene.display().to_string(),
+            scene: name,
             adapter: device.adapter(),
             target: self.target,
             triangles,
@@ -223,16 +232,19 @@ impl Bake {
         Ok(report)
     }
 
+    /// The bake itself; `unshot_goal` is set to the share of unshot light that it goes down to.
     fn bake(
         &self,
         scene: Scene,
         device: &Backend,
+        unshot_goal: &Cell<f64>,
         progress: progress::OfBake,
     ) -> Result<BakeResult, Error> {
         let overrides = |settings: &mut BakeSettings| {
             for adjustment in &self.adjustments {
                 adjustment(settings);
             }
+            unshot_goal.set(settings.solve.solver.unshot);
         };
         match self.target {
             Target::Error(error) => {

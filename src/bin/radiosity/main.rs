@@ -1,7 +1,7 @@
 //! The command-line program.
 //!
 //! ```text
-//! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, JSON, EXR, PNG
+//! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, GLB, JSON, EXR, PNG
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY

@@ -1,7 +1,21 @@
-//! Progress bars on standard error; they vanish when the work is done, and where standard error is
-//! no terminal there are none.
+//! What is under way, on standard error: a bar on a terminal, which vanishes when the work is done,
+//! else a line every few seconds, so that a log of a long bake tells where it is.
+//!
+//! ```text
+//!   stage       share of it that is done                            what is left
+//!   reading     –                                                   –
+//!   meshing     –                                                   –
+//!   shooting    orders of magnitude of the unshot share             time so far × (1 − share) / share
+//!   gathering   vertices of this pass                               the same
+//!   estimating  points                                              the same
+//!   drawing, writing  –                                             –
+//! ```
 
 use std::ops::ControlFlow;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::BakeProgress;
@@ -9,7 +23,18 @@ use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
 
 /// Steps of a bar from empty to full.
-const STEPS: usize = 1000;
+const STEPS: u64 = 1000;
+
+/// Between lines where standard error is no terminal. Chosen by hand.
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Between redraws of what has no share. Chosen by hand.
+const TICK: Duration = Duration::from_millis(200);
+
+/// Time and share of a stage from which on it is said how long the rest takes. Chosen by hand:
+/// before, the figure jumps.
+const LEFT_AFTER: Duration = Duration::from_secs(1);
+const LEFT_SHARE: f64 = 0.02;
 
 /// Takes the progress of a bake.
 pub type OfBake<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
@@ -17,79 +42,202 @@ pub type OfBake<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
 /// Takes how much is done, and of how much.
 pub type OfCount<'a> = &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>;
 
-/// A bar that fills from 0 to [`STEPS`], with a message behind it.
-fn bar() -> ProgressBar {
-    let bar = ProgressBar::new(STEPS as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {msg}") {
-        bar.set_style(style);
-    }
-    bar
-}
-
-/// Runs `work` with a bar that shows the progress of a bake.
-pub fn of_bake<T>(work: impl FnOnce(OfBake) -> T) -> T {
-    let bar = bar();
-    let result = work(&mut |progress| {
-        show(&bar, progress);
+/// Runs `work` with the progress of a bake shown. `unshot_goal` gives the share of unshot light at
+/// which shooting ends.
+pub fn of_bake<T>(unshot_goal: impl Fn() -> f64, work: impl FnOnce(OfBake) -> T) -> T {
+    let mut display = Display::new("meshing");
+    work(&mut |progress| {
+        show(&mut display, progress, unshot_goal());
         ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
-    result
+    })
 }
 
-/// Runs `work` with a bar for what is counted: `unit` done, of how many.
+/// Runs `work` with the progress shown of what is counted: `unit` done, of how many.
 pub fn of_count<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
-    let bar = bar();
-    let result = work(&mut |done, of| {
-        bar.set_position(share(done, of));
-        bar.set_message(format!("{done} of {of} {unit}"));
+    let mut display = Display::new(unit);
+    work(&mut |done, of| {
+        display.show(unit, share(done, of), &format!("{done} of {of} {unit}"));
         ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
-    result
+    })
 }
 
-fn share(done: usize, of: usize) -> u64 {
-    (STEPS * done / of.max(1)) as u64
+/// Runs `work` with its name shown, and for how long it has run.
+pub fn of_stage<T>(name: &str, work: impl FnOnce() -> T) -> T {
+    let _display = Display::new(name);
+    work()
 }
 
-/// The bar fills while light is shot with the share of it that is shot, else with what is counted.
-fn show(bar: &ProgressBar, progress: &BakeProgress) {
+fn share(done: usize, of: usize) -> f64 {
+    done as f64 / of.max(1) as f64
+}
+
+/// Of the way from 1 to the goal, on a logarithmic scale: each order of magnitude takes about as
+/// long as the one before.
+fn shot_share(unshot: f64, goal: f64) -> f64 {
+    let share = unshot.ln() / goal.ln();
+    if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+fn show(display: &mut Display, progress: &BakeProgress, unshot_goal: f64) {
     match progress {
-        BakeProgress::Shooting(Progress { shots, rows_made, unshot_share, elapsed, .. }) => {
-            bar.set_position((STEPS as f64 * (1.0 - unshot_share).clamp(0.0, 1.0)) as u64);
-            bar.set_message(format!(
-                "shooting, {:.3} % unshot, {shots} shots, {rows_made} hemicubes, {:.1} s",
-                100.0 * unshot_share,
-                elapsed.as_secs_f64()
-            ));
+        BakeProgress::Shooting(Progress { shots, rows_made, unshot_share, .. }) => {
+            let text = format!(
+                "shooting, {:.3} % unshot, {shots} shots, {rows_made} rows",
+                100.0 * unshot_share
+            );
+            display.show("shooting", shot_share(*unshot_share, unshot_goal), &text);
         }
         BakeProgress::Gathering(gather) => {
-            let GatherProgress {
-                pass: sweep,
-                refinements: level,
-                elements,
-                gathered,
-                total: of,
-                ..
-            } = gather;
-            bar.set_position(share(*gathered, *of));
-            bar.set_message(format!(
-                "gathering, sweep {}, split {level} times, {gathered} of {of} vertices, \
+            let GatherProgress { pass, refinements, elements, gathered, total, .. } = gather;
+            let text = format!(
+                "gathering, pass {}, split {refinements} times, {gathered} of {total} vertices, \
                  {elements} elements",
-                sweep + 1
-            ));
+                pass + 1
+            );
+            let stage = format!("gathering {pass} {refinements}");
+            display.show(&stage, share(*gathered, *total), &text);
         }
         BakeProgress::Estimating { samples, of } => {
-            bar.set_position(share(*samples, *of));
-            bar.set_message(format!("estimating the error, {samples} of {of} points"));
+            let text = format!("estimating the error, {samples} of {of} points");
+            display.show("estimating", share(*samples, *of), &text);
         }
         BakeProgress::Estimated(estimate) => {
-            bar.println(format!("estimated error {:.2} %", 100.0 * estimate.total));
+            display.note(&format!("estimated error {:.2} %", 100.0 * estimate.total));
         }
         BakeProgress::DeviceFailed(error) => {
-            bar.println(format!("rays on the CPU go on: {error}"));
+            display.note(&format!("rays on the CPU go on: {error}"));
         }
         _ => {}
+    }
+}
+
+/// Shows the stage that is under way, until dropped.
+struct Display {
+    bar: ProgressBar,
+    /// Where standard error is no terminal.
+    lines: Option<Lines>,
+    stage: String,
+    /// When the stage began.
+    start: Instant,
+}
+
+impl Display {
+    /// Begins with a stage whose share is not known yet.
+    fn new(stage: &str) -> Display {
+        let bar = ProgressBar::new(STEPS);
+        bar.set_style(style("{spinner} {msg}, {elapsed}"));
+        bar.set_message(stage.to_string());
+        let lines = bar.is_hidden().then(|| Lines::new(stage));
+        if lines.is_none() {
+            bar.enable_steady_tick(TICK);
+        }
+        Display { bar, lines, stage: stage.to_string(), start: Instant::now() }
+    }
+
+    /// Shows the share of `stage` that is done.
+    fn show(&mut self, stage: &str, share: f64, text: &str) {
+        if stage != self.stage || self.bar.position() == 0 {
+            self.bar.set_style(style("{bar:30} {msg}"));
+        }
+        if stage != self.stage {
+            self.stage = stage.to_string();
+            self.start = Instant::now();
+        }
+        let text = with_time_left(text, share, self.start.elapsed());
+        self.bar.set_position((STEPS as f64 * share) as u64);
+        if let Some(lines) = &self.lines {
+            lines.set(text);
+        } else {
+            self.bar.set_message(text);
+        }
+    }
+
+    /// Prints a line that stays, on a terminal.
+    fn note(&self, line: &str) {
+        self.bar.println(line);
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+/// `text`, and how long the rest of a stage takes of which this share is done.
+fn with_time_left(text: &str, share: f64, elapsed: Duration) -> String {
+    if share < LEFT_SHARE || elapsed < LEFT_AFTER {
+        return text.to_string();
+    }
+    let left = elapsed.as_secs_f64() * (1.0 - share) / share;
+    format!("{text}, about {left:.0} s left")
+}
+
+/// A thread that prints a line every few seconds.
+struct Lines {
+    text: Arc<Mutex<String>>,
+    /// Hung up, it ends the thread.
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Lines {
+    fn new(text: &str) -> Lines {
+        let text = Arc::new(Mutex::new(text.to_string()));
+        let (stop, stopped) = mpsc::channel::<()>();
+        let shown = Arc::clone(&text);
+        let start = Instant::now();
+        let print = move || {
+            while stopped.recv_timeout(LINE_INTERVAL) == Err(RecvTimeoutError::Timeout) {
+                let text = shown.lock().map_or_else(|e| e.into_inner().clone(), |t| t.clone());
+                eprintln!("{text} ({} s)", start.elapsed().as_secs());
+            }
+        };
+        Lines { text, stop: Some(stop), thread: Some(std::thread::spawn(print)) }
+    }
+
+    fn set(&self, text: String) {
+        if let Ok(mut shown) = self.text.lock() {
+            *shown = text;
+        }
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread was printed, and harms nothing.
+            let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rest_takes_as_long_as_its_share() {
+        let after = |seconds| Duration::from_secs(seconds);
+        assert_eq!(with_time_left("drawing", 0.25, after(10)), "drawing, about 30 s left");
+        assert_eq!(with_time_left("drawing", 1.0, after(10)), "drawing, about 0 s left");
+        for (share, seconds) in [(0.0, 10), (0.01, 10), (0.5, 0)] {
+            assert_eq!(with_time_left("drawing", share, after(seconds)), "drawing");
+        }
+    }
+
+    #[test]
+    fn each_order_of_magnitude_is_shot_in_the_same_time() {
+        for (unshot, want) in [(1.0, 0.0), (0.1, 0.25), (0.01, 0.5), (1e-4, 1.0), (1e-9, 1.0)] {
+            assert!((shot_share(unshot, 1e-4) - want).abs() < 1e-12, "{unshot}");
+        }
+        for (unshot, goal) in [(0.0, 0.0), (f64::NAN, 0.1), (1.0, 1.0), (2.0, 0.1)] {
+            assert!((0.0..=1.0).contains(&shot_share(unshot, goal)), "{unshot} {goal}");
+        }
     }
 }

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use lexopt::prelude::*;
 use radiosity::glam::DVec3;
+use radiosity::io::{ToneCurve, write_ply_with_tone};
 use radiosity::{
     Backend, BakeResult, Camera, Error, ErrorEstimate, RadianceImage, VertexMesh, write_exr,
-    write_ply, write_png,
+    write_glb, write_png,
 };
 
 use crate::args::{self, Stop};
@@ -22,13 +23,19 @@ const PIXEL_RAYS: u32 = 2048;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Format {
     Ply,
+    Glb,
     Json,
     Exr,
     Png,
 }
 
-const FORMATS: [(&str, Format); 4] =
-    [("ply", Format::Ply), ("json", Format::Json), ("exr", Format::Exr), ("png", Format::Png)];
+const FORMATS: [(&str, Format); 5] = [
+    ("ply", Format::Ply),
+    ("glb", Format::Glb),
+    ("json", Format::Json),
+    ("exr", Format::Exr),
+    ("png", Format::Png),
+];
 
 /// What to write, and where.
 pub struct Files {
@@ -102,32 +109,58 @@ impl Files {
         self.stem.with_added_extension(ending)
     }
 
-    /// Writes meshes and pictures, and gives the camera of the picture, if there is one.
+    /// Writes pictures and meshes, and gives the camera of the picture, if there is one.
     pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Camera>, Error> {
+        let mut camera = None;
+        let mut tone = ToneCurve::fit(&baked.light.surface.radiosity);
+        if self.writes(Format::Exr) || self.writes(Format::Png) {
+            let chosen = camera.insert(self.camera.unwrap_or_else(|| self.framing(baked)));
+            let image = self.picture(chosen, baked, device)?;
+            // Where the picture is black, what it does not show has its own exposure.
+            if image.pixels.iter().any(|c| c.max_element() > 0.0) {
+                tone = ToneCurve::fit(&image.pixels).of_radiosity();
+            }
+            self.write_picture(&image)?;
+        }
+        self.write_meshes(baked, &tone)?;
+        Ok(camera)
+    }
+
+    /// The camera where none is given.
+    fn framing(&self, baked: &BakeResult) -> Camera {
+        let (width, height) = self.image;
+        progress::of_stage("choosing a view", || {
+            Camera::framing(&baked.light, f64::from(width) / f64::from(height))
+        })
+    }
+
+    fn write_picture(&self, image: &RadianceImage) -> Result<(), Error> {
+        if self.writes(Format::Exr) {
+            write_exr(self.path("exr"), image)?;
+        }
+        if self.writes(Format::Png) {
+            write_png(self.path("png"), image)?;
+        }
+        Ok(())
+    }
+
+    /// Writes meshes; their colours are those of the picture.
+    fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) -> Result<(), Error> {
         if self.writes(Format::Ply) {
             let mut surface = baked.light.surface.clone();
             surface.comments = comments(baked);
-            write_ply(self.path("ply"), &surface)?;
+            progress::of_stage("writing PLY", || {
+                write_ply_with_tone(self.path("ply"), &surface, tone)
+            })?;
+        }
+        if self.writes(Format::Glb) {
+            progress::of_stage("writing GLB", || write_glb(self.path("glb"), &baked.light, tone))?;
         }
         if self.elements {
             let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
-            write_ply(self.path("elements.ply"), &flat)?;
+            write_ply_with_tone(self.path("elements.ply"), &flat, tone)?;
         }
-        if !self.writes(Format::Exr) && !self.writes(Format::Png) {
-            return Ok(None);
-        }
-        let (width, height) = self.image;
-        let camera = self
-            .camera
-            .unwrap_or_else(|| Camera::framing(&baked.light, f64::from(width) / f64::from(height)));
-        let image = self.picture(&camera, baked, device)?;
-        if self.writes(Format::Exr) {
-            write_exr(self.path("exr"), &image)?;
-        }
-        if self.writes(Format::Png) {
-            write_png(self.path("png"), &image)?;
-        }
-        Ok(Some(camera))
+        Ok(())
     }
 
     /// Writes the report.
@@ -147,7 +180,9 @@ impl Files {
     ) -> Result<RadianceImage, Error> {
         let (width, height) = self.image;
         if !self.pixel_gather {
-            return camera.image(&baked.light.surface, width, height, SAMPLES);
+            return progress::of_stage("drawing the picture", || {
+                camera.image(&baked.light.surface, width, height, SAMPLES)
+            });
         }
         let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
         let mut gather = device.gather(&baked.light.mesh, rays)?;

@@ -1,0 +1,205 @@
+//! The JSON of a glTF file: nodes, meshes and materials by name, and where their numbers lie.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf_json::buffer::{Stride, Target, View};
+use gltf_json::extras::RawValue;
+use gltf_json::material::PbrMetallicRoughness;
+use gltf_json::mesh::{Mode, Semantic};
+use gltf_json::scene::Node;
+use gltf_json::validation::Checked::Valid;
+use gltf_json::{Accessor, Asset, Buffer, Index, Material, Mesh, Root, Scene, Value};
+
+use super::{ATTRIBUTES, Attribute, INDEX_BYTES, Model, Primitive, VECTOR_BYTES};
+use crate::scene::Rgb;
+
+/// The extension that shows a colour as it is.
+const UNLIT: &str = "KHR_materials_unlit";
+
+impl Attribute {
+    fn semantic(self) -> Semantic {
+        match self {
+            Attribute::Position => Semantic::Positions,
+            Attribute::Normal => Semantic::Normals,
+            Attribute::Colour => Semantic::Colors(0),
+            // Written with an underscore before it, as names must be that glTF does not know.
+            Attribute::Radiosity => Semantic::Extras("RADIOSITY".into()),
+        }
+    }
+}
+
+impl Model<'_> {
+    pub fn document(&self) -> Root {
+        let mut root = Root { asset: self.asset(), ..Default::default() };
+        root.extensions_used.push(UNLIT.into());
+        root.push(Buffer {
+            byte_length: self.binary_length().into(),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: None,
+        });
+        self.add_views(&mut root);
+        let groups = self.add_groups(&mut root);
+        let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
+        let top = Node { children: Some(groups), translation, ..Default::default() };
+        let nodes = vec![root.push(top)];
+        let scene = Scene { nodes, name: None, extensions: None, extras: None };
+        root.scene = Some(root.push(scene));
+        root
+    }
+
+    fn asset(&self) -> Asset {
+        let notes = BTreeMap::from([
+            ("axes", Value::from("those of the scene's file")),
+            ("unit", Value::from("that of the scene's file")),
+            ("_RADIOSITY", Value::from("W/m2 per channel, linear BT.709")),
+            ("COLOR_0", Value::from("_RADIOSITY times exposure, highlights rolled off")),
+            ("exposure", Value::from(self.tone.exposure())),
+        ]);
+        Asset {
+            generator: Some(concat!("radiosity ", env!("CARGO_PKG_VERSION")).into()),
+            extras: notes_of(&notes),
+            ..Default::default()
+        }
+    }
+
+    /// A view of the binary chunk for each attribute, and one for the indices.
+    fn add_views(&self, root: &mut Root) {
+        let vectors = self.vertex_count() * VECTOR_BYTES;
+        let mut offset = 0;
+        let mut add = |length: u64, stride: Option<Stride>, target: Target| {
+            root.push(View {
+                buffer: Index::new(0),
+                byte_length: length.into(),
+                byte_offset: Some(offset.into()),
+                byte_stride: stride,
+                name: None,
+                target: Some(Valid(target)),
+                extensions: None,
+                extras: None,
+            });
+            offset += length;
+        };
+        for _ in ATTRIBUTES {
+            add(vectors, Some(Stride(VECTOR_BYTES as usize)), Target::ArrayBuffer);
+        }
+        add(3 * self.face_count() * INDEX_BYTES, None, Target::ElementArrayBuffer);
+    }
+
+    /// A node and a mesh for each group that has faces.
+    fn add_groups(&self, root: &mut Root) -> Vec<Index<Node>> {
+        let mut materials = BTreeMap::new();
+        let (mut vertices, mut faces) = (0, 0);
+        let mut nodes = vec![];
+        for of_group in self.primitives.chunk_by(|a, b| a.group == b.group) {
+            let mut primitives = vec![];
+            for primitive in of_group {
+                let material = *materials
+                    .entry(primitive.material)
+                    .or_insert_with(|| root.push(self.material(primitive.material)));
+                primitives.push(self.primitive(root, primitive, material, vertices, faces));
+                vertices += primitive.vertices.len() as u64;
+                faces += primitive.faces.len() as u64;
+            }
+            let name = self.light.mesh.scene().groups()[of_group[0].group as usize].clone();
+            let mesh = root.push(Mesh {
+                primitives,
+                name: Some(name.clone()),
+                weights: None,
+                extensions: None,
+                extras: None,
+            });
+            let node = Node { mesh: Some(mesh), name: Some(name), ..Default::default() };
+            nodes.push(root.push(node));
+        }
+        nodes
+    }
+
+    /// A primitive that comes after so many vertices and faces.
+    fn primitive(
+        &self,
+        root: &mut Root,
+        primitive: &Primitive,
+        material: Index<Material>,
+        vertices: u64,
+        faces: u64,
+    ) -> gltf_json::mesh::Primitive {
+        let mut attributes = BTreeMap::new();
+        for (view, attribute) in ATTRIBUTES.into_iter().enumerate() {
+            let mut accessor = accessor(view, vertices * VECTOR_BYTES, primitive.vertices.len());
+            if attribute == Attribute::Position {
+                let values =
+                    || primitive.vertices.iter().map(|&v| self.value(attribute, v as usize));
+                accessor.min = Some(numbers(values().fold(Vec3::INFINITY, Vec3::min)));
+                accessor.max = Some(numbers(values().fold(Vec3::NEG_INFINITY, Vec3::max)));
+            }
+            attributes.insert(Valid(attribute.semantic()), root.push(accessor));
+        }
+        let indices = Accessor {
+            component_type: Valid(GenericComponentType(ComponentType::U32)),
+            type_: Valid(Type::Scalar),
+            ..accessor(ATTRIBUTES.len(), 3 * faces * INDEX_BYTES, 3 * primitive.faces.len())
+        };
+        gltf_json::mesh::Primitive {
+            attributes,
+            indices: Some(root.push(indices)),
+            material: Some(material),
+            mode: Valid(Mode::Triangles),
+            targets: None,
+            extensions: None,
+            extras: None,
+        }
+    }
+
+    /// White and unlit: all colour is in the vertices.
+    fn material(&self, index: u32) -> Material {
+        let material = &self.light.mesh.scene().materials()[index as usize];
+        let channels = |c: Rgb| Value::from(c.to_array().to_vec());
+        let notes = BTreeMap::from([
+            ("reflectance", channels(material.reflectance)),
+            ("exitance", channels(material.exitance)),
+        ]);
+        let unlit = gltf_json::extensions::material::Unlit {};
+        Material {
+            name: Some(material.name.clone()),
+            pbr_metallic_roughness: PbrMetallicRoughness {
+                metallic_factor: gltf_json::material::StrengthFactor(0.0),
+                ..Default::default()
+            },
+            extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
+            extras: notes_of(&notes),
+            ..Default::default()
+        }
+    }
+}
+
+/// Vectors of floats in a view, from an offset in bytes on.
+fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
+    Accessor {
+        buffer_view: Some(Index::new(view as u32)),
+        byte_offset: Some(offset.into()),
+        count: count.into(),
+        component_type: Valid(GenericComponentType(ComponentType::F32)),
+        type_: Valid(Type::Vec3),
+        min: None,
+        max: None,
+        name: None,
+        normalized: false,
+        sparse: None,
+        extensions: None,
+        extras: None,
+    }
+}
+
+fn numbers(v: Vec3) -> Value {
+    Value::from(v.to_array().to_vec())
+}
+
+/// `extras` with these entries.
+fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
+    let text = gltf_json::serialize::to_string(notes).ok()?;
+    RawValue::from_string(text).ok()
+}
