@@ -23,9 +23,10 @@
 //! scene's m.
 //!
 //! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
-//! more than 95 % of their hemisphere, weighted by the cosine, or in more than half of it backs
-//! nearer than 0.2 % of the diagonal of all that reflects. They lie inside a solid, under what
-//! stands on them or right behind a plate; nobody sees them, and bakes tell there what would be
+//! more than 95 % of their hemisphere, weighted by the cosine; or in more than 40 % of it backs
+//! nearer than 0.2 % of the diagonal of all that reflects; or whose mean of 1/distance to what they
+//! see is above 10 000 over that diagonal. They lie inside a solid, under what stands on them,
+//! right behind a plate or in a crack; nobody sees them, and bakes tell there what would be
 //! seen without it. The mean m is over all points.
 //!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
@@ -64,10 +65,14 @@ const FIRST_PATHS: usize = 64;
 const HIDDEN: f64 = 0.95;
 
 /// or more than this share meets backs that are near:
-const HIDDEN_NEAR: f64 = 0.5;
+const HIDDEN_NEAR: f64 = 0.4;
 
 /// nearer than this share of the diagonal of all that reflects.
 const NEAR: f64 = 0.002;
+
+/// It is hidden in a crack, too, where the mean of 1/distance to what it sees is above one over
+/// this share of that diagonal.
+const CRACK: f64 = 1e-4;
 
 /// Rays that find that out.
 const HIDDEN_RAYS: usize = 128;
@@ -273,8 +278,8 @@ struct Sampler<'a> {
     tracer: PathTracer<'a>,
     solution: SolutionLookup<'a>,
     strata: Vec<Stratum>,
-    /// Backs nearer than this hide what is behind them, scene unit.
-    near: f64,
+    /// Of all that reflects, scene unit.
+    diagonal: f64,
     /// Paths done at every point but the new ones.
     paths: usize,
 }
@@ -312,7 +317,7 @@ impl<'a> Sampler<'a> {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             solution: SolutionLookup::new(solution, scene.bounds().diagonal())?,
             tracer: PathTracer::new(scene),
-            near: NEAR * scene.reflecting_bounds().diagonal(),
+            diagonal: scene.reflecting_bounds().diagonal(),
             scene,
             settings,
             paths: 0,
@@ -411,11 +416,15 @@ impl<'a> Sampler<'a> {
         }
         if point.paths == 0 {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
-            let backs = self.tracer.backs(&point.point, HIDDEN_RAYS, &mut rng);
-            let share = |nearer: f64| {
-                backs.iter().filter(|&&d| d < nearer).count() as f64 / HIDDEN_RAYS as f64
+            let hits = self.tracer.hits(&point.point, HIDDEN_RAYS, &mut rng);
+            let backs = |nearer: f64| {
+                let near = hits.iter().filter(|hit| !hit.front && hit.distance < nearer);
+                near.count() as f64 / HIDDEN_RAYS as f64
             };
-            traced.hidden = share(f64::INFINITY) > HIDDEN || share(self.near) > HIDDEN_NEAR;
+            let inverse = hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>();
+            traced.hidden = backs(f64::INFINITY) > HIDDEN
+                || backs(NEAR * self.diagonal) > HIDDEN_NEAR
+                || inverse / HIDDEN_RAYS as f64 * CRACK * self.diagonal > 1.0;
         }
         traced.paths = paths;
         traced

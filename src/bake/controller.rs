@@ -176,9 +176,17 @@ impl Steps {
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
         let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
         let bounces = truncation.hypot(unshot);
-        let cap = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
+        let cap_of_all = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
+        let cap_of_rest = model::water_filling_cap([mesh, gaps, bounces], sampling, allowed);
+        // More rays have every vertex gather again; what is left of the error may cost less.
+        let growth = |cap: f64| model::vertex_growth(mesh.max(gaps), cap);
+        let all = growth(cap_of_all) * model::ray_factor(sampling, cap_of_all);
+        let rest = growth(cap_of_rest) - 1.0;
+        let leaves_enough = model::leaves_budget(sampling, allowed);
+        let lowers_sampling = sampling > cap_of_all && (all < rest || !leaves_enough);
+        let cap = if lowers_sampling { cap_of_all } else { cap_of_rest };
         Steps {
-            sampling: (sampling > cap)
+            sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
             mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
             gaps: (gaps > cap).then(|| model::mesh_step(gaps, cap)),
@@ -261,6 +269,22 @@ mod tests {
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
         let new = refined(&gather, judged(&met, &[]), &target(0.02, false));
         assert_eq!(new, gather, "0.0112 is below 0.9 · 0.75 · 0.02");
+    }
+
+    #[test]
+    fn rays_that_all_vertices_would_cast_again_are_the_last_resort() {
+        let gather = settings();
+        let of =
+            |sampling, mesh| ErrorEstimate { total: 0.5, sampling, mesh, ..Default::default() };
+        // Allowed are 0.0126. Sampling alone is above half of that squared, but to lower the mesh
+        // beside it takes (0.0099/0.0078)^1.6 = 1.5 times the vertices, less than to cast all
+        // again.
+        let new = refined(&gather, judged(&of(0.0099, 0.0099), &[]), &target(0.02, false));
+        assert_eq!(Step::between(&gather, &new), Step::Split);
+        assert!(new.refinement.surplus_tolerance < gather.refinement.surplus_tolerance);
+        // Where next to nothing is left for the mesh, rays are cheaper.
+        let new = refined(&gather, judged(&of(0.0125, 0.0099), &[]), &target(0.02, false));
+        assert_eq!(Step::between(&gather, &new), Step::AllVertices { bounce: false });
     }
 
     #[test]

@@ -9,9 +9,10 @@
 //! with B the reflected radiosity (emission is known and has no error) and | | a length over the
 //! channels. Surfaces that reflect nothing have neither error nor weight. Places that nobody sees
 //! are left out: those that see backs in more than 95 % of their hemisphere, weighted by the
-//! cosine, or in more than half of it backs that nearly touch them. They are inside a solid or
-//! under what stands on them. A group of the scene has the same figure over its own area, with the
-//! floor of the scene.
+//! cosine, or in more than 40 % of it backs that nearly touch them, or on average nothing but what
+//! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
+//! what stands on them, or in a crack. A group of the scene has the same figure over its own area,
+//! with the floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result

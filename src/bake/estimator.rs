@@ -369,11 +369,12 @@ impl Sample {
     }
 }
 
-/// Whether a point is inside a solid, or under what nearly touches it; `diagonal` of where the
-/// light is, scene unit.
+/// Whether a point is inside a solid, under what nearly touches it, or in a crack; `diagonal` of
+/// where the light is, scene unit.
 fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
     // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
     let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
     sample.backface > buried::HIDDEN
+        || sample.inverse_distance * buried::CRACK * diagonal > 1.0
         || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
 }

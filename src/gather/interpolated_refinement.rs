@@ -13,6 +13,7 @@
 //! | split onto the interpolant | s/8 |
 //! | at a boundary of its surface or next to buried vertices | 2.5 · s/4 |
 //! | without a parent | how far the source light is from linear |
+//! | in a gap, or at its mouth | a quarter of its radiosity, at least |
 
 use std::collections::{HashMap, HashSet};
 
@@ -33,6 +34,11 @@ const BOUNDARY_FACTOR: f64 = 2.5;
 /// Share of an element's error that remains when its midsides are put on the quadratic
 /// interpolant. Chosen by hand; no measurement kept.
 const FOLLOWED_SHARE: f64 = 0.5;
+
+/// Error of an element whose corners see surfaces nearer than the element is large, over its
+/// radiosity, at least: light changes there between the corners, which say nothing of it. Chosen by
+/// hand: half of it is lost on average across the mouth of a gap, at half of the element's places.
+const GAP_ERROR: f64 = 0.25;
 
 /// The refined mesh, and an estimate of the error that remains in each of its elements, W/m²: a
 /// length over the channels.
@@ -146,9 +152,21 @@ fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usiz
             1.0
         };
         let children = if is_split { 4 } else { 1 };
-        errors.resize(errors.len() + children, factor * error);
+        errors.resize(errors.len() + children, (factor * error).max(gap_error(samples, e)));
     }
     errors
+}
+
+/// Least error of element `e` if it is in a gap, W/m²; 0 elsewhere.
+fn gap_error(samples: &SampledMesh, e: usize) -> f64 {
+    let corners = samples.corners()[e].map(|v| v as usize);
+    let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+    let nearest = largest(corners.map(|v| samples.inverse_distance[v]));
+    if nearest * samples.mesh.area(samples.mesh.element(e)).sqrt() > 1.0 {
+        GAP_ERROR * largest(corners.map(|v| samples.reflected[v].length()))
+    } else {
+        0.0
+    }
 }
 
 /// Whether each vertex lies on the boundary of a smooth surface, or on an element with a buried

@@ -59,6 +59,8 @@ pub(crate) struct ErrorScale {
     pub max_edge: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
     pub touching: f64,
+    /// Distance below which a gap is a crack that nobody looks into; scene unit.
+    pub crack: f64,
     /// Where most of the light is: elements grow with the distance from it.
     region: Option<Aabb>,
 }
@@ -75,6 +77,7 @@ impl ErrorScale {
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
             touching: buried::NEAR_BACKS_DISTANCE * diagonal,
+            crack: buried::CRACK * diagonal,
             radiosity_floor: field.radiosity_floor(),
             max_edge: reflecting.map(edge).fold(0.0, f64::max),
             region,
@@ -108,7 +111,7 @@ pub(super) fn refinement_indicator(
     // (Hottel's crossed strings): elements as long as the distance follow that.
     let nearest = samples.nearest_dim(e, GAP_DIMNESS * scale.radiosity_floor);
     let gap_factor = settings.gap_factor * group_factor;
-    let in_gap = edge * nearest > gap_factor;
+    let in_gap = edge * nearest > gap_factor && nearest * scale.crack < 1.0;
     if size <= settings.min_edge * group_factor && !in_gap {
         return 0.0;
     }

@@ -143,12 +143,10 @@ impl<'a> PathTracer<'a> {
         (0..paths).map(|_| self.path(point, rng)).sum()
     }
 
-    /// How far off backs are, scene unit, where those of `rays` rays about `point`, dense as the
-    /// cosine, meet any.
-    pub(super) fn backs(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<f64> {
+    /// What those of `rays` rays from `point`, dense as the cosine, meet that meet anything.
+    pub(super) fn hits(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<Hit> {
         let normal = self.normals[point.triangle];
-        let hits = (0..rays).filter_map(|_| self.next_hit(point, cosine_weighted(normal, rng).0));
-        hits.filter(|hit| !hit.front).map(|hit| hit.distance).collect()
+        (0..rays).filter_map(|_| self.next_hit(point, cosine_weighted(normal, rng).0)).collect()
     }
 
     /// Reflected radiosity at `point` as one path finds it, W/m².

@@ -8,7 +8,9 @@ use radiosity::verify::{Progress, Settings, Stop, Verification, verify};
 use radiosity::{ErrorKind, Material, Rgb, Scene, Triangle, VertexMesh};
 
 use crate::common::keep_going;
-use crate::common::scenes::{facing_down, facing_up, lamp, paint, quads, standing_block, walls};
+use crate::common::scenes::{
+    block, facing_down, facing_up, lamp, paint, quads, standing_block, walls,
+};
 
 /// A solution with a radiosity for each triangle.
 fn solution(scene: &Scene, radiosity: impl Fn(&Triangle) -> Rgb) -> VertexMesh {
@@ -170,6 +172,26 @@ fn what_is_hidden_is_left_out_and_said() {
     let all = verify(&scene, &lit, &settings, keep_going).unwrap();
     assert_eq!(all.error, all.error_with_hidden);
     assert!(all.groups[0].error.unwrap().value > 10.0);
+}
+
+#[test]
+fn a_crack_is_hidden_and_a_gap_is_not() {
+    let shares = |height: f64| {
+        let mut all = vec![(facing_up([0.0, 1.0], [0.0, 1.0], 0.0), paint(0.5, 0.0))];
+        let hovering = block([0.2, 0.3, height], [0.7, 0.8, height + 0.4]);
+        all.extend(hovering.map(|side| (side, paint(0.5, 0.0))));
+        all.push((facing_down([-9.0, 10.0], [-9.0, 10.0], 2.0), lamp([1.0; 3])));
+        let scene = quads(&all);
+        let lit = solution(&scene, |_| Rgb::splat(0.5));
+        let found = verify(&scene, &lit, &settings(0.1), keep_going).unwrap();
+        let floor = found.groups[0];
+        (floor.hidden_share, (0.25 * 0.75 / floor.points as f64).sqrt())
+    };
+    // The diagonal is 1.47: a mean of 1/distance of 2/3 over the height is above 10 000/1.47 below
+    // a height of 9.8e-5.
+    let (crack, deviation) = shares(3e-5);
+    assert!((crack - 0.25).abs() < 4.0 * deviation, "{crack} ± {deviation}");
+    assert_eq!(shares(3e-3).0, 0.0);
 }
 
 #[test]

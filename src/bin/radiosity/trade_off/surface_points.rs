@@ -42,10 +42,13 @@ const CELLS: usize = 32;
 const HIDDEN: f64 = 0.95;
 
 /// Points that see more backs than this share, and nearer ones than [`NEAR`], are under something.
-const NEAR_BACKS: f64 = 0.5;
+const NEAR_BACKS: f64 = 0.4;
 
 /// Share of the diagonal of all that reflects.
 const NEAR: f64 = 0.002;
+
+/// Points whose mean of 1/distance is above one over this share of that diagonal are in a crack.
+const CRACK: f64 = 1e-4;
 
 /// Rays of a point that find out how wide the gap is that it lies in.
 const RAYS: u32 = 64;
@@ -70,7 +73,8 @@ impl SurfacePoints {
         let dim = (FLOOR * mean).max(f64::MIN_POSITIVE);
         let lowest = points.iter().fold(DVec3::INFINITY, |low, p| low.min(p.position));
         let highest = points.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(p.position));
-        let near = NEAR_BACKS / (NEAR * (highest - lowest).length());
+        let reflecting = (highest - lowest).length();
+        let near = NEAR_BACKS / (NEAR * reflecting);
         let offset = OFFSET * diagonal;
         let above = |point: &SurfacePoint| GatherPoint {
             position: point.position + offset * point.normal,
@@ -83,7 +87,8 @@ impl SurfacePoints {
         points.retain(|_| {
             let sample = samples.next().expect("a sample for every point");
             let is_covered = sample.backface > NEAR_BACKS && sample.inverse_distance > near;
-            !is_covered && sample.backface <= HIDDEN
+            let is_in_crack = sample.inverse_distance * CRACK * reflecting > 1.0;
+            !is_covered && !is_in_crack && sample.backface <= HIDDEN
         });
         let size = (high - low) / CELLS as f64;
         let cells = vec![vec![]; CELLS * CELLS * CELLS];
