@@ -2,7 +2,7 @@
 //!
 //! | format | function | content |
 //! |---|---|---|
-//! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`] | a scene |
+//! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups and materials, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -14,6 +14,7 @@ mod exr;
 mod files;
 #[cfg(feature = "glb")]
 mod glb;
+mod lights;
 mod mtl;
 mod obj;
 mod ply;
@@ -36,7 +37,7 @@ pub use self::exr::write_exr;
 pub use self::glb::write_glb;
 #[cfg(feature = "png")]
 pub use self::png::write_png;
-pub use obj::{load_obj, read_obj};
+pub use obj::{ObjSettings, load_obj, read_obj};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;
 pub use tone::ToneCurve;

@@ -108,10 +108,10 @@ pub use io::write_exr;
 pub use io::write_glb;
 #[cfg(feature = "png")]
 pub use io::write_png;
-pub use io::{load_obj, read_ply, write_ply};
+pub use io::{ObjSettings, load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
-pub use scene::{Material, Rgb, Scene, Triangle};
+pub use scene::{Material, Rgb, Scene, Triangle, Warning};
 pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;
 pub use view_factor::ViewFactors;

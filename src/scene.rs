@@ -7,12 +7,15 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+mod warning;
+
 use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+pub use warning::{Warning, WarningKind};
 
 /// One value per colour channel (r, g, b), linear; the unit is said where it is used. Made by
 /// `Rgb::new(r, g, b)` or `Rgb::splat(grey)`.
@@ -55,7 +58,7 @@ pub struct Scene {
     degenerate: usize,
     /// See [`Scene::coordinate_ulp`].
     coordinate_ulp: f64,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 impl Scene {
@@ -145,7 +148,7 @@ impl Scene {
         let mut scene =
             Scene { positions, triangles, groups, materials, degenerate, coordinate_ulp, warnings };
         if degenerate > 0 {
-            scene.warn(format!("{degenerate} triangles without area were dropped"));
+            scene.warn(Warning::new(WarningKind::Degenerate, degenerate, "dropped"));
         }
         Ok(scene)
     }
@@ -175,8 +178,8 @@ impl Scene {
         self.degenerate
     }
 
-    /// What was accepted but deserves a look, one sentence each.
-    pub fn warnings(&self) -> &[String] {
+    /// What was accepted but deserves a look, one kind each.
+    pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
@@ -271,7 +274,7 @@ impl Scene {
         Ok(scene)
     }
 
-    pub(crate) fn warn(&mut self, warning: String) {
+    pub(crate) fn warn(&mut self, warning: Warning) {
         self.warnings.push(warning);
     }
 }

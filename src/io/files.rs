@@ -1,9 +1,16 @@
-//! Where the text of OBJ and MTL files comes from, and how much of it may come.
+//! Where the bytes of OBJ files, their libraries and textures come from, and how many may come.
+//!
+//! A name in a file is looked for below the folder of the OBJ file and nowhere else: as it is
+//! written, with `/` for `\`, then without its first folders one by one, down to the file name
+//! alone; each time as it is spelled and then without regard to case.
 
-use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
+
+use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use crate::error::quoted;
 
@@ -11,52 +18,161 @@ use crate::error::quoted;
 /// the sides of all triangles can be numbered in 32 bits.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 
-/// The files that `mtllib` lines can name, from the folder of the OBJ file.
-pub(super) enum LibrarySource<'a> {
+/// Names that are looked for in a scene's folder; more are taken for missing, so that a file with
+/// a million names does not keep the disk busy. Chosen by hand: a look takes some 10 µs.
+const MAX_LOOKUPS: usize = 10_000;
+
+/// Bytes of the longest name that is looked for: that of a path on Linux.
+const MAX_NAME: usize = 4096;
+
+/// Folders of a name, from its end, that are looked for below the scene's folder.
+const MAX_FOLDERS: usize = 8;
+
+/// The files that an OBJ file and its libraries can name.
+pub(super) struct FileSource<'a> {
+    place: Place<'a>,
+    /// Of each folder that was looked into: names in lower case, and as they are.
+    listings: RefCell<HashMap<PathBuf, HashMap<String, String>>>,
+    /// What was looked for already.
+    found: RefCell<HashMap<String, Option<String>>>,
+    lookups: Cell<usize>,
+}
+
+enum Place<'a> {
     Folder(&'a Path),
-    /// Name and content of each.
+    /// Name and content of each file.
     Memory(&'a [(&'a str, &'a [u8])]),
 }
 
-impl LibrarySource<'_> {
+impl<'a> FileSource<'a> {
+    pub fn in_folder(folder: &'a Path) -> FileSource<'a> {
+        FileSource::new(Place::Folder(folder))
+    }
+
+    pub fn in_memory(files: &'a [(&'a str, &'a [u8])]) -> FileSource<'a> {
+        FileSource::new(Place::Memory(files))
+    }
+
+    fn new(place: Place<'a>) -> FileSource<'a> {
+        let (listings, found) = Default::default();
+        FileSource { place, listings, found, lookups: Cell::new(0) }
+    }
+
     /// `name` with the folder before it.
     pub fn path(&self, name: &str) -> PathBuf {
-        match self {
-            LibrarySource::Folder(folder) => folder.join(name),
-            LibrarySource::Memory(_) => name.into(),
+        match self.place {
+            Place::Folder(folder) => folder.join(name),
+            Place::Memory(_) => name.into(),
         }
     }
 
-    /// The content of file `name`, of at most `most` bytes, if it is in the folder or below.
-    pub fn read(&self, name: &str, most: u64) -> io::Result<String> {
-        let below = |c| matches!(c, Component::Normal(_) | Component::CurDir);
-        if !Path::new(name).components().all(below) {
-            let found = "it is not in the folder of the OBJ file, nor below";
-            return Err(io::Error::new(ErrorKind::PermissionDenied, found));
+    /// The file that `name` stands for, as a path from the scene's folder.
+    pub fn find(&self, name: &str) -> Option<String> {
+        if name.len() > MAX_NAME || name.contains('\0') {
+            return None;
         }
-        match self {
-            LibrarySource::Folder(_) => read(&self.path(name), most),
-            LibrarySource::Memory(files) => {
+        if let Some(found) = self.found.borrow().get(name) {
+            return found.clone();
+        }
+        if self.lookups.replace(self.lookups.get() + 1) >= MAX_LOOKUPS {
+            return None;
+        }
+        let found = self.look_for(name);
+        self.found.borrow_mut().insert(name.into(), found.clone());
+        found
+    }
+
+    fn look_for(&self, name: &str) -> Option<String> {
+        if self.is_below(name) && self.is_file(name) {
+            return Some(name.into());
+        }
+        let slashes = name.replace('\\', "/");
+        let parts: Vec<&str> = slashes.split('/').filter(|p| !["", "."].contains(p)).collect();
+        // What stands before the last `..` lies elsewhere.
+        let inside = parts.iter().rposition(|&p| p == "..").map_or(0, |k| k + 1);
+        let first = inside.max(parts.len().saturating_sub(MAX_FOLDERS));
+        (first..parts.len()).find_map(|k| self.spelled(&parts[k..]))
+    }
+
+    /// Whether `name` is a plain path from the folder down.
+    fn is_below(&self, name: &str) -> bool {
+        use std::path::Component::{CurDir, Normal};
+        !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Normal(_) | CurDir))
+    }
+
+    /// A file of this path, spelled so or with other capitals.
+    fn spelled(&self, parts: &[&str]) -> Option<String> {
+        let path = parts.join("/");
+        if !self.is_below(&path) {
+            return None;
+        }
+        if self.is_file(&path) {
+            return Some(path);
+        }
+        if let Place::Memory(files) = self.place {
+            let same = |file: &&(&str, _)| file.0.to_lowercase() == path.to_lowercase();
+            return files.iter().find(same).map(|file| file.0.into());
+        }
+        let mut found = PathBuf::new();
+        for part in parts {
+            let name = self.listed(&found, part)?;
+            found.push(name);
+        }
+        let found = found.to_str()?.to_string();
+        self.is_file(&found).then_some(found)
+    }
+
+    /// The entry of `folder` that is `name` but for capitals.
+    fn listed(&self, folder: &Path, name: &str) -> Option<String> {
+        let mut listings = self.listings.borrow_mut();
+        let names = listings.entry(folder.into()).or_insert_with(|| {
+            let names = self.entries(folder).into_iter();
+            names.map(|name| (name.to_lowercase(), name)).collect()
+        });
+        names.get(&name.to_lowercase()).cloned()
+    }
+
+    /// The names in `folder`, which lies in the scene's.
+    fn entries(&self, folder: &Path) -> Vec<String> {
+        let Place::Folder(root) = self.place else { return vec![] };
+        let folder = root.join(folder);
+        let folder = if folder == Path::new("") { Path::new(".") } else { &folder };
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect()
+    }
+
+    /// Whether there is a regular file of this name, and no link leads out of the folder.
+    fn is_file(&self, name: &str) -> bool {
+        match self.place {
+            Place::Memory(files) => files.iter().any(|f| Path::new(f.0) == Path::new(name)),
+            Place::Folder(folder) => {
+                let path = folder.join(name);
+                path.is_file() && is_inside(&path, folder)
+            }
+        }
+    }
+
+    /// The content of file `name`, which was found, of at most `most` bytes.
+    pub fn read(&self, name: &str, most: u64) -> io::Result<Vec<u8>> {
+        match self.place {
+            Place::Folder(_) => read_bytes(&self.path(name), most),
+            Place::Memory(files) => {
                 let named = |file: &&(&str, _)| Path::new(file.0) == Path::new(name);
-                let file = files.iter().find(named).ok_or(ErrorKind::NotFound)?;
-                limited(file.1.into(), most)
+                limited(files.iter().find(named).ok_or(ErrorKind::NotFound)?.1, most)
             }
         }
     }
 
     /// Which libraries there are.
     pub fn libraries(&self) -> String {
-        let (place, mut names): (_, Vec<String>) = match self {
-            LibrarySource::Folder(folder) => {
-                let folder = if *folder == Path::new("") { Path::new(".") } else { folder };
-                let files = fs::read_dir(folder).into_iter().flatten().flatten();
-                let libraries = files
-                    .map(|entry| entry.path())
-                    .filter(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl")));
-                let name = |f: PathBuf| Some(f.file_name()?.to_string_lossy().into_owned());
-                (format!("the folder '{}'", folder.display()), libraries.filter_map(name).collect())
+        let (place, mut names): (_, Vec<String>) = match self.place {
+            Place::Folder(folder) => {
+                let library = |name: &String| name.to_lowercase().ends_with(".mtl");
+                let names = self.entries(Path::new("")).into_iter().filter(library).collect();
+                let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+                (format!("the folder '{}'", folder.display()), names)
             }
-            LibrarySource::Memory(files) => {
+            Place::Memory(files) => {
                 ("what was given".into(), files.iter().map(|file| file.0.into()).collect())
             }
         };
@@ -68,9 +184,13 @@ impl LibrarySource<'_> {
     }
 }
 
-/// The text of a regular file of at most `most` bytes; bytes that are not UTF-8 become U+FFFD.
-pub(super) fn read(path: &Path, most: u64) -> io::Result<String> {
-    limited(read_bytes(path, most)?.into(), most)
+/// Whether `path` lies in `folder` when all links are followed.
+fn is_inside(path: &Path, folder: &Path) -> bool {
+    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+    match (path.canonicalize(), folder.canonicalize()) {
+        (Ok(path), Ok(folder)) => path.starts_with(folder),
+        _ => false,
+    }
 }
 
 /// The whole of a regular file of at most `most` bytes.
@@ -92,15 +212,69 @@ pub(super) fn read_bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
 }
 
-/// `bytes` as text, if they are not too many.
-pub(super) fn limited(bytes: Cow<[u8]>, most: u64) -> io::Result<String> {
-    if bytes.len() as u64 > most {
-        return Err(too_large(most));
-    }
-    let lossy = |e: std::string::FromUtf8Error| String::from_utf8_lossy(e.as_bytes()).into_owned();
-    Ok(String::from_utf8(bytes.into_owned()).unwrap_or_else(lossy))
+/// A copy of `bytes`, if they are not too many.
+pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<Vec<u8>> {
+    if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes.into()) }
 }
 
 fn too_large(most: u64) -> io::Error {
     io::Error::new(ErrorKind::FileTooLarge, format!("it has more than {most} bytes"))
+}
+
+/// `bytes` as text, and the name of their encoding where that is not UTF-8: UTF-16 by its
+/// byte-order mark or by its zeros, else Windows-1252, of which Latin-1 is a part.
+pub(super) fn decode(bytes: Vec<u8>) -> (String, Option<&'static str>) {
+    let marked = Encoding::for_bom(&bytes).map(|(encoding, _)| encoding);
+    if let Some(utf_16) = marked.filter(|e| e.name() != "UTF-8").or_else(|| utf_16(&bytes)) {
+        return (utf_16.decode_with_bom_removal(&bytes).0.into_owned(), Some(utf_16.name()));
+    }
+    match String::from_utf8(bytes) {
+        Ok(text) => (text, None),
+        Err(e) => {
+            let text = WINDOWS_1252.decode_without_bom_handling(e.as_bytes()).0.into_owned();
+            (text, Some(WINDOWS_1252.name()))
+        }
+    }
+}
+
+/// UTF-16 without a byte-order mark: of its first 256 pairs of bytes, three in four have a zero
+/// always at the same end, as Latin letters have.
+fn utf_16(bytes: &[u8]) -> Option<&'static Encoding> {
+    let pairs = || bytes.chunks_exact(2).take(256);
+    let most = |zero: usize| {
+        let latin = pairs().filter(|pair| pair[zero] == 0 && pair[1 - zero] != 0).count();
+        latin > 0 && 4 * latin >= 3 * pairs().count()
+    };
+    if most(0) {
+        Some(UTF_16BE)
+    } else if most(1) {
+        Some(UTF_16LE)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_decoded() {
+        let text = "v 0 0 0\ng b\u{e9}ton\n";
+        let be: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let le: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        let with = |mark: &[u8], bytes: &[u8]| [mark, bytes].concat();
+        for (bytes, name) in [
+            (text.as_bytes().to_vec(), None),
+            (with(&[0xfe, 0xff], &be), Some("UTF-16BE")),
+            (with(&[0xff, 0xfe], &le), Some("UTF-16LE")),
+            (be, Some("UTF-16BE")),
+            (le, Some("UTF-16LE")),
+            (latin, Some("windows-1252")),
+        ] {
+            assert_eq!(decode(bytes), (text.to_string(), name));
+        }
+        assert_eq!(decode(vec![0; 9]), ("\0".repeat(9), None));
+    }
 }

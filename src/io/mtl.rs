@@ -5,38 +5,51 @@
 //! | `newmtl` | begins a material |
 //! | `Kd` | diffuse reflectance ρ per channel, linear |
 //! | `Ke` | emitted radiance L per channel: exitance π L |
+//! | `Ka` | radiance, if above 1 and no material has a `Ke`: see [`super::lights`] |
 //! | `d`, `Tr`, `map_d` | transparency: not modelled, warned about |
 //! | `map_Kd`, `map_Ke` | textures: not modelled, warned about |
 //!
-//! All others do not change diffuse light, and are skipped.
+//! All others do not change diffuse light, and are skipped. tobj reads the materials, one at a time
+//! so that its large records do not pile up. It gets the statements above alone, with three finite
+//! numbers each: it gives no line for others, panics at fewer, and takes what is not finite.
 
 use std::collections::{HashMap, HashSet};
-use std::f64::consts::PI;
-use std::io;
-use std::path::PathBuf;
+use std::io::{self, Write as _};
 
-use super::files::{LibrarySource, MAX_BYTES};
+use super::files::{self, FileSource, MAX_BYTES};
+use super::obj::repairs::Repairs;
 use super::text::{self, Line, finite, words};
-use crate::error::{Error, ErrorKind, quoted};
-use crate::scene::{Material, Rgb};
+use crate::error::{Error, ErrorKind};
+use crate::scene::{Rgb, Warning, WarningKind};
+
+/// Words of a `mtllib` line that are tried as one name with spaces. Chosen by hand.
+const MAX_WORDS: usize = 8;
 
 /// The materials of all libraries loaded so far.
 #[derive(Default)]
 pub(super) struct Library {
-    entries: Vec<Entry>,
+    pub materials: Vec<MtlMaterial>,
     by_name: HashMap<String, u32>,
-    files: HashSet<PathBuf>,
+    /// Files that were loaded, by their path from the scene's folder.
+    files: Vec<String>,
     bytes: u64,
     redefined: Vec<String>,
 }
 
-/// One `newmtl` and what follows it.
-struct Entry {
-    name: String,
-    reflectance: Option<Rgb>,
-    exitance: Rgb,
-    textured: bool,
+/// One `newmtl` and what follows it, as it is written.
+pub(super) struct MtlMaterial {
+    pub name: String,
+    /// `Kd`.
+    pub reflectance: Option<Rgb>,
+    /// `Ke`.
+    pub radiance: Option<Rgb>,
+    /// `Ka`.
+    pub ambient: Option<Rgb>,
+    pub textured: bool,
     transparent: bool,
+    /// Its `newmtl` line, and the file by index.
+    line: u32,
+    file: u32,
 }
 
 impl Library {
@@ -45,169 +58,264 @@ impl Library {
         self.by_name.get(name).copied()
     }
 
-    /// What a `usemtl` that found nothing should have said.
-    pub fn remedy(&self) -> String {
-        let names: Vec<_> = self.entries.iter().map(|e| &e.name).collect();
-        match (self.files.len(), names.len()) {
-            (0, _) => "add `mtllib FILE` above it, with a file that defines the material".into(),
-            (_, 0) => "define it with `newmtl`: the libraries loaded so far are empty".into(),
-            _ => format!("the libraries loaded so far define {}", quoted(&names)),
-        }
+    /// Whether no file was found yet.
+    pub fn is_empty(&self) -> bool {
+        self.files.is_empty()
     }
 
-    /// Loads the files that a `mtllib` line names: one name, which may contain spaces, or several.
-    pub fn load(&mut self, line: &Line, names: &str, files: &LibrarySource) -> Result<(), Error> {
-        if names.is_empty() {
-            return Err(line.parse_error("no file name", "write `mtllib FILE`"));
-        }
-        let as_one_name = self.read(names, files);
-        if as_one_name.is_ok() || names.split_whitespace().nth(1).is_none() {
-            return self.take(line, names, as_one_name, files);
-        }
-        for name in names.split_whitespace() {
-            let text = self.read(name, files);
-            self.take(line, name, text, files)?;
-        }
-        Ok(())
+    /// Where `material` is defined.
+    pub fn place(&self, material: &MtlMaterial, files: &FileSource) -> String {
+        text::place(&files.path(&self.files[material.file as usize]), material.line as usize)
     }
 
-    /// The text of file `name`; nothing if it is loaded already.
-    fn read(&self, name: &str, files: &LibrarySource) -> io::Result<String> {
-        if self.files.contains(&files.path(name)) {
-            return Ok(String::new());
+    /// Loads the files that a `mtllib` line names: one name or several, each of which may contain
+    /// spaces, with or without backslashes before them. Gives the materials by name, for tobj.
+    pub fn load(
+        &mut self,
+        line: &Line,
+        names: &str,
+        files: &FileSource,
+        repairs: &mut Repairs,
+    ) -> Result<tobj::MTLLoadResult, Error> {
+        let first = self.materials.len();
+        let whole = names.trim_matches('"');
+        if files.find(whole).is_some() {
+            self.load_file(line, whole, files, repairs)?;
+        } else {
+            let words = escaped_words(names);
+            let mut at = 0;
+            while at < words.len() {
+                let most = MAX_WORDS.min(words.len() - at);
+                let name = |count: &usize| words[at..at + count].join(" ");
+                let known = (1..=most).rev().find(|count| files.find(&name(count)).is_some());
+                // What is missing ends where a name of a library does.
+                let ends = |word: &String| word.to_ascii_lowercase().ends_with(".mtl");
+                let to_end = words[at..].iter().position(ends).map_or(words.len() - at, |k| k + 1);
+                let count = known.unwrap_or(to_end);
+                self.load_file(line, &name(&count), files, repairs)?;
+                at += count;
+            }
+            if words.is_empty() {
+                note_missing(line, "", files, repairs)?;
+            }
         }
-        files.read(name, MAX_BYTES.saturating_sub(self.bytes))
+        let new = self.materials.iter().enumerate().skip(first);
+        Ok(Ok((vec![], new.map(|(k, m)| (m.name.clone(), k)).collect())))
     }
 
-    /// Takes in the `text` of file `name`.
-    fn take(
+    /// Loads the library `name`, if it is there and was not loaded before.
+    fn load_file(
         &mut self,
         line: &Line,
         name: &str,
-        text: io::Result<String>,
-        files: &LibrarySource,
+        files: &FileSource,
+        repairs: &mut Repairs,
     ) -> Result<(), Error> {
-        let text = text.map_err(|e| {
-            let found = format!("{} cannot be read: {e}", quoted(&[name]));
-            line.parse_error_as(ErrorKind::File, found, files.libraries()).with_source(e)
-        })?;
-        self.bytes += text.len() as u64;
-        let (path, start) = (files.path(name), self.entries.len());
-        text::lines(&path, &text).try_for_each(|line| self.line(&line, start))?;
-        self.files.insert(path);
-        Ok(())
+        let Some(found) = files.find(name) else {
+            return note_missing(line, name, files, repairs);
+        };
+        let plain = |path: &str| path.trim_start_matches("./").replace("/./", "/");
+        if plain(&found) != plain(name) {
+            repairs.note(
+                WarningKind::LibraryElsewhere,
+                line,
+                name,
+                format!("'{found}' is taken"),
+            )?;
+        }
+        self.take(line, &found, files, repairs)
     }
 
-    /// Takes in one line of a file whose first material has the index `start`.
-    fn line(&mut self, line: &Line, start: usize) -> Result<(), Error> {
-        let (keyword, rest) = line.keyword();
-        if keyword == "newmtl" {
-            return self.begin(line, rest);
-        }
-        if !["Kd", "Ke", "d", "Tr", "map_Kd", "map_Ke", "map_d"].contains(&keyword) {
+    /// Takes in the file `found`, which exists, once.
+    pub fn take(
+        &mut self,
+        line: &Line,
+        found: &str,
+        files: &FileSource,
+        repairs: &mut Repairs,
+    ) -> Result<(), Error> {
+        if self.files.iter().any(|file| file == found) {
             return Ok(());
         }
-        let Some(entry) = self.entries.get_mut(start..).and_then(<[_]>::last_mut) else {
-            return Err(
-                line.parse_error(format!("`{keyword}` of no material"), "begin with `newmtl`")
-            );
+        let bytes = match files.read(found, MAX_BYTES.saturating_sub(self.bytes)) {
+            Err(e) if e.kind() != io::ErrorKind::FileTooLarge => {
+                return note_missing(line, found, files, repairs);
+            }
+            bytes => bytes.map_err(|e| {
+                let found = format!("{} cannot be read: {e}", crate::error::quoted(&[found]));
+                line.parse_error_as(ErrorKind::File, found, files.libraries()).with_source(e)
+            })?,
         };
-        match keyword {
-            "Kd" => entry.reflectance = Some(reflectance(line, &entry.name, rest)?),
-            "Ke" => entry.exitance = exitance(line, &entry.name, rest)?,
-            "map_Kd" | "map_Ke" => entry.textured = true,
-            "map_d" => entry.transparent = true,
-            _ => {
-                let number = words(rest).last().and_then(finite);
-                let x =
-                    number.ok_or_else(|| unusable_value(line, &entry.name, "a finite number"))?;
-                // Files disagree about which end of `Tr` is opaque.
-                entry.transparent |= x < 1.0 && (keyword == "d" || x > 0.0);
+        self.bytes += bytes.len() as u64;
+        self.files.push(found.into());
+        let path = files.path(found);
+        let (text, encoding) = files::decode(bytes);
+        if let Some(encoding) = encoding {
+            let done = format!("read as {encoding}");
+            repairs.note_at(WarningKind::Encoding, || path.display().to_string(), "", done)?;
+        }
+        let mut block = Block::default();
+        for line in text::lines(&path, &text) {
+            if line.keyword().0.eq_ignore_ascii_case("newmtl") {
+                self.push(std::mem::take(&mut block));
+            }
+            block.line(&line, repairs)?;
+        }
+        self.push(block);
+        Ok(())
+    }
+
+    /// Has tobj read `block`, if a material begins there.
+    fn push(&mut self, block: Block) {
+        if block.line == 0 {
+            return;
+        }
+        let Ok((materials, _)) = tobj::load_mtl_buf(&mut &*block.statements) else { return };
+        for material in materials {
+            let index = self.materials.len() as u32;
+            if self.by_name.insert(material.name.clone(), index).is_some() {
+                self.redefined.push(material.name.clone());
+            }
+            let file = self.files.len() as u32 - 1;
+            self.materials.push(MtlMaterial::new(material, block.line, file));
+        }
+    }
+
+    /// Warns of what `used` materials have that is not modelled.
+    pub fn warn(&mut self, used: &HashSet<u32>, repairs: &mut Repairs) {
+        let names = |odd: fn(&MtlMaterial) -> bool| {
+            let all = self.materials.iter().enumerate();
+            let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
+            odd.map(|(_, m)| m.name.as_str()).collect::<Vec<_>>()
+        };
+        let mut redefined: Vec<&str> = self.redefined.iter().map(String::as_str).collect();
+        redefined.sort_unstable();
+        redefined.dedup();
+        let lists = [
+            (
+                WarningKind::Texture,
+                names(|m| m.textured),
+                "not modelled: `Kd` and `Ke` count alone",
+            ),
+            (WarningKind::Transparency, names(|m| m.transparent), "not modelled: they are opaque"),
+            (
+                WarningKind::RedefinedMaterial,
+                redefined,
+                "each `usemtl` takes the last one above it",
+            ),
+        ];
+        for (kind, names, done) in lists {
+            if !names.is_empty() {
+                repairs.push(Warning::new(kind, names.len(), done).naming(names));
             }
         }
-        Ok(())
-    }
-
-    fn begin(&mut self, line: &Line, name: &str) -> Result<(), Error> {
-        if name.is_empty() {
-            return Err(line.parse_error("a material without a name", "write `newmtl NAME`"));
-        }
-        if self.by_name.insert(name.into(), self.entries.len() as u32).is_some() {
-            self.redefined.push(name.into());
-        }
-        self.entries.push(Entry {
-            name: name.into(),
-            reflectance: None,
-            exitance: Rgb::ZERO,
-            textured: false,
-            transparent: false,
-        });
-        Ok(())
-    }
-
-    /// The materials by index, and warnings about those for which `used` holds.
-    pub fn into_materials(mut self, used: &HashSet<u32>) -> (Vec<Material>, Vec<String>) {
-        self.redefined.sort();
-        self.redefined.dedup();
-        let names = |odd: fn(&Entry) -> bool| {
-            let entries = self.entries.iter().enumerate();
-            let odd = entries.filter(|(i, e)| used.contains(&(*i as u32)) && odd(e));
-            odd.map(|(_, e)| e.name.clone()).collect::<Vec<_>>()
-        };
-        let dark = |e: &Entry| e.reflectance.is_none() && e.exitance == Rgb::ZERO;
-        let lists = [
-            (names(dark), "neither `Kd` nor `Ke`, so they are black"),
-            (names(|e| e.textured), "textures, which are not modelled: `Kd` and `Ke` count alone"),
-            (names(|e| e.transparent), "transparency, which is not modelled: they are opaque"),
-            (self.redefined, "several definitions: each `usemtl` takes the last one above it"),
-        ];
-        let lists = lists.into_iter().filter(|(names, _)| !names.is_empty());
-        let warnings = lists.map(|(n, what)| format!("materials with {what}: {}", quoted(&n)));
-        let warnings = warnings.collect();
-        let material = |e: Entry| Material {
-            name: e.name,
-            reflectance: e.reflectance.unwrap_or(Rgb::ZERO),
-            exitance: e.exitance,
-        };
-        (self.entries.into_iter().map(material).collect(), warnings)
     }
 }
 
-fn reflectance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
-    let rho = colour(line, name, rest)?;
-    if rho.to_array().iter().any(|x| !(0.0..1.0).contains(x)) {
-        let right = "a diffuse reflectance of at least 0 and below 1 in each channel";
-        return Err(unusable_value(line, name, right));
-    }
-    Ok(rho)
+fn note_missing(
+    line: &Line,
+    name: &str,
+    files: &FileSource,
+    repairs: &mut Repairs,
+) -> Result<(), Error> {
+    // Looks into the folder, which is not done again for each of many.
+    let first = repairs.count_of(WarningKind::MissingLibrary) == 0;
+    let there = if first { files.libraries() } else { String::new() };
+    let done = format!("its materials are grey; {there}");
+    repairs.note(WarningKind::MissingLibrary, line, name, done)
 }
 
-/// `Ke` is radiance L; a diffuse surface then has the exitance π L.
-fn exitance(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
-    let exitance = PI * colour(line, name, rest)?;
-    if !exitance.is_finite() || exitance.min_element() < 0.0 {
-        return Err(unusable_value(line, name, "a radiance of at least 0 in each channel"));
+/// The words of `text`; a backslash before a space makes it part of a word, and so do quotes.
+fn escaped_words(text: &str) -> Vec<String> {
+    let mut words = vec![];
+    let (mut word, mut quoted) = (String::new(), false);
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '"' => quoted = !quoted,
+            '\\' if letters.peek().is_some_and(|c| c.is_whitespace()) => {
+                word.extend(letters.next());
+            }
+            space if space.is_whitespace() && !quoted => {
+                words.push(std::mem::take(&mut word));
+            }
+            other => word.push(other),
+        }
     }
-    Ok(exitance)
+    words.push(word);
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+impl MtlMaterial {
+    fn new(material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
+        let has = |key: &str| material.unknown_param.contains_key(key);
+        let rgb = |colour: Option<[f64; 3]>| colour.map(Rgb::from_array);
+        MtlMaterial {
+            reflectance: rgb(material.diffuse),
+            radiance: rgb(material.emissive),
+            ambient: rgb(material.ambient),
+            textured: material.diffuse_texture.is_some() || has("map_Ke"),
+            // Files disagree about which end of `Tr` is opaque.
+            transparent: material.dissolve.is_some_and(|d| d < 1.0)
+                || has("transparent")
+                || material.dissolve_texture.is_some(),
+            name: material.name,
+            line,
+            file,
+        }
+    }
+}
+
+/// The statements of one material as tobj can take them.
+#[derive(Default)]
+struct Block {
+    statements: Vec<u8>,
+    /// Of `newmtl`; 0 before the first.
+    line: u32,
+}
+
+/// Statements that are handed on, as they are written here. Files differ in capitals.
+const STATEMENTS: [&str; 9] = ["newmtl", "Kd", "Ke", "Ka", "d", "Tr", "map_Kd", "map_Ke", "map_d"];
+
+impl Block {
+    fn line(&mut self, line: &Line, repairs: &mut Repairs) -> Result<(), Error> {
+        let (keyword, rest) = line.keyword();
+        let Some(known) = STATEMENTS.iter().find(|known| known.eq_ignore_ascii_case(keyword))
+        else {
+            return Ok(());
+        };
+        let handed_on = match *known {
+            "newmtl" if !rest.is_empty() => {
+                self.line = line.number as u32;
+                Some(rest.to_string())
+            }
+            "newmtl" => None,
+            _ if self.line == 0 => None,
+            "Kd" | "Ke" | "Ka" => colour(rest).map(|c| format!("{:e} {:e} {:e}", c.x, c.y, c.z)),
+            "d" | "Tr" => words(rest).last().and_then(finite).map(|x| format!("{x:e}")),
+            _ => Some(rest.to_string()).filter(|name| !name.is_empty()),
+        };
+        match handed_on {
+            Some(transparency) if *known == "Tr" => {
+                if transparency.parse().is_ok_and(|t: f64| 0.0 < t && t < 1.0) {
+                    self.statements.extend_from_slice(b"transparent\n");
+                }
+            }
+            // A vector takes whatever is written.
+            Some(values) => drop(writeln!(self.statements, "{known} {values}")),
+            None => repairs.note(WarningKind::MaterialStatement, line, "", "passed over")?,
+        }
+        Ok(())
+    }
 }
 
 /// Three finite numbers, or one for all channels.
-fn colour(line: &Line, name: &str, rest: &str) -> Result<Rgb, Error> {
-    if let Some(form @ ("spectral" | "xyz")) = words(rest).next() {
-        let found = format!("material {}: unsupported form `{form}`", quoted(&[name]));
-        return Err(line.parse_error(found, "write linear r g b"));
-    }
+fn colour(rest: &str) -> Option<Rgb> {
     let numbers: Option<Vec<f64>> = words(rest).take(4).map(finite).collect();
-    match numbers.as_deref() {
-        Some(&[grey]) => Ok(Rgb::splat(grey)),
-        Some(&[r, g, b]) => Ok(Rgb::new(r, g, b)),
-        _ => Err(unusable_value(line, name, "three finite numbers r g b, or one for all three")),
+    match *numbers? {
+        [grey] => Some(Rgb::splat(grey)),
+        [r, g, b] => Some(Rgb::new(r, g, b)),
+        _ => None,
     }
-}
-
-fn unusable_value(line: &Line, name: &str, right: &str) -> Error {
-    line.parse_error(
-        format!("material {}: unusable value", quoted(&[name])),
-        format!("write {right}"),
-    )
 }

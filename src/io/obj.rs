@@ -1,33 +1,39 @@
 //! Scenes from Wavefront OBJ files and their MTL libraries.
 //!
-//! One pass over the lines collects positions, and faces with the group, material and smoothing
-//! group that are current at their line ([`ObjParser`]). All numbers are checked there, so that an
-//! error names its line. Then faces are cut into triangles and the scene is made, with a warning
-//! for each kind of thing that was skipped or replaced by a default.
+//! The `tobj` crate reads geometry, groups and materials. A pass before it ([`statements`]) numbers
+//! the lines, keeps what tobj does not tell (smoothing groups, which faces are repaired), and hands
+//! on only what tobj can take. Here faces are cut into triangles, materials completed and repaired,
+//! and the scene is made, with a warning for each kind of thing that was odd.
 
-use std::collections::{HashMap, HashSet};
+pub(super) mod repairs;
+mod settings;
+mod statements;
+
+use std::cell::RefCell;
+use std::collections::HashSet;
+use std::f64::consts::PI;
 use std::io;
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::files::{self, LibrarySource, MAX_BYTES};
-use super::mtl::Library;
-use super::text::{self, Line, finite, words};
+use super::files::{self, FileSource};
+use super::lights;
+use super::mtl::{Library, MtlMaterial};
+use super::text::{self, Line};
 use crate::error::{Error, ErrorKind, quoted};
-use crate::geometry::triangulation::{MAX_EAR_CLIPPING_CORNERS, triangulate};
-use crate::scene::{Material, Scene, Triangle};
-
-/// Group of the faces that come before any `o` or `g` line.
-const DEFAULT_GROUP: &str = "default";
+use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
+use crate::scene::{Material, Rgb, Scene, Triangle, Warning, WarningKind};
+use repairs::Repairs;
+pub use settings::ObjSettings;
+use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 
 /// Loads a Wavefront OBJ file and the MTL files that it names.
 ///
 /// The front of a face is where its corners run counter-clockwise. A face may have any number of
-/// corners, and its outline may be concave, but must not cross itself. It belongs to the group of
-/// the latest `o` or `g` line ("default" before the first); a name that comes again continues its
-/// group. Lengths stay in the file's own unit. Normals, texture coordinates, points and lines are
-/// not used.
+/// corners, and its outline may be concave. It belongs to the group of the latest `o` or `g` line
+/// ("default" before the first); a name that comes again continues its group. Lengths stay in the
+/// file's own unit. Normals, points, lines and curves are not used.
 ///
 /// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
 /// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced
@@ -37,313 +43,385 @@ const DEFAULT_GROUP: &str = "default";
 /// group of their own.
 ///
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
-/// radiance L: the exitance becomes π L, in the file's unit times steradian. Faces without a
-/// material reflect [`Material::DEFAULT_REFLECTANCE`].
+/// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
+/// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
+/// [`Material::DEFAULT_REFLECTANCE`].
 ///
-/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or
-/// below: absolute names and `..` are refused, so that a scene cannot have other files of the
-/// machine (or of its network) opened. Only regular files are read, of at most 1 GiB, as are all
-/// MTL files of a scene together. Memory stays within forty times the size of the files.
+/// What is merely odd is repaired, and said in [`Scene::warnings`]: libraries under other names or
+/// missing, materials that no library defines (grey), reflectances of 1 or more
+/// ([`ObjSettings::MAX_REFLECTANCE`]), polygons that cross themselves, texts in UTF-16 or Latin-1,
+/// and more; `docs/obj.md` has the whole list. [`ObjSettings`] refuses these instead, sets the
+/// ceiling, and lets materials emit.
 ///
-/// What is read but not modelled, or replaced by a default, is in [`Scene::warnings`].
+/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below, so
+/// that a scene cannot have other files of the machine (or of its network) opened. Only regular
+/// files are read, of at most 1 GiB, as are all MTL files of a scene together. Memory stays within
+/// sixty times the size of the files.
 ///
 /// # Errors
 /// [`ErrorKind::File`] for a file that cannot be read. [`ErrorKind::Scene`], with file and line,
-/// for one whose content cannot be used: numbers that are not finite, corners without a vertex,
-/// unknown materials, smoothing groups that are not whole numbers, reflectances outside [0, 1),
-/// negative radiances, outlines that cross themselves; and for a scene without a triangle that has
-/// area.
+/// for one whose content has no meaning: coordinates that are no finite numbers, corners without a
+/// vertex, no face at all; and for a scene without a triangle that has area.
 pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    let path = path.as_ref();
-    let text = files::read(path, MAX_BYTES);
-    read_text(path, text, &LibrarySource::Folder(path.parent().unwrap_or(Path::new(""))))
+    ObjSettings::default().load(path)
 }
 
-/// [`load_obj`] from memory: an OBJ file of this name, for messages, and this content. `libraries`
-/// are the MTL files, name and content, that its `mtllib` lines may name.
+/// [`load_obj`] from memory: an OBJ file of this name, for messages, and this content. `files` are
+/// the MTL files, name and content, that its `mtllib` lines may name.
 ///
 /// # Errors
 /// Those of [`load_obj`].
 pub fn read_obj(
     name: impl AsRef<Path>,
     obj: &[u8],
-    libraries: &[(&str, &[u8])],
+    files: &[(&str, &[u8])],
 ) -> Result<Scene, Error> {
-    read_text(
-        name.as_ref(),
-        files::limited(obj.into(), MAX_BYTES),
-        &LibrarySource::Memory(libraries),
-    )
+    ObjSettings::default().read(name, obj, files)
 }
 
-fn read_text(path: &Path, text: io::Result<String>, files: &LibrarySource) -> Result<Scene, Error> {
-    let text = text.map_err(|e| {
+/// The scene of the OBJ file `path` with this content.
+fn read_scene(
+    path: &Path,
+    bytes: io::Result<Vec<u8>>,
+    files: &FileSource,
+    settings: &ObjSettings,
+) -> Result<Scene, Error> {
+    let bytes = bytes.map_err(|e| {
         let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
         Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
     })?;
-    ObjParser::parse(path, &text, files)?.into_scene(path)
+    let (text, encoding) = files::decode(bytes);
+    let mut repairs = Repairs::new(settings.strict);
+    if let Some(encoding) = encoding {
+        let done = format!("read as {encoding}");
+        repairs.note_at(WarningKind::Encoding, || path.display().to_string(), "", done)?;
+    }
+    ObjFile::read(path, text, files, repairs)?.into_scene(settings)
 }
 
-/// What one pass over the lines finds. Every number is checked here, where its line is known.
-#[derive(Default)]
-struct ObjParser {
-    positions: Vec<DVec3>,
-    /// Of all faces, one after the other, as indices into the positions.
-    corners: Vec<u32>,
-    faces: Vec<Face>,
-    groups: Vec<String>,
-    group_by_name: HashMap<String, u32>,
-    /// What the latest `o` or `g` line says, and its index once a face needs it.
-    group_name: String,
-    group: Option<u32>,
+/// What the OBJ file and its libraries say.
+struct ObjFile<'a> {
+    path: &'a Path,
+    files: &'a FileSource<'a>,
+    models: Vec<tobj::Model>,
+    statements: Statements,
     library: Library,
-    material: Option<u32>,
-    /// By the latest `s` line, as in [`Triangle::smoothing`].
-    smoothing: Option<u32>,
-    /// `s` lines with neither a group nor `off`.
-    without_group: usize,
-    first_without_group: String,
-    points_and_lines: usize,
-    unknown: usize,
-    first_unknown: String,
+    repairs: Repairs,
 }
 
-/// Where a face stands and what it belongs to.
-struct Face {
-    line: usize,
-    /// Where its corners end, which begin where those of the face before it end.
-    end: u32,
-    group: u32,
-    material: Option<u32>,
-    smoothing: Option<u32>,
+/// What the pass before tobj and the loader of libraries share.
+struct Reading<'a> {
+    /// The one that tobj is at.
+    line: Line<'a>,
+    statements: Statements,
+    library: Library,
+    repairs: Repairs,
+    /// Why reading ended early.
+    failure: Option<Error>,
 }
 
-impl ObjParser {
-    fn parse(path: &Path, text: &str, files: &LibrarySource) -> Result<ObjParser, Error> {
-        let mut parser = ObjParser::default();
-        text::lines(path, text).try_for_each(|line| parser.line(&line, files))?;
-        if parser.faces.is_empty() {
-            let mut found = format!("no face, {} vertices", parser.positions.len());
-            if parser.unknown > 0 {
-                found += &format!(", {} lines that are not OBJ", parser.unknown);
+impl<'a> ObjFile<'a> {
+    fn read(
+        path: &'a Path,
+        text: String,
+        files: &'a FileSource,
+        repairs: Repairs,
+    ) -> Result<ObjFile<'a>, Error> {
+        let reading = RefCell::new(Reading {
+            line: Line { file: path, number: 0, text: "".into() },
+            statements: Statements::default(),
+            library: Library::default(),
+            repairs,
+            failure: None,
+        });
+        let mut lines = text::lines(path, &text);
+        let mut feed = LineFeed::new(|out: &mut Vec<u8>| {
+            let reading = &mut *reading.borrow_mut();
+            while out.is_empty() && reading.failure.is_none() {
+                let Some(line) = lines.next() else { break };
+                reading.line = line;
+                let result = reading.statements.line(&reading.line, &mut reading.repairs, out);
+                reading.failure = result.err();
             }
-            let remedy = "give an OBJ file with `v` and `f` lines";
-            return Err(Error::new(ErrorKind::Scene, path.display().to_string(), found, remedy));
-        }
-        Ok(parser)
-    }
-
-    fn line(&mut self, line: &Line, files: &LibrarySource) -> Result<(), Error> {
-        let (keyword, rest) = line.keyword();
-        match keyword {
-            "v" => self.vertex(line, rest)?,
-            "f" => self.face(line, rest)?,
-            "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
-            "usemtl" => self.material = Some(self.use_material(line, rest)?),
-            "s" => self.smooth(line, rest)?,
-            "mtllib" => self.library.load(line, rest, files)?,
-            "p" | "l" => self.points_and_lines += 1,
-            "vt" | "vn" | "" => {}
-            comment if comment.starts_with('#') => {}
-            _ => {
-                if self.unknown == 0 {
-                    self.first_unknown = line.place();
-                }
-                self.unknown += 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// `v x y z`, with a fourth number to divide by, or with a colour, which is left out.
-    fn vertex(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
-        let words: Vec<&str> = words(rest).take(7).collect();
-        let used = match words.len() {
-            3 | 4 => &words[..],
-            6 => &words[..3],
-            n => {
-                return Err(
-                    line.parse_error(format!("{n} words after `v`"), "a vertex is `v x y z`")
-                );
-            }
-        };
-        let mut numbers = [0.0, 0.0, 0.0, 1.0];
-        for (number, word) in numbers.iter_mut().zip(used) {
-            *number = finite(word).ok_or_else(|| {
-                let found = format!("coordinate {}", quoted(&[word]));
-                line.parse_error(found, "coordinates must be finite numbers")
-            })?;
-        }
-        let [x, y, z, w] = numbers;
-        let position = DVec3::new(x, y, z) / w;
-        if !position.is_finite() {
-            return Err(line.parse_error(format!("weight {w}"), "leave the fourth number out"));
-        }
-        self.positions.push(position);
-        Ok(())
-    }
-
-    /// `f` and its corners: `v`, `v/vt`, `v//vn` or `v/vt/vn` each.
-    fn face(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
-        if words(rest).next().is_none() {
-            return Err(line.parse_error("a face without corners", "write `f` and three or more"));
-        }
-        for word in words(rest) {
-            self.corners.push(self.corner(line, word)?);
-        }
-        let group = self.current_group();
-        let (material, smoothing, end) = (self.material, self.smoothing, self.corners.len() as u32);
-        self.faces.push(Face { line: line.number, end, group, material, smoothing });
-        Ok(())
-    }
-
-    /// The vertex of a corner, which must exist.
-    fn corner(&self, line: &Line, word: &str) -> Result<u32, Error> {
-        let bad = |found: &str, remedy: String| {
-            Err(line.parse_error(format!("corner {}, {found}", quoted(&[word])), remedy))
-        };
-        let mut parts = word.split('/');
-        let vertex = parts.next().unwrap_or(word);
-        let Ok(index) = vertex.parse::<i64>() else {
-            return bad("not a vertex index", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
-        };
-        let is_integer_or_empty = |part: &str| part.is_empty() || part.parse::<i64>().is_ok();
-        if parts.clone().count() > 2 || !parts.all(is_integer_or_empty) {
-            return bad("not whole numbers", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
-        }
-        if index == 0 {
-            return bad("vertex index 0", "count from 1, or back from -1".into());
-        }
-        let count = self.positions.len();
-        if index.unsigned_abs() > count as u64 {
-            return match count {
-                0 => bad("but no vertex so far", "put `v` lines above the faces".into()),
-                n => bad(
-                    &format!("vertex index {index} of {n} vertices so far"),
-                    format!("use 1 to {n}, or -1 to -{n} counting back"),
-                ),
-            };
-        }
-        Ok(if index > 0 { index - 1 } else { count as i64 + index } as u32)
-    }
-
-    /// Index of the group that faces belong to now.
-    fn current_group(&mut self) -> u32 {
-        let new = self.groups.len() as u32;
-        *self.group.get_or_insert_with(|| {
-            let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
-            *self.group_by_name.entry(name.into()).or_insert_with(|| {
-                self.groups.push(name.into());
-                new
+            if reading.failure.is_none() { Ok(()) } else { Err(io::ErrorKind::InvalidData.into()) }
+        });
+        let read = tobj::load_obj_buf(&mut feed, &tobj::LoadOptions::default(), |names| {
+            let Reading { line, library, repairs, failure, .. } = &mut *reading.borrow_mut();
+            let loaded = library.load(line, &names.to_string_lossy(), files, repairs);
+            loaded.unwrap_or_else(|e| {
+                *failure = Some(e);
+                Err(tobj::LoadError::GenericFailure)
             })
-        })
-    }
-
-    /// `s` with a group, or with `off`; without either it says nothing.
-    fn smooth(&mut self, line: &Line, rest: &str) -> Result<(), Error> {
-        self.smoothing = match words(rest).collect::<Vec<_>>().join(" ").as_str() {
-            "off" => Some(0),
-            "" | "on" => {
-                if self.without_group == 0 {
-                    self.first_without_group = line.place();
-                }
-                self.without_group += 1;
-                None
-            }
-            group => Some(group.parse().map_err(|_| {
-                let remedy = format!("write `s off`, or `s` and a whole number up to {}", u32::MAX);
-                line.parse_error(format!("smoothing group {}", quoted(&[group])), remedy)
-            })?),
-        };
-        Ok(())
-    }
-
-    fn use_material(&self, line: &Line, name: &str) -> Result<u32, Error> {
-        if name.is_empty() {
-            return Err(line.parse_error("no material name", self.library.remedy()));
+        });
+        let Reading { line, statements, library, repairs, failure } = reading.into_inner();
+        if let Some(failure) = failure {
+            return Err(failure);
         }
-        let unknown = || {
-            let found = format!("unknown material {}", quoted(&[name]));
-            line.parse_error(found, self.library.remedy())
-        };
-        self.library.find(name).ok_or_else(unknown)
+        let (models, _) = read
+            .map_err(|e| line.parse_error(e, "write it as the OBJ format has it").with_source(e))?;
+        Ok(ObjFile { path, files, models, statements, library, repairs })
     }
 
-    fn into_scene(mut self, path: &Path) -> Result<Scene, Error> {
-        let mut warnings = self.warnings();
-        let used: HashSet<u32> = self.faces.iter().filter_map(|f| f.material).collect();
-        let (mut materials, about) = std::mem::take(&mut self.library).into_materials(&used);
-        warnings.extend(about);
-        let default = materials.len() as u32;
-        if self.faces.iter().any(|f| f.material.is_none()) {
-            materials.push(Material::grey("(default)", Material::DEFAULT_REFLECTANCE));
+    fn into_scene(mut self, settings: &ObjSettings) -> Result<Scene, Error> {
+        if self.statements.faces.is_empty() {
+            return Err(self.without_faces());
         }
-        let triangles = self.triangles(path, default)?;
-        let scene = Scene::new(self.positions, triangles, self.groups, materials);
-        let mut scene = scene.map_err(|e| e.inside(path))?;
-        warnings.into_iter().for_each(|warning| scene.warn(warning));
+        self.find_default_library()?;
+        let named = self.named_materials()?;
+        let models = std::mem::take(&mut self.models);
+        let geometry = self.geometry(models, &named)?;
+        let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
+        self.library.warn(&used, &mut self.repairs);
+        let materials = self.materials(&used, settings)?;
+        let groups = std::mem::take(&mut self.statements.groups.list);
+        let scene = Scene::new(geometry.positions, geometry.triangles, groups, materials);
+        let mut scene = scene.map_err(|e| e.inside(self.path))?;
+        let is_used = |(i, _): &(usize, _)| used.contains(&(*i as u32));
+        let emitting = scene.materials().iter().enumerate().filter(is_used).map(|(_, m)| m);
+        let dark = lights::no_light(emitting);
+        self.repairs.into_warnings().into_iter().chain(dark).for_each(|w| scene.warn(w));
         Ok(scene)
     }
 
-    /// The faces as triangles, those without a material with that of index `default`.
-    fn triangles(&self, path: &Path, default: u32) -> Result<Vec<Triangle>, Error> {
-        let mut start = 0;
-        let mut triangles = Vec::with_capacity(self.faces.len());
-        for (number, face) in self.faces.iter().enumerate() {
-            let corners = &self.corners[start..face.end as usize];
-            start = face.end as usize;
-            let points: Vec<DVec3> = corners.iter().map(|&i| self.positions[i as usize]).collect();
-            let pieces = triangulate(&points).ok_or_else(|| {
-                let group = quoted(&[&self.groups[face.group as usize]]);
-                let found = format!(
-                    "face {} ({} corners, group {group}) cannot be cut into triangles",
-                    number + 1,
-                    corners.len()
-                );
-                let remedy = format!(
-                    "its outline must not cross itself, and may have {MAX_EAR_CLIPPING_CORNERS} \
-                     corners unless it is convex; triangles always work"
-                );
-                Error::new(ErrorKind::Scene, text::place(path, face.line), found, remedy)
-            })?;
-            let Face { group, smoothing, .. } = *face;
-            let material = face.material.unwrap_or(default);
-            let triangle = |t: [usize; 3]| {
-                let corners = t.map(|i| corners[i]);
-                Triangle { corners, group, material, smoothing }
-            };
-            triangles.extend(pieces.into_iter().map(triangle));
+    /// The error that there is no face, with what there is.
+    fn without_faces(&self) -> Error {
+        let mut found = format!("no face, {} vertices", self.statements.vertices);
+        for kind in [
+            WarningKind::FewCorners,
+            WarningKind::PointsAndLines,
+            WarningKind::FreeForm,
+            WarningKind::UnknownStatement,
+        ] {
+            let count = self.repairs.count_of(kind);
+            if count > 0 {
+                let (one, many) = kind.nouns();
+                found += &format!(", {count} {}", if count == 1 { one } else { many });
+            }
         }
-        Ok(triangles)
+        let remedy = "give an OBJ file with `v` and `f` lines";
+        Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy)
     }
 
-    /// What was replaced by a default or passed over in the OBJ file.
-    fn warnings(&self) -> Vec<String> {
-        let mut warnings = vec![];
-        let default = Material::DEFAULT_REFLECTANCE;
-        match (self.faces.iter().filter(|f| f.material.is_none()).count(), self.faces.len()) {
-            (0, _) => {}
-            (bare, all) if bare == all => warnings.push(format!(
-                "no face names a material: all {all} reflect {default} and emit nothing"
-            )),
-            (bare, _) => warnings.push(format!(
-                "{bare} faces before the first `usemtl` reflect {default} and emit nothing"
-            )),
+    /// Where materials are not known and no library was found, takes one that has the name of the
+    /// OBJ file, as Blender and Assimp do.
+    fn find_default_library(&mut self) -> Result<(), Error> {
+        let names = &self.statements.materials.list;
+        if !self.library.is_empty() || names.is_empty() {
+            return Ok(());
         }
-        if self.without_group > 0 {
-            let (count, first) = (self.without_group, &self.first_without_group);
-            warnings.push(format!(
-                "{count} `s` lines without a group, first at {first}: creases by angle alone there"
-            ));
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let candidates = [format!("{stem}.mtl"), format!("{name}.mtl")];
+        let Some(found) = candidates.iter().find_map(|name| self.files.find(name)) else {
+            return Ok(());
+        };
+        let number = self.statements.first_use.first().map_or(0, |&line| line as usize);
+        let line = Line { file: self.path, number, text: "usemtl".into() };
+        let done = "taken for its name";
+        self.repairs.note(WarningKind::LibraryElsewhere, &line, &found, done)?;
+        self.library.take(&line, &found, self.files, &mut self.repairs)
+    }
+
+    /// For each name that `usemtl` lines gave, the index of its material: those of the library,
+    /// then those that no library defines, then the one of faces without a material.
+    fn named_materials(&mut self) -> Result<Vec<u32>, Error> {
+        let mut unknown = self.library.materials.len() as u32;
+        let mut named = vec![];
+        for (name, &line) in self.statements.materials.list.iter().zip(&self.statements.first_use) {
+            named.push(match self.library.find(name) {
+                Some(known) => known,
+                None => {
+                    let place = || text::place(self.path, line as usize);
+                    let kind = WarningKind::UnknownMaterial;
+                    self.repairs.note_at(kind, place, name, UNKNOWN_MATERIAL)?;
+                    unknown += 1;
+                    unknown - 1
+                }
+            });
         }
-        if self.points_and_lines > 0 {
-            let count = self.points_and_lines;
-            warnings.push(format!("{count} `p` and `l` lines (points and lines) were ignored"));
+        named.push(unknown);
+        Ok(named)
+    }
+
+    /// The vertices that faces use, in the order of the file, and the faces as triangles.
+    fn geometry(&mut self, models: Vec<tobj::Model>, named: &[u32]) -> Result<Geometry, Error> {
+        let mut geometry = Geometry {
+            positions: vec![DVec3::NAN; self.statements.vertices as usize],
+            triangles: Vec::with_capacity(self.statements.faces.len()),
+        };
+        let (mut face, mut bare) = (0, 0);
+        for tobj::Model { mesh, name } in models {
+            // A model that has no face has no number either.
+            let Some(&note) = name.parse().ok().and_then(|k: usize| self.statements.models.get(k))
+            else {
+                continue;
+            };
+            let by_name = note.material.map_or(named[named.len() - 1], |k| named[k as usize]);
+            let known = mesh.material_id.filter(|_| note.material.is_some());
+            let material = known.map_or(by_name, |id| id as u32);
+            // The number of each vertex in the file is its colour.
+            let numbers: Vec<u32> =
+                mesh.vertex_color.iter().step_by(3).map(|&n| n as u32).collect();
+            for (&number, p) in numbers.iter().zip(mesh.positions.chunks_exact(3)) {
+                geometry.positions[number as usize] = DVec3::new(p[0], p[1], p[2]);
+            }
+            let arity = |k: usize| mesh.face_arities.get(k).map_or(3, |&arity| arity as usize);
+            let (mut start, mut k) = (0, 0);
+            while start < mesh.indices.len() {
+                let corners = &mesh.indices[start..start + arity(k)];
+                let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
+                let like = Triangle {
+                    group: note.group,
+                    material,
+                    smoothing: self.statements.faces[face].smoothing,
+                    ..Default::default()
+                };
+                self.cut(face, &corners, like, &mut geometry)?;
+                bare += usize::from(note.material.is_none());
+                (start, k, face) = (start + corners.len(), k + 1, face + 1);
+            }
         }
-        if self.unknown > 0 {
-            let (count, first) = (self.unknown, &self.first_unknown);
-            warnings.push(format!("{count} lines of unknown kind were ignored, first at {first}"));
+        if bare > 0 {
+            let default = Material::DEFAULT_REFLECTANCE;
+            let done = match bare == face {
+                true => format!("all of them reflect {default} and emit nothing"),
+                false => format!("before the first `usemtl`: reflect {default} and emit nothing"),
+            };
+            self.repairs.push(Warning::new(WarningKind::FaceWithoutMaterial, bare, done));
         }
-        warnings
+        geometry.drop_unused();
+        Ok(geometry)
+    }
+
+    /// Appends the triangles of a face with these corners, each otherwise `like` that one.
+    fn cut(
+        &mut self,
+        face: usize,
+        corners: &[u32],
+        like: Triangle,
+        geometry: &mut Geometry,
+    ) -> Result<(), Error> {
+        let points: Vec<DVec3> = corners.iter().map(|&i| geometry.positions[i as usize]).collect();
+        let pieces = match triangulate(&points) {
+            Some(pieces) => pieces,
+            None => {
+                let group = &self.statements.groups.list[like.group as usize];
+                let line = self.statements.faces[face].line as usize;
+                let place = || text::place(self.path, line);
+                let done = "cut into triangles as well as can be";
+                self.repairs.note_at(WarningKind::Polygon, place, group, done)?;
+                triangulate_anyhow(&points)
+            }
+        };
+        let triangle = |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), ..like };
+        geometry.triangles.extend(pieces.into_iter().map(triangle));
+        Ok(())
+    }
+
+    /// All materials, by the indices of [`ObjFile::named_materials`]. What is odd about one is
+    /// repaired, and said if it is `used`.
+    fn materials(
+        &mut self,
+        used: &HashSet<u32>,
+        settings: &ObjSettings,
+    ) -> Result<Vec<Material>, Error> {
+        let mut materials = vec![];
+        let library = std::mem::take(&mut self.library);
+        let emits = |m: &MtlMaterial| m.radiance.is_some_and(|l| l.max_element() > 0.0);
+        let ambient_counts = settings.emit.is_empty() && !library.materials.iter().any(emits);
+        for (index, material) in library.materials.iter().enumerate() {
+            let place = || library.place(material, self.files);
+            let used = used.contains(&(index as u32));
+            let mut note = |kind, done: String| match used {
+                true => self.repairs.note_at(kind, place, &material.name, done),
+                false => Ok(()),
+            };
+            materials.push(material.complete(settings, ambient_counts, &mut note)?);
+        }
+        let grey = |name: &str| Material::grey(name, Material::DEFAULT_REFLECTANCE);
+        let names = &self.statements.materials.list;
+        let unknown = names.iter().filter(|name| library.find(name).is_none());
+        materials.extend(unknown.map(|name| grey(name)));
+        if used.contains(&(materials.len() as u32)) {
+            materials.push(grey("(default)"));
+        }
+        for (name, radiance) in &settings.emit {
+            let mut found = false;
+            for material in materials.iter_mut().filter(|m| m.name == *name) {
+                (material.exitance, found) = (PI * *radiance, true);
+            }
+            if !found {
+                let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+                let place = self.path.display().to_string();
+                let found = format!("no material {} that could emit", quoted(&[name]));
+                let remedy = format!("its materials are {}", quoted(&names));
+                return Err(Error::new(ErrorKind::Scene, place, found, remedy));
+            }
+        }
+        Ok(materials)
+    }
+}
+
+impl MtlMaterial {
+    /// As a material of a scene; `note` is told of every repair.
+    fn complete(
+        &self,
+        settings: &ObjSettings,
+        ambient_counts: bool,
+        note: &mut impl FnMut(WarningKind, String) -> Result<(), Error>,
+    ) -> Result<Material, Error> {
+        let ceiling = settings.max_reflectance;
+        let mut radiance = self.radiance.unwrap_or(Rgb::ZERO);
+        let above_one = |colour: Option<Rgb>| colour.is_some_and(|c| c.max_element() > 1.0);
+        // Where `Kd` is above 1 too, colours may be in other units.
+        if ambient_counts && above_one(self.ambient) && !above_one(self.reflectance) {
+            radiance = self.ambient.unwrap_or(Rgb::ZERO);
+            note(WarningKind::AmbientAsRadiance, "taken for the radiance that they emit".into())?;
+        }
+        let mut reflectance = self.reflectance.unwrap_or(Rgb::ZERO);
+        if self.reflectance.is_none() && radiance == Rgb::ZERO {
+            reflectance = Rgb::splat(Material::DEFAULT_REFLECTANCE);
+            note(WarningKind::MaterialWithoutColour, UNKNOWN_MATERIAL.into())?;
+        }
+        if reflectance.min_element() < 0.0 || radiance.min_element() < 0.0 {
+            note(WarningKind::NegativeColour, "those channels are 0".into())?;
+            (reflectance, radiance) = (reflectance.max(Rgb::ZERO), radiance.max(Rgb::ZERO));
+        }
+        if reflectance.max_element() >= 1.0 {
+            note(WarningKind::HighReflectance, format!("those channels reflect {ceiling}"))?;
+            let below_one = |rho: f64| if rho < 1.0 { rho } else { ceiling };
+            reflectance = Rgb::from_array(reflectance.to_array().map(below_one));
+        }
+        let exitance = PI * radiance;
+        if !exitance.is_finite() {
+            note(WarningKind::MaterialStatement, "it emits nothing".into())?;
+        }
+        let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
+        Ok(Material { name: self.name.clone(), reflectance, exitance })
+    }
+}
+
+/// Positions and faces of a scene.
+struct Geometry {
+    positions: Vec<DVec3>,
+    triangles: Vec<Triangle>,
+}
+
+impl Geometry {
+    /// Drops the vertices that no face uses, which are those without a position.
+    fn drop_unused(&mut self) {
+        let mut used = 0;
+        let numbers: Vec<u32> = self
+            .positions
+            .iter()
+            .map(|p| {
+                used += u32::from(!p.is_nan());
+                used.saturating_sub(1)
+            })
+            .collect();
+        self.positions.retain(|p| !p.is_nan());
+        for triangle in &mut self.triangles {
+            triangle.corners = triangle.corners.map(|k| numbers[k as usize]);
+        }
     }
 }

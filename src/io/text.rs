@@ -39,8 +39,13 @@ impl Line<'_> {
         found: impl Display,
         remedy: impl Into<String>,
     ) -> Error {
-        let found = format!("{found} in {:?}", shortened(&self.text));
+        let found = format!("{found} in {:?}", self.start());
         Error::new(kind, self.place(), found, remedy)
+    }
+
+    /// Its text, short enough for a message.
+    pub fn start(&self) -> Cow<'_, str> {
+        shortened(&self.text)
     }
 }
 

@@ -16,10 +16,9 @@
 
 use rayon::prelude::*;
 
-use crate::error::quoted;
 use crate::sampling::hemisphere::HemisphereSamples;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
-use crate::scene::Scene;
+use crate::scene::{Scene, Warning, WarningKind};
 use crate::visibility::ray_scene::{Hit, RayScene};
 use crate::visibility::{buried, offset};
 
@@ -52,11 +51,10 @@ impl Scene {
         let named = (0..of_groups.len()).filter(|&g| inverted[g] || of_groups[g].is_inverted());
         let names: Vec<&str> = named.map(|g| &*self.groups()[g]).collect();
         if !names.is_empty() {
-            self.warn(format!(
-                "groups with faces that are seen from behind, where light is lost: {}; turn them \
-                 if they are wound inside out, or give them a second face",
-                quoted(&names)
-            ));
+            let done = "light is lost there: turn their faces if they are wound inside out, or \
+                        give them a second face";
+            let names = names.into_iter();
+            self.warn(Warning::new(WarningKind::Winding, names.len(), done).naming(names));
         }
     }
 }

@@ -203,7 +203,8 @@ impl Bake {
         for warning in scene.warnings() {
             eprintln!("warning: {warning}");
         }
-        let (warnings, triangles) = (scene.warnings().to_vec(), scene.triangles().len());
+        let (warnings, triangles) =
+            (scene.warnings().iter().map(ToString::to_string).collect(), scene.triangles().len());
         let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
         let device = progress::of_stage("opening the device", || self.device.open())?;

@@ -1,0 +1,94 @@
+//! How an OBJ file is to be read.
+
+use std::path::Path;
+
+use super::super::files::{self, FileSource, MAX_BYTES};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::scene::{Rgb, Scene};
+
+/// How odd things in an OBJ file and its libraries are treated, and which materials emit.
+///
+/// ```no_run
+/// use radiosity::Rgb;
+/// use radiosity::io::ObjSettings;
+///
+/// # fn main() -> Result<(), radiosity::Error> {
+/// let mut settings = ObjSettings::default();
+/// settings.emit.push(("ceiling lamp".into(), Rgb::splat(15.0)));
+/// let scene = settings.load("room.obj")?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ObjSettings {
+    /// Refuses what would be repaired otherwise, with its line.
+    pub strict: bool,
+    /// What a reflectance of 1 or more in a channel becomes, in [0, 1).
+    pub max_reflectance: f64,
+    /// Materials by name, and the radiance that they emit per channel, whatever the file says.
+    pub emit: Vec<(String, Rgb)>,
+}
+
+impl ObjSettings {
+    /// [`ObjSettings::max_reflectance`] unless set: light meets such a surface some fifty times.
+    /// Chosen by hand, between fresh snow or barium sulphate and what still settles quickly.
+    pub const MAX_REFLECTANCE: f64 = 0.98;
+
+    /// Loads a Wavefront OBJ file and the MTL files that it names: see [`crate::load_obj`].
+    ///
+    /// # Errors
+    /// Those of [`crate::load_obj`]; [`ErrorKind::Setting`] for a ceiling outside [0, 1) or a
+    /// radiance that is negative or not finite; [`ErrorKind::Scene`] for a material to emit that
+    /// the scene does not have, and with [`ObjSettings::strict`] for what would be repaired.
+    pub fn load(&self, path: impl AsRef<Path>) -> Result<Scene, Error> {
+        let path = path.as_ref();
+        self.check()?;
+        let bytes = files::read_bytes(path, MAX_BYTES);
+        let files = FileSource::in_folder(path.parent().unwrap_or(Path::new("")));
+        super::read_scene(path, bytes, &files, self)
+    }
+
+    /// [`ObjSettings::load`] from memory: see [`crate::io::read_obj`].
+    ///
+    /// # Errors
+    /// Those of [`ObjSettings::load`].
+    pub fn read(
+        &self,
+        name: impl AsRef<Path>,
+        obj: &[u8],
+        files: &[(&str, &[u8])],
+    ) -> Result<Scene, Error> {
+        self.check()?;
+        let bytes = files::limited(obj, MAX_BYTES);
+        super::read_scene(name.as_ref(), bytes, &FileSource::in_memory(files), self)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let ceiling = self.max_reflectance;
+        if !(0.0..1.0).contains(&ceiling) {
+            let remedy = "must be at least 0 and below 1";
+            return Err(Error::new(
+                ErrorKind::Setting,
+                "max_reflectance",
+                ceiling.to_string(),
+                remedy,
+            ));
+        }
+        let bad = |l: &Rgb| !(std::f64::consts::PI * *l).is_finite() || l.min_element() < 0.0;
+        if let Some((name, radiance)) = self.emit.iter().find(|(_, radiance)| bad(radiance)) {
+            let place = format!("emit {}", quoted(&[name]));
+            let found = format!("radiance {radiance}");
+            let remedy = "must be finite and at least 0 in each channel";
+            return Err(Error::new(ErrorKind::Setting, place, found, remedy));
+        }
+        Ok(())
+    }
+}
+
+impl Default for ObjSettings {
+    fn default() -> ObjSettings {
+        let max_reflectance = ObjSettings::MAX_REFLECTANCE;
+        ObjSettings { strict: false, max_reflectance, emit: vec![] }
+    }
+}

@@ -1,0 +1,348 @@
+//! The pass over an OBJ file that goes before tobj: what tobj does not tell or cannot take.
+//!
+//! ```text
+//!   lines of the file ──► Statements ──► lines that tobj can take ──► tobj ──► models
+//!                             │ line numbers, smoothing groups, group names,
+//!                             ▼ what was passed over
+//!                           notes by face and by model
+//! ```
+//!
+//! tobj reads the lines one by one through [`LineFeed`]; nothing of the text is kept. What is done
+//! to them, and why:
+//!
+//! | statement | tobj gets | because tobj |
+//! |---|---|---|
+//! | `v` | the number of the vertex as its colour | numbers vertices anew in each model |
+//! | `f` | corners counted from 1, `v` or `v/vt` | takes bad indices without a line |
+//! | `vt` | the same; first of all one that is no number | gives corners without one another's |
+//! | `o`, `g` | the number of a model | copies the name into every model |
+//! | `l`, `p` | nothing | makes faces of lines |
+//! | `usemtl`, `mtllib` | the same, after one space | splits at a space only |
+
+use std::collections::HashMap;
+use std::io::{self, BufRead, Read, Write as _};
+
+use super::super::text::{Line, finite, words};
+use super::repairs::Repairs;
+use crate::error::{Error, quoted};
+use crate::scene::WarningKind;
+
+/// Group of the faces that come before any `o` or `g` line.
+const DEFAULT_GROUP: &str = "default";
+
+/// Corners after which tobj is told to begin another model: it keeps 24 bytes or more for each
+/// until then. Chosen by hand.
+const MODEL_CORNERS: usize = 1 << 14;
+
+/// What becomes of faces whose material is not known.
+pub(super) const UNKNOWN_MATERIAL: &str = "grey: reflectance 0.5";
+
+/// What is known of a face beside its corners.
+pub(super) struct FaceNote {
+    pub line: u32,
+    /// As in [`crate::Triangle::smoothing`].
+    pub smoothing: Option<u32>,
+}
+
+/// What the faces of a model of tobj have in common.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct ModelNote {
+    /// Index into the groups.
+    pub group: u32,
+    /// Index into the names that `usemtl` lines gave.
+    pub material: Option<u32>,
+}
+
+/// Names in the order of their first use.
+#[derive(Default)]
+pub(super) struct Names {
+    pub list: Vec<String>,
+    by_name: HashMap<String, u32>,
+}
+
+impl Names {
+    fn index(&mut self, name: &str) -> u32 {
+        if let Some(&known) = self.by_name.get(name) {
+            return known;
+        }
+        let new = self.list.len() as u32;
+        self.by_name.insert(name.into(), new);
+        self.list.push(name.into());
+        new
+    }
+}
+
+/// What the lines so far say.
+#[derive(Default)]
+pub(super) struct Statements {
+    pub faces: Vec<FaceNote>,
+    pub models: Vec<ModelNote>,
+    pub groups: Names,
+    /// Names of materials that faces use.
+    pub materials: Names,
+    /// Where each of them is used first.
+    pub first_use: Vec<u32>,
+    pub vertices: u32,
+    pub texture_coordinates: u32,
+    group_name: String,
+    group: Option<u32>,
+    material_name: String,
+    material: Option<u32>,
+    material_line: u32,
+    smoothing: Option<u32>,
+    /// Corners that tobj has of the current model.
+    model_corners: usize,
+    /// Vertex and texture coordinate of each corner of a face, counted from 1; 0 for none.
+    corners: Vec<[u32; 2]>,
+}
+
+impl Statements {
+    /// Takes in `line`, and appends what tobj is to read for it to `out`.
+    pub fn line(
+        &mut self,
+        line: &Line,
+        repairs: &mut Repairs,
+        out: &mut Vec<u8>,
+    ) -> Result<(), Error> {
+        let (keyword, rest) = line.keyword();
+        let passed_over = |repairs: &mut Repairs, kind| repairs.note(kind, line, "", "passed over");
+        match keyword {
+            "v" => self.vertex(line, rest, repairs, out)?,
+            "vt" => self.texture_coordinate(rest, out),
+            "f" => self.face(line, rest, repairs, out)?,
+            "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
+            "usemtl" => {
+                (self.material_name, self.material) = (rest.into(), None);
+                self.material_line = line.number as u32;
+                if rest.is_empty() {
+                    repairs.note(WarningKind::UnknownMaterial, line, "", UNKNOWN_MATERIAL)?;
+                } else {
+                    emit(out, format_args!("usemtl {rest}\n"));
+                }
+            }
+            "s" => self.smooth(line, rest, repairs)?,
+            "mtllib" => emit(out, format_args!("mtllib {rest}\n")),
+            "p" | "l" => passed_over(repairs, WarningKind::PointsAndLines)?,
+            "vn" | "" => {}
+            "vp" | "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm"
+            | "trim" | "hole" | "scrv" | "sp" | "end" | "con" => {
+                passed_over(repairs, WarningKind::FreeForm)?;
+            }
+            comment if comment.starts_with('#') => {}
+            _ => passed_over(repairs, WarningKind::UnknownStatement)?,
+        }
+        Ok(())
+    }
+
+    /// `v x y z`, with a fourth number to divide by, or with a colour, which is left out.
+    fn vertex(
+        &mut self,
+        line: &Line,
+        rest: &str,
+        repairs: &mut Repairs,
+        out: &mut Vec<u8>,
+    ) -> Result<(), Error> {
+        let words: Vec<&str> = words(rest).take(9).collect();
+        let used = if words.len() == 4 { 4 } else { 3 };
+        if words.len() < 3 {
+            let found = format!("{} words after `v`", words.len());
+            return Err(line.parse_error(found, "a vertex is `v x y z`"));
+        }
+        if ![3, 4, 6, 7].contains(&words.len()) {
+            repairs.note(WarningKind::VertexNumbers, line, "", "the first three are its place")?;
+        }
+        let mut numbers = [0.0, 0.0, 0.0, 1.0];
+        for (number, word) in numbers.iter_mut().zip(&words[..used]) {
+            *number = finite(word).ok_or_else(|| {
+                let found = format!("coordinate {}", quoted(&[word]));
+                line.parse_error(found, "coordinates must be finite numbers")
+            })?;
+        }
+        self.vertices += 1;
+        let number = self.vertices - 1;
+        if used == 3 {
+            emit(out, format_args!("v {} {} {} {number} 0 0\n", words[0], words[1], words[2]));
+            return Ok(());
+        }
+        let [x, y, z] = [0, 1, 2].map(|k| numbers[k] / numbers[3]);
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            let found = format!("weight {}", numbers[3]);
+            return Err(line.parse_error(found, "leave the fourth number out"));
+        }
+        emit(out, format_args!("v {x:e} {y:e} {z:e} {number} 0 0\n"));
+        Ok(())
+    }
+
+    /// `vt u v`; numbers that are none make corners that have no texture coordinate.
+    fn texture_coordinate(&mut self, rest: &str, out: &mut Vec<u8>) {
+        if self.texture_coordinates == 0 {
+            emit(out, format_args!("vt nan nan\n"));
+        }
+        self.texture_coordinates += 1;
+        let mut words = words(rest);
+        let (u, v) = (words.next().unwrap_or("nan"), words.next().unwrap_or("0"));
+        match (finite(u), finite(v)) {
+            (Some(_), Some(_)) => emit(out, format_args!("vt {u} {v}\n")),
+            _ => emit(out, format_args!("vt nan nan\n")),
+        }
+    }
+
+    /// `f` and its corners: `v`, `v/vt`, `v//vn` or `v/vt/vn` each.
+    fn face(
+        &mut self,
+        line: &Line,
+        rest: &str,
+        repairs: &mut Repairs,
+        out: &mut Vec<u8>,
+    ) -> Result<(), Error> {
+        self.corners.clear();
+        for word in words(rest) {
+            let corner = self.corner(line, word)?;
+            self.corners.push(corner);
+        }
+        let given = self.corners.len();
+        self.corners.dedup_by_key(|corner| corner[0]);
+        let ends = |corners: &[[u32; 2]]| {
+            corners.len() > 1 && corners[0][0] == corners[corners.len() - 1][0]
+        };
+        while ends(&self.corners) {
+            self.corners.pop();
+        }
+        let [first, second] = [0, 1].map(|k| self.corners.get(k).map(|c| c[0]));
+        if !self.corners.iter().any(|c| Some(c[0]) != first && Some(c[0]) != second) {
+            return repairs.note(WarningKind::FewCorners, line, "", "dropped");
+        }
+        if self.corners.len() < given {
+            repairs.note(WarningKind::RepeatedCorner, line, "", "taken for one")?;
+        }
+        self.begin_model(out);
+        self.model_corners += self.corners.len();
+        let (number, smoothing) = (line.number as u32, self.smoothing);
+        self.faces.push(FaceNote { line: number, smoothing });
+        emit(out, format_args!("f"));
+        for &[vertex, texture_coordinate] in &self.corners {
+            emit(out, format_args!(" {vertex}"));
+            if self.texture_coordinates > 0 {
+                emit(out, format_args!("/{}", texture_coordinate + 1));
+            }
+        }
+        emit(out, format_args!("\n"));
+        Ok(())
+    }
+
+    /// Begins another model where group or material are others, or when the last one is large.
+    fn begin_model(&mut self, out: &mut Vec<u8>) {
+        let group = *self.group.get_or_insert_with(|| {
+            let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
+            self.groups.index(name)
+        });
+        if self.material.is_none() && !self.material_name.is_empty() {
+            let material = self.materials.index(&self.material_name);
+            if material as usize == self.first_use.len() {
+                self.first_use.push(self.material_line);
+            }
+            self.material = Some(material);
+        }
+        let model = ModelNote { group, material: self.material };
+        if self.models.last() != Some(&model) || self.model_corners >= MODEL_CORNERS {
+            emit(out, format_args!("g {}\n", self.models.len()));
+            self.models.push(model);
+            self.model_corners = 0;
+        }
+    }
+
+    /// Vertex, which must exist, and texture coordinate, if it exists, of a corner.
+    fn corner(&self, line: &Line, word: &str) -> Result<[u32; 2], Error> {
+        let bad = |found: &str, remedy: String| {
+            Err(line.parse_error(format!("corner {}, {found}", quoted(&[word])), remedy))
+        };
+        let mut parts = word.split('/');
+        let vertex = parts.next().unwrap_or(word);
+        let Ok(index) = vertex.parse::<i64>() else {
+            return bad("not a vertex index", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
+        };
+        let texture_coordinate = parts.clone().next().unwrap_or("");
+        let is_integer_or_empty = |part: &str| part.is_empty() || part.parse::<i64>().is_ok();
+        if parts.clone().count() > 2 || !parts.all(is_integer_or_empty) {
+            return bad("not whole numbers", "write `v`, `v/vt`, `v//vn` or `v/vt/vn`".into());
+        }
+        let counted = |index: i64, count: u32| {
+            let from_start =
+                if index < 0 { i64::from(count).checked_add(index)? + 1 } else { index };
+            u32::try_from(from_start).ok().filter(|&k| 0 < k && k <= count)
+        };
+        if index == 0 {
+            return bad("vertex index 0", "count from 1, or back from -1".into());
+        }
+        let Some(vertex) = counted(index, self.vertices) else {
+            return match self.vertices {
+                0 => bad("but no vertex so far", "put `v` lines above the faces".into()),
+                n => bad(
+                    &format!("vertex index {index} of {n} vertices so far"),
+                    format!("use 1 to {n}, or -1 to -{n} counting back"),
+                ),
+            };
+        };
+        let texture_coordinate = texture_coordinate.parse().ok();
+        let texture_coordinate =
+            texture_coordinate.and_then(|k| counted(k, self.texture_coordinates));
+        Ok([vertex, texture_coordinate.unwrap_or(0)])
+    }
+
+    /// `s` with a group, or with `off`; without either it says nothing.
+    fn smooth(&mut self, line: &Line, rest: &str, repairs: &mut Repairs) -> Result<(), Error> {
+        let mut words = words(rest);
+        let word = words.next().unwrap_or("").to_ascii_lowercase();
+        self.smoothing = if word == "off" { Some(0) } else { word.parse().ok() };
+        let says_nothing = word.is_empty() || word == "on";
+        if words.next().is_some() || (self.smoothing.is_none() && !says_nothing) {
+            let done = "the first word counts if it is one, else creases by angle alone";
+            repairs.note(WarningKind::SmoothingGroup, line, "", done)?;
+        } else if says_nothing {
+            let done = "creases by angle alone there";
+            repairs.note(WarningKind::SmoothingWithoutGroup, line, "", done)?;
+        }
+        Ok(())
+    }
+}
+
+/// Appends text; a vector takes whatever is written.
+fn emit(out: &mut Vec<u8>, text: std::fmt::Arguments) {
+    let _ = out.write_fmt(text);
+}
+
+/// Text that is made when it is read: `fill` appends the next piece of it, or nothing at its end.
+pub(super) struct LineFeed<F> {
+    fill: F,
+    buffer: Vec<u8>,
+    at: usize,
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> LineFeed<F> {
+    pub fn new(fill: F) -> LineFeed<F> {
+        LineFeed { fill, buffer: vec![], at: 0 }
+    }
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> Read for LineFeed<F> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let count = self.fill_buf()?.read(bytes)?;
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> BufRead for LineFeed<F> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.at == self.buffer.len() {
+            self.buffer.clear();
+            self.at = 0;
+            (self.fill)(&mut self.buffer)?;
+        }
+        Ok(&self.buffer[self.at..])
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.at += count;
+    }
+}

@@ -1,0 +1,202 @@
+//! What was accepted but deserves a look: what it is, how often and where first, what was done.
+
+use std::fmt;
+
+use crate::error::quoted;
+
+/// Something odd in a scene that was repaired, replaced or passed over.
+///
+/// Shown with `{}`, it is one line: how many, what, where first, what was done, which.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Warning {
+    /// What was found.
+    pub kind: WarningKind,
+    /// How often.
+    pub count: usize,
+    /// Where first, as `file:line`; `None` where no line is to blame.
+    pub place: Option<String>,
+    /// What was done about it.
+    pub done: String,
+    /// The groups, materials or files concerned, up to [`Warning::MAX_NAMES`] of them, each once.
+    pub names: Vec<String>,
+}
+
+/// What a [`Warning`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum WarningKind {
+    /// A library of materials that cannot be read.
+    MissingLibrary,
+    /// A library under another path, in other letters, or one that no `mtllib` names.
+    LibraryElsewhere,
+    /// `usemtl` with a name that no library defines, or with none.
+    UnknownMaterial,
+    /// A face before the first `usemtl`.
+    FaceWithoutMaterial,
+    /// A material with neither reflectance nor radiance.
+    MaterialWithoutColour,
+    /// A material that is defined several times.
+    RedefinedMaterial,
+    /// A reflectance of 1 or more in a channel.
+    HighReflectance,
+    /// A reflectance or radiance below 0 in a channel.
+    NegativeColour,
+    /// A statement of a material that cannot be read.
+    MaterialStatement,
+    /// A texture, which is not modelled.
+    Texture,
+    /// Transparency, which is not modelled.
+    Transparency,
+    /// `Ka` above 1, taken for radiance.
+    AmbientAsRadiance,
+    /// No face emits light.
+    NoLight,
+    /// A polygon that crosses itself, or has too many corners, or no front.
+    Polygon,
+    /// A face that names a corner twice in a row.
+    RepeatedCorner,
+    /// A face with fewer than three different corners.
+    FewCorners,
+    /// A vertex with more numbers than a position, a weight or a colour has.
+    VertexNumbers,
+    /// A smoothing group that is no whole number.
+    SmoothingGroup,
+    /// `s` with neither a group nor `off`.
+    SmoothingWithoutGroup,
+    /// Points and lines.
+    PointsAndLines,
+    /// Curves and surfaces of free form.
+    FreeForm,
+    /// A line that is not OBJ.
+    UnknownStatement,
+    /// A text that is not UTF-8.
+    Encoding,
+    /// A triangle without area.
+    Degenerate,
+    /// A group whose faces are met from behind.
+    Winding,
+}
+
+impl Warning {
+    /// Most names that a warning keeps.
+    pub const MAX_NAMES: usize = 9;
+
+    /// A warning of `kind` without place or names.
+    pub fn new(kind: WarningKind, count: usize, done: impl Into<String>) -> Warning {
+        Warning { kind, count, place: None, done: done.into(), names: vec![] }
+    }
+
+    /// The same about these, the first few of which are kept.
+    pub fn naming<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Warning {
+        for name in names {
+            self.add_name(name);
+        }
+        self
+    }
+
+    /// Keeps `name` too, if there is room and it is new.
+    pub(crate) fn add_name(&mut self, name: impl Into<String>) {
+        if self.names.len() < Warning::MAX_NAMES {
+            let name = name.into();
+            if !self.names.contains(&name) {
+                self.names.push(name);
+            }
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (one, many) = self.kind.nouns();
+        write!(f, "{} {}", self.count, if self.count == 1 { one } else { many })?;
+        match (&self.place, self.count) {
+            (Some(place), 1) => write!(f, ", at {place}")?,
+            (Some(place), _) => write!(f, ", first at {place}")?,
+            (None, _) => {}
+        }
+        write!(f, ": {}", self.done)?;
+        if !self.names.is_empty() {
+            write!(f, " ({})", quoted(&self.names))?;
+        }
+        Ok(())
+    }
+}
+
+impl WarningKind {
+    /// What it is about, for one and for many.
+    pub(crate) fn nouns(self) -> (&'static str, &'static str) {
+        use WarningKind::*;
+        match self {
+            MissingLibrary => ("missing library", "missing libraries"),
+            LibraryElsewhere => ("library not where it is said", "libraries not where it is said"),
+            UnknownMaterial => ("unknown material", "unknown materials"),
+            FaceWithoutMaterial => ("face without a material", "faces without a material"),
+            MaterialWithoutColour => {
+                ("material with neither `Kd` nor `Ke`", "materials with neither `Kd` nor `Ke`")
+            }
+            RedefinedMaterial => {
+                ("material with several definitions", "materials with several definitions")
+            }
+            HighReflectance => (
+                "material with a reflectance of 1 or more",
+                "materials with reflectances of 1 or more",
+            ),
+            NegativeColour => {
+                ("material with a negative colour", "materials with negative colours")
+            }
+            MaterialStatement => {
+                ("unusable statement of a material", "unusable statements of materials")
+            }
+            Texture => ("material with a texture", "materials with textures"),
+            Transparency => ("material with transparency", "materials with transparency"),
+            AmbientAsRadiance => ("material with `Ka` above 1", "materials with `Ka` above 1"),
+            NoLight => ("scene without light", "scenes without light"),
+            Polygon => ("polygon that crosses itself", "polygons that cross themselves"),
+            RepeatedCorner => ("corner given twice in a row", "corners given twice in a row"),
+            FewCorners => ("face of fewer than three corners", "faces of fewer than three corners"),
+            VertexNumbers => ("vertex with too many numbers", "vertices with too many numbers"),
+            SmoothingGroup => (
+                "smoothing group that is no whole number",
+                "smoothing groups that are no whole numbers",
+            ),
+            SmoothingWithoutGroup => ("`s` line without a group", "`s` lines without a group"),
+            PointsAndLines => {
+                ("`p` or `l` line (points, lines)", "`p` and `l` lines (points, lines)")
+            }
+            FreeForm => {
+                ("line of free-form curves or surfaces", "lines of free-form curves or surfaces")
+            }
+            UnknownStatement => ("line of unknown kind", "lines of unknown kind"),
+            Encoding => ("text that is not UTF-8", "texts that are not UTF-8"),
+            Degenerate => ("triangle without area", "triangles without area"),
+            Winding => ("group seen from behind", "groups seen from behind"),
+        }
+    }
+
+    /// What would be right, where a strict reader refuses it; `None` for what it only warns of:
+    /// nothing was changed, or what was passed over has no place in a scene of surfaces.
+    pub(crate) fn remedy(self) -> Option<&'static str> {
+        use WarningKind::*;
+        Some(match self {
+            MissingLibrary => "put the library into the folder of the OBJ file or below",
+            LibraryElsewhere => "name it by its path from the folder of the OBJ file",
+            UnknownMaterial => "define it with `newmtl` in a library that `mtllib` names",
+            HighReflectance => "a diffuse reflectance is at least 0 and below 1 in each channel",
+            NegativeColour => "reflectance and radiance are at least 0 in each channel",
+            MaterialStatement => {
+                "begin with `newmtl NAME`; write three finite numbers r g b, or one for all three"
+            }
+            Polygon => {
+                "its outline must not cross itself, and may have 10000 corners unless it is \
+                 convex; triangles always work"
+            }
+            RepeatedCorner => "name each corner once",
+            FewCorners => "a face has three corners or more",
+            VertexNumbers => "a vertex is `v x y z`, with a weight or a colour at most",
+            SmoothingGroup => "write `s off`, or `s` and a whole number up to 4294967295",
+            AmbientAsRadiance => "write `Ke` for emitted radiance",
+            _ => return None,
+        })
+    }
+}
