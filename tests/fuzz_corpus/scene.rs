@@ -52,7 +52,7 @@ fn check_scene(scene: &Scene, bytes: usize) {
     for count in [scene.positions().len(), scene.triangles().len(), scene.groups().len()] {
         assert!(count <= bytes, "{count} of {bytes} bytes");
     }
-    for warning in scene.warnings() {
+    for warning in scene.warnings().iter().map(ToString::to_string) {
         assert!(!warning.contains(char::is_control), "{warning:?}");
         assert!(warning.len() < 4000, "{warning}");
     }

@@ -2,6 +2,8 @@ mod glb;
 mod image;
 mod mtl;
 mod obj;
+mod obj_libraries;
+mod obj_light;
 mod obj_polygons;
 mod obj_texts;
 mod ply;

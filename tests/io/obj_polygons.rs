@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use radiosity::{ErrorKind, Mesh, Rgb, VertexMesh, load_obj};
+use radiosity::{Mesh, Rgb, VertexMesh, load_obj};
 
-use super::obj_texts::{SQUARE, area, obj, refused};
+use super::obj_texts::{SQUARE, area, obj, repaired, warned};
 use crate::common::framed::{Frame, HERE};
 
 #[test]
@@ -54,34 +54,44 @@ fn convex_polygon_of_100_000_corners() {
 }
 
 #[test]
-fn rejects_concave_polygons_above_10_000_corners() {
+fn fans_concave_polygons_above_10_000_corners() {
     // Along a parabola from below: what is cut off has all other corners near it.
     let parabola = |n: usize| {
         let x = |i: usize| 2.0 * i as f64 / n as f64 - 1.0;
         let arc: String = (0..=n).map(|i| format!("v {} {} 0\n", x(i), x(i) * x(i))).collect();
         let corners: Vec<String> = (1..=n + 3).map(|i| i.to_string()).collect();
-        obj(&format!("{arc}v 1 -1 0\nv -1 -1 0\nf {}\n", corners.join(" ")))
+        format!("{arc}v 1 -1 0\nv -1 -1 0\nf {}\n", corners.join(" "))
     };
-    assert_eq!(parabola(9_997).unwrap().triangles().len(), 9_998);
-    refused(
-        parabola(9_998),
-        ErrorKind::Scene,
-        "room.obj:10002",
-        &["10001 corners", "may have 10000 corners"],
-    );
+    assert_eq!(obj(&parabola(9_997)).unwrap().triangles().len(), 9_998);
+    let text = parabola(9_998);
+    let files: [(&str, &[u8]); 1] = [("room.obj", text.as_bytes())];
+    let scene = repaired(&files, "1 polygon", "room.obj:10002", "may have 10000 corners");
+    assert_eq!(scene.triangles().len(), 9_999);
 }
 
 #[test]
-fn names_polygons_that_cannot_be_cut() {
+fn polygons_that_cross_themselves_are_cut_somehow() {
     let text = format!("{SQUARE}g wall\nf 1 2 3\ng floor\nf 1 3 2 4\n");
-    let parts = ["face 2 ", "'floor'"];
-    refused(obj(&text), ErrorKind::Scene, "room.obj:8", &parts);
+    let files: [(&str, &[u8]); 1] = [("room.obj", text.as_bytes())];
+    let scene = repaired(&files, "cross", "room.obj:8", "'floor'");
+    assert_eq!(scene.triangles().len(), 3);
+    assert!(scene.warnings().iter().any(|w| w.names == ["floor"]));
+    // Two loops of different size: what of them can be cut turns as the larger does.
+    let loops = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv -1 -1 0\nv -1 0 0\nf 1 2 3 4 5\n";
+    let scene = obj(loops).unwrap();
+    warned(&scene, "1 polygon that crosses itself");
+    assert!((0..scene.triangles().len()).all(|t| scene.normal(t).to_array() == [0., 0., 1.]));
+    assert!(area(&scene) > 2.0, "{}", area(&scene));
     // Concave, with the front that its corners turn to.
     let text = "v 0 0 0\nv 0 3 0\nv 1 3 0\nv 1 1 0\nv 2 1 0\nv 2 3 0\nv 3 3 0\nv 3 0 0\n";
     let scene = obj(&format!("{text}f 1 2 3 4 5 6 7 8\n")).unwrap();
     assert_eq!(area(&scene), 7.0);
     assert!((0..scene.triangles().len()).all(|t| scene.normal(t).to_array() == [0., 0., -1.]));
     // A corner given twice in a row is one corner.
-    assert_eq!(obj(&format!("{SQUARE}f 1 2 2 3 4 1\n")).unwrap().triangles().len(), 2);
-    assert_eq!(obj(&format!("{SQUARE}f 1 2 3 3\n")).unwrap().triangles().len(), 1);
+    for (face, triangles) in [("1 2 2 3 4 1", 2), ("1 2 3 3", 1)] {
+        let text = format!("{SQUARE}f {face}\n");
+        let files: [(&str, &[u8]); 1] = [("room.obj", text.as_bytes())];
+        let scene = repaired(&files, "1 corner given twice", "room.obj:5", "each corner once");
+        assert_eq!(scene.triangles().len(), triangles);
+    }
 }

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use radiosity::{Error, ErrorKind, Scene, load_obj};
+use radiosity::scene::WarningKind;
+use radiosity::{Error, ErrorKind, ObjSettings, Scene, load_obj};
 use tempfile::TempDir;
 
 pub const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -17,6 +18,13 @@ pub fn load(files: &[(&str, &[u8])]) -> Result<Scene, Error> {
         fs::write(folder.path().join(name), bytes).unwrap();
     }
     load_obj(folder.path().join(files[0].0))
+}
+
+/// The same, refusing what would be repaired.
+pub fn load_strictly(files: &[(&str, &[u8])]) -> Result<Scene, Error> {
+    let mut settings = ObjSettings::default();
+    settings.strict = true;
+    settings.read(files[0].0, files[0].1, &files[1..])
 }
 
 pub fn obj(text: &str) -> Result<Scene, Error> {
@@ -58,8 +66,27 @@ pub fn name_of(path: &Path) -> String {
 
 #[track_caller]
 pub fn warned(scene: &Scene, part: &str) {
-    let warnings = scene.warnings();
+    let warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
     assert!(warnings.iter().any(|w| w.contains(part)), "'{part}' is not in {warnings:?}");
+    for warning in &warnings {
+        assert!(warning.lines().count() == 1 && warning.len() < 900, "{warning}");
+    }
+}
+
+/// What the warnings are about, but for light, which few of these scenes have.
+pub fn oddities(scene: &Scene) -> Vec<WarningKind> {
+    let kinds = scene.warnings().iter().map(|w| w.kind);
+    kinds.filter(|&kind| kind != WarningKind::NoLight).collect()
+}
+
+/// What is repaired with a warning that contains `part`, and refused at `place` by a strict reader,
+/// with a message that contains `part` of strict too.
+#[track_caller]
+pub fn repaired(files: &[(&str, &[u8])], part: &str, place: &str, strict_part: &str) -> Scene {
+    let scene = load(files).unwrap_or_else(|e| panic!("not repaired: {e}"));
+    warned(&scene, part);
+    refused(load_strictly(files), ErrorKind::Scene, place, &[strict_part]);
+    scene
 }
 
 pub fn area(scene: &Scene) -> f64 {

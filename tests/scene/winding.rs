@@ -35,8 +35,8 @@ fn named(groups: &[(&str, Vec<[DVec3; 3]>)]) -> String {
     .unwrap();
     scene.check_winding();
     assert!(scene.warnings().len() < 2);
-    let warning = scene.warnings().first().map_or("", |w| w);
-    warning.chars().skip_while(|&c| c != '\'').take_while(|&c| c != ';').collect()
+    let names = scene.warnings().iter().flat_map(|w| w.names.iter().map(|n| format!("'{n}'")));
+    names.collect::<Vec<_>>().join(", ")
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn accepts_groups_wound_right() {
     let mut scene =
         load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")).unwrap();
     scene.check_winding();
-    assert_eq!(scene.warnings(), [""; 0]);
+    assert!(scene.warnings().is_empty(), "{:?}", scene.warnings());
 }
 
 #[test]
@@ -90,5 +90,5 @@ fn ignores_face_that_sees_nothing() {
     let plate = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     let mut scene = quads(&[(plate, Material::grey("m", 0.5))]);
     scene.check_winding();
-    assert_eq!(scene.warnings(), [""; 0]);
+    assert!(scene.warnings().is_empty(), "{:?}", scene.warnings());
 }

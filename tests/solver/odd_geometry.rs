@@ -228,7 +228,7 @@ fn lamp_flush_in_the_ceiling() {
     ];
     let [hole, first, last] = scenes.map(|mut scene| {
         scene.check_winding();
-        assert_eq!(scene.warnings(), [""; 0]);
+        assert!(scene.warnings().is_empty(), "{:?}", scene.warnings());
         let (mesh, solution) = settle(scene, 0.125);
         assert_eq!((solution.ledger.escaped.x, solution.ledger.backface_loss.x), (0.0, 0.0));
         [0, 1, 2, 3, 4].map(|g| flux(&mesh, &solution, Some(g)))

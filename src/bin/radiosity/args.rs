@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use lexopt::prelude::*;
-use radiosity::{Backend, Error, ErrorKind};
+use radiosity::{Backend, Error, ErrorKind, ObjSettings, Rgb, Scene};
 
 /// Why a command ended without having done its work.
 pub enum Stop {
@@ -78,6 +78,48 @@ pub fn numbers<T: FromStr, const N: usize>(
     let numbers: Result<Vec<T>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     let array = numbers.ok().and_then(|numbers| numbers.try_into().ok());
     array.ok_or_else(|| wrong_value(option, &text, expected))
+}
+
+/// What an option of the command line does to how OBJ files are read.
+pub type ObjOption = fn(&mut lexopt::Parser, &mut ObjSettings) -> Result<(), Stop>;
+
+/// The option of how OBJ files are read that is called `name`.
+pub fn obj_option(name: &str) -> Option<ObjOption> {
+    match name {
+        "strict" => Some(|_, settings| {
+            settings.strict = true;
+            Ok(())
+        }),
+        "max-reflectance" => Some(|parser, settings| {
+            settings.max_reflectance = value(parser, "max-reflectance", "a number below 1")?;
+            Ok(())
+        }),
+        "emit" => Some(|parser, settings| {
+            settings.emit.push(emission(parser)?);
+            Ok(())
+        }),
+        _ => None,
+    }
+}
+
+/// `MATERIAL=r,g,b`, or one number for all three.
+fn emission(parser: &mut lexopt::Parser) -> Result<(String, Rgb), Stop> {
+    let text = parser.value()?.string()?;
+    let wrong = || wrong_value("emit", &text, "MATERIAL=r,g,b");
+    let (name, radiance) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let numbers: Result<Vec<f64>, _> = radiance.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[grey]) => Ok((name.into(), Rgb::splat(grey))),
+        Ok(&[r, g, b]) => Ok((name.into(), Rgb::new(r, g, b))),
+        _ => Err(wrong()),
+    }
+}
+
+/// Tells the user what is odd about a scene.
+pub fn print_warnings(scene: &Scene) {
+    for warning in scene.warnings() {
+        eprintln!("warning: {warning}");
+    }
 }
 
 /// The error for a value that is not as expected.

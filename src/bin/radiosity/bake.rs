@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use files::Files;
 use lexopt::prelude::*;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene, Solver, load_obj};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ObjSettings, Scene, Solver};
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
@@ -67,6 +67,9 @@ Of vertices that gather:
   --sweeps N        times that all vertices gather, the last time what they found before
 
 Files and devices:
+  --strict          refuse what would be repaired in the file
+  --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
+  --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
@@ -84,6 +87,7 @@ Files and devices:
 /// What is asked of a bake.
 pub struct Bake {
     pub scene: PathBuf,
+    obj: ObjSettings,
     pub target: Target,
     /// Settings made by hand, in their order.
     adjustments: Vec<Adjustment>,
@@ -125,6 +129,7 @@ impl Bake {
         let (mut gather, mut state) = (None, false);
         let mut bake = Bake {
             scene: PathBuf::new(),
+            obj: ObjSettings::default(),
             target: Target::Settings(Gather::None),
             adjustments: vec![],
             files: Files::new(),
@@ -158,6 +163,8 @@ impl Bake {
                     let name = name.to_string();
                     if let Some(setting) = Setting::named(&name) {
                         bake.adjustments.push(setting.adjustment(parser)?);
+                    } else if let Some(option) = args::obj_option(&name) {
+                        option(parser, &mut bake.obj)?;
                     } else if !bake.files.option(&name, parser)? {
                         return Err(Long(&name).unexpected().into());
                     }
@@ -196,13 +203,11 @@ impl Bake {
         self.files.check()?;
         let name = self.scene.display().to_string();
         let scene = progress::of_stage(&format!("reading {name}"), || {
-            let mut scene = load_obj(&self.scene)?;
+            let mut scene = self.obj.load(&self.scene)?;
             scene.check_winding();
             Ok::<_, Error>(scene)
         })?;
-        for warning in scene.warnings() {
-            eprintln!("warning: {warning}");
-        }
+        args::print_warnings(&scene);
         let (warnings, triangles) =
             (scene.warnings().iter().map(ToString::to_string).collect(), scene.triangles().len());
         let load = start.elapsed().as_secs_f64();

@@ -25,7 +25,9 @@ use std::time::Instant;
 use grid::{Grid, Run, Target};
 use lexopt::prelude::*;
 use measure::Measured;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene, load_obj};
+use radiosity::{
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, ObjSettings, Scene,
+};
 use reference::Reference;
 use surface_points::SurfacePoints;
 
@@ -46,6 +48,9 @@ given.
                   finest, which has errors of its own, at 4096 places; gaps that nobody looks
                   into are left out
   --quick         fewer runs, none of them fine, around those meant for 5 %
+  --strict        refuse what would be repaired in the file
+  --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
+  --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu           rays on the CPU instead of hemicubes
 
@@ -57,6 +62,7 @@ shares of the radiosity.";
 /// What is asked of the command.
 struct Options {
     scene: PathBuf,
+    obj: ObjSettings,
     /// A file of points with their true radiosity.
     truth: Option<PathBuf>,
     /// Path of the output without its ending.
@@ -101,6 +107,7 @@ impl Options {
     fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
         let (mut scenes, mut truth, mut out) = (vec![], None, None);
         let (mut quick, mut device) = (false, Device::Gpu(None));
+        let mut obj = ObjSettings::default();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
@@ -110,6 +117,10 @@ impl Options {
                 Long("adapter") => device = Device::named(parser)?,
                 Long("cpu") => device = Device::Cpu,
                 Value(path) => scenes.push(path.into()),
+                Long(name) => match args::obj_option(name) {
+                    Some(option) => option(parser, &mut obj)?,
+                    None => return Err(arg.unexpected().into()),
+                },
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -119,16 +130,14 @@ impl Options {
             stem.push("_trade_off");
             stem.into()
         });
-        Ok(Options { scene, truth, out, quick, device })
+        Ok(Options { scene, obj, truth, out, quick, device })
     }
 
     fn run(&self) -> Result<Results, Error> {
         args::check_writable(&self.out)?;
         let truth = self.read_truth()?;
-        let scene = Arc::new(load_obj(&self.scene)?);
-        for warning in scene.warnings() {
-            eprintln!("warning: {warning}");
-        }
+        let scene = Arc::new(self.obj.load(&self.scene)?);
+        args::print_warnings(&scene);
         let device = self.device.open()?;
         let grid = Grid::new(&scene, self.quick);
         BakeSettings::for_error(WARM_UP_ERROR, &scene).bake(scene.clone(), &device, go)?;

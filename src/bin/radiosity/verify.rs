@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use lexopt::prelude::*;
 use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
-use radiosity::{Error, Scene, load_obj, read_ply};
+use radiosity::{Error, ObjSettings, Scene, read_ply};
 use serde_json::Value as Json;
 
 use crate::args::{self, Stop};
@@ -34,6 +34,9 @@ the channels. Beside it stands what the bake told, from SOLUTION.json, if that i
                     ground under a box or a wall right behind a plate; said, and left out if not
   --seed N          another seed, other points and paths [0]
   --csv FILE        write the table, all groups, as CSV
+  --strict          refuse what would be repaired in the file
+  --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
+  --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:
@@ -52,6 +55,7 @@ const DEFAULT_PATHS: usize = 16384;
 /// What is asked of the command.
 struct Options {
     scene: PathBuf,
+    obj: ObjSettings,
     settings: Settings,
     csv: Option<PathBuf>,
     what: What,
@@ -73,6 +77,7 @@ impl Options {
         let (mut files, mut csv, mut points_ply) = (vec![], None, None);
         let (mut points, mut paths) = (None, None);
         let (mut only_solution, mut settings) = (false, Settings::default());
+        let mut obj = ObjSettings::default();
         while let Some(arg) = parser.next()? {
             only_solution |=
                 matches!(arg, Long("precision" | "time" | "places" | "hidden" | "points-ply"));
@@ -95,6 +100,10 @@ impl Options {
                     paths = Some(args::value::<NonZeroUsize>(parser, "paths", expected)?);
                 }
                 Value(path) => files.push(PathBuf::from(path)),
+                Long(name) => match args::obj_option(name) {
+                    Some(option) => option(parser, &mut obj)?,
+                    None => return Err(arg.unexpected().into()),
+                },
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -112,7 +121,7 @@ impl Options {
             }
             None => What::Solution { ply: files.remove(1), points_ply },
         };
-        Ok(Options { scene: args::only_scene(files)?, settings, csv, what })
+        Ok(Options { scene: args::only_scene(files)?, obj, settings, csv, what })
     }
 
     fn run(&self) -> Result<(), Error> {
@@ -123,10 +132,8 @@ impl Options {
         for file in self.csv.iter().chain(points_ply) {
             args::check_writable(file)?;
         }
-        let scene = load_obj(&self.scene)?;
-        for warning in scene.warnings() {
-            eprintln!("warning: {warning}");
-        }
+        let scene = self.obj.load(&self.scene)?;
+        args::print_warnings(&scene);
         match &self.what {
             What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),
             What::Points { json, paths } => {

@@ -9,8 +9,9 @@ use std::time::Instant;
 use files::Format;
 use lexopt::prelude::*;
 use radiosity::backend::AdapterInfo;
+use radiosity::scene::WarningKind;
 use radiosity::view_factor::Estimate;
-use radiosity::{BakeSettings, Error, ErrorKind, Mesh, Scene, ViewFactors, load_obj};
+use radiosity::{BakeSettings, Error, ErrorKind, Mesh, ObjSettings, Scene, ViewFactors, Warning};
 
 use crate::args::{self, Device, Stop};
 use crate::progress;
@@ -37,7 +38,8 @@ what leaves the scene, `back` what meets the backs of surfaces.
   --element-size X  longest edge of the elements that are seen from [diagonal / 32]
   --hemicube N      pixels along an edge of a hemicube's top face, even [128]
   --adapter NAME    a graphics adapter with NAME in its name
-  --cpu             rays on the CPU instead of hemicubes, N squared a row";
+  --cpu             rays on the CPU instead of hemicubes, N squared a row
+  --strict          refuse what would be repaired in the file";
 
 /// Groups whose factors are printed at most.
 const MAX_PRINTED: usize = 16;
@@ -51,6 +53,7 @@ const DEFAULT_HEMICUBE: u32 = 128;
 /// What is asked of the command.
 struct Options {
     scenes: Vec<PathBuf>,
+    obj: ObjSettings,
     /// The folder for files, or none for that of each scene.
     out: Option<PathBuf>,
     formats: Vec<Format>,
@@ -83,6 +86,7 @@ impl Options {
         let (mut error, mut two_sided) = (None, vec![]);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let mut device = None;
+        let mut obj = ObjSettings::default();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
@@ -103,6 +107,10 @@ impl Options {
                 Long("adapter") => device = Some(Device::named(parser)?),
                 Long("cpu") => device = Some(Device::Cpu),
                 Value(path) => scenes.push(path.into()),
+                Long(name) => match args::obj_option(name) {
+                    Some(option) => option(parser, &mut obj)?,
+                    None => return Err(arg.unexpected().into()),
+                },
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -125,7 +133,7 @@ impl Options {
             }
             Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided }
         };
-        Ok(Options { scenes, out, formats, enforce, method })
+        Ok(Options { scenes, obj, out, formats, enforce, method })
     }
 
     fn run(&self, path: &Path) -> Result<(), Error> {
@@ -136,8 +144,9 @@ impl Options {
         for format in &self.formats {
             args::check_writable(&format.path(&stem))?;
         }
-        let scene = load_obj(path)?;
-        for warning in scene.warnings() {
+        let scene = self.obj.load(path)?;
+        let of_light = |w: &&Warning| w.kind == WarningKind::NoLight;
+        for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
         }
         let start = Instant::now();

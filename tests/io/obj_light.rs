@@ -1,0 +1,108 @@
+//! Which materials emit: `Ke`, `Ka` above 1, and what the caller says.
+
+use std::f64::consts::PI;
+
+use radiosity::scene::WarningKind;
+use radiosity::{Error, ErrorKind, ObjSettings, Rgb, Scene};
+
+use super::obj_texts::{SQUARE, refused, warned};
+
+/// A wall and a lamp, with this library.
+fn room(library: &str, settings: &ObjSettings) -> Result<Scene, Error> {
+    let text =
+        format!("mtllib room.mtl\n{SQUARE}usemtl wall\nf 1 2 3\nusemtl Ceiling Lamp\nf 1 3 4\n");
+    settings.read("room.obj", text.as_bytes(), &[("room.mtl", library.as_bytes())])
+}
+
+fn emitting(emit: &[(&str, f64)]) -> ObjSettings {
+    let mut settings = ObjSettings::default();
+    settings.emit = emit.iter().map(|&(name, l)| (name.into(), Rgb::splat(l))).collect();
+    settings
+}
+
+fn kinds(scene: &Scene) -> Vec<WarningKind> {
+    scene.warnings().iter().map(|w| w.kind).collect()
+}
+
+#[test]
+fn ambient_above_one_is_light_where_nothing_else_is() {
+    let wall = "newmtl wall\nKd 0.5\nKa 1 1 1\n";
+    let lamp = "newmtl Ceiling Lamp\nKd 0.5\nKa 20 10 0\n";
+    let scene = room(&format!("{wall}{lamp}Ke 0 0 0\n"), &ObjSettings::default()).unwrap();
+    assert_eq!(scene.material(0).exitance, Rgb::ZERO);
+    assert_eq!(scene.material(1).exitance, PI * Rgb::new(20.0, 10.0, 0.0));
+    assert_eq!(kinds(&scene), [WarningKind::AmbientAsRadiance]);
+    warned(&scene, "room.mtl:4");
+    let mut strict = ObjSettings::default();
+    strict.strict = true;
+    let refusal = room(&format!("{wall}{lamp}"), &strict);
+    refused(refusal, ErrorKind::Scene, "room.mtl:4", &["`Ka` above 1", "`Ke`"]);
+    // Another light, in the file or of the caller's; a colour in other units; no more than white.
+    let dim = emitting(&[("wall", 1.0)]);
+    let other = ObjSettings::default();
+    let units = lamp.replace("Kd 0.5", "Kd 255 255 255");
+    for (library, settings) in [
+        (format!("{wall}{lamp}newmtl third\nKe 1 1 1\n"), &other),
+        (format!("{wall}{lamp}"), &dim),
+        (format!("{wall}{units}"), &other),
+        (format!("{wall}{}", lamp.replace("20 10 0", "1 1 1")), &other),
+    ] {
+        let scene = room(&library, settings).unwrap();
+        assert_eq!(scene.material(1).exitance, Rgb::ZERO, "{library}");
+        assert!(!kinds(&scene).contains(&WarningKind::AmbientAsRadiance), "{library}");
+    }
+}
+
+#[test]
+fn caller_says_what_emits() {
+    let library = "newmtl wall\nKd 0.5\nnewmtl Ceiling Lamp\nKd 0.5\nKe 7 7 7\n";
+    let scene = room(library, &emitting(&[("Ceiling Lamp", 3.0), ("wall", 1.0)])).unwrap();
+    assert_eq!(scene.material(0).exitance, Rgb::splat(PI));
+    assert_eq!(scene.material(1).exitance, Rgb::splat(3.0 * PI));
+    // Materials that no library defines can emit too.
+    let scene = room("", &emitting(&[("Ceiling Lamp", 3.0)])).unwrap();
+    assert_eq!(scene.material(1).exitance, Rgb::splat(3.0 * PI));
+    let parts = ["'ceiling lamp'", "'wall', 'Ceiling Lamp'"];
+    let unknown = room(library, &emitting(&[("ceiling lamp", 3.0)]));
+    refused(unknown, ErrorKind::Scene, "room.obj", &parts);
+    for radiance in [-1.0, f64::NAN, f64::INFINITY, 1e308] {
+        let wrong = room(library, &emitting(&[("wall", radiance)]));
+        refused(wrong, ErrorKind::Setting, "emit 'wall'", &["at least 0"]);
+    }
+}
+
+#[test]
+fn ceiling_is_the_callers() {
+    let mut settings = ObjSettings::default();
+    settings.max_reflectance = 0.9;
+    let scene = room("newmtl wall\nKd 1 0.95 0.5\n", &settings).unwrap();
+    assert_eq!(scene.material(0).reflectance.to_array(), [0.9, 0.95, 0.5]);
+    for ceiling in [1.0, -0.1, f64::NAN] {
+        settings.max_reflectance = ceiling;
+        refused(room("", &settings), ErrorKind::Setting, "max_reflectance", &["below 1"]);
+    }
+}
+
+#[test]
+fn without_light_names_candidates() {
+    let dark = room("newmtl wall\nKd 0.5\nnewmtl Ceiling Lamp\nKd 0.5\n", &ObjSettings::default());
+    let dark = dark.unwrap();
+    let warning = dark.warnings().iter().find(|w| w.kind == WarningKind::NoLight).unwrap();
+    assert_eq!(warning.names, ["Ceiling Lamp"]);
+    warned(&dark, "--emit 'Ceiling Lamp=15,15,15'");
+    for (name, is_light) in [
+        ("area_light_03", true),
+        ("NEON", true),
+        ("Deckenleuchte", true),
+        ("led strip", true),
+        ("tiled", false),
+        ("sunflower", false),
+        ("sun", true),
+        ("wall", false),
+    ] {
+        let text = format!("{SQUARE}usemtl {name}\nf 1 2 3\n");
+        let scene = ObjSettings::default().read("room.obj", text.as_bytes(), &[]).unwrap();
+        let warning = scene.warnings().iter().find(|w| w.kind == WarningKind::NoLight).unwrap();
+        assert_eq!(warning.names.len(), usize::from(is_light), "{name}");
+    }
+}
