@@ -36,6 +36,18 @@ fn peak_memory_is_bounded_by_file_size() {
         names("o", ""),
         many("s 1\n"),
         many("g a\nf 1\n"),
+        many("f 1 2 3\ng\nf 1 2 3\ng a\n"),
+        many("f 1 2 3\ns\nf 1 2 3\ns 1\n"),
+        many("usemtl\nf 1 2 3\nusemtl a\nf 1 2 3\n"),
+        many("vt 0 0\n"),
+        format!("vt 0 0\n{}", many("f 1/1 2/1 3/1\n")),
+        format!("vt 0 0\nf {}\n", "1/1 2/1 3/1 ".repeat(BYTES / 12)),
+        names("usemtl", "f 1 2 3\n"),
+        many("p 1\n"),
+        format!("g {}\n{}", "x".repeat(BYTES / 2), "f 1 2 3\ng\nf 1 2 3\ns\n".repeat(BYTES / 40)),
+        format!("mtllib{}\n", " x".repeat(BYTES / 2)),
+        names("mtllib", ""),
+        "\u{e9}".repeat(BYTES / 2).chars().map(|c| c as u8 as char).collect(),
     ];
     let mtls = [names("newmtl", ""), many("newmtl a\n"), names("newmtl", "Kd 0\n"), many("d 1\n")];
     let start = peak();
@@ -53,8 +65,8 @@ fn peak_memory_is_bounded_by_file_size() {
     for mtl in &mtls {
         check(mtl, &format!("{square}mtllib it.mtl\nusemtl 1\nf 1 2 3\n"), mtl);
     }
-    // The corner of a polygon, of two bytes, becomes an index, a place in space and a triangle of
-    // 28 bytes; a face, a group or a material of four to eight bytes some 100 to 150.
+    // The corner of a polygon, of two bytes, becomes 24 bytes in tobj, which go again, an index, a
+    // place in space and a triangle of 28 bytes; a model, of some ten bytes, some 300 in tobj.
     let factor = (highest - start) as f64 / BYTES as f64;
-    assert!(factor < 40.0, "{factor} bytes a byte");
+    assert!(factor < 60.0, "{factor} bytes a byte");
 }

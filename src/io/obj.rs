@@ -26,7 +26,7 @@ use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
 use crate::scene::{Material, Rgb, Scene, Triangle, Warning, WarningKind};
 use repairs::Repairs;
 pub use settings::ObjSettings;
-use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
+use statements::{FaceNote, LineFeed, Statements, UNKNOWN_MATERIAL};
 
 /// Loads a Wavefront OBJ file and the MTL files that it names.
 ///
@@ -217,7 +217,7 @@ impl<'a> ObjFile<'a> {
         };
         let number = self.statements.first_use.first().map_or(0, |&line| line as usize);
         let line = Line { file: self.path, number, text: "usemtl".into() };
-        let done = "taken for its name";
+        let done = "taken since it has the name of the OBJ file";
         self.repairs.note(WarningKind::LibraryElsewhere, &line, &found, done)?;
         self.library.take(&line, &found, self.files, &mut self.repairs)
     }
@@ -252,12 +252,12 @@ impl<'a> ObjFile<'a> {
         let (mut face, mut bare) = (0, 0);
         for tobj::Model { mesh, name } in models {
             // A model that has no face has no number either.
-            let Some(&note) = name.parse().ok().and_then(|k: usize| self.statements.models.get(k))
-            else {
+            let number = name.parse().ok();
+            let Some(&used) = number.and_then(|k: usize| self.statements.models.get(k)) else {
                 continue;
             };
-            let by_name = note.material.map_or(named[named.len() - 1], |k| named[k as usize]);
-            let known = mesh.material_id.filter(|_| note.material.is_some());
+            let by_name = used.map_or(named[named.len() - 1], |k| named[k as usize]);
+            let known = mesh.material_id.filter(|_| used.is_some());
             let material = known.map_or(by_name, |id| id as u32);
             // The number of each vertex in the file is its colour.
             let numbers: Vec<u32> =
@@ -270,14 +270,10 @@ impl<'a> ObjFile<'a> {
             while start < mesh.indices.len() {
                 let corners = &mesh.indices[start..start + arity(k)];
                 let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
-                let like = Triangle {
-                    group: note.group,
-                    material,
-                    smoothing: self.statements.faces[face].smoothing,
-                    ..Default::default()
-                };
+                let FaceNote { group, smoothing, .. } = self.statements.faces[face];
+                let like = Triangle { group, material, smoothing, ..Default::default() };
                 self.cut(face, &corners, like, &mut geometry)?;
-                bare += usize::from(note.material.is_none());
+                bare += usize::from(used.is_none());
                 (start, k, face) = (start + corners.len(), k + 1, face + 1);
             }
         }

@@ -78,7 +78,8 @@ impl ObjSettings {
         let bad = |l: &Rgb| !(std::f64::consts::PI * *l).is_finite() || l.min_element() < 0.0;
         if let Some((name, radiance)) = self.emit.iter().find(|(_, radiance)| bad(radiance)) {
             let place = format!("emit {}", quoted(&[name]));
-            let found = format!("radiance {radiance}");
+            let [r, g, b] = radiance.to_array();
+            let found = format!("radiance {r:e}, {g:e}, {b:e}");
             let remedy = "must be finite and at least 0 in each channel";
             return Err(Error::new(ErrorKind::Setting, place, found, remedy));
         }

@@ -15,7 +15,7 @@
 //! | `v` | the number of the vertex as its colour | numbers vertices anew in each model |
 //! | `f` | corners counted from 1, `v` or `v/vt` | takes bad indices without a line |
 //! | `vt` | the same; first of all one that is no number | gives corners without one another's |
-//! | `o`, `g` | the number of a model | copies the name into every model |
+//! | `o`, `g` | the number of a model, from here | makes a model for each, and copies its name |
 //! | `l`, `p` | nothing | makes faces of lines |
 //! | `usemtl`, `mtllib` | the same, after one space | splits at a space only |
 
@@ -35,22 +35,15 @@ const DEFAULT_GROUP: &str = "default";
 const MODEL_CORNERS: usize = 1 << 14;
 
 /// What becomes of faces whose material is not known.
-pub(super) const UNKNOWN_MATERIAL: &str = "grey: reflectance 0.5";
+pub(super) const UNKNOWN_MATERIAL: &str = "they are grey, reflectance 0.5";
 
 /// What is known of a face beside its corners.
 pub(super) struct FaceNote {
     pub line: u32,
     /// As in [`crate::Triangle::smoothing`].
     pub smoothing: Option<u32>,
-}
-
-/// What the faces of a model of tobj have in common.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct ModelNote {
     /// Index into the groups.
     pub group: u32,
-    /// Index into the names that `usemtl` lines gave.
-    pub material: Option<u32>,
 }
 
 /// Names in the order of their first use.
@@ -76,7 +69,8 @@ impl Names {
 #[derive(Default)]
 pub(super) struct Statements {
     pub faces: Vec<FaceNote>,
-    pub models: Vec<ModelNote>,
+    /// Of each model of tobj, by its name: what its faces use, as an index into `materials`.
+    pub models: Vec<Option<u32>>,
     pub groups: Names,
     /// Names of materials that faces use.
     pub materials: Names,
@@ -217,8 +211,8 @@ impl Statements {
         }
         self.begin_model(out);
         self.model_corners += self.corners.len();
-        let (number, smoothing) = (line.number as u32, self.smoothing);
-        self.faces.push(FaceNote { line: number, smoothing });
+        let (line, smoothing, group) = (line.number as u32, self.smoothing, self.current_group());
+        self.faces.push(FaceNote { line, smoothing, group });
         emit(out, format_args!("f"));
         for &[vertex, texture_coordinate] in &self.corners {
             emit(out, format_args!(" {vertex}"));
@@ -230,12 +224,16 @@ impl Statements {
         Ok(())
     }
 
-    /// Begins another model where group or material are others, or when the last one is large.
-    fn begin_model(&mut self, out: &mut Vec<u8>) {
-        let group = *self.group.get_or_insert_with(|| {
+    /// Index of the group that faces belong to now.
+    fn current_group(&mut self) -> u32 {
+        *self.group.get_or_insert_with(|| {
             let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
             self.groups.index(name)
-        });
+        })
+    }
+
+    /// Begins another model where the material is another, or when the last one is large.
+    fn begin_model(&mut self, out: &mut Vec<u8>) {
         if self.material.is_none() && !self.material_name.is_empty() {
             let material = self.materials.index(&self.material_name);
             if material as usize == self.first_use.len() {
@@ -243,10 +241,9 @@ impl Statements {
             }
             self.material = Some(material);
         }
-        let model = ModelNote { group, material: self.material };
-        if self.models.last() != Some(&model) || self.model_corners >= MODEL_CORNERS {
+        if self.models.last() != Some(&self.material) || self.model_corners >= MODEL_CORNERS {
             emit(out, format_args!("g {}\n", self.models.len()));
-            self.models.push(model);
+            self.models.push(self.material);
             self.model_corners = 0;
         }
     }
