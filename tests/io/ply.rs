@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use radiosity::io::{ToneCurve, write_ply_with_tone};
 use radiosity::{
     ErrorKind, Material, Mesh, RadianceImage, Rgb, VertexMesh, write_exr, write_ply, write_png,
 };
@@ -15,6 +16,23 @@ fn surface() -> VertexMesh {
         .map(|e| Rgb::new(1.0, 2.0, 3.0) * mesh.centroid(mesh.element(e)).x + 0.5)
         .collect();
     VertexMesh::new(&mesh, &ramp)
+}
+
+/// The colours are those of the tone curve that is given: after nine floats of each vertex.
+#[test]
+fn ply_has_the_colours_of_a_picture() {
+    let (surface, folder) = (surface(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("cube.ply");
+    let tone = ToneCurve::fit(&[Rgb::splat(20.0)]);
+    write_ply_with_tone(&path, &surface, &tone).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let records = bytes[end..].chunks(39).take(surface.positions.len());
+    let colours: Vec<[u8; 3]> = records.map(|record| record[36..].try_into().unwrap()).collect();
+    let of = |tone: &ToneCurve| -> Vec<[u8; 3]> {
+        surface.radiosity.iter().map(|&b| tone.display(b)).collect()
+    };
+    assert!(colours == of(&tone) && colours != of(&ToneCurve::fit(&surface.radiosity)));
 }
 
 #[test]
