@@ -13,6 +13,8 @@ mod gathered;
 mod up_axis;
 mod view_score;
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -60,8 +62,8 @@ impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
     /// `samples` primary rays on an n-rooks grid: no two in one row or column.
     ///
-    /// Radiance is the interpolated radiosity over π. Backs of faces, and rays that meet nothing,
-    /// are black.
+    /// Radiance is the interpolated radiosity over π. Backs of faces are black, and rays that meet
+    /// nothing see the sky, [`VertexMesh::sky`].
     ///
     /// # Errors
     /// Those of [`Camera::check`].
@@ -74,8 +76,11 @@ impl Camera {
     ) -> Result<RadianceImage, Error> {
         let rays = PrimaryRays::new(self, surface, width, height, samples)?;
         let pixel = |k: u32| {
-            let sum: Rgb = rays.hits(k).map(|hit| rays.interpolate(&hit, &surface.radiosity)).sum();
-            sum * rays.weight / std::f64::consts::PI
+            let radiance = |seen: Seen| match seen {
+                Seen::Front(hit) => rays.interpolate(&hit, &surface.radiosity) / PI,
+                Seen::Sky => surface.sky,
+            };
+            rays.seen(k).map(radiance).sum::<Rgb>() * rays.weight
         };
         let pixels = (0..width * height).into_par_iter().map(pixel).collect();
         Ok(RadianceImage { width, height, pixels })
@@ -127,6 +132,12 @@ impl Camera {
     }
 }
 
+/// What a primary ray sees first.
+enum Seen {
+    Front(Hit),
+    Sky,
+}
+
 /// The primary rays through the pixels of an image, and the surface that they meet.
 struct PrimaryRays<'a> {
     surface: &'a VertexMesh,
@@ -176,8 +187,8 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// The fronts that the rays of pixel `k` hit first. The other rays hit backs or nothing.
-    fn hits(&self, k: u32) -> impl Iterator<Item = Hit> {
+    /// What the rays of pixel `k` see. The other rays hit backs.
+    fn seen(&self, k: u32) -> impl Iterator<Item = Seen> {
         let n = self.samples;
         // Middle of row or column k of an n × n grid within a sub-pixel.
         let middle = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
@@ -189,9 +200,12 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// The front that the ray along `direction` hits first, if it hits a front.
-    fn hit(&self, direction: DVec3) -> Option<Hit> {
-        self.scene.closest_hit(self.eye, direction, 0.0, None).filter(|hit| hit.front)
+    /// What the ray along `direction` sees first; nothing if that is a back.
+    fn hit(&self, direction: DVec3) -> Option<Seen> {
+        match self.scene.closest_hit(self.eye, direction, 0.0, None) {
+            Some(hit) => hit.front.then_some(Seen::Front(hit)),
+            None => Some(Seen::Sky),
+        }
     }
 
     /// Values at the surface's vertices, interpolated linearly to a hit.

@@ -52,7 +52,7 @@ pub struct GatherPoint {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
-    /// reflected.
+    /// reflected, and the sky where there is no surface.
     pub irradiance: Rgb,
     /// The part of `irradiance` from the emission of lights that were sampled explicitly, W/m² per
     /// channel. Emission that is seen like any other surface is not in it.
@@ -89,7 +89,8 @@ pub struct RadiosityField<'a> {
 ///   other points are in the call and however many calls were before;
 /// - see the same directions from a point whatever the field, so that the difference of two fields
 ///   has no more noise than is in the difference;
-/// - count each front by emitted plus reflected radiosity, backs as black.
+/// - count each front by emitted plus reflected radiosity, backs as black, and directions that meet
+///   no surface by the radiosity of the scene's sky, π times its radiance.
 ///
 /// It is called with some hundred points at once or more, and should make use of all of the machine
 /// for a call. Progress and cancelling are the caller's business.

@@ -236,6 +236,9 @@ impl Mesh {
             let Node { triangle, cell: Cell { level, i, j, flipped }, .. } = *self.node(element);
             all.update(bytemuck::bytes_of(&[triangle, level, i, j, flipped.into()]));
         }
+        if self.scene.sky() != Rgb::ZERO {
+            all.update(bytemuck::bytes_of(&self.scene.sky().to_array()));
+        }
         self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
         all.digest()
     }

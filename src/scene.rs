@@ -10,6 +10,7 @@
 mod warning;
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3};
 
@@ -59,6 +60,8 @@ pub struct Scene {
     /// See [`Scene::coordinate_ulp`].
     coordinate_ulp: f64,
     warnings: Vec<Warning>,
+    /// See [`Scene::sky`].
+    sky: Rgb,
 }
 
 impl Scene {
@@ -145,8 +148,17 @@ impl Scene {
         let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let coordinate_ulp = f64::EPSILON * largest;
         let warnings = vec![];
-        let mut scene =
-            Scene { positions, triangles, groups, materials, degenerate, coordinate_ulp, warnings };
+        let sky = Rgb::ZERO;
+        let mut scene = Scene {
+            positions,
+            triangles,
+            groups,
+            materials,
+            degenerate,
+            coordinate_ulp,
+            warnings,
+            sky,
+        };
         if degenerate > 0 {
             scene.warn(Warning::new(WarningKind::Degenerate, degenerate, "dropped"));
         }
@@ -171,6 +183,34 @@ impl Scene {
     /// The materials.
     pub fn materials(&self) -> &[Material] {
         &self.materials
+    }
+
+    /// Radiance of the sky, W/(m² sr) per channel: the same in every direction in which there is no
+    /// surface, 0 unless set. What sees nothing else receives the irradiance π times that.
+    pub fn sky(&self) -> Rgb {
+        self.sky
+    }
+
+    /// The same scene under a uniform sky of `radiance`, W/(m² sr) per channel.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite.
+    pub fn with_sky(&self, radiance: Rgb) -> Result<Scene, Error> {
+        if !(radiance * PI).is_finite() || radiance.min_element() < 0.0 {
+            let remedy = "give at least 0 in every channel, and finite";
+            return Err(bad("sky", format!("radiance {radiance}"), remedy));
+        }
+        Ok(Scene { sky: radiance, ..self.clone() })
+    }
+
+    /// Radiosity of a surface that looks like the sky, W/m².
+    pub(crate) fn sky_radiosity(&self) -> Rgb {
+        PI * self.sky
+    }
+
+    /// Whether any surface emits light.
+    pub fn has_emitter(&self) -> bool {
+        (0..self.triangles.len()).any(|t| self.material(t).exitance != Rgb::ZERO)
     }
 
     /// How many triangles were dropped for having no area.
@@ -266,7 +306,7 @@ impl Scene {
             });
         }
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
-        let scene = Scene::new(positions, triangles, groups, materials)?;
+        let scene = Scene { sky: self.sky, ..Scene::new(positions, triangles, groups, materials)? };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

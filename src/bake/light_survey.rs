@@ -10,6 +10,8 @@
 //!   falls on the house in its middle, and no hemicube of its patches resolves the house. Where
 //!   less than half of a light falls on anything that reflects, each element looks for it instead.
 //!
+//! The sky lights what sees it, and is always gathered.
+//!
 //! Both are by direct light alone: what is reflected seldom falls further.
 
 use glam::DVec3;
@@ -17,7 +19,7 @@ use glam::DVec3;
 use crate::backend::cpu::RayGather;
 use crate::gather::RadiosityField;
 use crate::gather::gather_points::SurfaceOffset;
-use crate::gather::{Gather, GatherPoint};
+use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::Mesh;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
 use crate::scene::{Aabb, Material, Rgb, Scene};
@@ -70,19 +72,27 @@ impl LightSurvey {
         let places = places(scene);
         // A scene with more triangles than a mesh may have elements is refused when it is cut.
         let is_too_large = scene.triangles().len() > Mesh::MAX_ELEMENTS;
-        if lights.is_empty() || places.is_empty() || is_too_large {
+        let sky = scene.sky_radiosity().length();
+        if (lights.is_empty() && sky == 0.0) || places.is_empty() || is_too_large {
             return survey;
         }
         // Direct light at each place: flux over the area that it stands for, W.
         let mut flux = vec![0.0; places.len()];
+        if sky > 0.0 {
+            for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(look(scene, &[], &places))
+            {
+                *flux += place.area * seen.escaped * sky;
+            }
+        }
         for lights in lights.chunks(3) {
-            let factors = form_factors_to(scene, lights, &places);
+            let seen = look(scene, lights, &places);
             for (channel, light) in lights.iter().enumerate() {
                 let exitance = scene.materials()[light.material as usize].exitance.length();
                 let mut landing = 0.0;
-                for ((flux, place), factors) in flux.iter_mut().zip(&places).zip(&factors) {
-                    landing += place.area * factors[channel];
-                    *flux += place.area * factors[channel] * exitance;
+                for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
+                    let factor = seen.irradiance[channel];
+                    landing += place.area * factor;
+                    *flux += place.area * factor * exitance;
                 }
                 if landing < MIN_LANDING_SHARE * light.area {
                     survey.gathered_materials.push(light.material);
@@ -151,10 +161,10 @@ fn places(scene: &Scene) -> Vec<Place> {
     sampler.spread(PLACES, 0.5).map(place).collect()
 }
 
-/// The form factor from each of `places` to each of up to three `lights`: visible shares of the
-/// hemisphere, weighted by the cosine.
-fn form_factors_to(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<[f64; 3]> {
-    // Each light shines in a channel of its own.
+/// What each of `places` sees where each of up to three `lights` emits 1 W/m² in a channel of its
+/// own and nothing else does: the irradiances are form factors, visible shares of the hemisphere,
+/// weighted by the cosine.
+fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<IrradianceSample> {
     let mut materials: Vec<Material> = scene.materials().to_vec();
     for material in &mut materials {
         material.exitance = Rgb::ZERO;
@@ -163,12 +173,12 @@ fn form_factors_to(scene: &Scene, lights: &[MaterialLight], places: &[Place]) ->
         materials[light.material as usize].exitance = channel;
     }
     let looked_at = scene.with_materials(materials).expect("as many materials, all in range");
+    let looked_at = looked_at.with_sky(Rgb::ZERO).expect("a sky of no light");
     let mesh = Mesh::new(looked_at, f64::INFINITY).expect("no splits");
     let points: Vec<GatherPoint> = places.iter().map(|place| place.point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];
     let mut rays = RayGather::new(&mesh, RAYS).expect("a number of rays in range");
-    let samples = rays.gather(&dark(&mesh, &corners), &points).expect("rays do not fail");
-    samples.iter().map(|sample| sample.irradiance.to_array()).collect()
+    rays.gather(&dark(&mesh, &corners), &points).expect("rays do not fail")
 }
 
 /// The field of `mesh` in which nothing is reflected, so that only lights are seen; `corners` has

@@ -123,14 +123,14 @@ pub(super) fn sizing(settings: &SolveSettings, scene: &Scene, size: f64) -> Elem
     ElementSizing { size, region: settings.region, unsplit_materials }
 }
 
-/// What the elements of `mesh` receive of the lights that are gathered.
+/// What the elements of `mesh` receive of the lights that are gathered, and of the sky.
 fn received(
     settings: &SolveSettings,
     mesh: &Mesh,
     backend: &ResilientBackend,
 ) -> Result<ReceivedLight, Error> {
     let materials = &settings.gathered_materials;
-    if materials.is_empty() {
+    if materials.is_empty() && mesh.scene().sky() == Rgb::ZERO {
         return Ok(ReceivedLight::default());
     }
     let scene = mesh.scene();

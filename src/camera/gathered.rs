@@ -16,7 +16,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Camera, PrimaryRays, RadianceImage};
+use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::{SurfaceOffset, is_buried};
@@ -149,18 +149,35 @@ impl GatheredView<'_> {
 
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
         let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
-        for hit in self.rays.hits(pixel) {
+        let mut parts = vec![];
+        for seen in self.rays.seen(pixel) {
+            let Seen::Front(hit) = seen else {
+                parts.push(self.sky_part(pixel as usize));
+                continue;
+            };
             let surface = self.smooth_surface(&hit);
             match groups.iter_mut().find(|group| group.0 == surface) {
                 Some((_, hits)) => hits.push(hit),
                 None => groups.push((surface, vec![hit])),
             }
         }
-        let mut parts = vec![];
         for (_, hits) in &groups {
             self.add_parts(pixel as usize, hits, &mut parts);
         }
         parts
+    }
+
+    /// One ray of a pixel that sees the sky, where nothing is to be gathered.
+    fn sky_part(&self, pixel: usize) -> PixelPart {
+        PixelPart {
+            pixel,
+            point: GatherPoint { position: self.rays.eye, normal: DVec3::Y, near: 0.0 },
+            size: 0.0,
+            weight: self.rays.weight,
+            exitance: Rgb::ZERO,
+            reflectance: Rgb::ZERO,
+            interpolated: self.light.surface.sky * self.rays.weight,
+        }
     }
 
     /// Adds the hits on one smooth surface: as one part, or as several where the radiosity varies.
@@ -200,9 +217,10 @@ impl GatheredView<'_> {
     fn middle_hit(&self, hits: &[Hit]) -> Hit {
         let position = |hit: &Hit| self.rays.interpolate(hit, &self.light.surface.positions);
         let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
-        let through_mean = self.rays.hit(mean - self.rays.eye);
         let surface = self.smooth_surface(&hits[0]);
-        if let Some(hit) = through_mean.filter(|hit| self.smooth_surface(hit) == surface) {
+        if let Some(Seen::Front(hit)) = self.rays.hit(mean - self.rays.eye)
+            && self.smooth_surface(&hit) == surface
+        {
             return hit;
         }
         let distance = |hit: &Hit| position(hit).distance_squared(mean);

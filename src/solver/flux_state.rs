@@ -57,7 +57,7 @@ impl Flux {
             elements.clone().map(|n| mesh.material(n).reflectance).collect();
         let mut unshot = emitted.clone();
         let mut incident = vec![Rgb::ZERO; emitted.len()];
-        for (e, node) in elements.enumerate().filter(|_| !received.materials.is_empty()) {
+        for (e, node) in elements.enumerate().filter(|_| !received.irradiance.is_empty()) {
             if received.is_of(mesh, node) {
                 unshot[e] = Rgb::ZERO;
             }
@@ -100,8 +100,8 @@ impl Flux {
     }
 }
 
-/// Light that elements have received before any is shot: that of lights which were looked at from
-/// the elements, since most of what they emit goes elsewhere.
+/// Light that elements have received before any is shot: that of the sky, and of lights which were
+/// looked at from the elements, since most of what they emit goes elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ReceivedLight {
     /// Irradiance of each element, W/m² per channel; empty for none.

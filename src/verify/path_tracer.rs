@@ -158,8 +158,10 @@ impl<'a> PathTracer<'a> {
             let weights = self.emitters.weights(at.position);
             reflected += throughput * self.next_event(&at, &weights, rng);
             let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
-            let Some(hit) = self.next_hit(&at, direction).filter(|hit| hit.front) else {
-                return reflected;
+            let hit = match self.next_hit(&at, direction) {
+                Some(hit) if hit.front => hit,
+                Some(_) => return reflected,
+                None => return reflected + throughput * PI * self.scene.sky(),
             };
             let material = self.scene.material(hit.triangle);
             if material.exitance != Rgb::ZERO {

@@ -34,8 +34,8 @@ impl ReflectingGroup {
         if total == 0.0 {
             return wrong("none that is used reflects", "give one a reflectance above 0");
         }
-        if (0..scene.triangles().len()).all(|t| scene.material(t).exitance == Rgb::ZERO) {
-            return wrong("none that is used emits", "give one an exitance above 0");
+        if !scene.has_emitter() && scene.sky() == Rgb::ZERO {
+            return wrong("none that is used emits", "give one an exitance above 0, or a sky");
         }
         let group = |(group, areas): (usize, Vec<(usize, f64)>)| {
             let share = whole(&areas) / total;

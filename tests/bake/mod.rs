@@ -1,4 +1,5 @@
 pub mod cornell_box;
 mod outcome;
+mod sky;
 mod surroundings;
 mod target;

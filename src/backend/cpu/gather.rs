@@ -139,11 +139,14 @@ impl RayGather {
         let rotation = self.rotations.at(point.position, point.near);
         let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
         let mut sums = RaySums::default();
+        let sky = sources.mesh.scene().sky_radiosity();
         let out = &mut sums.hemisphere;
         for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
             let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
             else {
                 out.escaped += 1.0;
+                out.irradiance += sky;
+                sums.max_contribution = sums.max_contribution.max(sky.length());
                 continue;
             };
             out.inverse_distance += 1.0 / hit.distance;
@@ -235,7 +238,7 @@ impl RayGather {
 #[derive(Debug, Default)]
 struct RaySums {
     hemisphere: IrradianceSample,
-    /// The largest reflected radiosity that one ray found, W/m².
+    /// The largest reflected radiosity, or that of the sky, that one ray found, W/m².
     max_contribution: f64,
     lights: Vec<Visible>,
 }

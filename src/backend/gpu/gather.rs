@@ -187,7 +187,8 @@ impl HemicubeGather {
         GatherJob { views, tiles, lights }
     }
 
-    fn sample(&self, sums: &Sums, job: &GatherJob) -> IrradianceSample {
+    /// What the sums over a point's pixels say, under a sky of this radiosity, W/m².
+    fn sample(&self, sums: &Sums, job: &GatherJob, sky: Rgb) -> IrradianceSample {
         let mut direct = Rgb::ZERO;
         for (&(light, factor), &[seen, alone]) in job.lights.iter().zip(&sums.lights) {
             let (light, seen) = (&self.lights.lights[light as usize], f64::from(seen));
@@ -199,10 +200,11 @@ impl HemicubeGather {
                 };
         }
         let [r, g, b] = sums.radiosity.map(f64::from);
+        let escaped = f64::from(sums.open);
         IrradianceSample {
-            irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct,
+            irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct + sky * escaped,
             direct,
-            escaped: sums.open.into(),
+            escaped,
             backface: sums.back.into(),
             inverse_distance: self.coordinates.inverse_length(sums.nearness),
         }
@@ -218,6 +220,7 @@ impl HemicubeGather {
         let jobs: Vec<GatherJob> = points.par_iter().map(|p| self.job(light.scene, p)).collect();
         let views: Vec<&[View]> = jobs.iter().map(|job| &job.views[..]).collect();
         let tiles: Vec<Tile> = jobs.iter().flat_map(|job| &job.tiles).copied().collect();
+        let sky = light.scene.sky_radiosity();
         let gpu = &self.gpu;
         let Batches { radiance, sum, readback, .. } = batches;
         let mut timings = self.timings;
@@ -231,7 +234,7 @@ impl HemicubeGather {
             let results = Results { buffer: &sum.sums, bytes };
             readback.finish(gpu, encoder, results, timer, |bytes| {
                 let sums: &[Sums] = bytemuck::cast_slice(bytes);
-                sums.iter().zip(&jobs).map(|(s, job)| checked(self.sample(s, job))).collect()
+                sums.iter().zip(&jobs).map(|(s, job)| checked(self.sample(s, job, sky))).collect()
             })
         })?;
         self.timings = timings;
