@@ -332,15 +332,62 @@ fn bad_scenes_are_refused_with_their_name() {
     let nan = bad("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     refused(&[&nan], &["nan.obj:1"]);
     let lib = bad("lib.obj", &format!("mtllib gone.mtl\n{triangle}usemtl a\nf 1 2 3\n"));
-    refused(&[&lib], &["lib.obj:1", "gone.mtl"]);
+    refused(&["--strict", &lib], &["lib.obj:1", "gone.mtl"]);
     bad("some.mtl", "newmtl chalk\nKd 0.5 0.5 0.5\n");
     let name = bad("name.obj", &format!("mtllib some.mtl\n{triangle}usemtl cheese\nf 1 2 3\n"));
-    refused(&[&name], &["name.obj:5", "cheese", "chalk"]);
+    refused(&["--strict", &name], &["name.obj:5", "cheese", "newmtl"]);
     for (k, kd) in ["1 0.5 0.5", "0.5 1.7 0.5", "0.5 0.5 -0.1"].iter().enumerate() {
         bad(&format!("kd{k}.mtl"), &format!("newmtl m\nKd {kd}\n"));
         let text = format!("mtllib kd{k}.mtl\n{triangle}usemtl m\nf 1 2 3\n");
-        refused(&[&bad(&format!("kd{k}.obj"), &text)], &[&format!("kd{k}.mtl:2"), "reflectance"]);
+        refused(
+            &["--strict", &bad(&format!("kd{k}.obj"), &text)],
+            &[&format!("kd{k}.mtl:1"), "channel"],
+        );
     }
+}
+
+/// A closed box, or one without its last wall; all walls face inwards.
+fn room(walls: usize) -> String {
+    let mut text = String::new();
+    for k in 0..8 {
+        text += &format!("v {} {} {}\n", k & 1, k >> 1 & 1, k >> 2 & 1);
+    }
+    let faces = ["5 6 2 1", "2 4 3 1", "3 7 5 1", "6 8 4 2", "7 8 6 5", "4 8 7 3"];
+    for face in &faces[..walls] {
+        text += &format!("f {face}\n");
+    }
+    text
+}
+
+#[test]
+fn a_sky_lights_what_has_no_lamp() {
+    let folder = tempfile::tempdir().unwrap();
+    let radiosity = |name: &str, more: &[&str]| {
+        let scene = write(folder.path(), name, &room(if name == "open.obj" { 5 } else { 6 }));
+        let scene = scene.display().to_string();
+        let mut args = vec![scene.as_str(), "--error", "0.1", "--cpu", "--write", "json,ply"];
+        args.extend(more);
+        let out = run("bake", &args);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{said}");
+        let stem = Path::new(&scene).with_extension("");
+        let ply = radiosity::io::read_ply(stem.with_extension("ply")).unwrap();
+        let json = std::fs::read(stem.with_extension("json")).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+        let brightest = ply.radiosity.iter().map(|b| b.x).fold(0.0, f64::max);
+        (brightest, json["sky"][0].as_f64().unwrap(), said)
+    };
+    let (one, sky, said) = radiosity("open.obj", &[]);
+    assert!(one > 0.1 && sky == 1.0 && said.contains("sky of radiance 1"), "{one} {sky} {said}");
+    let (two, sky, said) = radiosity("open.obj", &["--sky", "2"]);
+    // The same rays: twice as much, in the files' six digits.
+    assert!((two / one - 2.0).abs() < 1e-5 && sky == 2.0 && !said.contains("sky"), "{two} {said}");
+    let (none, _, said) = radiosity("open.obj", &["--sky", "none"]);
+    assert!(none == 0.0 && said.contains("left dark") && said.contains("--emit"), "{said}");
+    let (closed, _, said) = radiosity("closed.obj", &[]);
+    assert!(closed == 0.0 && said.contains("no light") && said.contains("--emit"), "{said}");
+    refused(&[cornell(), "--sky", "blue"], &["--sky", "none"]);
+    refused(&[cornell(), "--sky", "1,2,-3"], &["sky", "0"]);
 }
 
 #[test]

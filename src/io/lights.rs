@@ -5,7 +5,7 @@
 //! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
 //! warning that nothing emits names these.
 
-use crate::scene::{Material, Warning, WarningKind};
+use crate::scene::{Material, Rgb, Warning, WarningKind};
 
 /// What is part of the names that lamps are given, in lower case.
 const LIGHT_NAMES: [&str; 22] = [
@@ -29,11 +29,25 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     names.filter(is_light).collect()
 }
 
-/// The warning that none of `used` emits, if none does.
-pub(super) fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone) -> Option<Warning> {
+/// Radiance of the sky over a scene in which nothing emits, unless said otherwise, W/(m² sr).
+const DEFAULT_SKY: Rgb = Rgb::ONE;
+
+/// Radiance of the sky over a scene of `used` materials where `wanted` is asked for; and the warning
+/// that none of them emits, if none does and no sky was asked for.
+pub(super) fn sky_and_warning<'a>(
+    used: impl Iterator<Item = &'a Material> + Clone,
+    wanted: Option<Rgb>,
+) -> (Rgb, Option<Warning>) {
     if used.clone().any(|m| m.exitance.max_element() > 0.0) {
-        return None;
+        return (wanted.unwrap_or(Rgb::ZERO), None);
     }
+    let sky = wanted.unwrap_or(DEFAULT_SKY);
+    let warns = wanted.is_none() || sky == Rgb::ZERO;
+    (sky, warns.then(|| no_light(used, sky)))
+}
+
+/// The warning that none of `used` emits, under a `sky`.
+fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone, sky: Rgb) -> Warning {
     let names = candidates(used.clone().map(|m| m.name.as_str()));
     let example = names.first().or(Some(&"MATERIAL")).map(|name| crate::error::shortened(name));
     let example = example.unwrap_or_default().escape_debug().to_string();
@@ -42,9 +56,13 @@ pub(super) fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone) -> 
     } else {
         format!("{example}=15,15,15")
     };
-    let done = match names.len() {
-        0 => format!("no name says light: write `Ke` into a material, or --emit {example}"),
-        _ => format!("these names say light: write `Ke` into them, or --emit {example}"),
+    let under = match sky {
+        Rgb::ZERO => "left dark",
+        _ => "lit from outside by a sky of radiance 1",
     };
-    Some(Warning::new(WarningKind::NoLight, 1, done).naming(names))
+    let done = match names.len() {
+        0 => format!("{under}; for a lamp write `Ke` into a material, or --emit {example}"),
+        _ => format!("{under}; these names say light: write `Ke` into them, or --emit {example}"),
+    };
+    Warning::new(WarningKind::NoLight, 1, done).naming(names)
 }

@@ -98,6 +98,10 @@ pub fn obj_option(name: &str) -> Option<ObjOption> {
             settings.emit.push(emission(parser)?);
             Ok(())
         }),
+        "sky" => Some(|parser, settings| {
+            settings.sky = Some(sky(parser)?);
+            Ok(())
+        }),
         _ => None,
     }
 }
@@ -107,11 +111,23 @@ fn emission(parser: &mut lexopt::Parser) -> Result<(String, Rgb), Stop> {
     let text = parser.value()?.string()?;
     let wrong = || wrong_value("emit", &text, "MATERIAL=r,g,b");
     let (name, radiance) = text.rsplit_once('=').ok_or_else(wrong)?;
-    let numbers: Result<Vec<f64>, _> = radiance.split(',').map(|n| n.trim().parse()).collect();
+    Ok((name.into(), rgb(radiance).ok_or_else(wrong)?))
+}
+
+/// `r,g,b`, one number for all three, or `none`.
+fn sky(parser: &mut lexopt::Parser) -> Result<Rgb, Stop> {
+    let text = parser.value()?.string()?;
+    let wrong = || wrong_value("sky", &text, "a radiance r,g,b, or none");
+    if text == "none" { Ok(Rgb::ZERO) } else { rgb(&text).ok_or_else(wrong) }
+}
+
+/// `r,g,b`, or one number for all three.
+fn rgb(text: &str) -> Option<Rgb> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     match numbers.as_deref() {
-        Ok(&[grey]) => Ok((name.into(), Rgb::splat(grey))),
-        Ok(&[r, g, b]) => Ok((name.into(), Rgb::new(r, g, b))),
-        _ => Err(wrong()),
+        Ok(&[grey]) => Some(Rgb::splat(grey)),
+        Ok(&[r, g, b]) => Some(Rgb::new(r, g, b)),
+        _ => None,
     }
 }
 

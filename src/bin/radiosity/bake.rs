@@ -9,7 +9,9 @@ use std::time::Instant;
 
 use files::Files;
 use lexopt::prelude::*;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ObjSettings, Scene, Solver};
+use radiosity::{
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, ObjSettings, Rgb, Scene, Solver,
+};
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
@@ -70,6 +72,7 @@ Files and devices:
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
+  --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
@@ -83,6 +86,10 @@ Files and devices:
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
                     light goes along";
+
+/// What to do about a scene that stays dark.
+const DARK_REMEDY: &str = "nothing emits, and no opening lets a sky in; name a material that emits \
+                           with --emit MATERIAL=r,g,b, or look at which way surfaces face";
 
 /// What is asked of a bake.
 pub struct Bake {
@@ -219,6 +226,9 @@ impl Bake {
             || unshot_goal.get(),
             |report| self.bake(scene, &device, &unshot_goal, report),
         )?;
+        if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) {
+            eprintln!("warning: no light reaches any surface: {DARK_REMEDY}");
+        }
         let writing = Instant::now();
         let camera = self.files.write(&baked, &device)?;
         let report = Report {

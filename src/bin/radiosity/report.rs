@@ -56,6 +56,7 @@ impl Report {
             },
             "settings": settings::report(&baked.settings),
             "triangles": self.triangles,
+            "sky": baked.mesh.scene().sky().to_array(),
             "shot_elements": baked.mesh.element_count(),
             "elements": baked.light.mesh.element_count(),
             "vertices": baked.light.surface.positions.len(),

@@ -51,6 +51,7 @@ given.
   --strict        refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
+  --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
   --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu           rays on the CPU instead of hemicubes
 

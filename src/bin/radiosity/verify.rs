@@ -37,6 +37,7 @@ the channels. Beside it stands what the bake told, from SOLUTION.json, if that i
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
+  --sky r,g,b       radiance of a uniform sky, or none (as the bake had) [1 if nothing emits]
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:

@@ -28,6 +28,9 @@ pub struct ObjSettings {
     pub max_reflectance: f64,
     /// Materials by name, and the radiance that they emit per channel, whatever the file says.
     pub emit: Vec<(String, Rgb)>,
+    /// Radiance of a uniform sky, W/(m² sr) per channel ([`Scene::with_sky`]). `None`: 1 if nothing
+    /// in the scene emits, else 0.
+    pub sky: Option<Rgb>,
 }
 
 impl ObjSettings {
@@ -90,6 +93,6 @@ impl ObjSettings {
 impl Default for ObjSettings {
     fn default() -> ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
-        ObjSettings { strict: false, max_reflectance, emit: vec![] }
+        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None }
     }
 }
