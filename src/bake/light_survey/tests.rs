@@ -96,7 +96,7 @@ fn a_sky_lights_what_nothing_is_above() {
     // A slab, wide and thin, on a floor a hundred times as wide: below it is no light.
     let floor = (level(100.0, 0.0, true), grey());
     let roof = (level(90.0, 1.0, false), Material::grey("roof", 0.0));
-    let open = scene(&[floor.clone()]).with_sky(Rgb::ONE).unwrap();
+    let open = scene(std::slice::from_ref(&floor)).with_sky(Rgb::ONE).unwrap();
     assert_eq!(LightSurvey::new(&open).region, None);
     let sheltered = scene(&[(level(1.0, 2.0, true), grey()), floor, roof]);
     let survey = LightSurvey::new(&sheltered.with_sky(Rgb::ONE).unwrap());
