@@ -22,6 +22,7 @@ mod ply_reader;
 #[cfg(feature = "png")]
 mod png;
 mod text;
+mod textures;
 mod tone;
 pub mod view_factors;
 

@@ -7,15 +7,17 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+pub mod texture;
 mod warning;
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
 
 /// One value per colour channel (r, g, b), linear; the unit is said where it is used. Made by
@@ -62,6 +64,10 @@ pub struct Scene {
     warnings: Vec<Warning>,
     /// See [`Scene::sky`].
     sky: Rgb,
+    /// Of the corners of each triangle; empty where no material has textures, as are those.
+    texture_coordinates: Vec<[DVec2; 3]>,
+    /// Of each material.
+    textures: Vec<MaterialTextures>,
 }
 
 impl Scene {
@@ -92,9 +98,22 @@ impl Scene {
     /// is not finite, an index out of range, or when no triangle with area is left.
     pub fn new(
         positions: Vec<DVec3>,
+        triangles: Vec<Triangle>,
+        groups: Vec<String>,
+        materials: Vec<Material>,
+    ) -> Result<Scene, Error> {
+        Scene::with_textures(positions, triangles, groups, materials, vec![], vec![])
+    }
+
+    /// The same with texture coordinates for each triangle and textures for each material, or none
+    /// of either.
+    pub(crate) fn with_textures(
+        positions: Vec<DVec3>,
         mut triangles: Vec<Triangle>,
         groups: Vec<String>,
         materials: Vec<Material>,
+        mut texture_coordinates: Vec<[DVec2; 3]>,
+        textures: Vec<MaterialTextures>,
     ) -> Result<Scene, Error> {
         for (i, p) in positions.iter().enumerate() {
             if !p.is_finite() {
@@ -130,12 +149,15 @@ impl Scene {
             }
         }
         let given = triangles.len();
-        triangles.retain(|t| {
+        let has_area = |t: &Triangle| {
             let (longest, cross) = longest_edge_and_cross(&positions, t);
             let corners = t.corners.map(|k| positions[k as usize].abs().max_element());
             let reach = corners.into_iter().fold(longest, f64::max);
             cross > 4.0 * f64::EPSILON * longest * reach && cross * cross >= f64::MIN_POSITIVE
-        });
+        };
+        let mut kept = triangles.iter().map(has_area);
+        texture_coordinates.retain(|_| kept.next().unwrap_or(false));
+        triangles.retain(has_area);
         let degenerate = given - triangles.len();
         if triangles.is_empty() {
             let found = match given {
@@ -158,6 +180,8 @@ impl Scene {
             coordinate_ulp,
             warnings,
             sky,
+            texture_coordinates,
+            textures,
         };
         if degenerate > 0 {
             scene.warn(Warning::new(WarningKind::Degenerate, degenerate, "dropped"));
@@ -266,6 +290,19 @@ impl Scene {
         &self.materials[self.triangles[t].material as usize]
     }
 
+    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None` where
+    /// the scene has no textures. Not finite for a corner that has none.
+    pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
+        self.texture_coordinates.get(t).copied()
+    }
+
+    /// Textures of triangle `t`; `None` where its material has none. Its material's reflectance and
+    /// exitance then are the means of the whole images.
+    pub fn textures(&self, t: usize) -> Option<&MaterialTextures> {
+        let textures = self.textures.get(self.triangles[t].material as usize)?;
+        (textures.reflectance.is_some() || textures.exitance.is_some()).then_some(textures)
+    }
+
     /// The same scene with `materials` in the place of its own, one for one.
     ///
     /// # Errors
@@ -306,7 +343,10 @@ impl Scene {
             });
         }
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
-        let scene = Scene { sky: self.sky, ..Scene::new(positions, triangles, groups, materials)? };
+        let (coordinates, textures) = (self.texture_coordinates.clone(), self.textures.clone());
+        let scene =
+            Scene::with_textures(positions, triangles, groups, materials, coordinates, textures)?;
+        let scene = Scene { sky: self.sky, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

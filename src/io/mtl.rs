@@ -7,7 +7,7 @@
 //! | `Ke` | emitted radiance L per channel: exitance π L |
 //! | `Ka` | radiance, if above 1 and no material has a `Ke`: see [`super::lights`] |
 //! | `d`, `Tr`, `map_d` | transparency: not modelled, warned about |
-//! | `map_Kd`, `map_Ke` | textures: not modelled, warned about |
+//! | `map_Kd`, `map_Ke` | textures, multiplied by `Kd` and `Ke`: see [`super::textures`] |
 //!
 //! All others do not change diffuse light, and are skipped. tobj reads the materials, one at a time
 //! so that its large records do not pile up. It gets the statements above alone, with three finite
@@ -45,7 +45,8 @@ pub(super) struct MtlMaterial {
     pub radiance: Option<Rgb>,
     /// `Ka`.
     pub ambient: Option<Rgb>,
-    pub textured: bool,
+    /// `map_Kd` and `map_Ke`, with their options.
+    pub textures: [Option<String>; 2],
     transparent: bool,
     /// Its `newmtl` line, and the file by index.
     line: u32,
@@ -192,11 +193,6 @@ impl Library {
         redefined.sort_unstable();
         redefined.dedup();
         let lists = [
-            (
-                WarningKind::Texture,
-                names(|m| m.textured),
-                "not modelled: `Kd` and `Ke` count alone",
-            ),
             (WarningKind::Transparency, names(|m| m.transparent), "not modelled: they are opaque"),
             (
                 WarningKind::RedefinedMaterial,
@@ -248,14 +244,15 @@ fn escaped_words(text: &str) -> Vec<String> {
 }
 
 impl MtlMaterial {
-    fn new(material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
+    fn new(mut material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
+        let emitted = material.unknown_param.remove("map_Ke");
         let has = |key: &str| material.unknown_param.contains_key(key);
         let rgb = |colour: Option<[f64; 3]>| colour.map(Rgb::from_array);
         MtlMaterial {
             reflectance: rgb(material.diffuse),
             radiance: rgb(material.emissive),
             ambient: rgb(material.ambient),
-            textured: material.diffuse_texture.is_some() || has("map_Ke"),
+            textures: [material.diffuse_texture, emitted],
             // Files disagree about which end of `Tr` is opaque.
             transparent: material.dissolve.is_some_and(|d| d < 1.0)
                 || has("transparent")

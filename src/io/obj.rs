@@ -5,25 +5,25 @@
 //! on only what tobj can take. Here faces are cut into triangles, materials completed and repaired,
 //! and the scene is made, with a warning for each kind of thing that was odd.
 
+mod materials;
 pub(super) mod repairs;
 mod settings;
 mod statements;
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-use std::f64::consts::PI;
 use std::io;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::files::{self, FileSource};
 use super::lights;
 use super::mtl::{Library, MtlMaterial};
 use super::text::{self, Line};
-use crate::error::{Error, ErrorKind, quoted};
+use crate::error::{Error, ErrorKind};
 use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
-use crate::scene::{Material, Rgb, Scene, Triangle, Warning, WarningKind};
+use crate::scene::{Material, Scene, Triangle, Warning, WarningKind};
 use repairs::Repairs;
 pub use settings::ObjSettings;
 use statements::{FaceNote, LineFeed, Statements, UNKNOWN_MATERIAL};
@@ -169,12 +169,24 @@ impl<'a> ObjFile<'a> {
         self.find_default_library()?;
         let named = self.named_materials()?;
         let models = std::mem::take(&mut self.models);
-        let geometry = self.geometry(models, &named)?;
+        let mut geometry = self.geometry(models, &named)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
         self.library.warn(&used, &mut self.repairs);
-        let materials = self.materials(&used, settings)?;
+        let mut materials = self.materials(&used, settings)?;
+        let textures = self.textures(&used, &mut materials, settings)?;
+        if textures.is_empty() {
+            geometry.texture_coordinates = vec![];
+        }
         let groups = std::mem::take(&mut self.statements.groups.list);
-        let scene = Scene::new(geometry.positions, geometry.triangles, groups, materials);
+        let Geometry { positions, triangles, texture_coordinates } = geometry;
+        let scene = Scene::with_textures(
+            positions,
+            triangles,
+            groups,
+            materials,
+            texture_coordinates,
+            textures,
+        );
         let mut scene = scene.map_err(|e| e.inside(self.path))?;
         let is_used = |(i, _): &(usize, _)| used.contains(&(*i as u32));
         let emitting = scene.materials().iter().enumerate().filter(is_used).map(|(_, m)| m);
@@ -248,7 +260,10 @@ impl<'a> ObjFile<'a> {
         let mut geometry = Geometry {
             positions: vec![DVec3::NAN; self.statements.vertices as usize],
             triangles: Vec::with_capacity(self.statements.faces.len()),
+            texture_coordinates: vec![],
         };
+        let has_texture = |m: &MtlMaterial| m.textures.iter().any(Option::is_some);
+        let textured = self.library.materials.iter().any(has_texture);
         let (mut face, mut bare) = (0, 0);
         for tobj::Model { mesh, name } in models {
             // A model that has no face has no number either.
@@ -270,9 +285,10 @@ impl<'a> ObjFile<'a> {
             while start < mesh.indices.len() {
                 let corners = &mesh.indices[start..start + arity(k)];
                 let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
+                let places = textured.then(|| texture_coordinates(&mesh, start, corners.len()));
                 let FaceNote { group, smoothing, .. } = self.statements.faces[face];
                 let like = Triangle { group, material, smoothing, ..Default::default() };
-                self.cut(face, &corners, like, &mut geometry)?;
+                self.cut(face, &corners, places.as_deref(), like, &mut geometry)?;
                 bare += usize::from(used.is_none());
                 (start, k, face) = (start + corners.len(), k + 1, face + 1);
             }
@@ -289,11 +305,13 @@ impl<'a> ObjFile<'a> {
         Ok(geometry)
     }
 
-    /// Appends the triangles of a face with these corners, each otherwise `like` that one.
+    /// Appends the triangles of a face with these corners, and `places` in texture space if these
+    /// matter, each otherwise `like` that one.
     fn cut(
         &mut self,
         face: usize,
         corners: &[u32],
+        places: Option<&[DVec2]>,
         like: Triangle,
         geometry: &mut Geometry,
     ) -> Result<(), Error> {
@@ -309,98 +327,30 @@ impl<'a> ObjFile<'a> {
                 triangulate_anyhow(&points)
             }
         };
+        if let Some(places) = places {
+            let coordinates = pieces.iter().map(|t| t.map(|i| places[i]));
+            geometry.texture_coordinates.extend(coordinates);
+        }
         let triangle = |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), ..like };
         geometry.triangles.extend(pieces.into_iter().map(triangle));
         Ok(())
     }
-
-    /// All materials, by the indices of [`ObjFile::named_materials`]. What is odd about one is
-    /// repaired, and said if it is `used`.
-    fn materials(
-        &mut self,
-        used: &HashSet<u32>,
-        settings: &ObjSettings,
-    ) -> Result<Vec<Material>, Error> {
-        let mut materials = vec![];
-        let library = std::mem::take(&mut self.library);
-        let emits = |m: &MtlMaterial| m.radiance.is_some_and(|l| l.max_element() > 0.0);
-        let ambient_counts = settings.emit.is_empty() && !library.materials.iter().any(emits);
-        for (index, material) in library.materials.iter().enumerate() {
-            let place = || library.place(material, self.files);
-            let used = used.contains(&(index as u32));
-            let mut note = |kind, done: String| match used {
-                true => self.repairs.note_at(kind, place, &material.name, done),
-                false => Ok(()),
-            };
-            materials.push(material.complete(settings, ambient_counts, &mut note)?);
-        }
-        let grey = |name: &str| Material::grey(name, Material::DEFAULT_REFLECTANCE);
-        let names = &self.statements.materials.list;
-        let unknown = names.iter().filter(|name| library.find(name).is_none());
-        materials.extend(unknown.map(|name| grey(name)));
-        if used.contains(&(materials.len() as u32)) {
-            materials.push(grey("(default)"));
-        }
-        for (name, radiance) in &settings.emit {
-            let mut found = false;
-            for material in materials.iter_mut().filter(|m| m.name == *name) {
-                (material.exitance, found) = (PI * *radiance, true);
-            }
-            if !found {
-                let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-                let place = self.path.display().to_string();
-                let found = format!("no material {} that could emit", quoted(&[name]));
-                let remedy = format!("its materials are {}", quoted(&names));
-                return Err(Error::new(ErrorKind::Scene, place, found, remedy));
-            }
-        }
-        Ok(materials)
-    }
 }
 
-impl MtlMaterial {
-    /// As a material of a scene; `note` is told of every repair.
-    fn complete(
-        &self,
-        settings: &ObjSettings,
-        ambient_counts: bool,
-        note: &mut impl FnMut(WarningKind, String) -> Result<(), Error>,
-    ) -> Result<Material, Error> {
-        let ceiling = settings.max_reflectance;
-        let mut radiance = self.radiance.unwrap_or(Rgb::ZERO);
-        let above_one = |colour: Option<Rgb>| colour.is_some_and(|c| c.max_element() > 1.0);
-        // Where `Kd` is above 1 too, colours may be in other units.
-        if ambient_counts && above_one(self.ambient) && !above_one(self.reflectance) {
-            radiance = self.ambient.unwrap_or(Rgb::ZERO);
-            note(WarningKind::AmbientAsRadiance, "taken for the radiance that they emit".into())?;
-        }
-        let mut reflectance = self.reflectance.unwrap_or(Rgb::ZERO);
-        if self.reflectance.is_none() && radiance == Rgb::ZERO {
-            reflectance = Rgb::splat(Material::DEFAULT_REFLECTANCE);
-            note(WarningKind::MaterialWithoutColour, UNKNOWN_MATERIAL.into())?;
-        }
-        if reflectance.min_element() < 0.0 || radiance.min_element() < 0.0 {
-            note(WarningKind::NegativeColour, "those channels are 0".into())?;
-            (reflectance, radiance) = (reflectance.max(Rgb::ZERO), radiance.max(Rgb::ZERO));
-        }
-        if reflectance.max_element() >= 1.0 {
-            note(WarningKind::HighReflectance, format!("those channels reflect {ceiling}"))?;
-            let below_one = |rho: f64| if rho < 1.0 { rho } else { ceiling };
-            reflectance = Rgb::from_array(reflectance.to_array().map(below_one));
-        }
-        let exitance = PI * radiance;
-        if !exitance.is_finite() {
-            note(WarningKind::MaterialStatement, "it emits nothing".into())?;
-        }
-        let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
-        Ok(Material { name: self.name.clone(), reflectance, exitance })
-    }
+/// Of `count` corners of `mesh` from `start` on; not finite where they have none.
+fn texture_coordinates(mesh: &tobj::Mesh, start: usize, count: usize) -> Vec<DVec2> {
+    let index = |k: usize| mesh.texcoord_indices.get(k).map(|&i| 2 * i as usize);
+    let place = |k| index(k).and_then(|at| mesh.texcoords.get(at..at + 2));
+    let corners = start..start + count;
+    corners.map(|k| place(k).map_or(DVec2::NAN, |uv| DVec2::new(uv[0], uv[1]))).collect()
 }
 
 /// Positions and faces of a scene.
 struct Geometry {
     positions: Vec<DVec3>,
     triangles: Vec<Triangle>,
+    /// Of the triangles' corners, where some material has a texture.
+    texture_coordinates: Vec<[DVec2; 3]>,
 }
 
 impl Geometry {

@@ -44,8 +44,10 @@ pub enum WarningKind {
     NegativeColour,
     /// A statement of a material that cannot be read.
     MaterialStatement,
-    /// A texture, which is not modelled.
-    Texture,
+    /// A texture that cannot be read.
+    MissingTexture,
+    /// Options of a texture that are not used.
+    TextureOptions,
     /// Transparency, which is not modelled.
     Transparency,
     /// `Ka` above 1, taken for radiance.
@@ -148,7 +150,11 @@ impl WarningKind {
             MaterialStatement => {
                 ("unusable statement of a material", "unusable statements of materials")
             }
-            Texture => ("material with a texture", "materials with textures"),
+            MissingTexture => ("texture that is not there", "textures that are not there"),
+            TextureOptions => (
+                "texture with options that are not used",
+                "textures with options that are not used",
+            ),
             Transparency => ("material with transparency", "materials with transparency"),
             AmbientAsRadiance => ("material with `Ka` above 1", "materials with `Ka` above 1"),
             NoLight => ("scene without light", "scenes without light"),
@@ -179,6 +185,9 @@ impl WarningKind {
     pub(crate) fn remedy(self) -> Option<&'static str> {
         use WarningKind::*;
         Some(match self {
+            MissingTexture => {
+                "put the image, as PNG, JPEG, BMP or TGA, into the folder of the OBJ file"
+            }
             MissingLibrary => "put the library into the folder of the OBJ file or below",
             LibraryElsewhere => "name it by its path from the folder of the OBJ file",
             UnknownMaterial => "define it with `newmtl` in a library that `mtllib` names",

@@ -6,6 +6,8 @@ mod obj_libraries;
 mod obj_light;
 mod obj_polygons;
 mod obj_texts;
+#[cfg(feature = "textures")]
+mod obj_textures;
 mod ply;
 mod ply_reader;
 mod tone;

@@ -106,9 +106,6 @@ fn warns_of_unmodelled_material_properties() {
     let lamp = with_library("newmtl chalk\nKe 1 1 1\n").unwrap();
     assert_eq!(lamp.material(0).reflectance.to_array(), [0.0; 3]);
     assert!(lamp.warnings().is_empty());
-    for texture in ["map_Kd wood.png", "map_Ke wood.png"] {
-        warned(&with_library(&format!("{CHALK}{texture}\n")).unwrap(), "texture");
-    }
     for clear in ["d 0.5", "d -halo 0.5", "Tr 0.5", "map_d holes.png"] {
         warned(&with_library(&format!("{CHALK}{clear}\n")).unwrap(), "transparency");
     }

@@ -1,0 +1,153 @@
+//! The materials of a scene from those of its libraries: repaired, with their textures, and with
+//! the light that the caller gives them.
+
+use std::collections::HashSet;
+use std::f64::consts::PI;
+
+use super::super::mtl::MtlMaterial;
+use super::super::textures::{TextureStatement, Textures};
+use super::statements::UNKNOWN_MATERIAL;
+use super::{ObjFile, ObjSettings};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::scene::texture::{MaterialTextures, TextureMap};
+use crate::scene::{Material, Rgb, WarningKind};
+
+impl ObjFile<'_> {
+    /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
+    /// if no used one has any that can be read.
+    pub(super) fn textures(
+        &mut self,
+        used: &HashSet<u32>,
+        materials: &mut [Material],
+        settings: &ObjSettings,
+    ) -> Result<Vec<MaterialTextures>, Error> {
+        let mut images = Textures::new(self.files);
+        let mut all = vec![MaterialTextures::default(); materials.len()];
+        let mut any = false;
+        let library = self.library.materials.iter().zip(materials).zip(&mut all).enumerate();
+        for (_, ((mtl, material), textures)) in library.filter(|(i, _)| used.contains(&(*i as u32)))
+        {
+            let place = || self.library.place(mtl, self.files);
+            let emitted = settings.emit.iter().any(|(name, _)| *name == material.name);
+            for (k, statement) in mtl.textures.iter().enumerate() {
+                let Some(statement) = statement else { continue };
+                let statement = TextureStatement::parse(statement);
+                let name = statement.name.as_str();
+                if statement.more {
+                    let done = "other options count";
+                    self.repairs.note_at(WarningKind::TextureOptions, place, name, done)?;
+                }
+                let Some(texture) = images.get(name) else {
+                    let done = "`Kd` and `Ke` count alone";
+                    self.repairs.note_at(WarningKind::MissingTexture, place, name, done)?;
+                    continue;
+                };
+                let written = if k == 0 { mtl.reflectance } else { mtl.radiance };
+                let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
+                    None => Rgb::ONE,
+                    Some(_) if k == 0 => material.reflectance,
+                    Some(radiance) => radiance,
+                };
+                let TextureStatement { scale, offset, clamped, .. } = statement;
+                let (factor, ceiling) = match k {
+                    0 => (factor, settings.max_reflectance),
+                    _ => (PI * factor.max(Rgb::ZERO), f64::MAX),
+                };
+                let map = TextureMap { texture, factor, ceiling, scale, offset, clamped };
+                if k == 0 {
+                    material.reflectance = map.whole_mean();
+                    textures.reflectance = Some(map);
+                } else if !emitted {
+                    material.exitance = map.whole_mean();
+                    textures.exitance = Some(map);
+                }
+                any = true;
+            }
+        }
+        Ok(if any { all } else { vec![] })
+    }
+
+    /// All materials, by the indices of [`ObjFile::named_materials`]. What is odd about one is
+    /// repaired, and said if it is `used`.
+    pub(super) fn materials(
+        &mut self,
+        used: &HashSet<u32>,
+        settings: &ObjSettings,
+    ) -> Result<Vec<Material>, Error> {
+        let mut materials = vec![];
+        let library = &self.library;
+        let emits = |m: &MtlMaterial| m.radiance.is_some_and(|l| l.max_element() > 0.0);
+        let ambient_counts = settings.emit.is_empty() && !library.materials.iter().any(emits);
+        for (index, material) in library.materials.iter().enumerate() {
+            let place = || library.place(material, self.files);
+            let used = used.contains(&(index as u32));
+            let mut note = |kind, done: String| match used {
+                true => self.repairs.note_at(kind, place, &material.name, done),
+                false => Ok(()),
+            };
+            materials.push(material.complete(settings, ambient_counts, &mut note)?);
+        }
+        let grey = |name: &str| Material::grey(name, Material::DEFAULT_REFLECTANCE);
+        let names = &self.statements.materials.list;
+        let unknown = names.iter().filter(|name| library.find(name).is_none());
+        materials.extend(unknown.map(|name| grey(name)));
+        if used.contains(&(materials.len() as u32)) {
+            materials.push(grey("(default)"));
+        }
+        for (name, radiance) in &settings.emit {
+            let mut found = false;
+            for material in materials.iter_mut().filter(|m| m.name == *name) {
+                (material.exitance, found) = (PI * *radiance, true);
+            }
+            if !found {
+                let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+                let place = self.path.display().to_string();
+                let found = format!("no material {} that could emit", quoted(&[name]));
+                let remedy = format!("its materials are {}", quoted(&names));
+                return Err(Error::new(ErrorKind::Scene, place, found, remedy));
+            }
+        }
+        Ok(materials)
+    }
+}
+
+impl MtlMaterial {
+    /// As a material of a scene; `note` is told of every repair.
+    fn complete(
+        &self,
+        settings: &ObjSettings,
+        ambient_counts: bool,
+        note: &mut impl FnMut(WarningKind, String) -> Result<(), Error>,
+    ) -> Result<Material, Error> {
+        let ceiling = settings.max_reflectance;
+        let mut radiance = self.radiance.unwrap_or(Rgb::ZERO);
+        let above_one = |colour: Option<Rgb>| colour.is_some_and(|c| c.max_element() > 1.0);
+        // Where `Kd` is above 1 too, colours may be in other units.
+        if ambient_counts && above_one(self.ambient) && !above_one(self.reflectance) {
+            radiance = self.ambient.unwrap_or(Rgb::ZERO);
+            note(WarningKind::AmbientAsRadiance, "taken for the radiance that they emit".into())?;
+        }
+        let mut reflectance = self.reflectance.unwrap_or(Rgb::ZERO);
+        if self.reflectance.is_none() && radiance == Rgb::ZERO {
+            reflectance = Rgb::splat(Material::DEFAULT_REFLECTANCE);
+            if self.textures.iter().all(Option::is_none) {
+                note(WarningKind::MaterialWithoutColour, UNKNOWN_MATERIAL.into())?;
+            }
+        }
+        if reflectance.min_element() < 0.0 || radiance.min_element() < 0.0 {
+            note(WarningKind::NegativeColour, "those channels are 0".into())?;
+            (reflectance, radiance) = (reflectance.max(Rgb::ZERO), radiance.max(Rgb::ZERO));
+        }
+        if reflectance.max_element() >= 1.0 {
+            note(WarningKind::HighReflectance, format!("those channels reflect {ceiling}"))?;
+            let below_one = |rho: f64| if rho < 1.0 { rho } else { ceiling };
+            reflectance = Rgb::from_array(reflectance.to_array().map(below_one));
+        }
+        let exitance = PI * radiance;
+        if !exitance.is_finite() {
+            note(WarningKind::MaterialStatement, "it emits nothing".into())?;
+        }
+        let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
+        Ok(Material { name: self.name.clone(), reflectance, exitance })
+    }
+}

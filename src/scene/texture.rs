@@ -1,0 +1,436 @@
+//! Images on surfaces: colours of texels, looked up at a point and averaged over a triangle.
+//!
+//! ```text
+//!   v                            texels (column, row), row 0 at the top: v = 1
+//!   ▲  ┌──┬──┬──┬──┐             level 1: means of up to 2 × 2 of them
+//!   │  ├──┼──┼──┼──┤             level 2: of up to 4 × 4, … to one for all
+//!   └──────► u
+//! ```
+//!
+//! A mean takes texels as squares of one colour. It goes down the levels: what lies within the
+//! triangle counts with its mean, what its sides cut is cut to a polygon and counts with its area.
+//! So a mean is exact for every triangle, whatever its corners, and costs its outline in texels, not
+//! its area. A look-up goes linearly between the centres of texels, for pictures.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec2;
+
+use super::Rgb;
+
+/// An image, in 8 bits a channel as sRGB has them.
+pub struct Texture {
+    width: u32,
+    height: u32,
+    texels: Vec<[u8; 3]>,
+    /// Linear means, level 1 first.
+    levels: Vec<Level>,
+}
+
+struct Level {
+    width: u32,
+    means: Vec<[f32; 3]>,
+}
+
+/// A cell that the outline of a triangle cuts counts with its mean if it is this share of the
+/// triangle's area or smaller. Some 3 / √1e-7 = 1e4 cells lie along an outline, so what they vary
+/// within changes the mean by 1e-3 at most, and by far less where they are not all alike.
+const SMALLEST_CELL: f64 = 1e-7;
+
+/// Repetitions of a texture across a triangle beyond which all of the triangle has the mean of the
+/// whole. Chosen by hand.
+const MAX_TILES: f64 = 4096.0;
+
+/// Points along each side that a clamped texture is looked up at beyond its border.
+const CLAMPED_POINTS: u32 = 48;
+
+impl Texture {
+    /// An image of `width` × `height` texels, at least one, rows from the top: sRGB, 8 bits a
+    /// channel (IEC 61966-2-1). `None` when their number is another.
+    pub fn new(width: u32, height: u32, texels: Vec<[u8; 3]>) -> Option<Texture> {
+        if texels.is_empty() || texels.len() as u64 != u64::from(width) * u64::from(height) {
+            return None;
+        }
+        let mut texture = Texture { width, height, texels, levels: vec![] };
+        while texture.levels.last().map_or(texture.texels.len(), |l| l.means.len()) > 1 {
+            let next = texture.coarser();
+            texture.levels.push(next);
+        }
+        Some(texture)
+    }
+
+    /// Texels along u and v.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// Linear mean of all texels.
+    pub fn whole_mean(&self) -> Rgb {
+        self.cell(self.levels.len(), 0, 0)
+    }
+
+    /// Linear colour at `uv`, between the centres of the four texels around it. Beyond 0 and 1 the
+    /// image repeats, or, `clamped`, goes on as its border.
+    pub fn at(&self, uv: DVec2, clamped: bool) -> Rgb {
+        if !uv.is_finite() {
+            return self.whole_mean();
+        }
+        let size = DVec2::new(self.width.into(), self.height.into());
+        let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
+        let place = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
+        let (first, part) = (place.floor(), place - place.floor());
+        let wrapped = |k: f64, count: u32| -> u32 {
+            let count = i64::from(count);
+            let k = k as i64;
+            (if clamped { k.clamp(0, count - 1) } else { k.rem_euclid(count) }) as u32
+        };
+        let texel = |dx: f64, dy: f64| {
+            let x = wrapped(first.x + dx, self.width);
+            self.cell(0, x, wrapped(first.y + dy, self.height))
+        };
+        let top = texel(0.0, 0.0).lerp(texel(1.0, 0.0), part.x);
+        top.lerp(texel(0.0, 1.0).lerp(texel(1.0, 1.0), part.x), part.y)
+    }
+
+    /// Linear mean over the triangle with these corners in texture space. Where that has no area,
+    /// the colour at its middle.
+    pub fn mean(&self, corners: [DVec2; 3], clamped: bool) -> Rgb {
+        let size = DVec2::new(self.width.into(), self.height.into());
+        let [a, b, c] = corners;
+        let low = a.min(b).min(c);
+        let high = a.max(b).max(c);
+        let area = 0.5 * (b - a).perp_dot(c - a).abs() * size.x * size.y;
+        if !area.is_finite() || !(area > 0.0) {
+            return self.at((a + b + c) / 3.0, clamped);
+        }
+        if clamped && (low.min_element() < 0.0 || high.max_element() > 1.0) {
+            return self.sampled_mean(corners);
+        }
+        // Tiles from the one of the lowest corner, so that no digits are lost far out.
+        let origin = low.floor();
+        let tiles = (high - origin).ceil().max(DVec2::ONE);
+        if tiles.x * tiles.y > MAX_TILES {
+            return self.whole_mean();
+        }
+        let (mut sum, mut covered) = (Rgb::ZERO, 0.0);
+        for (i, j) in (0..tiles.y as u32).flat_map(|j| (0..tiles.x as u32).map(move |i| (i, j))) {
+            let tile = origin + DVec2::new(i.into(), j.into());
+            let inside = |p: DVec2| (DVec2::new(p.x - tile.x, 1.0 - (p.y - tile.y))) * size;
+            let polygon = Polygon::new(&corners.map(inside));
+            self.add(self.levels.len(), [0, 0], &polygon, area, &mut (&mut sum, &mut covered));
+        }
+        if covered > 0.0 { sum / covered } else { self.at((a + b + c) / 3.0, clamped) }
+    }
+
+    /// Adds what `polygon`, in texels, covers of a cell: colour times area, and area.
+    fn add(
+        &self,
+        level: usize,
+        [x, y]: [u32; 2],
+        polygon: &Polygon,
+        area: f64,
+        sums: &mut (&mut Rgb, &mut f64),
+    ) {
+        let corner = |k: u32, count: u32| f64::from(((u64::from(k) << level) as u32).min(count));
+        let low = DVec2::new(corner(x, self.width), corner(y, self.height));
+        let high = DVec2::new(corner(x + 1, self.width), corner(y + 1, self.height));
+        let cut = polygon.cut(low, high);
+        let covered = cut.area();
+        if covered <= 0.0 {
+            return;
+        }
+        let cell_area = (high.x - low.x) * (high.y - low.y);
+        let whole = covered >= cell_area * (1.0 - 1e-12);
+        if level == 0 || whole || cell_area <= SMALLEST_CELL * area {
+            *sums.0 += covered * self.cell(level, x, y);
+            *sums.1 += covered;
+            return;
+        }
+        let [width, height] = self.level_size(level - 1);
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            if 2 * x + i < width && 2 * y + j < height {
+                self.add(level - 1, [2 * x + i, 2 * y + j], &cut, area, sums);
+            }
+        }
+    }
+
+    /// The mean of points spread evenly over a triangle.
+    fn sampled_mean(&self, [a, b, c]: [DVec2; 3]) -> Rgb {
+        let n = CLAMPED_POINTS;
+        let mut sum = Rgb::ZERO;
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            // The square of points folded onto the triangle.
+            let [mut s, mut t] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(n));
+            if s + t > 1.0 {
+                (s, t) = (1.0 - s, 1.0 - t);
+            }
+            sum += self.at(a + s * (b - a) + t * (c - a), true);
+        }
+        sum / f64::from(n * n)
+    }
+
+    /// Linear mean of a cell: a texel at level 0.
+    fn cell(&self, level: usize, x: u32, y: u32) -> Rgb {
+        let index = |width: u32| y as usize * width as usize + x as usize;
+        match level {
+            0 => Rgb::from_array(self.texels[index(self.width)].map(|s| linear()[s as usize])),
+            _ => {
+                let level = &self.levels[level - 1];
+                Rgb::from_array(level.means[index(level.width)].map(f64::from))
+            }
+        }
+    }
+
+    fn level_size(&self, level: usize) -> [u32; 2] {
+        [self.width, self.height].map(|n| n.div_ceil(1 << level.min(31)))
+    }
+
+    /// The level after the last: means of up to 2 × 2 cells by how many texels they have.
+    fn coarser(&self) -> Level {
+        let from = self.levels.len();
+        let [width, height] = self.level_size(from + 1);
+        let [inner_width, inner_height] = self.level_size(from);
+        let extent = |k: u32, count: u32| {
+            let start = u64::from(k) << from;
+            (u64::from(count).min(start + (1 << from)) - start) as f64
+        };
+        let mut means = Vec::with_capacity(width as usize * height as usize);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let (mut sum, mut count) = (Rgb::ZERO, 0.0);
+            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let [x, y] = [2 * x + i, 2 * y + j];
+                if x < inner_width && y < inner_height {
+                    let texels = extent(x, self.width) * extent(y, self.height);
+                    sum += texels * self.cell(from, x, y);
+                    count += texels;
+                }
+            }
+            means.push((sum / count).as_vec3().to_array());
+        }
+        Level { width, means }
+    }
+}
+
+impl std::fmt::Debug for Texture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Texture({} × {})", self.width, self.height)
+    }
+}
+
+/// Linear values of 8-bit sRGB.
+fn linear() -> &'static [f64; 256] {
+    static LINEAR: OnceLock<[f64; 256]> = OnceLock::new();
+    LINEAR.get_or_init(|| {
+        std::array::from_fn(|k| {
+            let x = k as f64 / 255.0;
+            if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+        })
+    })
+}
+
+/// A texture as a material uses it.
+#[derive(Clone, Debug)]
+pub struct TextureMap {
+    /// The image.
+    pub texture: Arc<Texture>,
+    /// What its colours are multiplied with, per channel.
+    pub factor: Rgb,
+    /// Most that the product may be: the ceiling of a reflectance, infinite for light.
+    pub ceiling: f64,
+    /// Texture coordinates of a corner are multiplied with this,
+    pub scale: DVec2,
+    /// and then this is added.
+    pub offset: DVec2,
+    /// Whether the image goes on as its border beyond 0 and 1, and does not repeat.
+    pub clamped: bool,
+}
+
+impl TextureMap {
+    /// The value at texture coordinates as the file has them.
+    pub fn at(&self, uv: DVec2) -> Rgb {
+        self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
+    }
+
+    /// The mean over a triangle with these texture coordinates, as the file has them.
+    pub fn mean(&self, corners: [DVec2; 3]) -> Rgb {
+        let corners = corners.map(|uv| uv * self.scale + self.offset);
+        self.value(self.texture.mean(corners, self.clamped))
+    }
+
+    /// The mean of the whole image.
+    pub fn whole_mean(&self) -> Rgb {
+        self.value(self.texture.whole_mean())
+    }
+
+    fn value(&self, colour: Rgb) -> Rgb {
+        (self.factor * colour).min(Rgb::splat(self.ceiling))
+    }
+}
+
+/// The textures of a material.
+#[derive(Clone, Debug, Default)]
+pub struct MaterialTextures {
+    /// Of its reflectance.
+    pub reflectance: Option<TextureMap>,
+    /// Of its exitance, W/m².
+    pub exitance: Option<TextureMap>,
+}
+
+/// A triangle cut by a rectangle has seven corners at most.
+#[derive(Clone, Copy)]
+struct Polygon {
+    corners: [DVec2; 8],
+    count: usize,
+}
+
+impl Polygon {
+    fn new(corners: &[DVec2]) -> Polygon {
+        let mut polygon = Polygon { corners: [DVec2::ZERO; 8], count: 0 };
+        corners.iter().for_each(|&p| polygon.push(p));
+        polygon
+    }
+
+    fn push(&mut self, corner: DVec2) {
+        if self.count < self.corners.len() {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
+
+    /// What of it lies between `low` and `high` (I. Sutherland, G. Hodgman, 1974).
+    fn cut(&self, low: DVec2, high: DVec2) -> Polygon {
+        let inside = |p: &DVec2| p.cmpge(low).all() && p.cmple(high).all();
+        if self.corners[..self.count].iter().all(inside) {
+            return *self;
+        }
+        let mut cut = *self;
+        for (axis, bound, sign) in
+            [(0, low.x, 1.0), (0, high.x, -1.0), (1, low.y, 1.0), (1, high.y, -1.0)]
+        {
+            let before = cut;
+            cut.count = 0;
+            for k in 0..before.count {
+                let (p, q) = (before.corners[k], before.corners[(k + 1) % before.count]);
+                let [from, to] = [p, q].map(|p| sign * (p[axis] - bound));
+                if from >= 0.0 {
+                    cut.push(p);
+                }
+                if (from < 0.0) != (to < 0.0) {
+                    let mut crossing = p.lerp(q, from / (from - to));
+                    crossing[axis] = bound;
+                    cut.push(crossing);
+                }
+            }
+        }
+        cut
+    }
+
+    fn area(&self) -> f64 {
+        let corners = &self.corners[..self.count];
+        let [first, rest @ ..] = corners else { return 0.0 };
+        let fan = rest.windows(2).map(|e| (e[0] - *first).perp_dot(e[1] - *first));
+        0.5 * fan.sum::<f64>().abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texels of noise, and their linear value.
+    fn noise(width: u32, height: u32) -> Texture {
+        let mut state = 7u64;
+        let texel = |_| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            [(state >> 56) as u8, (state >> 48) as u8, (state >> 40) as u8]
+        };
+        Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
+    }
+
+    /// The two triangles of a rectangle, and their mean.
+    fn rectangle(texture: &Texture, low: DVec2, high: DVec2) -> Rgb {
+        let [b, d] = [DVec2::new(high.x, low.y), DVec2::new(low.x, high.y)];
+        0.5 * (texture.mean([low, b, high], false) + texture.mean([low, high, d], false))
+    }
+
+    #[test]
+    fn rectangles_of_texels_have_the_mean_of_these() {
+        // Means are kept in 24 bits, and are sums of thousands: 1e-6.
+        for (width, height) in [(8, 8), (5, 3), (1, 7), (37, 64)] {
+            let texture = noise(width, height);
+            let size = DVec2::new(width.into(), height.into());
+            let (across, down) = (width.div_ceil(2), height.div_ceil(3));
+            let mut sum = Rgb::ZERO;
+            for (x, y) in (0..across).flat_map(|x| (0..down).map(move |y| (x, y))) {
+                sum += texture.cell(0, x, y);
+            }
+            let mean = sum / f64::from(across * down);
+            let place = |x: u32, y: u32| {
+                let p = DVec2::new(x.into(), y.into()) / size;
+                DVec2::new(p.x, 1.0 - p.y)
+            };
+            let (low, high) = (place(0, down), place(across, 0));
+            for shift in [DVec2::ZERO, DVec2::new(3.0, -2.0)] {
+                let found = rectangle(&texture, low + shift, high + shift);
+                assert!(found.abs_diff_eq(mean, 1e-6), "{width} × {height}: {found} {mean}");
+            }
+            let all = rectangle(&texture, DVec2::splat(-1.0), DVec2::splat(2.0));
+            assert!(all.abs_diff_eq(texture.whole_mean(), 1e-6));
+        }
+    }
+
+    #[test]
+    fn mean_over_any_triangle_is_that_of_many_points() {
+        let texture = noise(16, 11);
+        let corners = [DVec2::new(0.1, 0.2), DVec2::new(1.7, 0.35), DVec2::new(0.4, 2.2)];
+        let [a, b, c] = corners;
+        let (n, mut sum, mut count) = (2000, Rgb::ZERO, 0.0);
+        for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+            let [s, t] = [i, j].map(|k| (f64::from(k) + 1.0 / 3.0) / f64::from(n));
+            let uv = a + s * (b - a) + t * (c - a);
+            let uv = uv - uv.floor();
+            let [x, y] = [uv.x * 16.0, (1.0 - uv.y) * 11.0].map(|k| k as u32);
+            sum += texture.cell(0, x, y.min(10));
+            count += 1.0;
+        }
+        // Points on texels that an edge cuts: some 100 texels of contrast 1, a 2000th off each.
+        assert!(texture.mean(corners, false).abs_diff_eq(sum / count, 1e-3));
+        // As does turning the other way round, to rounding.
+        let mirrored = texture.mean([a, c, b], false);
+        assert!(mirrored.abs_diff_eq(texture.mean(corners, false), 1e-12));
+    }
+
+    #[test]
+    fn large_noise_has_its_mean_over_a_large_triangle() {
+        let texture = noise(4096, 4096);
+        let found = texture.mean([DVec2::ZERO, DVec2::X, DVec2::ONE], false);
+        // Of 8e6 texels with a standard deviation of 0.3: 1e-4, and the same of all.
+        assert!(found.abs_diff_eq(texture.whole_mean(), 5e-4), "{found}");
+    }
+
+    #[test]
+    fn borders_repeat_or_go_on() {
+        let texture = Texture::new(2, 1, vec![[0; 3], [255; 3]]).unwrap();
+        let at = |u, clamped| texture.at(DVec2::new(u, 0.5), clamped).x;
+        assert_eq!([at(0.25, false), at(0.75, false), at(0.5, false)], [0.0, 1.0, 0.5]);
+        assert_eq!([at(0.0, false), at(1.25, false), at(-0.25, false)], [0.5, 0.0, 1.0]);
+        assert_eq!([at(-3.0, true), at(9.0, true), at(0.0, true)], [0.0, 1.0, 0.0]);
+        // Up is +v: row 0 is at the top.
+        let texture = Texture::new(1, 2, vec![[255; 3], [0; 3]]).unwrap();
+        assert_eq!(texture.at(DVec2::new(0.5, 0.75), true).x, 1.0);
+        let beyond = [DVec2::new(0.0, 1.5), DVec2::new(1.0, 1.5), DVec2::new(0.0, 9.0)];
+        assert_eq!(texture.mean(beyond, true), Rgb::ONE);
+    }
+
+    #[test]
+    fn odd_triangles_have_a_colour() {
+        let texture = noise(4, 4);
+        let point = DVec2::new(0.3, 0.4);
+        let mean = texture.mean([point; 3], false);
+        assert!(mean.abs_diff_eq(texture.at(point, false), 1e-12));
+        let far = [DVec2::ZERO, DVec2::new(1e9, 0.0), DVec2::new(0.0, 1e9)];
+        assert_eq!(texture.mean(far, false), texture.whole_mean());
+        assert_eq!(texture.mean([DVec2::NAN; 3], false), texture.whole_mean());
+        assert!(Texture::new(0, 0, vec![]).is_none() && Texture::new(2, 2, vec![[0; 3]]).is_none());
+    }
+}
