@@ -100,7 +100,7 @@ impl Texture {
         let low = a.min(b).min(c);
         let high = a.max(b).max(c);
         let area = 0.5 * (b - a).perp_dot(c - a).abs() * size.x * size.y;
-        if !area.is_finite() || !(area > 0.0) {
+        if !area.is_finite() || area <= 0.0 {
             return self.at((a + b + c) / 3.0, clamped);
         }
         if clamped && (low.min_element() < 0.0 || high.max_element() > 1.0) {
