@@ -46,6 +46,8 @@ pub struct RadianceImage {
     pub height: u32,
     /// `width` × `height` pixels.
     pub pixels: Vec<Rgb>,
+    /// Radiance of pixels in which there is nothing but sky, W/(m² sr) per channel.
+    pub sky: Rgb,
 }
 
 /// Largest image side, pixels. Chosen by hand: memory for the pixels is 24 GiB there.
@@ -83,7 +85,7 @@ impl Camera {
             rays.seen(k).map(radiance).sum::<Rgb>() * rays.weight
         };
         let pixels = (0..width * height).into_par_iter().map(pixel).collect();
-        Ok(RadianceImage { width, height, pixels })
+        Ok(RadianceImage { width, height, pixels, sky: surface.sky })
     }
 
     /// Right, up and forward of the view, unit length.

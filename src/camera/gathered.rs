@@ -92,7 +92,7 @@ impl Camera {
                 return Ok(None);
             }
         }
-        Ok(Some(RadianceImage { width, height, pixels }))
+        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
     }
 }
 

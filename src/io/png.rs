@@ -12,7 +12,7 @@ use crate::io::tone::ToneCurve;
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
 pub fn write_png(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    let tone = ToneCurve::fit(&image.pixels);
+    let tone = ToneCurve::fit_image(image);
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|&c| tone.display(c)).collect();
     let mut png = std::io::Cursor::new(vec![]);
     image::write_buffer_with_format(

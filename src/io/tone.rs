@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::camera::RadianceImage;
 use crate::scene::Rgb;
 
 /// A tone curve: exposure from the light's own histogram, highlights rolled off.
@@ -32,6 +33,13 @@ impl ToneCurve {
         let middle = luminances.len() / 2;
         let (_, median, _) = luminances.select_nth_unstable_by(middle, f64::total_cmp);
         ToneCurve { exposure: KEY / median.max(f64::MIN_POSITIVE) }
+    }
+
+    /// Fits the curve to an image; what is nothing but sky does not count.
+    pub fn fit_image(image: &RadianceImage) -> ToneCurve {
+        let is_sky = |colour: &Rgb| colour.distance(image.sky) <= 1e-9 * image.sky.length();
+        let surfaces: Vec<Rgb> = image.pixels.iter().copied().filter(|c| !is_sky(c)).collect();
+        ToneCurve::fit(if surfaces.is_empty() { &image.pixels } else { &surfaces })
     }
 
     /// The curve that shows a radiosity B as this one shows the radiance of diffuse surfaces, B/π.

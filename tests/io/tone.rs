@@ -1,7 +1,7 @@
 //! The tone curve: exposure from the median, highlights rolled off, sRGB.
 
 use radiosity::io::ToneCurve;
-use radiosity::{Camera, Rgb};
+use radiosity::{Camera, RadianceImage, Rgb};
 
 use crate::common::framed::{self, HERE};
 
@@ -71,6 +71,14 @@ fn black_pixels_do_not_count() {
     let grey = Rgb::splat(0.3);
     assert_eq!(ToneCurve::fit(&[Rgb::ZERO, grey, Rgb::ZERO]), ToneCurve::fit(&[grey]));
     assert_eq!(ToneCurve::fit(&[grey]).display(Rgb::ZERO), [0; 3]);
+    // Nor does the sky in a picture, however much of it there is; if there is no more, it does.
+    let sky = Rgb::new(3.0, 4.0, 5.0);
+    let with_sky = |pixels: Vec<Rgb>| {
+        let image = RadianceImage { width: 4, height: 1, pixels, sky };
+        ToneCurve::fit_image(&image)
+    };
+    assert_eq!(with_sky(vec![sky, grey, sky, sky]), ToneCurve::fit(&[grey]));
+    assert_eq!(with_sky(vec![sky; 4]), ToneCurve::fit(&[sky]));
     for none in [&[][..], &[Rgb::ZERO]] {
         assert_eq!(ToneCurve::fit(none).display(Rgb::ZERO), [0; 3]);
     }

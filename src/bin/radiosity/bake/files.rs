@@ -118,7 +118,7 @@ impl Files {
             let image = self.picture(chosen, baked, device)?;
             // Where the picture is black, what it does not show has its own exposure.
             if image.pixels.iter().any(|c| c.max_element() > 0.0) {
-                tone = ToneCurve::fit(&image.pixels).of_radiosity();
+                tone = ToneCurve::fit_image(&image).of_radiosity();
             }
             self.write_picture(&image)?;
         }
