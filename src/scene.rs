@@ -10,7 +10,7 @@
 pub mod texture;
 mod warning;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec2, DVec3};
@@ -66,8 +66,8 @@ pub struct Scene {
     sky: Rgb,
     /// Of the corners of each triangle; empty where no material has textures, as are those.
     texture_coordinates: Vec<[DVec2; 3]>,
-    /// Of each material.
-    textures: Vec<MaterialTextures>,
+    /// Of the materials that have some, by their indices.
+    textures: BTreeMap<u32, MaterialTextures>,
 }
 
 impl Scene {
@@ -102,18 +102,18 @@ impl Scene {
         groups: Vec<String>,
         materials: Vec<Material>,
     ) -> Result<Scene, Error> {
-        Scene::with_textures(positions, triangles, groups, materials, vec![], vec![])
+        Scene::with_textures(positions, triangles, groups, materials, vec![], BTreeMap::new())
     }
 
-    /// The same with texture coordinates for each triangle and textures for each material, or none
-    /// of either.
+    /// The same with texture coordinates for each triangle and textures for materials by their indices,
+    /// or none of either.
     pub(crate) fn with_textures(
         positions: Vec<DVec3>,
         mut triangles: Vec<Triangle>,
         groups: Vec<String>,
         materials: Vec<Material>,
         mut texture_coordinates: Vec<[DVec2; 3]>,
-        textures: Vec<MaterialTextures>,
+        textures: BTreeMap<u32, MaterialTextures>,
     ) -> Result<Scene, Error> {
         for (i, p) in positions.iter().enumerate() {
             if !p.is_finite() {
@@ -299,8 +299,7 @@ impl Scene {
     /// Textures of triangle `t`; `None` where its material has none. Its material's reflectance and
     /// exitance then are the means of the whole images.
     pub fn textures(&self, t: usize) -> Option<&MaterialTextures> {
-        let textures = self.textures.get(self.triangles[t].material as usize)?;
-        (textures.reflectance.is_some() || textures.exitance.is_some()).then_some(textures)
+        self.textures.get(&self.triangles[t].material)
     }
 
     /// The same scene with `materials` in the place of its own, one for one.

@@ -13,7 +13,7 @@
 //! so that its large records do not pile up. It gets the statements above alone, with three finite
 //! numbers each: it gives no line for others, panics at fewer, and takes what is not finite.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::{self, Write as _};
 
 use super::files::{self, FileSource, MAX_BYTES};
@@ -33,7 +33,7 @@ pub(super) struct Library {
     /// Files that were loaded, by their path from the scene's folder.
     files: Vec<String>,
     bytes: u64,
-    redefined: Vec<String>,
+    redefined: BTreeSet<String>,
 }
 
 /// One `newmtl` and what follows it, as it is written.
@@ -46,7 +46,7 @@ pub(super) struct MtlMaterial {
     /// `Ka`.
     pub ambient: Option<Rgb>,
     /// `map_Kd` and `map_Ke`, with their options.
-    pub textures: [Option<String>; 2],
+    pub textures: [Option<Box<str>>; 2],
     transparent: bool,
     /// Its `newmtl` line, and the file by index.
     line: u32,
@@ -175,7 +175,7 @@ impl Library {
         for material in materials {
             let index = self.materials.len() as u32;
             if self.by_name.insert(material.name.clone(), index).is_some() {
-                self.redefined.push(material.name.clone());
+                self.redefined.insert(material.name.clone());
             }
             let file = self.files.len() as u32 - 1;
             self.materials.push(MtlMaterial::new(material, block.line, file));
@@ -189,9 +189,7 @@ impl Library {
             let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
             odd.map(|(_, m)| m.name.as_str()).collect::<Vec<_>>()
         };
-        let mut redefined: Vec<&str> = self.redefined.iter().map(String::as_str).collect();
-        redefined.sort_unstable();
-        redefined.dedup();
+        let redefined: Vec<&str> = self.redefined.iter().map(String::as_str).collect();
         let lists = [
             (WarningKind::Transparency, names(|m| m.transparent), "not modelled: they are opaque"),
             (
@@ -252,7 +250,8 @@ impl MtlMaterial {
             reflectance: rgb(material.diffuse),
             radiance: rgb(material.emissive),
             ambient: rgb(material.ambient),
-            textures: [material.diffuse_texture, emitted],
+            textures: [material.diffuse_texture, emitted]
+                .map(|name| name.map(String::into_boxed_str)),
             // Files disagree about which end of `Tr` is opaque.
             transparent: material.dissolve.is_some_and(|d| d < 1.0)
                 || has("transparent")

@@ -1,7 +1,7 @@
 //! The materials of a scene from those of its libraries: repaired, with their textures, and with
 //! the light that the caller gives them.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::PI;
 
 use super::super::mtl::MtlMaterial;
@@ -20,13 +20,11 @@ impl ObjFile<'_> {
         used: &HashSet<u32>,
         materials: &mut [Material],
         settings: &ObjSettings,
-    ) -> Result<Vec<MaterialTextures>, Error> {
+    ) -> Result<BTreeMap<u32, MaterialTextures>, Error> {
         let mut images = Textures::new(self.files);
-        let mut all = vec![MaterialTextures::default(); materials.len()];
-        let mut any = false;
-        let library = self.library.materials.iter().zip(materials).zip(&mut all).enumerate();
-        for (_, ((mtl, material), textures)) in library.filter(|(i, _)| used.contains(&(*i as u32)))
-        {
+        let mut all: BTreeMap<u32, MaterialTextures> = BTreeMap::new();
+        let library = (0u32..).zip(self.library.materials.iter().zip(materials));
+        for (index, (mtl, material)) in library.filter(|(index, _)| used.contains(index)) {
             let place = || self.library.place(mtl, self.files);
             let emitted = settings.emit.iter().any(|(name, _)| *name == material.name);
             for (k, statement) in mtl.textures.iter().enumerate() {
@@ -56,15 +54,14 @@ impl ObjFile<'_> {
                 let map = TextureMap { texture, factor, ceiling, scale, offset, clamped };
                 if k == 0 {
                     material.reflectance = map.whole_mean();
-                    textures.reflectance = Some(map);
+                    all.entry(index).or_default().reflectance = Some(map);
                 } else if !emitted {
                     material.exitance = map.whole_mean();
-                    textures.exitance = Some(map);
+                    all.entry(index).or_default().exitance = Some(map);
                 }
-                any = true;
             }
         }
-        Ok(if any { all } else { vec![] })
+        Ok(all)
     }
 
     /// All materials, by the indices of [`ObjFile::named_materials`]. What is odd about one is
@@ -74,18 +71,22 @@ impl ObjFile<'_> {
         used: &HashSet<u32>,
         settings: &ObjSettings,
     ) -> Result<Vec<Material>, Error> {
-        let mut materials = vec![];
-        let library = &self.library;
+        let library = &mut self.library;
+        let mut materials = Vec::with_capacity(library.materials.len());
         let emits = |m: &MtlMaterial| m.radiance.is_some_and(|l| l.max_element() > 0.0);
         let ambient_counts = settings.emit.is_empty() && !library.materials.iter().any(emits);
-        for (index, material) in library.materials.iter().enumerate() {
+        for index in 0..library.materials.len() {
+            let material = &library.materials[index];
             let place = || library.place(material, self.files);
             let used = used.contains(&(index as u32));
             let mut note = |kind, done: String| match used {
                 true => self.repairs.note_at(kind, place, &material.name, done),
                 false => Ok(()),
             };
-            materials.push(material.complete(settings, ambient_counts, &mut note)?);
+            let complete = material.complete(settings, ambient_counts, &mut note)?;
+            // There may be many, with long names.
+            let name = std::mem::take(&mut library.materials[index].name);
+            materials.push(Material { name, ..complete });
         }
         let grey = |name: &str| Material::grey(name, Material::DEFAULT_REFLECTANCE);
         let names = &self.statements.materials.list;
@@ -112,7 +113,7 @@ impl ObjFile<'_> {
 }
 
 impl MtlMaterial {
-    /// As a material of a scene; `note` is told of every repair.
+    /// As a material of a scene, as yet without its name; `note` is told of every repair.
     fn complete(
         &self,
         settings: &ObjSettings,
@@ -148,6 +149,6 @@ impl MtlMaterial {
             note(WarningKind::MaterialStatement, "it emits nothing".into())?;
         }
         let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
-        Ok(Material { name: self.name.clone(), reflectance, exitance })
+        Ok(Material { name: String::new(), reflectance, exitance })
     }
 }
