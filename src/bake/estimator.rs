@@ -41,6 +41,10 @@ const JITTER: f64 = 1e-3;
 /// where walls meet, it is undefined what is seen.
 const INSET: f64 = 0.03;
 
+/// Reflected radiosity over the largest exitance, at and below which there is none: ten thousand
+/// times the rounding of their sum.
+const NEGLIGIBLE_REFLECTION: f64 = 1e-12;
+
 /// A result whose error is to be estimated.
 pub(super) struct ErrorEstimator<'a> {
     /// The result: what vertices gathered, or the elements' own light.
@@ -156,9 +160,13 @@ impl ErrorEstimator<'_> {
         Ok((model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt())
     }
 
-    /// Reflected radiosity below which errors are relative to this instead, W/m².
+    /// Reflected radiosity below which errors are relative to this instead, W/m². Where next to
+    /// nothing is reflected, rounding of what is emitted is no error.
     fn radiosity_floor(&self) -> f64 {
-        self.light.radiosity_field().radiosity_floor().max(f64::MIN_POSITIVE)
+        let materials = self.light.mesh.scene().materials();
+        let brightest = materials.iter().map(|m| m.exitance.length()).fold(0.0, f64::max);
+        let negligible = (NEGLIGIBLE_REFLECTION * brightest).max(f64::MIN_POSITIVE);
+        self.light.radiosity_field().radiosity_floor().max(negligible)
     }
 
     /// What lights the vertices.

@@ -46,21 +46,28 @@ impl<'a> ResilientBackend<'a> {
         let _ = self.failure.set(error);
     }
 
-    /// A source of rows as `settings` ask for. What keeps the device from starting is an error,
-    /// since nothing is lost then.
+    /// A source of rows as `settings` ask for: on the CPU if `mesh` is too large for the device.
+    /// What else keeps the device from starting is an error, since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
         mesh: &'m Mesh,
         settings: &'m SolveSettings,
     ) -> Result<ResilientRows<'m>, Error> {
-        let rows = |backend: &Backend| {
+        let rows = |backend: &Backend| -> Result<BackendRows, Error> {
             let rows = backend.rows(mesh, settings.hemicube_resolution, settings.rotations)?;
             Ok(match settings.full_resolution_share {
                 Some(share) => rows.with_full_share(share),
                 None => rows,
             })
         };
-        Ok(Fallback::new(rows(self.backend)?, move |error| {
+        let first = match rows(self.backend) {
+            Err(e) if e.kind() == ErrorKind::Memory => {
+                self.record(e);
+                rows(&Backend::Cpu)?
+            }
+            result => result?,
+        };
+        Ok(Fallback::new(first, move |error| {
             self.record(error);
             rows(&Backend::Cpu)
         }))

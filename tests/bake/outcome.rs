@@ -1,11 +1,13 @@
 //! Whether a target was met, for the whole or each group, and what stood in the way.
 
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use radiosity::bake::{Obstacle, Outcome};
-use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Scene};
+use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Material, Rgb, Scene};
 
+use crate::common::scenes::{facing_up, quads};
 use crate::common::{cornell_box, keep_going};
 
 fn cornell() -> Scene {
@@ -64,4 +66,14 @@ fn without_an_error_there_is_nothing_to_miss() {
     let target = BakeTarget::Time(Duration::from_nanos(1));
     let baked = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
     assert_eq!(baked.outcome, Outcome::Unasked);
+}
+
+#[test]
+fn a_lamp_alone_has_no_error() {
+    // It reflects what nothing sends it: 0, but for the rounding of 0.3 π beside it.
+    let lamp = Material { exitance: Rgb::splat(0.3 * PI), ..Material::grey("lamp", 0.9) };
+    let scene = quads(&[(facing_up([0.0, 0.7], [0.0, 0.3], 0.1), lamp)]);
+    let baked = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, keep_going).unwrap();
+    assert_eq!(baked.outcome, Outcome::Reached);
+    assert!(baked.estimate.total < 1e-3, "{:?}", baked.estimate);
 }

@@ -260,7 +260,7 @@ fn check_mesh_fits(limits: GpuLimits, mesh: &Mesh) -> Result<(), Error> {
     let found = format!("{items} finest cells of elements in {triangles} triangles");
     let (cells, most) = (limits.buffer / 4 - 16, limits.buffer / triangle_bytes);
     let remedy = format!("this device holds {cells} and {most}");
-    Err(Error::new(ErrorKind::Setting, "mesh".to_string(), found, remedy))
+    Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy))
 }
 
 impl FormFactors for HemicubeRows {

@@ -332,8 +332,17 @@ fn limits_of_small_device_are_reported() {
     let few = within(GpuLimits { buffer: 32 << 10, ..GpuLimits::MOST });
     let large = cornell_box(30.0);
     let e = HemicubeRows::new(&few, &large, 16).unwrap_err();
-    assert!(e.kind() == ErrorKind::Setting && e.place() == "mesh", "{e}");
+    assert!(e.kind() == ErrorKind::Memory && e.place() == "mesh", "{e}");
     assert!(e.to_string().contains(&format!("{}", (32 << 10) / 4 - 16)), "{e}");
+    // A bake says so, and casts rays on the CPU.
+    let mut settings = BakeSettings::elements_only(large.scene());
+    settings.solve.element_size = 30.0;
+    settings.solve.hemicube_resolution = 32;
+    settings.solve.solver.unshot = 0.5;
+    let bake = |device: Backend| settings.bake(large.scene().clone(), &device, keep_going).unwrap();
+    let (baked, on_the_cpu) = (bake(Backend::Gpu(few)), bake(Backend::Cpu));
+    assert_eq!(baked.device_failure.expect("too small").kind(), ErrorKind::Memory);
+    assert!(baked.light.surface.radiosity == on_the_cpu.light.surface.radiosity);
     // One layer is one hemicube at a time, and the same rows.
     let patches: Vec<NodeId> = (0..20).map(|e| mesh.element(e)).collect();
     let [one, many] = [1, 16].map(|layers| {
