@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
-//! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups and materials, for viewers |
+//! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |

@@ -42,8 +42,8 @@
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
-//! Features: `gpu` (wgpu), `exr`, `glb`, `png`, all on by default, and `cli` for the program `radiosity`.
-//! Long work takes a callback that is told of progress and answers with a
+//! Features: `gpu` (wgpu), `textures`, `exr`, `glb`, `png`, all on by default, and `cli` for the
+//! program `radiosity`. Long work takes a callback that is told of progress and answers with a
 //! [`ControlFlow`](std::ops::ControlFlow): `Break(())` stops it with what there is.
 //!
 //! # Conventions

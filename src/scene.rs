@@ -105,8 +105,8 @@ impl Scene {
         Scene::with_textures(positions, triangles, groups, materials, vec![], BTreeMap::new())
     }
 
-    /// The same with texture coordinates for each triangle and textures for materials by their indices,
-    /// or none of either.
+    /// The same with texture coordinates for each triangle and textures for materials by their
+    /// indices, or none of either.
     pub(crate) fn with_textures(
         positions: Vec<DVec3>,
         mut triangles: Vec<Triangle>,
@@ -290,8 +290,8 @@ impl Scene {
         &self.materials[self.triangles[t].material as usize]
     }
 
-    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None` where
-    /// the scene has no textures. Not finite for a corner that has none.
+    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
+    /// where the scene has no textures. Not finite for a corner that has none.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
         self.texture_coordinates.get(t).copied()
     }

@@ -46,7 +46,8 @@ pub struct VertexMesh {
     pub faces: Vec<[u32; 3]>,
     /// For each face, the index of the element that it is, or is a part of.
     pub elements: Vec<u32>,
-    /// Radiance where there is no surface, W/(m² sr) per channel: [`Scene::sky`](crate::Scene::sky).
+    /// Radiance where there is no surface, W/(m² sr) per channel:
+    /// [`Scene::sky`](crate::Scene::sky).
     pub sky: Rgb,
     /// Comments for a file's header, one line each.
     pub comments: Vec<String>,

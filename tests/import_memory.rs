@@ -111,9 +111,9 @@ fn peak_memory_is_bounded_by_file_size() {
         let said = String::from_utf8_lossy(&said.stdout).into_owned();
         let factor = said.lines().find_map(|line| line.rsplit_once("factor ")).unwrap().1;
         println!("case {case}: {factor} bytes a byte");
-        // The corner of a polygon, of two bytes, becomes 24 bytes in tobj, which go again, an index,
-        // a place in space and a triangle of 28 bytes; a model, of some 17 bytes, some 600 in tobj;
-        // a material, of nine bytes or more, some 350.
+        // The corner of a polygon, of two bytes, becomes 24 bytes in tobj, which go again, an
+        // index, a place in space and a triangle of 28 bytes; a model, of some 17 bytes, some 600
+        // in tobj; a material, of nine bytes or more, some 350.
         assert!(factor.parse::<f64>().unwrap() < 60.0, "case {case}: {factor} bytes a byte");
     }
 }

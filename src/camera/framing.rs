@@ -6,8 +6,8 @@
 //!                          └─► scored coarsely ──► the best in all directions ──► best score
 //! ```
 //!
-//! Inside and outside compete by what is seen ([`ViewScorer`]): from outside, a room shows the backs
-//! of its walls, and an object shows nothing else from within. Everything is deterministic.
+//! Inside and outside compete by what is seen ([`ViewScorer`]): from outside, a room shows the
+//! backs of its walls, and an object shows nothing else from within. Everything is deterministic.
 
 use std::f64::consts::TAU;
 
@@ -259,7 +259,8 @@ fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
     scene.positions().iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| *p).collect()
 }
 
-/// Those of `points` that are not among the outlying ones; all, if what is left is not much smaller.
+/// Those of `points` that are not among the outlying ones; all, if what is left is not much
+/// smaller.
 fn core(points: &[DVec3], up: DVec3) -> Vec<DVec3> {
     let skipped = (points.len() as f64 * OUTLYING_SHARE).ceil() as usize;
     let mut inner = Aabb::EVERYTHING;

@@ -37,7 +37,7 @@ const NEAR_SHARE: f64 = 0.05;
 /// Of the luminance that nine tenths of the reflecting area stay below, the share from which on
 /// something is lit, and the score of a view of nothing that is lit. Chosen by hand.
 const LIT_SHARE: f64 = 0.05;
-const UNLIT_SCORE: f64 = 0.25;
+const UNLIT_SCORE: f64 = 0.02;
 
 /// A part is as good as unseen at a few rays: n of them count n / (n + this). Chosen by hand.
 const HALF_SEEN: f64 = 1.0;

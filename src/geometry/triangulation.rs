@@ -3,8 +3,8 @@
 //! A fan from the first corner covers every convex outline and some others. Where it does not, ears
 //! are clipped off one by one in the polygon's own plane (D. Eberly, "Triangulation by Ear
 //! Clipping", 2002; the `earcut` crate). Either way the areas of the triangles must sum to that of
-//! the outline (Newell's formula); an outline that crosses itself fails this, and what can be cut of
-//! it is another function's answer.
+//! the outline (Newell's formula); an outline that crosses itself fails this, and what can be cut
+//! of it is another function's answer.
 
 use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
@@ -52,8 +52,8 @@ pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     ((covered - doubled_area).abs() <= rounding).then_some(triangles)
 }
 
-/// Triangles for the polygon with these corners where [`triangulate`] has none: the ears that can be
-/// clipped off an outline that crosses itself, else a fan from the first corner.
+/// Triangles for the polygon with these corners where [`triangulate`] has none: the ears that can
+/// be clipped off an outline that crosses itself, else a fan from the first corner.
 pub(crate) fn triangulate_anyhow(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let origin = corners.first().copied().unwrap_or_default();
     let extent = corners.iter().map(|&p| (p - origin).abs().max_element()).fold(0.0, f64::max);

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   header │ JSON chunk: what lies where     │ binary chunk
-//!          │ scene ── node ── node per group │ positions   normals     colours    radiosity  indices
-//!          │   └ mesh: a primitive for each  │ p₀ p₁ p₂ …  p₀ p₁ p₂ …  …                     p₀ p₁ …
+//! │ scene ── node ── node per group │ positions   normals     colours   radiosity  indices
+//!          │   └ mesh: a primitive for each  │ p₀ p₁ p₂ …  p₀ p₁ p₂ …  …                    p₀ p₁
 //!          │     material, by its name       │ (of each primitive, one after the other)
 //! ```
 //!
@@ -30,8 +30,8 @@ use crate::scene::Rgb;
 /// A node for each group and a primitive for each of its materials, by their names. Vertices have
 /// `POSITION`, `NORMAL`, `COLOR_0` (linear, through `tone`, a curve of radiosity, within [0, 1])
 /// and `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
-/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have reflectance
-/// and exitance. All numbers are 32-bit floats.
+/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have
+/// reflectance and exitance. All numbers are 32-bit floats.
 ///
 /// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF means
 /// metres with +y up: nothing is turned or scaled. A scene that lies more than 16 of its sizes from

@@ -1,7 +1,7 @@
 //! Which materials emit: `Ke`, else `Ka` above 1, and what the user says.
 //!
-//! MTL has no statement for light. `Ke` is the radiance that a material emits by common usage;
-//! some scenes, older than that usage, give a lamp an ambient colour far above 1 instead, as Intel's
+//! MTL has no statement for light. `Ke` is the radiance that a material emits by common usage; some
+//! scenes, older than that usage, give a lamp an ambient colour far above 1 instead, as Intel's
 //! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
 //! warning that nothing emits names these.
 
@@ -32,8 +32,8 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// Radiance of the sky over a scene in which nothing emits, unless said otherwise, W/(m² sr).
 const DEFAULT_SKY: Rgb = Rgb::ONE;
 
-/// Radiance of the sky over a scene of `used` materials where `wanted` is asked for; and the warning
-/// that none of them emits, if none does and no sky was asked for.
+/// Radiance of the sky over a scene of `used` materials where `wanted` is asked for; and the
+/// warning that none of them emits, if none does and no sky was asked for.
 pub(super) fn sky_and_warning<'a>(
     used: impl Iterator<Item = &'a Material> + Clone,
     wanted: Option<Rgb>,

@@ -9,8 +9,8 @@
 //!
 //! A mean takes texels as squares of one colour. It goes down the levels: what lies within the
 //! triangle counts with its mean, what its sides cut is cut to a polygon and counts with its area.
-//! So a mean is exact for every triangle, whatever its corners, and costs its outline in texels, not
-//! its area. A look-up goes linearly between the centres of texels, for pictures.
+//! So a mean is exact for every triangle, whatever its corners, and costs its outline in texels,
+//! not its area. A look-up goes linearly between the centres of texels, for pictures.
 
 use std::sync::{Arc, OnceLock};
 

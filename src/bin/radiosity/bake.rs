@@ -87,9 +87,16 @@ Files and devices:
   --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
                     light goes along";
 
-/// What to do about a scene that stays dark.
-const DARK_REMEDY: &str = "nothing emits, and no opening lets a sky in; name a material that emits \
-                           with --emit MATERIAL=r,g,b, or look at which way surfaces face";
+/// What is said of a scene that stays dark, and what to do about it.
+const DARK: (&str, &str) = (
+    "no light reaches any surface",
+    "nothing emits, and no opening lets a sky in; name a material that emits with --emit \
+     MATERIAL=r,g,b, or look at which way surfaces face",
+);
+
+/// The same where all surfaces are black.
+const BLACK: (&str, &str) =
+    ("no surface reflects or emits anything", "give materials a `Kd`, or --emit MATERIAL=r,g,b");
 
 /// What is asked of a bake.
 pub struct Bake {
@@ -222,12 +229,20 @@ impl Bake {
         let device = progress::of_stage("opening the device", || self.device.open())?;
         let open = opening.elapsed().as_secs_f64();
         let unshot_goal = Cell::new(Solver::default().unshot);
-        let baked = progress::of_bake(
+        let mut baked = progress::of_bake(
             || unshot_goal.get(),
             |report| self.bake(scene, &device, &unshot_goal, report),
         )?;
         if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) {
-            eprintln!("warning: no light reaches any surface: {DARK_REMEDY}");
+            let scene = baked.mesh.scene();
+            let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
+            let is_black = !(0..scene.triangles().len()).any(reflects);
+            let (found, remedy) = if is_black { BLACK } else { DARK };
+            eprintln!("warning: {found}: {remedy}");
+        }
+        if self.obj.sky.is_none() {
+            // White things would not be seen before the sky that was chosen to light them.
+            baked.light.surface.sky = Rgb::ZERO;
         }
         let writing = Instant::now();
         let camera = self.files.write(&baked, &device)?;

@@ -2,13 +2,13 @@
 //! else a line every few seconds, so that a log of a long bake tells where it is.
 //!
 //! ```text
-//!   stage       share of it that is done                            what is left
-//!   reading     –                                                   –
-//!   meshing     –                                                   –
-//!   shooting    orders of magnitude of the unshot share             time so far × (1 − share) / share
-//!   gathering   vertices of this pass                               the same
-//!   estimating  points                                              the same
-//!   drawing, writing  –                                             –
+//!   stage       share of it that is done                        what is left
+//!   reading     –                                               –
+//!   meshing     –                                               –
+//!   shooting    orders of magnitude of the unshot share         time so far × (1 − share) / share
+//!   gathering   vertices of this pass                           the same
+//!   estimating  points                                          the same
+//!   drawing, writing  –                                         –
 //! ```
 
 use std::ops::ControlFlow;

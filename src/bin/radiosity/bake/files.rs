@@ -119,6 +119,8 @@ impl Files {
             // Where the picture is black, what it does not show has its own exposure.
             if image.pixels.iter().any(|c| c.max_element() > 0.0) {
                 tone = ToneCurve::fit_image(&image).of_radiosity();
+            } else if baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0) {
+                eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
             self.write_picture(&image)?;
         }
