@@ -382,6 +382,13 @@ fn a_sky_lights_what_has_no_lamp() {
     let (two, sky, said) = radiosity("open.obj", &["--sky", "2"]);
     // The same rays: twice as much, in the files' six digits.
     assert!((two / one - 2.0).abs() < 1e-5 && sky == 2.0 && !said.contains("sky"), "{two} {said}");
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    let (scene, ply) = (place("open.obj"), place("open.ply"));
+    let other_sky = run("verify", &[&scene, &ply]);
+    let said = String::from_utf8_lossy(&other_sky.stderr);
+    assert!(!other_sky.status.success() && said.contains("--sky 2,2,2"), "{said}");
+    let same_sky = run("verify", &[&scene, &ply, "--sky", "2", "--precision", "0.5"]);
+    assert!(same_sky.status.success(), "{}", String::from_utf8_lossy(&same_sky.stderr));
     let (none, _, said) = radiosity("open.obj", &["--sky", "none"]);
     assert!(none == 0.0 && said.contains("left dark") && said.contains("--emit"), "{said}");
     let (closed, _, said) = radiosity("closed.obj", &[]);

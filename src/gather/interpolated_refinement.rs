@@ -72,7 +72,7 @@ pub(super) fn interpolated_refinement(
             refined.reflected[v] = *sum / *count;
         }
     }
-    let residual_error = residual_errors(samples, source, &split);
+    let residual_error = residual_errors(samples, source, scale, &split);
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }
 
@@ -134,7 +134,12 @@ fn midside_values(
 }
 
 /// Error that remains in each element after `split` (ascending) were split, W/m².
-fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usize]) -> Vec<f64> {
+fn residual_errors(
+    samples: &SampledMesh,
+    source: &RadiosityField,
+    scale: &ErrorScale,
+    split: &[usize],
+) -> Vec<f64> {
     let at_boundary = boundary_vertices(samples);
     let mut split = split.iter().peekable();
     let mut errors = Vec::with_capacity(samples.mesh.element_count() + 3 * split.len());
@@ -152,17 +157,18 @@ fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usiz
             1.0
         };
         let children = if is_split { 4 } else { 1 };
-        errors.resize(errors.len() + children, (factor * error).max(gap_error(samples, e)));
+        errors.resize(errors.len() + children, (factor * error).max(gap_error(samples, scale, e)));
     }
     errors
 }
 
-/// Least error of element `e` if it is in a gap, W/m²; 0 elsewhere.
-fn gap_error(samples: &SampledMesh, e: usize) -> f64 {
+/// Least error of element `e` if it is in a gap that can be looked into, W/m²; 0 elsewhere.
+fn gap_error(samples: &SampledMesh, scale: &ErrorScale, e: usize) -> f64 {
     let corners = samples.corners()[e].map(|v| v as usize);
     let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
     let nearest = largest(corners.map(|v| samples.inverse_distance[v]));
-    if nearest * samples.mesh.area(samples.mesh.element(e)).sqrt() > 1.0 {
+    let is_hidden = nearest * scale.crack > 1.0 || corners.iter().any(|&v| samples.buried[v]);
+    if !is_hidden && nearest * samples.mesh.area(samples.mesh.element(e)).sqrt() > 1.0 {
         GAP_ERROR * largest(corners.map(|v| samples.reflected[v].length()))
     } else {
         0.0

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use lexopt::prelude::*;
 use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
-use radiosity::{Error, ObjSettings, Scene, read_ply};
+use radiosity::{Error, ErrorKind, ObjSettings, Rgb, Scene, read_ply};
 use serde_json::Value as Json;
 
 use crate::args::{self, Stop};
@@ -148,6 +148,8 @@ impl Options {
 
     fn verify(&self, scene: &Scene, ply: &Path, points_ply: Option<&Path>) -> Result<(), Error> {
         let start = Instant::now();
+        let told = Told::beside(ply);
+        told.check_sky(scene, ply)?;
         let solution = read_ply(ply)?;
         let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings, |progress| {
@@ -155,7 +157,6 @@ impl Options {
                 ControlFlow::Continue(())
             })
         })?;
-        let told = Told::beside(ply);
         let lines = lines(scene, &found, &told);
         println!("{}", table(&lines));
         println!("{}", self.end(&found, start.elapsed()));
@@ -225,6 +226,22 @@ impl Told {
     fn beside(ply: &Path) -> Told {
         let text = std::fs::read(ply.with_extension("json")).unwrap_or_default();
         Told(serde_json::from_slice(&text).unwrap_or_default())
+    }
+
+    /// Refuses a solution that was baked under another sky than that of `scene`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] with the sky that it was baked under.
+    fn check_sky(&self, scene: &Scene, ply: &Path) -> Result<(), Error> {
+        let Some(channels) = self.0["sky"].as_array() else { return Ok(()) };
+        let [r, g, b] = [0, 1, 2].map(|k| channels.get(k).and_then(Json::as_f64).unwrap_or(0.0));
+        // Digits of a file may be rounded once more.
+        if Rgb::new(r, g, b).abs_diff_eq(scene.sky(), 1e-12 * scene.sky().max_element()) {
+            return Ok(());
+        }
+        let found = format!("baked under a sky of radiance {r},{g},{b}");
+        let remedy = format!("verify it under the same: --sky {r},{g},{b}");
+        Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
     }
 
     fn total(&self) -> Option<f64> {
