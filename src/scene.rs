@@ -7,6 +7,7 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+mod rgb;
 pub mod texture;
 mod warning;
 
@@ -17,12 +18,9 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+pub use rgb::Rgb;
 use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
-
-/// One value per colour channel (r, g, b), linear; the unit is said where it is used. Made by
-/// `Rgb::new(r, g, b)` or `Rgb::splat(grey)`.
-pub type Rgb = DVec3;
 
 /// How the front of a face reflects and emits. Backs only block light.
 #[derive(Clone, Debug, PartialEq)]
@@ -219,12 +217,12 @@ impl Scene {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a radiance that is negative or not finite.
-    pub fn with_sky(&self, radiance: Rgb) -> Result<Scene, Error> {
+    pub fn with_sky(self, radiance: Rgb) -> Result<Scene, Error> {
         if !(radiance * PI).is_finite() || radiance.min_element() < 0.0 {
             let remedy = "give at least 0 in every channel, and finite";
             return Err(bad("sky", format!("radiance {radiance}"), remedy));
         }
-        Ok(Scene { sky: radiance, ..self.clone() })
+        Ok(Scene { sky: radiance, ..self })
     }
 
     /// Radiosity of a surface that looks like the sky, W/m².

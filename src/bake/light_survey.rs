@@ -78,14 +78,15 @@ impl LightSurvey {
         }
         // Direct light at each place: flux over the area that it stands for, W.
         let mut flux = vec![0.0; places.len()];
-        if sky > 0.0 {
-            for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(look(scene, &[], &places))
-            {
-                *flux += place.area * seen.escaped * sky;
-            }
-        }
-        for lights in lights.chunks(3) {
+        // Without lights one look still finds the sky.
+        for first in (0..lights.len().max(1)).step_by(3) {
+            let lights = &lights[first..lights.len().min(first + 3)];
             let seen = look(scene, lights, &places);
+            if first == 0 {
+                for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
+                    *flux += place.area * seen.escaped * sky;
+                }
+            }
             for (channel, light) in lights.iter().enumerate() {
                 let exitance = scene.materials()[light.material as usize].exitance.length();
                 let mut landing = 0.0;

@@ -149,10 +149,10 @@ impl GatheredView<'_> {
 
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
         let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
-        let mut parts = vec![];
+        let mut sky_rays = 0;
         for seen in self.rays.seen(pixel) {
             let Seen::Front(hit) = seen else {
-                parts.push(self.sky_part(pixel as usize));
+                sky_rays += 1;
                 continue;
             };
             let surface = self.smooth_surface(&hit);
@@ -161,22 +161,27 @@ impl GatheredView<'_> {
                 None => groups.push((surface, vec![hit])),
             }
         }
+        let mut parts = vec![];
+        if sky_rays > 0 && self.light.surface.sky != Rgb::ZERO {
+            parts.push(self.sky_part(pixel as usize, sky_rays));
+        }
         for (_, hits) in &groups {
             self.add_parts(pixel as usize, hits, &mut parts);
         }
         parts
     }
 
-    /// One ray of a pixel that sees the sky, where nothing is to be gathered.
-    fn sky_part(&self, pixel: usize) -> PixelPart {
+    /// The rays of a pixel that see the sky, where nothing is to be gathered.
+    fn sky_part(&self, pixel: usize, rays: u32) -> PixelPart {
+        let weight = self.rays.weight * f64::from(rays);
         PixelPart {
             pixel,
             point: GatherPoint { position: self.rays.eye, normal: DVec3::Y, near: 0.0 },
             size: 0.0,
-            weight: self.rays.weight,
+            weight,
             exitance: Rgb::ZERO,
             reflectance: Rgb::ZERO,
-            interpolated: self.light.surface.sky * self.rays.weight,
+            interpolated: self.light.surface.sky * weight,
         }
     }
 

@@ -16,7 +16,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
 
-use super::Rgb;
+use super::rgb::Rgb;
 
 /// An image, in 8 bits a channel as sRGB has them.
 pub struct Texture {

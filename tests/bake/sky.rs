@@ -153,7 +153,7 @@ fn what_nothing_hides_is_sky_in_the_picture() {
 fn a_sky_is_no_less_than_dark() {
     let ground = quads(&[(facing_up([0.0, 1.0], [0.0, 1.0], 0.0), paint(0.5, 0.0))]);
     for radiance in [Rgb::new(0.0, -1.0, 0.0), Rgb::splat(f64::NAN), Rgb::splat(f64::MAX)] {
-        let error = ground.with_sky(radiance).unwrap_err();
+        let error = ground.clone().with_sky(radiance).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Scene);
         assert!(error.to_string().contains("sky"), "{error}");
     }

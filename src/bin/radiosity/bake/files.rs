@@ -112,18 +112,19 @@ impl Files {
     /// Writes pictures and meshes, and gives the camera of the picture, if there is one.
     pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Camera>, Error> {
         let mut camera = None;
-        let mut tone = ToneCurve::fit(&baked.light.surface.radiosity);
+        let mut tone = None;
         if self.writes(Format::Exr) || self.writes(Format::Png) {
             let chosen = camera.insert(self.camera.unwrap_or_else(|| self.framing(baked)));
             let image = self.picture(chosen, baked, device)?;
             // Where the picture is black, what it does not show has its own exposure.
             if image.pixels.iter().any(|c| c.max_element() > 0.0) {
-                tone = ToneCurve::fit_image(&image).of_radiosity();
+                tone = Some(ToneCurve::fit_image(&image).of_radiosity());
             } else if baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0) {
                 eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
             self.write_picture(&image)?;
         }
+        let tone = tone.unwrap_or_else(|| ToneCurve::fit(&baked.light.surface.radiosity));
         self.write_meshes(baked, &tone)?;
         Ok(camera)
     }
