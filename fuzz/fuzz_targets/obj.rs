@@ -1,4 +1,4 @@
-//! OBJ and MTL from anywhere: see `try_scene`.
+//! OBJ files, libraries and images from anywhere: see `try_scene`.
 #![no_main]
 
 #[path = "../../tests/fuzz_corpus/scene.rs"]

@@ -1,9 +1,11 @@
 //! Replays what fuzzing kept: inputs that each reach code that no other does, and, by name, those
-//! that once crashed, took too long or broke something. `cargo +nightly fuzz run obj`, or `state`,
-//! looks for more.
+//! that once crashed, took too long or broke something. `docs/robustness.md` says how to look for
+//! more.
 
+mod ply;
 mod scene;
 mod state;
+mod texture;
 
 use std::fs;
 use std::path::Path;
@@ -36,6 +38,18 @@ fn every_obj_input_keeps_its_promises() {
 fn every_state_input_keeps_its_promises() {
     let (accepted, refused) = replay("state", state::try_state);
     assert!(accepted > 10 && refused > 10, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+fn every_image_keeps_its_promises() {
+    let (accepted, refused) = replay("texture", texture::try_texture);
+    assert!(accepted > 15 && refused > 0, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+fn every_ply_input_keeps_its_promises() {
+    let (accepted, refused) = replay("ply", ply::try_ply);
+    assert!(accepted > 4 && refused > 1, "{accepted} accepted, {refused} refused");
 }
 
 /// States of today's solver are what the corpus begins with: RADIOSITY_SEEDS=FOLDER writes them
