@@ -4,12 +4,17 @@
 //! ([`super::files`]). What an image claims to be is checked before memory is taken for it.
 
 use std::collections::HashMap;
+#[cfg(feature = "textures")]
+use std::io;
 use std::sync::Arc;
 
 use glam::DVec2;
 
 use super::files::FileSource;
 use super::text::finite;
+#[cfg(feature = "textures")]
+use crate::error::shortened;
+use crate::scene::WarningKind;
 use crate::scene::texture::Texture;
 
 /// Texels that all images of a scene may have together: each takes up to 15 bytes while it is
@@ -24,6 +29,22 @@ const MAX_IMAGE_BYTES: u64 = 1 << 28;
 /// Texels that an image may have along a side. Chosen by hand.
 #[cfg(feature = "textures")]
 const MAX_SIDE: u32 = 1 << 15;
+
+/// Texels that a byte of a PNG file can stand for at most: deflate makes up to 1032 bytes of one
+/// (258 of two bits: RFC 1951, 3.2.5), of eight texels each.
+#[cfg(feature = "textures")]
+const PNG_TEXELS: u64 = 8 * 1032;
+
+/// The same of the others: JPEG has at least a bit for each 8 × 8 texels (ITU-T T.81, F and G), BMP
+/// and TGA have two bytes for each run of up to 255 and 128. A file of a hundred bytes is thus not
+/// taken for one of 10 000 × 10 000 texels that breaks off.
+#[cfg(feature = "textures")]
+const OTHER_TEXELS: u64 = 512;
+
+/// Bytes that colour profiles and texts of a PNG may have together when they are unpacked, which is
+/// done before its size is known. Chosen by hand: profiles have some kilobytes.
+#[cfg(feature = "textures")]
+const MAX_ANCILLARY_BYTES: u64 = 1 << 24;
 
 /// `map_Kd` or `map_Ke`.
 #[derive(Debug, PartialEq)]
@@ -82,10 +103,17 @@ impl TextureStatement {
 /// Images by name, each read once.
 pub(super) struct Textures<'a> {
     files: &'a FileSource<'a>,
-    known: HashMap<String, Option<Arc<Texture>>>,
-    /// Texels of all images so far.
+    known: HashMap<String, Result<Arc<Texture>, Unread>>,
+    /// Texels that may yet be read.
     #[cfg(feature = "textures")]
-    texels: u64,
+    texels_left: u64,
+}
+
+/// Why an image is not used: what it is, and a reason for the kinds that have several.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unread {
+    pub kind: WarningKind,
+    pub reason: Option<String>,
 }
 
 impl<'a> Textures<'a> {
@@ -94,13 +122,14 @@ impl<'a> Textures<'a> {
             files,
             known: HashMap::new(),
             #[cfg(feature = "textures")]
-            texels: 0,
+            texels_left: MAX_TEXELS,
         }
     }
 
     /// The image `name`, if it is there and can be read.
-    pub fn get(&mut self, name: &str) -> Option<Arc<Texture>> {
-        let found = self.files.find(name)?;
+    pub fn get(&mut self, name: &str) -> Result<Arc<Texture>, Unread> {
+        let missing = Unread { kind: WarningKind::MissingTexture, reason: None };
+        let found = self.files.find(name).ok_or(missing)?;
         if let Some(known) = self.known.get(&found) {
             return known.clone();
         }
@@ -110,33 +139,74 @@ impl<'a> Textures<'a> {
     }
 
     #[cfg(feature = "textures")]
-    fn read(&mut self, found: &str) -> Option<Texture> {
-        let bytes = self.files.read(found, MAX_IMAGE_BYTES).ok()?;
-        let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
+    fn read(&mut self, found: &str) -> Result<Texture, Unread> {
+        let bytes = self.files.read(found, MAX_IMAGE_BYTES).map_err(|e| match e.kind() {
+            io::ErrorKind::FileTooLarge => Unread::large(e),
+            _ => Unread::unreadable(e),
+        })?;
+        let length = bytes.len() as u64;
+        let mut reader = image::ImageReader::new(io::Cursor::new(bytes));
         if let Ok(format) = image::ImageFormat::from_path(found) {
             reader.set_format(format);
         }
         // Some are called .png and are none; TGA cannot be told by its content.
-        let mut reader = reader.with_guessed_format().ok()?;
+        let mut reader = reader.with_guessed_format().map_err(Unread::unreadable)?;
+        let is_png = reader.format() == Some(image::ImageFormat::Png);
         let mut limits = image::Limits::default();
-        limits.max_image_width = Some(MAX_SIDE);
-        limits.max_image_height = Some(MAX_SIDE);
-        limits.max_alloc = Some(8 * (MAX_TEXELS - self.texels));
+        limits.max_alloc = Some(MAX_ANCILLARY_BYTES);
         reader.limits(limits);
-        let image = reader.decode().ok()?.into_rgb8();
-        let (width, height) = image.dimensions();
+        let decoder = reader.into_decoder().map_err(Unread::undecoded)?;
+        let (width, height) = image::ImageDecoder::dimensions(&decoder);
+        self.check(width, height, length * if is_png { PNG_TEXELS } else { OTHER_TEXELS })?;
+        let image = image::DynamicImage::from_decoder(decoder).map_err(Unread::undecoded)?;
+        let texels = image.into_rgb8().into_raw().as_chunks().0.to_vec();
+        self.texels_left -= texels.len() as u64;
+        Texture::new(width, height, texels).ok_or_else(|| Unread::unreadable("no texels"))
+    }
+
+    /// Whether an image may be so large, whose file has bytes enough for `most` texels.
+    #[cfg(feature = "textures")]
+    fn check(&self, width: u32, height: u32, most: u64) -> Result<(), Unread> {
         let texels = u64::from(width) * u64::from(height);
-        if self.texels + texels > MAX_TEXELS {
-            return None;
+        if width.max(height) > MAX_SIDE {
+            let found = format!("{width} × {height} texels, and {MAX_SIDE} a side is the limit");
+            return Err(Unread::large(found));
         }
-        self.texels += texels;
-        let texels = image.into_raw().chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        Texture::new(width, height, texels)
+        if texels > self.texels_left {
+            return Err(Unread::large(format!(
+                "{width} × {height} texels, and {MAX_TEXELS} of all images is the limit"
+            )));
+        }
+        if texels > most {
+            return Err(Unread::unreadable(format!(
+                "its file is too short for the {width} × {height} texels that it claims"
+            )));
+        }
+        Ok(())
     }
 
     #[cfg(not(feature = "textures"))]
-    fn read(&mut self, _: &str) -> Option<Texture> {
-        None
+    fn read(&mut self, _: &str) -> Result<Texture, Unread> {
+        Err(Unread::unreadable("this program was built without the feature `textures`"))
+    }
+}
+
+impl Unread {
+    #[cfg(feature = "textures")]
+    fn large(reason: impl std::fmt::Display) -> Unread {
+        Unread { kind: WarningKind::LargeTexture, reason: Some(reason.to_string()) }
+    }
+
+    fn unreadable(reason: impl std::fmt::Display) -> Unread {
+        Unread { kind: WarningKind::UnreadableTexture, reason: Some(reason.to_string()) }
+    }
+
+    #[cfg(feature = "textures")]
+    fn undecoded(e: image::ImageError) -> Unread {
+        match e {
+            image::ImageError::Limits(e) => Unread::large(e),
+            e => Unread::unreadable(shortened(&e.to_string()).escape_debug()),
+        }
     }
 }
 
@@ -168,5 +238,34 @@ mod tests {
         }
         assert_eq!(parsed("-s"), plain(""));
         assert_eq!(parsed(""), plain(""));
+    }
+
+    /// A grey TGA image of this size.
+    #[cfg(feature = "textures")]
+    fn tga(width: u8, height: u8) -> Vec<u8> {
+        let header = [0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, height, 0, 8, 0];
+        [&header[..], &vec![200; usize::from(width) * usize::from(height)]].concat()
+    }
+
+    #[cfg(feature = "textures")]
+    #[test]
+    fn images_beyond_the_texels_of_a_scene_are_not_read() {
+        let (large, small) = (tga(9, 9), tga(3, 3));
+        let files: [(&str, &[u8]); 3] = [("a.tga", &large), ("b.tga", &large), ("c.tga", &small)];
+        let files = FileSource::in_memory(&files);
+        let mut textures = Textures { texels_left: 100, ..Textures::new(&files) };
+        let mut size = |name| textures.get(name).map(|texture| texture.size());
+        assert_eq!(size("a.tga"), Ok([9, 9]));
+        let unread = size("b.tga").unwrap_err();
+        assert_eq!(unread.kind, WarningKind::LargeTexture);
+        let reason = unread.reason.clone().unwrap();
+        assert!(reason.starts_with("9 × 9 texels") && reason.contains("134217728"), "{reason}");
+        // Those that still fit are read, and each counts once.
+        assert_eq!(size("c.tga"), Ok([3, 3]));
+        assert_eq!(
+            [size("b.tga"), size("a.tga"), size("c.tga")],
+            [Err(unread), Ok([9, 9]), Ok([3, 3])]
+        );
+        assert_eq!(textures.texels_left, 100 - 81 - 9);
     }
 }

@@ -44,8 +44,12 @@ pub enum WarningKind {
     NegativeColour,
     /// A statement of a material that cannot be read.
     MaterialStatement,
-    /// A texture that cannot be read.
+    /// A texture that is not there.
     MissingTexture,
+    /// A texture that is no image, or breaks off.
+    UnreadableTexture,
+    /// A texture that is too large, alone or with those before it.
+    LargeTexture,
     /// Options of a texture that are not used.
     TextureOptions,
     /// Transparency, which is not modelled.
@@ -151,6 +155,8 @@ impl WarningKind {
                 ("unusable statement of a material", "unusable statements of materials")
             }
             MissingTexture => ("texture that is not there", "textures that are not there"),
+            UnreadableTexture => ("texture that cannot be read", "textures that cannot be read"),
+            LargeTexture => ("texture that is too large", "textures that are too large"),
             TextureOptions => (
                 "texture with options that are not used",
                 "textures with options that are not used",
@@ -188,6 +194,8 @@ impl WarningKind {
             MissingTexture => {
                 "put the image, as PNG, JPEG, BMP or TGA, into the folder of the OBJ file"
             }
+            UnreadableTexture => "give a whole image, as PNG, JPEG, BMP or TGA",
+            LargeTexture => "make images smaller: a side of 32768 texels, 134217728 in all",
             MissingLibrary => "put the library into the folder of the OBJ file or below",
             LibraryElsewhere => "name it by its path from the folder of the OBJ file",
             UnknownMaterial => "define it with `newmtl` in a library that `mtllib` names",

@@ -153,12 +153,34 @@ fn png_that_claims(side: u32) -> Vec<u8> {
 #[test]
 fn images_that_claim_too_much_or_are_none_are_not_read() {
     let (text, image) = two_halves();
-    let liars = [png_that_claims(100_000), png_that_claims(30_000), vec![], vec![7; 100]];
     let library: &[u8] = b"newmtl wall\nKd 0.3\nmap_Kd a.png\n";
-    for bytes in liars.iter().chain([&image[..20].to_vec()]) {
+    // Runs of a palette of one colour, which end before the first.
+    let mut bmp = [&b"BM"[..], &[0; 8], &[58, 0, 0, 0, 40, 0, 0, 0]].concat();
+    bmp.extend([5000u32, 5000].map(u32::to_le_bytes).concat());
+    bmp.extend([1, 0, 8, 0, 1]);
+    bmp.extend([0; 15]);
+    bmp.extend([1, 0, 0, 0, 0, 0, 0, 0, 9, 9, 9, 0, 0, 1]);
+    let (large, unreadable) = (WarningKind::LargeTexture, WarningKind::UnreadableTexture);
+    for (bytes, kind, reason) in [
+        (png_that_claims(100_000), large, "100000 × 100000 texels, and 32768 a side"),
+        (png_that_claims(30_000), large, "30000 × 30000 texels, and 134217728 of all"),
+        (png_that_claims(10_000), unreadable, "too short for the 10000 × 10000 texels"),
+        (bmp, unreadable, "too short for the 5000 × 5000 texels"),
+        (vec![], unreadable, ""),
+        (vec![7; 100], unreadable, ""),
+        (image[..20].to_vec(), unreadable, ""),
+    ] {
         let files: [(&str, &[u8]); 3] =
-            [("room.obj", text.as_bytes()), ("room.mtl", library), ("a.png", bytes)];
+            [("room.obj", text.as_bytes()), ("room.mtl", library), ("a.png", &bytes)];
         let scene = ObjSettings::default().read("room.obj", files[0].1, &files[1..]).unwrap();
-        assert_eq!(oddities(&scene), [WarningKind::MissingTexture], "{}", bytes.len());
+        assert_eq!(oddities(&scene), [kind], "{} {:?}", bytes.len(), scene.warnings());
+        let warning = scene.warnings()[0].to_string();
+        assert!(warning.contains(reason) && warning.contains("`Kd` and `Ke` count"), "{warning}");
+        assert!(warning.contains("room.mtl:1") && warning.contains("'a.png'"), "{warning}");
+        assert_eq!(scene.material(0).reflectance.to_array(), [0.3; 3]);
+        let mut strict = ObjSettings::default();
+        strict.strict = true;
+        let refused = strict.read("room.obj", files[0].1, &files[1..]).unwrap_err().to_string();
+        assert!(refused.contains("room.mtl:1") && refused.contains("a.png"), "{refused}");
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::PI;
 
 use super::super::mtl::MtlMaterial;
-use super::super::textures::{TextureStatement, Textures};
+use super::super::textures::{TextureStatement, Textures, Unread};
 use super::statements::UNKNOWN_MATERIAL;
 use super::{ObjFile, ObjSettings};
 use crate::error::{Error, ErrorKind, quoted};
@@ -35,10 +35,14 @@ impl ObjFile<'_> {
                     let done = "other options count";
                     self.repairs.note_at(WarningKind::TextureOptions, place, name, done)?;
                 }
-                let Some(texture) = images.get(name) else {
-                    let done = "`Kd` and `Ke` count alone";
-                    self.repairs.note_at(WarningKind::MissingTexture, place, name, done)?;
-                    continue;
+                let texture = match images.get(name) {
+                    Ok(texture) => texture,
+                    Err(Unread { kind, reason }) => {
+                        let reason = reason.map_or(String::new(), |reason| format!("{reason}; "));
+                        let done = format!("{reason}`Kd` and `Ke` count alone");
+                        self.repairs.note_at(kind, place, name, done)?;
+                        continue;
+                    }
                 };
                 let written = if k == 0 { mtl.reflectance } else { mtl.radiance };
                 let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
