@@ -216,7 +216,7 @@ impl Bake {
         let start = Instant::now();
         self.files.check()?;
         let name = self.scene.display().to_string();
-        let scene = progress::of_stage(&format!("reading {name}"), || {
+        let scene = progress::of_reading(&self.scene, || {
             let mut scene = self.obj.load(&self.scene)?;
             scene.check_winding();
             Ok::<_, Error>(scene)

@@ -10,10 +10,13 @@
 //!   estimating  points                                          the same
 //!   drawing, writing  –                                         –
 //! ```
+//!
+//! The seconds between lines go on from stage to stage, so that many short ones are no silence.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -65,6 +68,16 @@ pub fn of_count<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
 pub fn of_stage<T>(name: &str, work: impl FnOnce() -> T) -> T {
     let _display = Display::new(name);
     work()
+}
+
+/// Runs `work`, which reads this file, with that shown.
+pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
+    of_stage(&format!("reading {}", path.display()), work)
+}
+
+/// Runs `work`, which writes this file, with that shown.
+pub fn of_writing<T>(path: &Path, work: impl FnOnce(&Path) -> T) -> T {
+    of_stage(&format!("writing {}", path.display()), || work(path))
 }
 
 fn share(done: usize, of: usize) -> f64 {
@@ -177,6 +190,14 @@ fn with_time_left(text: &str, share: f64, elapsed: Duration) -> String {
     format!("{text}, about {left:.0} s left")
 }
 
+/// When the last line was printed, or the program began to work.
+static LAST_LINE: Mutex<Option<Instant>> = Mutex::new(None);
+
+/// How long it is `now` until the next line, where the last one was printed at `last`.
+fn until_next_line(last: &mut Option<Instant>, now: Instant) -> Duration {
+    LINE_INTERVAL.saturating_sub(now.duration_since(*last.get_or_insert(now)))
+}
+
 /// A thread that prints a line every few seconds.
 struct Lines {
     text: Arc<Mutex<String>>,
@@ -191,20 +212,24 @@ impl Lines {
         let (stop, stopped) = mpsc::channel::<()>();
         let shown = Arc::clone(&text);
         let start = Instant::now();
+        let until_next = || until_next_line(&mut locked(&LAST_LINE), Instant::now());
         let print = move || {
-            while stopped.recv_timeout(LINE_INTERVAL) == Err(RecvTimeoutError::Timeout) {
-                let text = shown.lock().map_or_else(|e| e.into_inner().clone(), |t| t.clone());
-                eprintln!("{text} ({} s)", start.elapsed().as_secs());
+            while stopped.recv_timeout(until_next()) == Err(RecvTimeoutError::Timeout) {
+                eprintln!("{} ({} s)", locked(&shown), start.elapsed().as_secs());
+                *locked(&LAST_LINE) = Some(Instant::now());
             }
         };
         Lines { text, stop: Some(stop), thread: Some(std::thread::spawn(print)) }
     }
 
     fn set(&self, text: String) {
-        if let Ok(mut shown) = self.text.lock() {
-            *shown = text;
-        }
+        *locked(&self.text) = text;
     }
+}
+
+/// What a mutex holds, which no panic leaves half done.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Lines {
@@ -229,6 +254,16 @@ mod tests {
         for (share, seconds) in [(0.0, 10), (0.01, 10), (0.5, 0)] {
             assert_eq!(with_time_left("drawing", share, after(seconds)), "drawing");
         }
+    }
+
+    #[test]
+    fn seconds_between_lines_go_on_from_stage_to_stage() {
+        let (mut last, start) = (None, Instant::now());
+        let after = |seconds| start + Duration::from_secs(seconds);
+        assert_eq!(until_next_line(&mut last, start), LINE_INTERVAL);
+        assert_eq!(until_next_line(&mut last, after(3)), LINE_INTERVAL - Duration::from_secs(3));
+        assert_eq!(until_next_line(&mut last, after(60)), Duration::ZERO);
+        assert_eq!(last, Some(start));
     }
 
     #[test]

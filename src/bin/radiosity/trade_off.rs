@@ -32,6 +32,7 @@ use reference::Reference;
 use surface_points::SurfacePoints;
 
 use crate::args::{self, Device, Stop};
+use crate::progress;
 
 pub const USAGE: &str = "\
 usage: radiosity trade-off SCENE.obj [--truth FILE] [--out STEM] [--quick]
@@ -137,7 +138,8 @@ impl Options {
     fn run(&self) -> Result<Results, Error> {
         args::check_writable(&self.out)?;
         let truth = self.read_truth()?;
-        let scene = Arc::new(self.obj.load(&self.scene)?);
+        let scene = progress::of_reading(&self.scene, || self.obj.load(&self.scene))?;
+        let scene = Arc::new(scene);
         args::print_warnings(&scene);
         let device = self.device.open()?;
         let grid = Grid::new(&scene, self.quick);

@@ -133,7 +133,7 @@ impl Options {
         for file in self.csv.iter().chain(points_ply) {
             args::check_writable(file)?;
         }
-        let scene = self.obj.load(&self.scene)?;
+        let scene = progress::of_reading(&self.scene, || self.obj.load(&self.scene))?;
         args::print_warnings(&scene);
         match &self.what {
             What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),
@@ -150,7 +150,7 @@ impl Options {
         let start = Instant::now();
         let told = Told::beside(ply);
         told.check_sky(scene, ply)?;
-        let solution = read_ply(ply)?;
+        let solution = progress::of_reading(ply, || read_ply(ply))?;
         let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings, |progress| {
                 report(progress.done, progress.of)?;

@@ -144,7 +144,7 @@ impl Options {
         for format in &self.formats {
             args::check_writable(&format.path(&stem))?;
         }
-        let scene = self.obj.load(path)?;
+        let scene = progress::of_reading(path, || self.obj.load(path))?;
         let of_light = |w: &&Warning| w.kind == WarningKind::NoLight;
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
@@ -161,7 +161,7 @@ impl Options {
             print_factors(&matrix);
         }
         for format in &self.formats {
-            format.write(&stem, &matrix)?;
+            progress::of_writing(&format.path(&stem), |_| format.write(&stem, &matrix))?;
         }
         Ok(())
     }

@@ -139,10 +139,10 @@ impl Files {
 
     fn write_picture(&self, image: &RadianceImage) -> Result<(), Error> {
         if self.writes(Format::Exr) {
-            write_exr(self.path("exr"), image)?;
+            progress::of_writing(&self.path("exr"), |path| write_exr(path, image))?;
         }
         if self.writes(Format::Png) {
-            write_png(self.path("png"), image)?;
+            progress::of_writing(&self.path("png"), |path| write_png(path, image))?;
         }
         Ok(())
     }
@@ -150,18 +150,20 @@ impl Files {
     /// Writes meshes; their colours are those of the picture.
     fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) -> Result<(), Error> {
         if self.writes(Format::Ply) {
-            let mut surface = baked.light.surface.clone();
-            surface.comments = comments(baked);
-            progress::of_stage("writing PLY", || {
-                write_ply_with_tone(self.path("ply"), &surface, tone)
+            progress::of_writing(&self.path("ply"), |path| {
+                let mut surface = baked.light.surface.clone();
+                surface.comments = comments(baked);
+                write_ply_with_tone(path, &surface, tone)
             })?;
         }
         if self.writes(Format::Glb) {
-            progress::of_stage("writing GLB", || write_glb(self.path("glb"), &baked.light, tone))?;
+            progress::of_writing(&self.path("glb"), |path| write_glb(path, &baked.light, tone))?;
         }
         if self.elements {
-            let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
-            write_ply_with_tone(self.path("elements.ply"), &flat, tone)?;
+            progress::of_writing(&self.path("elements.ply"), |path| {
+                let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
+                write_ply_with_tone(path, &flat, tone)
+            })?;
         }
         Ok(())
     }
@@ -171,7 +173,9 @@ impl Files {
         if !self.writes(Format::Json) {
             return Ok(());
         }
-        args::write_file(&self.path("json"), format!("{json:#}\n").as_bytes())
+        progress::of_writing(&self.path("json"), |path| {
+            args::write_file(path, format!("{json:#}\n").as_bytes())
+        })
     }
 
     /// The picture, interpolated between vertices or gathered by its pixels.
@@ -188,7 +192,8 @@ impl Files {
             });
         }
         let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
-        let mut gather = device.gather(&baked.light.mesh, rays)?;
+        let mut gather =
+            progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
         let image = progress::of_count("pixels of the picture", |report| {
             camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
         })?;
