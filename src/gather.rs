@@ -73,7 +73,8 @@ pub struct RadiosityField<'a> {
     pub mesh: &'a Mesh,
     /// Per element, the indices of its three corners in `reflected`.
     pub corners: &'a [[u32; 3]],
-    /// Reflected radiosity B − E, W/m² per channel.
+    /// Reflected radiosity B − E, W/m² per channel, with the reflectance of the material: it
+    /// follows the light and no texture. [`RadiosityField::reflected_at`] has the texture in it.
     pub reflected: &'a [Rgb],
 }
 
@@ -137,10 +138,21 @@ impl RadiosityField<'_> {
         RADIOSITY_FLOOR_SHARE * flux / area
     }
 
-    /// Reflected radiosity at barycentric position (`u`, `v`) of the scene's triangle `t`, W/m²
-    /// per channel: `u` and `v` are the weights of its second and third corner.
-    pub(crate) fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
-        let (element, [u, v]) = self.mesh.element_at(t, u, v);
+    /// Radiosity that barycentric position (`u`, `v`) of the scene's triangle `t` reflects, W/m²
+    /// per channel: `u` and `v` are the weights of its second and third corner. An element of a
+    /// textured material reflects the mean of its own piece of the texture.
+    pub fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
+        let (element, local) = self.mesh.element_at(t, u, v);
+        self.interpolated(element, local) * self.mesh.relative_reflectance(element)
+    }
+
+    /// The same as if all of the material reflected alike.
+    pub(crate) fn untextured_at(&self, t: usize, u: f64, v: f64) -> Rgb {
+        let (element, local) = self.mesh.element_at(t, u, v);
+        self.interpolated(element, local)
+    }
+
+    fn interpolated(&self, element: usize, [u, v]: [f64; 2]) -> Rgb {
         let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);
         a * (1.0 - u - v) + b * u + c * v
     }

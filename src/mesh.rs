@@ -21,6 +21,7 @@ mod clusters;
 mod contacts;
 mod quadtree;
 pub(crate) mod sizing;
+mod textured;
 mod topology;
 
 use std::collections::HashSet;
@@ -76,6 +77,8 @@ pub struct Mesh {
     areas: Vec<f64>,
     /// Made when they are asked for.
     clusters: Arc<OnceLock<Clusters>>,
+    /// See [`Mesh::reflectance`]; empty without textures. Made when they are asked for.
+    textured_reflectances: Arc<OnceLock<Vec<Rgb>>>,
 }
 
 impl Mesh {
@@ -149,6 +152,7 @@ impl Mesh {
             normals: (0..count).map(|t| scene.normal(t)).collect(),
             areas: (0..count).map(|t| scene.area(t)).collect(),
             clusters: Arc::default(),
+            textured_reflectances: Arc::default(),
             scene,
         };
         for root in 0..count {
@@ -215,7 +219,8 @@ impl Mesh {
         self.clusters();
         let normals = (0..count).map(|t| scene.normal(t)).collect();
         let areas = (0..count).map(|t| scene.area(t)).collect();
-        Ok(Mesh { scene, normals, areas, ..self.clone() })
+        let textured_reflectances = Arc::default();
+        Ok(Mesh { scene, normals, areas, textured_reflectances, ..self.clone() })
     }
 
     /// Clusters of triangles.
@@ -238,6 +243,12 @@ impl Mesh {
         }
         if self.scene.sky() != Rgb::ZERO {
             all.update(bytemuck::bytes_of(&self.scene.sky().to_array()));
+        }
+        if self.scene.has_textures() {
+            for e in 0..self.element_count() {
+                let pair = [self.reflectance(e), self.exitance(e)];
+                all.update(bytemuck::bytes_of(&pair.map(|v| v.to_array())));
+            }
         }
         self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
         all.digest()
@@ -320,9 +331,9 @@ impl Mesh {
     /// Mean reflectance by area of the elements that reflect, per channel; 0 where none does. What
     /// reflects nothing is left out, since a black sky around a scene makes the scene no darker.
     pub(crate) fn mean_reflectance(&self) -> Rgb {
-        let reflecting = |&node: &NodeId| self.material(node).reflectance * self.area(node);
+        let reflecting = |(e, &node): (usize, &NodeId)| self.reflectance(e) * self.area(node);
         let area = self.reflecting_area().max(f64::MIN_POSITIVE);
-        self.elements.iter().map(reflecting).sum::<Rgb>() / area
+        self.elements.iter().enumerate().map(reflecting).sum::<Rgb>() / area
     }
 
     /// Unit normal of `node`, on its front.

@@ -9,10 +9,12 @@
 
 mod rgb;
 pub mod texture;
+mod textured;
 mod warning;
 
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -20,6 +22,7 @@ use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
 pub use rgb::Rgb;
 use texture::MaterialTextures;
+use textured::SceneTextures;
 pub use warning::{Warning, WarningKind};
 
 /// How the front of a face reflects and emits. Backs only block light.
@@ -27,9 +30,11 @@ pub use warning::{Warning, WarningKind};
 pub struct Material {
     /// Name, for messages and look-up.
     pub name: String,
-    /// Diffuse hemispherical reflectance ρ per channel, in [0, 1).
+    /// Diffuse hemispherical reflectance ρ per channel, in [0, 1). Of a texture the mean over all
+    /// triangles of the material; [`Scene::reflectance_at`] has it in detail.
     pub reflectance: Rgb,
-    /// Exitance E per channel, W/m²: π times the emitted radiance.
+    /// Exitance E per channel, W/m²: π times the emitted radiance. Of a texture the mean over all
+    /// triangles of the material; [`Scene::exitance_at`] has it in detail.
     pub exitance: Rgb,
 }
 
@@ -62,10 +67,8 @@ pub struct Scene {
     warnings: Vec<Warning>,
     /// See [`Scene::sky`].
     sky: Rgb,
-    /// Of the corners of each triangle; empty where no material has textures, as are those.
-    texture_coordinates: Vec<[DVec2; 3]>,
-    /// Of the materials that have some, by their indices.
-    textures: BTreeMap<u32, MaterialTextures>,
+    /// Textures of materials, and where they lie on triangles.
+    textures: Arc<SceneTextures>,
 }
 
 impl Scene {
@@ -104,7 +107,8 @@ impl Scene {
     }
 
     /// The same with texture coordinates for each triangle and textures for materials by their
-    /// indices, or none of either.
+    /// indices, or none of either. Reflectance and exitance of those materials become the means of
+    /// their textures over their triangles.
     pub(crate) fn with_textures(
         positions: Vec<DVec3>,
         mut triangles: Vec<Triangle>,
@@ -178,9 +182,12 @@ impl Scene {
             coordinate_ulp,
             warnings,
             sky,
-            texture_coordinates,
-            textures,
+            textures: Arc::default(),
         };
+        if !textures.is_empty() {
+            scene.lay_textures(texture_coordinates, textures);
+            scene.materials.iter().try_for_each(Material::check)?;
+        }
         if degenerate > 0 {
             scene.warn(Warning::new(WarningKind::Degenerate, degenerate, "dropped"));
         }
@@ -232,7 +239,7 @@ impl Scene {
 
     /// Whether any surface emits light.
     pub fn has_emitter(&self) -> bool {
-        (0..self.triangles.len()).any(|t| self.material(t).exitance != Rgb::ZERO)
+        (0..self.triangles.len()).any(|t| self.exitance(t) != Rgb::ZERO)
     }
 
     /// How many triangles were dropped for having no area.
@@ -288,19 +295,8 @@ impl Scene {
         &self.materials[self.triangles[t].material as usize]
     }
 
-    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
-    /// where the scene has no textures. Not finite for a corner that has none.
-    pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
-        self.texture_coordinates.get(t).copied()
-    }
-
-    /// Textures of triangle `t`; `None` where its material has none. Its material's reflectance and
-    /// exitance then are the means of the whole images.
-    pub fn textures(&self, t: usize) -> Option<&MaterialTextures> {
-        self.textures.get(&self.triangles[t].material)
-    }
-
-    /// The same scene with `materials` in the place of its own, one for one.
+    /// The same scene with `materials` in the place of its own, one for one. Textures stay: where
+    /// a material has one, its reflectance or exitance is the mean that the texture is scaled to.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when their number is another, or one is out of range.
@@ -340,10 +336,8 @@ impl Scene {
             });
         }
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
-        let (coordinates, textures) = (self.texture_coordinates.clone(), self.textures.clone());
-        let scene =
-            Scene::with_textures(positions, triangles, groups, materials, coordinates, textures)?;
-        let scene = Scene { sky: self.sky, ..scene };
+        let scene = Scene::new(positions, triangles, groups, materials)?;
+        let scene = Scene { sky: self.sky, textures: self.textures.clone(), ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

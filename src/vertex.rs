@@ -15,13 +15,15 @@ mod boundary_fit;
 mod corner_singularity;
 pub(crate) mod hanging_nodes;
 pub(crate) mod keys;
+pub(crate) mod textured;
 
 use glam::DVec3;
 
 use crate::mesh::{Mesh, SurfaceTopology};
-use crate::scene::Rgb;
+use crate::scene::{Material, Rgb};
 use hanging_nodes::HangingNodes;
 use keys::{ElementLoops, Vertices};
+use textured::irradiance;
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
@@ -37,8 +39,13 @@ pub struct VertexMesh {
     pub positions: Vec<DVec3>,
     /// Unit normals: area-weighted over the elements around a vertex.
     pub normals: Vec<DVec3>,
-    /// Radiosity B at the vertices, W/m² per channel, linear.
+    /// Radiosity B at the vertices, W/m² per channel, linear. On a textured surface a vertex
+    /// reflects the mean of the elements around it, weighted by area.
     pub radiosity: Vec<Rgb>,
+    /// Irradiance at the vertices, W/m² per channel, linear: what a program with the textures
+    /// multiplies with their reflectance. A channel in which the material reflects nothing is not
+    /// gathered, and 0 here. Empty where it is not known.
+    pub irradiance: Vec<Rgb>,
     /// Standard error of the radiosity at each vertex and over the faces around it, W/m²: a length
     /// over the channels. Empty where it was not estimated.
     pub error: Vec<f64>,
@@ -63,15 +70,21 @@ impl VertexMesh {
     /// there. Means smooth: the mean over an element's corners is no longer the element's value.
     /// One step of van Cittert's (1931) iteration restores most of it, by adding the area-weighted
     /// mean of the differences. No value is below zero.
+    ///
+    /// Elements of a textured material are averaged as if all of it reflected alike.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
         VertexMesh::with_corners(mesh, element_radiosity).0
     }
 
-    /// The same, and the vertices at the corners of each element.
+    /// The same, the vertices at the corners of each element, and the reflected radiosity of these
+    /// as if no material were textured, W/m².
     pub(crate) fn with_corners(
         mesh: &Mesh,
         element_radiosity: &[Rgb],
-    ) -> (VertexMesh, Vec<[u32; 3]>) {
+    ) -> (VertexMesh, Vec<[u32; 3]>, Vec<Rgb>) {
+        let untextured = textured::untextured(mesh, element_radiosity);
+        let with_textures = element_radiosity;
+        let element_radiosity = untextured.as_deref().unwrap_or(element_radiosity);
         let topology = SurfaceTopology::new(mesh.scene());
         let vertices = Vertices::new(mesh, &topology);
         let outlines = &vertices.outlines;
@@ -100,30 +113,43 @@ impl VertexMesh {
             sky: mesh.scene().sky(),
             ..Default::default()
         };
+        let mut reflected = out.radiosity.clone();
+        for (e, outline) in outlines.iter() {
+            let emitted = mesh.material(mesh.element(e)).exitance;
+            for v in outline.iter().map(|&v| v as usize) {
+                reflected[v] = (out.radiosity[v] - emitted).max(Rgb::ZERO);
+            }
+        }
+        out.reflect(mesh, outlines, &reflected);
         let hanging_nodes = HangingNodes::new(mesh, &topology, &vertices);
-        out.add_elements(mesh, &hanging_nodes, |_, e| element_radiosity[e]);
-        (out, vertices.corners)
+        out.add_elements(mesh, &hanging_nodes, |_, e| {
+            let Material { reflectance, exitance, .. } = mesh.material(mesh.element(e));
+            let reflected = (element_radiosity[e] - exitance).max(Rgb::ZERO);
+            [with_textures[e], irradiance(reflected, *reflectance)]
+        });
+        (out, vertices.corners, reflected)
     }
 
     /// Adds the hanging nodes, and every element of `mesh` as a face, or as a fan where there are
-    /// vertices on its sides. `centre_radiosity` gives the value at the centre of an element's fan,
-    /// W/m² per channel.
+    /// vertices on its sides. `centre_light` gives radiosity and irradiance at the centre of an
+    /// element's fan, W/m² per channel.
     pub(crate) fn add_elements(
         &mut self,
         mesh: &Mesh,
         hanging_nodes: &HangingNodes,
-        centre_radiosity: impl Fn(&Self, usize) -> Rgb,
+        centre_light: impl Fn(&Self, usize) -> [Rgb; 2],
     ) {
         for node in &hanging_nodes.nodes {
             let [a, b] = node.between.map(|v| v as usize);
             self.positions.push(node.position);
             self.normals.push((self.normals[a] + self.normals[b]).normalize_or_zero());
             self.radiosity.push((self.radiosity[a] + self.radiosity[b]) / 2.0);
+            self.irradiance.push((self.irradiance[a] + self.irradiance[b]) / 2.0);
         }
         for (e, outline) in hanging_nodes.outlines.iter() {
             match *outline {
                 [a, b, c] => self.add_face([a, b, c], e),
-                _ => self.add_fan(mesh, outline, e, centre_radiosity(self, e)),
+                _ => self.add_fan(mesh, outline, e, centre_light(self, e)),
             }
         }
     }
@@ -133,12 +159,14 @@ impl VertexMesh {
         self.elements.push(e as u32);
     }
 
-    /// Adds element `e` as a fan around its centroid, which has `radiosity`.
-    fn add_fan(&mut self, mesh: &Mesh, outline: &[u32], e: usize, radiosity: Rgb) {
+    /// Adds element `e` as a fan around its centroid, which has this radiosity and irradiance.
+    fn add_fan(&mut self, mesh: &Mesh, outline: &[u32], e: usize, centre_light: [Rgb; 2]) {
         let centre = self.positions.len() as u32;
         self.positions.push(mesh.centroid(mesh.element(e)));
         self.normals.push(mesh.normal(mesh.element(e)));
+        let [radiosity, irradiance] = centre_light;
         self.radiosity.push(radiosity);
+        self.irradiance.push(irradiance);
         for (k, &a) in outline.iter().enumerate() {
             self.add_face([centre, a, outline[(k + 1) % outline.len()]], e);
         }
@@ -154,6 +182,8 @@ impl VertexMesh {
             out.positions.extend(mesh.corners(node));
             out.normals.extend([mesh.normal(node); 3]);
             out.radiosity.extend([radiosity; 3]);
+            let reflected = (radiosity - mesh.exitance(e)).max(Rgb::ZERO);
+            out.irradiance.extend([irradiance(reflected, mesh.reflectance(e)); 3]);
             out.faces.push([first, first + 1, first + 2]);
             out.elements.push(e as u32);
         }
@@ -221,7 +251,7 @@ mod tests {
     use std::collections::HashMap;
 
     use super::*;
-    use crate::scene::{Material, Scene, Triangle};
+    use crate::scene::{Scene, Triangle};
 
     /// Triangles over shared positions; one group and one material each as given.
     fn mesh(positions: &[[f64; 3]], faces: &[([u32; 3], u32, u32)], size: f64) -> Mesh {

@@ -234,7 +234,13 @@ impl ErrorEstimator<'_> {
             let inset = 3.0 * u.min(v).min(1.0 - u - v);
             let position = mix(corners(face));
             let point = above.gather_point(position, mesh.normal(node), size * inset);
-            let radiosity = mix(face.map(|v| surface.radiosity[v as usize]));
+            let interpolated = |values: &[Rgb]| mix(face.map(|v| values[v as usize]));
+            // Of the light, whatever textures are.
+            let reflected = if mesh.scene().has_textures() {
+                material.reflectance * interpolated(&surface.irradiance)
+            } else {
+                interpolated(&surface.radiosity) - material.exitance
+            };
             Sample {
                 stratum,
                 weight,
@@ -242,7 +248,7 @@ impl ErrorEstimator<'_> {
                 reflectance: material.reflectance,
                 point,
                 inward: corners(face).iter().sum::<DVec3>() / 3.0 - position,
-                interpolated: radiosity - material.exitance,
+                interpolated: reflected,
                 size,
                 rotation: rotations.at(point.position, point.near),
             }
@@ -291,13 +297,12 @@ impl ErrorEstimator<'_> {
     fn unshot(&self, floor: f64, strata: &mut [Stratum]) -> f64 {
         let sources = self.sources();
         let mesh = &sources.mesh;
-        let mut ambient = vec![Rgb::ZERO; mesh.element_count()];
-        self.ledger.add_ambient(mesh, &mut ambient);
+        let ambient_irradiance = self.ledger.add_ambient(mesh, &mut []);
         let groups = mesh.scene().groups().len().max(1);
         let (mut squares, mut areas) = (vec![0.0; groups], vec![0.0; groups]);
         let mut flux = Rgb::ZERO;
         let mut max_reflectance = Rgb::ZERO;
-        for (e, ambient) in ambient.iter().enumerate() {
+        for e in 0..mesh.element_count() {
             let node = mesh.element(e);
             let material = mesh.material(node);
             if !material.reflects() {
@@ -306,11 +311,13 @@ impl ErrorEstimator<'_> {
             let corners = sources.corners[e].iter().map(|&v| sources.reflected[v as usize]);
             let reflected = corners.sum::<Rgb>() / 3.0;
             let (element_area, group) = (mesh.area(node), mesh.group(node) as usize);
-            let scale = (reflected + *ambient).length().max(floor);
+            let ambient = material.reflectance * ambient_irradiance;
+            let scale = (reflected + ambient).length().max(floor);
             squares[group] += (ambient.length() / scale).powi(2) * element_area;
             areas[group] += element_area;
-            flux += (reflected + material.exitance) * element_area;
-            max_reflectance = max_reflectance.max(material.reflectance);
+            let reflected = reflected * mesh.relative_reflectance(e);
+            flux += (reflected + mesh.exitance(e)) * element_area;
+            max_reflectance = max_reflectance.max(mesh.reflectance(e));
         }
         let mean = |squares: f64, area: f64| if area > 0.0 { squares / area } else { 0.0 };
         let whole = mean(squares.iter().sum(), areas.iter().sum());
@@ -329,9 +336,11 @@ impl ErrorEstimator<'_> {
         let surface = &self.light.surface;
         let mut sums = vec![(0.0, 0.0); surface.positions.len()];
         for (face, &e) in surface.faces.iter().zip(&surface.elements) {
-            let area = self.light.mesh.area(self.light.mesh.element(e as usize));
+            let (e, mesh) = (e as usize, &self.light.mesh);
+            let area = mesh.area(mesh.element(e));
+            let residual = self.element_residual[e] * (mesh.relative_reflectance(e).element_sum() / 3.0);
             for &v in face {
-                sums[v as usize].0 += area * self.element_residual[e as usize].powi(2);
+                sums[v as usize].0 += area * residual.powi(2);
                 sums[v as usize].1 += area;
             }
         }

@@ -21,7 +21,7 @@ pub struct GatheredMesh {
     /// Per element, the indices of its three corners in `reflected`.
     pub corners: Vec<[u32; 3]>,
     /// Reflected radiosity B − E at the vertices, W/m² per channel, as a source of light for
-    /// others. It differs from `surface` by what makes the mean over each element right: that of
+    /// others, with the reflectance of the material: see [`RadiosityField`]. It differs from `surface` by what makes the mean over each element right: that of
     /// the quadratic interpolant, which a linear one through the exact vertex values does not have.
     pub reflected: Vec<Rgb>,
     /// Points at which light was gathered, repeated attempts included.
@@ -42,14 +42,7 @@ impl GatheredMesh {
     /// [`ErrorKind::Setting`] when `radiosity` has not one value an element.
     pub fn from_elements(mesh: &Mesh, radiosity: &[Rgb]) -> Result<GatheredMesh, Error> {
         check_count(mesh, radiosity)?;
-        let (surface, corners) = VertexMesh::with_corners(mesh, radiosity);
-        let mut reflected = surface.radiosity.clone();
-        for (e, corners) in corners.iter().enumerate() {
-            let emitted = mesh.material(mesh.element(e)).exitance;
-            for v in corners.map(|v| v as usize) {
-                reflected[v] = (surface.radiosity[v] - emitted).max(Rgb::ZERO);
-            }
-        }
+        let (surface, corners, reflected) = VertexMesh::with_corners(mesh, radiosity);
         Ok(GatheredMesh {
             mesh: mesh.clone(),
             surface,

@@ -1,6 +1,6 @@
 //! Lights: connected emitters, which gatherers sample explicitly.
 //!
-//! Emitting triangles of one material that share corners are one light. From a gather point, the
+//! Emitting triangles of one material and exitance that share corners are one light. From a gather point, the
 //! few lights that could contribute most are sampled one by one (rays to points on them, or a view
 //! that they fill), each scaled by its closed-form unoccluded form factor:
 //!
@@ -21,7 +21,7 @@ use crate::geometry::weld::position_key;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene};
 
-/// Emitting triangles of one material that are connected by shared corners.
+/// Emitting triangles of one material and exitance that are connected by shared corners.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
     /// Its triangles, ascending.
@@ -69,7 +69,7 @@ impl Lights {
     pub fn new(scene: Arc<Scene>) -> Lights {
         let count = scene.triangles().len();
         let emitters: Vec<usize> =
-            (0..count).filter(|&t| scene.material(t).exitance != Rgb::ZERO).collect();
+            (0..count).filter(|&t| scene.exitance(t) != Rgb::ZERO).collect();
         let connected = connected_emitters(&scene, &emitters);
         let mut lights: Vec<Vec<u32>> = vec![];
         let mut of_triangle = vec![NO_LIGHT; count];
@@ -108,22 +108,25 @@ impl Light {
     fn new(scene: &Scene, triangles: Vec<u32>) -> Light {
         Light {
             surface: AreaSampler::new(triangles.iter().map(|&t| scene.area(t as usize))),
-            exitance: scene.material(triangles[0] as usize).exitance,
+            exitance: scene.exitance(triangles[0] as usize),
             convex: is_convex(scene, &triangles),
             triangles,
         }
     }
 }
 
-/// For each of `emitters` (ascending), the lowest one of its material that it is connected to by
-/// shared corners: itself, if there is no lower one.
+/// For each of `emitters` (ascending), the lowest one of its material and exitance that it is
+/// connected to by shared corners: itself, if there is no lower one. Triangles of a texture have
+/// their own exitance each.
 fn connected_emitters(scene: &Scene, emitters: &[usize]) -> Vec<usize> {
     let mut sets = UnionFind::new(emitters.len());
-    let mut first_at_corner: FxHashMap<([u64; 3], u32), usize> = FxHashMap::default();
+    let mut first_at_corner: FxHashMap<([u64; 3], u32, [u64; 3]), usize> = FxHashMap::default();
     for (k, &t) in emitters.iter().enumerate() {
         let material = scene.triangles()[t].material;
+        let exitance = scene.exitance(t).to_array().map(f64::to_bits);
         for corner in scene.corners(t) {
-            let first = *first_at_corner.entry((position_key(corner), material)).or_insert(k);
+            let key = (position_key(corner), material, exitance);
+            let first = *first_at_corner.entry(key).or_insert(k);
             sets.join(first, k);
         }
     }

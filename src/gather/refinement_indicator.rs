@@ -158,7 +158,7 @@ pub(super) fn source_nonlinearity(mesh: &Mesh, source: &RadiosityField, e: usize
     let node = mesh.element(e);
     let t = mesh.triangle(node);
     let [a, b, c] = mesh.cell(node).corners().map(DVec2::from_array);
-    let value_at = |p: DVec2| source.reflected_at(t, p.x, p.y);
+    let value_at = |p: DVec2| source.untextured_at(t, p.x, p.y);
     let ends = [a, b, c].map(value_at);
     let mut squares = 0.0;
     for i in 0..=SOURCE_SAMPLES {

@@ -46,7 +46,7 @@ impl SampledMesh {
     pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
         let topology = SurfaceTopology::new(mesh.scene());
         let vertices = Vertices::new(&mesh, &topology);
-        let value = |&(t, [u, v]): &(usize, [f64; 2])| field.reflected_at(t, u, v);
+        let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
         let buried = vec![false; reflected.len()];
         let inverse_distance = vec![0.0; reflected.len()];
@@ -160,10 +160,12 @@ impl SampledMesh {
         for normal in &mut out.normals {
             *normal = normal.normalize_or_zero();
         }
+        out.reflect(&self.mesh, &self.vertices.outlines, &self.reflected);
         let hanging_nodes = HangingNodes::new(&self.mesh, &self.topology, &self.vertices);
         out.add_elements(&self.mesh, &hanging_nodes, |out, e| {
-            let corners = self.vertices.corners[e].map(|v| out.radiosity[v as usize]);
-            corners.iter().sum::<Rgb>() / 3.0
+            let corners = self.vertices.corners[e].map(|v| v as usize);
+            [&out.radiosity, &out.irradiance]
+                .map(|values| corners.iter().map(|&v| values[v]).sum::<Rgb>() / 3.0)
         });
         out
     }

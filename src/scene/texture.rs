@@ -235,8 +235,11 @@ pub struct TextureMap {
     pub texture: Arc<Texture>,
     /// What its colours are multiplied with, per channel.
     pub factor: Rgb,
-    /// Most that the product may be: the ceiling of a reflectance, infinite for light.
+    /// Most that a point may have where the material's mean is changed: the ceiling of a
+    /// reflectance, infinite for light.
     pub ceiling: f64,
+    /// Mean over the triangles of the material, per channel.
+    pub mean: Rgb,
     /// Texture coordinates of a corner are multiplied with this,
     pub scale: DVec2,
     /// and then this is added.
@@ -263,7 +266,14 @@ impl TextureMap {
     }
 
     fn value(&self, colour: Rgb) -> Rgb {
-        (self.factor * colour).min(Rgb::splat(self.ceiling))
+        self.factor * colour
+    }
+
+    /// What has `value` in this map, if `mean` is to be the mean over the triangles of the material.
+    /// Where all of it is 0 it is even.
+    pub(crate) fn scaled(&self, value: Rgb, mean: Rgb) -> Rgb {
+        let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), value / self.mean, Rgb::ONE);
+        (mean * relative).min(Rgb::splat(self.ceiling))
     }
 }
 

@@ -52,9 +52,8 @@ impl Flux {
     pub fn after(mesh: &Mesh, received: &ReceivedLight) -> Result<Flux, Error> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
         let emitted: Vec<Rgb> =
-            elements.clone().map(|n| mesh.material(n).exitance * mesh.area(n)).collect();
-        let reflectance: Vec<Rgb> =
-            elements.clone().map(|n| mesh.material(n).reflectance).collect();
+            elements.clone().enumerate().map(|(e, n)| mesh.exitance(e) * mesh.area(n)).collect();
+        let reflectance: Vec<Rgb> = (0..emitted.len()).map(|e| mesh.reflectance(e)).collect();
         let mut unshot = emitted.clone();
         let mut incident = vec![Rgb::ZERO; emitted.len()];
         for (e, node) in elements.enumerate().filter(|_| !received.irradiance.is_empty()) {

@@ -52,7 +52,7 @@ impl Ledger {
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
         let ambient = self.ambient(mesh);
         for (e, b) in radiosity.iter_mut().enumerate() {
-            *b += mesh.material(mesh.element(e)).reflectance * ambient;
+            *b += mesh.reflectance(e) * ambient;
         }
         ambient
     }

@@ -113,7 +113,7 @@ fn coincident_vertices(mesh: &Mesh, boundary: &[BoundaryVertex]) -> Vec<Vec<usiz
 fn shot_radiosity(mesh: &Mesh, elements: &[Rgb]) -> Vec<Rgb> {
     let mut shot = elements.to_vec();
     for t in 0..mesh.scene().triangles().len() {
-        if mesh.scene().material(t).exitance == Rgb::ZERO {
+        if mesh.scene().exitance(t) == Rgb::ZERO {
             average_over_patches(mesh, mesh.root(t), &mut shot);
         }
     }
@@ -160,14 +160,15 @@ fn edge_exchanges(
     let mut total = 0.0;
     let mut exchanges = vec![];
     for &other in others {
-        let mut gain = 0.0;
+        let mut gain = Rgb::ZERO;
         let mut received = Rgb::ZERO;
         for &j in &boundary[other].neighbourhood {
             let factor = fitted_factor(j);
-            gain += factor;
-            received += shot[j as usize] * factor;
+            let relative = mesh.relative_reflectance(j as usize);
+            total += factor;
+            gain += relative * factor;
+            received += shot[j as usize] * relative * factor;
         }
-        total += gain;
         exchanges.push(EdgeExchange {
             other,
             gain: reflectance * gain,

@@ -95,7 +95,7 @@ impl DrawnScene<'_> {
 
     /// Triangle `t` as the shader reads it.
     pub fn triangle(&self, t: u32) -> RadianceTriangle {
-        let exitance = self.scene.material(t as usize).exitance / self.radiance_unit;
+        let exitance = self.scene.exitance(t as usize) / self.radiance_unit;
         RadianceTriangle {
             exitance: exitance.as_vec3().to_array(),
             light: self.lights.of_triangle[t as usize],

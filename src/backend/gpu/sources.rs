@@ -16,6 +16,7 @@ use super::memory::Memory;
 use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
 use crate::mesh::{Mesh, NodeId};
+use crate::scene::Rgb;
 
 /// Arrays that `radiance.wgsl` reads.
 #[derive(Debug)]
@@ -65,14 +66,18 @@ impl SourceBuffers {
 
 /// The texture of the elements' corners, line by line.
 pub fn element_texels(sources: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4]> {
-    let RadiosityField { corners, reflected, .. } = *sources;
-    let value = |k: u32| (reflected[k as usize] / radiance_unit).as_vec3().extend(0.0).to_array();
+    let RadiosityField { mesh, corners, reflected } = *sources;
+    let value = |k: u32, relative: Rgb| {
+        (reflected[k as usize] * relative / radiance_unit).as_vec3().extend(0.0).to_array()
+    };
     let line = ELEMENTS_A_LINE as usize;
     let mut texels = vec![[0f32; 4]; corners.len().div_ceil(line) * 3 * line];
-    texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).for_each(|(texels, corners)| {
+    let lines = texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).enumerate();
+    lines.for_each(|(first, (texels, corners))| {
         for (x, corner) in corners.iter().enumerate() {
+            let relative = mesh.relative_reflectance(first * line + x);
             for k in 0..3 {
-                texels[k * line + x] = value(corner[k]);
+                texels[k * line + x] = value(corner[k], relative);
             }
         }
     });

@@ -46,6 +46,7 @@ impl ObjFile<'_> {
                 };
                 let written = if k == 0 { mtl.reflectance } else { mtl.radiance };
                 let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
+                    None if k == 0 => Rgb::splat(settings.max_reflectance),
                     None => Rgb::ONE,
                     Some(_) if k == 0 => material.reflectance,
                     Some(radiance) => radiance,
@@ -55,12 +56,11 @@ impl ObjFile<'_> {
                     0 => (factor, settings.max_reflectance),
                     _ => (PI * factor.max(Rgb::ZERO), f64::MAX),
                 };
-                let map = TextureMap { texture, factor, ceiling, scale, offset, clamped };
+                let mean = factor * texture.whole_mean();
+                let map = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
                 if k == 0 {
-                    material.reflectance = map.whole_mean();
                     all.entry(index).or_default().reflectance = Some(map);
                 } else if !emitted {
-                    material.exitance = map.whole_mean();
                     all.entry(index).or_default().exitance = Some(map);
                 }
             }

@@ -1,0 +1,50 @@
+//! What elements reflect and emit: of a texture, the mean of their own piece.
+
+use super::Mesh;
+use crate::scene::Rgb;
+
+/// Least share of the material's reflectance that an element has whose piece of the texture is
+/// black. It reflects nothing that matters, and still what it receives can be told from what it
+/// reflects: a thousand million is far from the 2⁵³ of rounding.
+const MIN_REFLECTANCE_SHARE: f64 = 1e-9;
+
+impl Mesh {
+    /// Reflectance of element `e` per channel: that of its material or, of a textured one, the mean
+    /// of the texture over the element, and no less than 1e-9 of the material's.
+    pub fn reflectance(&self, e: usize) -> Rgb {
+        let of_material = || self.material(self.element(e)).reflectance;
+        self.textured_reflectances().get(e).copied().unwrap_or_else(of_material)
+    }
+
+    /// Exitance of element `e` per channel, W/m²: that of its triangle
+    /// ([`Scene::exitance`](crate::Scene::exitance)).
+    pub fn exitance(&self, e: usize) -> Rgb {
+        self.scene().exitance(self.triangle(self.element(e)))
+    }
+
+    /// Reflectance of element `e` over that of its material, per channel: 1 without a texture, and
+    /// where nothing is reflected.
+    pub(crate) fn relative_reflectance(&self, e: usize) -> Rgb {
+        let Some(&reflectance) = self.textured_reflectances().get(e) else { return Rgb::ONE };
+        let of_material = self.material(self.element(e)).reflectance;
+        Rgb::select(of_material.cmpgt(Rgb::ZERO), reflectance / of_material, Rgb::ONE)
+    }
+
+    /// Reflectance of every element; of none where no material has a texture of it.
+    fn textured_reflectances(&self) -> &[Rgb] {
+        self.textured_reflectances.get_or_init(|| {
+            if !self.scene().has_textured_reflectance() {
+                return vec![];
+            }
+            let nodes: Vec<_> = (0..self.element_count()).map(|e| self.element(e)).collect();
+            let piece = |&node: &_| (self.triangle(node), self.cell(node).corners());
+            let pieces: Vec<_> = nodes.iter().map(piece).collect();
+            let mut reflectances = self.scene().mean_reflectances(&pieces);
+            for (reflectance, &node) in reflectances.iter_mut().zip(&nodes) {
+                *reflectance =
+                    reflectance.max(MIN_REFLECTANCE_SHARE * self.material(node).reflectance);
+            }
+            reflectances
+        })
+    }
+}

@@ -1,0 +1,173 @@
+//! Textures on the triangles of a scene: what a point reflects and emits, and what a piece does.
+//!
+//! ```text
+//!   texture ── mean over all triangles of the material ──► Material::reflectance, ρ̄
+//!      ├────── mean over a piece of a triangle ÷ mean of all, × ρ̄ ──► ρ of an element
+//!      └────── look-up at a point ÷ mean of all, × ρ̄ ──────────────► ρ of a point
+//! ```
+//!
+//! A texture says how reflectance is spread, the material how much there is: a material that is
+//! changed scales its texture. Emission is the mean over each triangle, in the same way.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::texture::{MaterialTextures, TextureMap};
+use super::{Rgb, Scene};
+
+/// A piece of a triangle: its index, and the weights of the second and third corner of the triangle
+/// at the three corners of the piece.
+pub(crate) type Piece = (usize, [[f64; 2]; 3]);
+
+/// All of a triangle.
+const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+/// Textures of materials, and where they lie on triangles.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SceneTextures {
+    /// Of the corners of each triangle; empty where no material has textures, as are those.
+    coordinates: Vec<[DVec2; 3]>,
+    /// Of the materials that have some, by their indices.
+    of_materials: BTreeMap<u32, MaterialTextures>,
+    /// Exitance of each triangle over that of its material; empty where no texture emits.
+    relative_exitance: Vec<Rgb>,
+}
+
+impl Scene {
+    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
+    /// where the scene has no textures. Not finite for a corner that has none.
+    pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
+        self.textures.coordinates.get(t).copied()
+    }
+
+    /// Textures of triangle `t`; `None` where its material has none.
+    pub fn textures(&self, t: usize) -> Option<&MaterialTextures> {
+        self.textures.of_materials.get(&self.triangles[t].material)
+    }
+
+    /// Reflectance per channel of a point of triangle `t`, where its second and third corner have
+    /// these weights: what the texture has there, if there is one.
+    pub fn reflectance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
+        let mean = self.material(t).reflectance;
+        let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
+        map.map_or(mean, |map| map.scaled(map.at(self.texture_place(t, barycentric)), mean))
+    }
+
+    /// Exitance per channel, W/m², of a point of triangle `t`, where its second and third corner
+    /// have these weights: what the texture has there, if there is one.
+    pub fn exitance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
+        let mean = self.material(t).exitance;
+        let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
+        map.map_or(mean, |map| map.scaled(map.at(self.texture_place(t, barycentric)), mean))
+    }
+
+    /// Exitance per channel, W/m², that triangle `t` lights others with: that of its material, or
+    /// the mean of the texture over the triangle.
+    pub fn exitance(&self, t: usize) -> Rgb {
+        let mean = self.material(t).exitance;
+        self.textures.relative_exitance.get(t).map_or(mean, |relative| mean * relative)
+    }
+
+    /// Whether any material has a texture.
+    pub(crate) fn has_textures(&self) -> bool {
+        !self.textures.of_materials.is_empty()
+    }
+
+    /// Whether any material has a texture of its reflectance.
+    pub(crate) fn has_textured_reflectance(&self) -> bool {
+        self.textures.of_materials.values().any(|textures| textures.reflectance.is_some())
+    }
+
+    /// Mean reflectance per channel of each of `pieces`.
+    pub(crate) fn mean_reflectances(&self, pieces: &[Piece]) -> Vec<Rgb> {
+        let means = self.means(pieces, |textures| textures.reflectance.as_ref());
+        let scaled = |(&(t, _), mean): (&Piece, Option<Rgb>)| {
+            let whole = self.material(t).reflectance;
+            let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
+            map.zip(mean).map_or(whole, |(map, mean)| map.scaled(mean, whole))
+        };
+        pieces.iter().zip(means).map(scaled).collect()
+    }
+
+    /// Lays textures of materials, by their indices, onto the triangles.
+    pub(super) fn lay_textures(
+        &mut self,
+        coordinates: Vec<[DVec2; 3]>,
+        of_materials: BTreeMap<u32, MaterialTextures>,
+    ) {
+        self.textures =
+            SceneTextures { coordinates, of_materials, relative_exitance: vec![] }.into();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
+        let reflected = self.means(&pieces, |textures| textures.reflectance.as_ref());
+        let emitted = self.means(&pieces, |textures| textures.exitance.as_ref());
+        let reflectances = self.means_of_materials(&reflected);
+        let exitances = self.means_of_materials(&emitted);
+        let mut textures = (*self.textures).clone();
+        for (&m, maps) in &mut textures.of_materials {
+            let material = &mut self.materials[m as usize];
+            if let Some(map) = &mut maps.reflectance {
+                map.mean = reflectances.get(&m).copied().unwrap_or(map.whole_mean());
+                material.reflectance = map.mean;
+            }
+            if let Some(map) = &mut maps.exitance {
+                map.mean = exitances.get(&m).copied().unwrap_or(map.whole_mean());
+                material.exitance = map.mean;
+            }
+        }
+        if emitted.iter().any(Option::is_some) {
+            let relative = |(t, mean): (usize, &Option<Rgb>)| {
+                let maps = textures.of_materials.get(&self.triangles[t].material);
+                let map = maps.and_then(|maps| maps.exitance.as_ref());
+                map.zip(*mean).map_or(Rgb::ONE, |(map, mean)| map.scaled(mean, Rgb::ONE))
+            };
+            textures.relative_exitance = emitted.iter().enumerate().map(relative).collect();
+        }
+        self.textures = textures.into();
+    }
+
+    /// Mean over all triangles of each material of what is given for each triangle.
+    fn means_of_materials(&self, of_triangles: &[Option<Rgb>]) -> BTreeMap<u32, Rgb> {
+        let mut sums: BTreeMap<u32, (Rgb, f64)> = BTreeMap::new();
+        for (t, mean) in of_triangles.iter().enumerate() {
+            if let Some(mean) = mean {
+                let (sum, area) = sums.entry(self.triangles[t].material).or_default();
+                *sum += self.area(t) * *mean;
+                *area += self.area(t);
+            }
+        }
+        sums.into_iter().map(|(m, (sum, area))| (m, sum / area)).collect()
+    }
+
+    /// Mean of a texture over each of `pieces`; none for those without one. Many triangles of a
+    /// scene may show the same piece, which is looked at once.
+    fn means(
+        &self,
+        pieces: &[Piece],
+        map_of: impl Fn(&MaterialTextures) -> Option<&TextureMap> + Sync,
+    ) -> Vec<Option<Rgb>> {
+        let mut numbers: FxHashMap<(u32, [u64; 6]), u32> = FxHashMap::default();
+        let mut different: Vec<(&TextureMap, [DVec2; 3])> = vec![];
+        let number_of = |&(t, corners): &Piece| {
+            let map = map_of(self.textures(t)?)?;
+            let [a, b, c] = corners.map(|corner| self.texture_place(t, corner));
+            let bits = [a.x, a.y, b.x, b.y, c.x, c.y].map(f64::to_bits);
+            let key = (self.triangles[t].material, bits);
+            Some(*numbers.entry(key).or_insert_with(|| {
+                different.push((map, [a, b, c]));
+                different.len() as u32 - 1
+            }))
+        };
+        let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
+        let means: Vec<Rgb> = different.par_iter().map(|(map, place)| map.mean(*place)).collect();
+        numbers.into_iter().map(|number| Some(means[number? as usize])).collect()
+    }
+
+    /// Texture coordinates of a point of triangle `t`; not finite where it has none.
+    fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+        let place = |[a, b, c]: [DVec2; 3]| a * (1.0 - u - v) + b * u + c * v;
+        self.texture_coordinates(t).map_or(DVec2::NAN, place)
+    }
+}
