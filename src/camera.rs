@@ -10,6 +10,7 @@
 
 mod framing;
 mod gathered;
+mod textured;
 mod up_axis;
 mod view_score;
 
@@ -19,9 +20,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
+use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 use crate::visibility::ray_scene::{Hit, RayScene};
+use textured::LitSurface;
 
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,15 +80,25 @@ impl Camera {
         samples: u32,
     ) -> Result<RadianceImage, Error> {
         let rays = PrimaryRays::new(self, surface, width, height, samples)?;
-        let pixel = |k: u32| {
-            let radiance = |seen: Seen| match seen {
-                Seen::Front(hit) => rays.interpolate(&hit, &surface.radiosity) / PI,
-                Seen::Sky => surface.sky,
-            };
-            rays.seen(k).map(radiance).sum::<Rgb>() * rays.weight
-        };
-        let pixels = (0..width * height).into_par_iter().map(pixel).collect();
-        Ok(RadianceImage { width, height, pixels, sky: surface.sky })
+        Ok(rays.image(height, |hit| rays.interpolate(hit, &surface.radiosity)))
+    }
+
+    /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray meets
+    /// a textured material, the irradiance between the vertices is reflected by the texture at that
+    /// point.
+    ///
+    /// # Errors
+    /// Those of [`Camera::check`].
+    pub fn interpolated_image(
+        &self,
+        light: &GatheredMesh,
+        width: u32,
+        height: u32,
+        samples: u32,
+    ) -> Result<RadianceImage, Error> {
+        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let lit = LitSurface { rays, light };
+        Ok(lit.rays.image(height, |hit| lit.radiosity(hit)))
     }
 
     /// Right, up and forward of the view, unit length.
@@ -147,6 +160,8 @@ struct PrimaryRays<'a> {
     eye: DVec3,
     /// Direction to the upper left corner of the image, at distance 1 along the view's axis.
     corner: DVec3,
+    /// Unit direction of the view's axis.
+    forward: DVec3,
     /// Steps of a sub-pixel to the right and downwards there.
     right: DVec3,
     down: DVec3,
@@ -181,12 +196,27 @@ impl PrimaryRays<'_> {
             scene,
             eye: camera.eye,
             corner,
+            forward,
             right,
             down,
             width,
             samples,
             weight,
         })
+    }
+
+    /// An image of so many rows, of the radiosity (W/m²) of what is seen.
+    fn image(&self, height: u32, radiosity: impl Fn(&Hit) -> Rgb + Sync) -> RadianceImage {
+        let sky = self.surface.sky;
+        let pixel = |k: u32| {
+            let radiance = |seen: Seen| match seen {
+                Seen::Front(hit) => radiosity(&hit) / PI,
+                Seen::Sky => sky,
+            };
+            self.seen(k).map(radiance).sum::<Rgb>() * self.weight
+        };
+        let pixels = (0..self.width * height).into_par_iter().map(pixel).collect();
+        RadianceImage { width: self.width, height, pixels, sky }
     }
 
     /// What the rays of pixel `k` see. The other rays hit backs.

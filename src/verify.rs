@@ -18,7 +18,9 @@
 //!
 //! where B is the *reflected* radiosity, that is radiosity minus the material's exitance; lengths
 //! |·| are Euclidean over the three channels; and m is the mean of |B_true| over the area of all
-//! reflecting surfaces of the scene. What emits and does not reflect has no error and no weight. A
+//! reflecting surfaces of the scene. A textured point is told and measured with the mean reflectance
+//! of its material: that compares the light, and no detail of the texture, which takes part where
+//! paths go on. What emits and does not reflect has no error and no weight. A
 //! group's error is the same root mean square over the group's own reflecting area, with the
 //! scene's m.
 //!
@@ -315,7 +317,7 @@ impl<'a> Sampler<'a> {
         let stratum = |surface| Stratum { surface, drawn: 0, points: vec![] };
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
-            solution: SolutionLookup::new(solution, scene.bounds().diagonal())?,
+            solution: SolutionLookup::new(solution, scene)?,
             tracer: PathTracer::new(scene),
             diagonal: scene.reflecting_bounds().diagonal(),
             scene,
@@ -333,13 +335,11 @@ impl<'a> Sampler<'a> {
             while *drawn < by_area.max(self.settings.points_per_group) {
                 let words = [self.settings.seed, surface.group as u64, *drawn as u64];
                 let point = surface.point(self.scene, &mut random_numbers(&words));
-                let normal = self.scene.normal(point.triangle);
-                let exitance = self.scene.material(point.triangle).exitance;
-                match self.solution.radiosity(point.position, normal) {
+                match self.solution.reflected(self.scene, &point) {
                     Some(told) => list.push(TracedPoint {
                         index: *drawn,
                         point,
-                        told: told - exitance,
+                        told,
                         hidden: false,
                         paths: 0,
                         sums: [Rgb::ZERO; PARTS],

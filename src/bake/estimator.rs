@@ -338,7 +338,8 @@ impl ErrorEstimator<'_> {
         for (face, &e) in surface.faces.iter().zip(&surface.elements) {
             let (e, mesh) = (e as usize, &self.light.mesh);
             let area = mesh.area(mesh.element(e));
-            let residual = self.element_residual[e] * (mesh.relative_reflectance(e).element_sum() / 3.0);
+            let residual =
+                self.element_residual[e] * (mesh.relative_reflectance(e).element_sum() / 3.0);
             for &v in face {
                 sums[v as usize].0 += area * residual.powi(2);
                 sums[v as usize].1 += area;

@@ -16,6 +16,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::textured::LitSurface;
 use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
@@ -60,7 +61,7 @@ impl Camera {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
-        let view = GatheredView::new(rays, light);
+        let view = GatheredView::new(LitSurface { rays, light });
         let field = light.radiosity_field();
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let total = pixels.len();
@@ -122,21 +123,19 @@ impl PixelPart {
 
 /// A solution as the camera's rays meet it.
 struct GatheredView<'a> {
-    rays: PrimaryRays<'a>,
-    light: &'a GatheredMesh,
+    lit: LitSurface<'a>,
     offset: SurfaceOffset,
     /// Per triangle of the scene, the smooth surface that it is a part of.
     surfaces: Vec<u32>,
 }
 
 impl GatheredView<'_> {
-    fn new<'a>(rays: PrimaryRays<'a>, light: &'a GatheredMesh) -> GatheredView<'a> {
-        let scene = light.mesh.scene();
+    fn new(lit: LitSurface) -> GatheredView {
+        let scene = lit.light.mesh.scene();
         GatheredView {
-            rays,
-            light,
             offset: SurfaceOffset::new(scene),
             surfaces: SurfaceTopology::new(scene).surfaces(),
+            lit,
         }
     }
 
@@ -150,7 +149,7 @@ impl GatheredView<'_> {
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
         let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
         let mut sky_rays = 0;
-        for seen in self.rays.seen(pixel) {
+        for seen in self.lit.rays.seen(pixel) {
             let Seen::Front(hit) = seen else {
                 sky_rays += 1;
                 continue;
@@ -162,7 +161,7 @@ impl GatheredView<'_> {
             }
         }
         let mut parts = vec![];
-        if sky_rays > 0 && self.light.surface.sky != Rgb::ZERO {
+        if sky_rays > 0 && self.lit.light.surface.sky != Rgb::ZERO {
             parts.push(self.sky_part(pixel as usize, sky_rays));
         }
         for (_, hits) in &groups {
@@ -173,22 +172,21 @@ impl GatheredView<'_> {
 
     /// The rays of a pixel that see the sky, where nothing is to be gathered.
     fn sky_part(&self, pixel: usize, rays: u32) -> PixelPart {
-        let weight = self.rays.weight * f64::from(rays);
+        let weight = self.lit.rays.weight * f64::from(rays);
         PixelPart {
             pixel,
-            point: GatherPoint { position: self.rays.eye, normal: DVec3::Y, near: 0.0 },
+            point: GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 },
             size: 0.0,
             weight,
             exitance: Rgb::ZERO,
             reflectance: Rgb::ZERO,
-            interpolated: self.light.surface.sky * weight,
+            interpolated: self.lit.light.surface.sky * weight,
         }
     }
 
     /// Adds the hits on one smooth surface: as one part, or as several where the radiosity varies.
     fn add_parts(&self, pixel: usize, hits: &[Hit], parts: &mut Vec<PixelPart>) {
-        let radiosity =
-            || hits.iter().map(|hit| self.rays.interpolate(hit, &self.light.surface.radiosity));
+        let radiosity = || hits.iter().map(|hit| self.lit.untextured_radiosity(hit));
         let sum: Rgb = radiosity().sum();
         let low = radiosity().fold(Rgb::INFINITY, Rgb::min);
         let spread = (radiosity().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
@@ -200,30 +198,51 @@ impl GatheredView<'_> {
             return;
         }
         let hit = self.middle_hit(hits);
-        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
-        let node = mesh.element(self.element(&hit));
-        let (size, material) = (mesh.area(node).sqrt(), mesh.material(node));
-        let normal = self.rays.interpolate(&hit, &surface.normals).normalize_or(mesh.normal(node));
-        let position = self.rays.interpolate(&hit, &surface.positions);
+        let (surface, mesh) = (&self.lit.light.surface, &self.lit.light.mesh);
+        let node = mesh.element(self.lit.element(&hit));
+        let size = mesh.area(node).sqrt();
+        let (reflectance, exitance, sum) = self.seen_of(hits, sum);
+        let normal =
+            self.lit.rays.interpolate(&hit, &surface.normals).normalize_or(mesh.normal(node));
+        let position = self.lit.rays.interpolate(&hit, &surface.positions);
         parts.push(PixelPart {
             pixel,
             point: self.offset.gather_point(position, normal, size),
             size,
-            weight: self.rays.weight * hits.len() as f64,
-            exitance: material.exitance,
-            reflectance: material.reflectance,
-            interpolated: sum * self.rays.weight / PI,
+            weight: self.lit.rays.weight * hits.len() as f64,
+            exitance,
+            reflectance,
+            interpolated: sum * self.lit.rays.weight / PI,
         });
+    }
+
+    /// Mean reflectance and exitance of what was hit, and the sum of the radiosity that the vertices
+    /// give it, which is `even` without a texture, W/m².
+    fn seen_of(&self, hits: &[Hit], even: Rgb) -> (Rgb, Rgb, Rgb) {
+        let t = self.lit.triangle(&hits[0]);
+        if self.lit.light.mesh.scene().textures(t).is_none() {
+            let material = self.lit.light.mesh.scene().material(t);
+            return (material.reflectance, material.exitance, even);
+        }
+        let (mut reflectance, mut exitance) = (Rgb::ZERO, Rgb::ZERO);
+        for hit in hits {
+            let [reflects, emits] = self.lit.reflectance_and_exitance(hit);
+            (reflectance, exitance) = (reflectance + reflects, exitance + emits);
+        }
+        let count = hits.len() as f64;
+        let interpolated = hits.iter().map(|hit| self.lit.radiosity(hit)).sum();
+        (reflectance / count, exitance / count, interpolated)
     }
 
     /// The hit of the ray through the mean position of `hits`, if it is on their surface, or else
     /// the one of them that is nearest to it. Light that is linear over the surface has its mean
     /// there.
     fn middle_hit(&self, hits: &[Hit]) -> Hit {
-        let position = |hit: &Hit| self.rays.interpolate(hit, &self.light.surface.positions);
+        let position =
+            |hit: &Hit| self.lit.rays.interpolate(hit, &self.lit.light.surface.positions);
         let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
         let surface = self.smooth_surface(&hits[0]);
-        if let Some(Seen::Front(hit)) = self.rays.hit(mean - self.rays.eye)
+        if let Some(Seen::Front(hit)) = self.lit.rays.hit(mean - self.lit.rays.eye)
             && self.smooth_surface(&hit) == surface
         {
             return hit;
@@ -239,14 +258,8 @@ impl GatheredView<'_> {
         nearest.1
     }
 
-    /// The element of the gathered mesh that was hit.
-    fn element(&self, hit: &Hit) -> usize {
-        self.light.surface.elements[hit.triangle] as usize
-    }
-
     /// The smooth surface that was hit.
     fn smooth_surface(&self, hit: &Hit) -> u32 {
-        let mesh = &self.light.mesh;
-        self.surfaces[mesh.triangle(mesh.element(self.element(hit)))]
+        self.surfaces[self.lit.triangle(hit)]
     }
 }

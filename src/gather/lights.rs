@@ -68,8 +68,7 @@ impl Lights {
     /// Finds the lights of `scene`.
     pub fn new(scene: Arc<Scene>) -> Lights {
         let count = scene.triangles().len();
-        let emitters: Vec<usize> =
-            (0..count).filter(|&t| scene.exitance(t) != Rgb::ZERO).collect();
+        let emitters: Vec<usize> = (0..count).filter(|&t| scene.exitance(t) != Rgb::ZERO).collect();
         let connected = connected_emitters(&scene, &emitters);
         let mut lights: Vec<Vec<u32>> = vec![];
         let mut of_triangle = vec![NO_LIGHT; count];

@@ -8,13 +8,15 @@ use super::write_file;
 use crate::error::Error;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
+use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 
 /// Writes `surface` as binary little-endian PLY.
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
-/// (float, W/m² per channel, linear), `red green blue` (uchar, tone-mapped for viewers), and, where
-/// it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the
+/// (float, W/m² per channel, linear), `irradiance_r irradiance_g irradiance_b` (the same; what a
+/// program multiplies with its own textures; 0 in channels that a material does not reflect), `red
+/// green blue` (uchar, the radiosity tone-mapped for viewers), and, where it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the
 /// channels). Faces: `vertex_indices`, triangles, counter-clockwise from the front. The surface's
 /// comments are in the header.
 ///
@@ -46,14 +48,16 @@ pub fn write_ply_with_tone(
             writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
         }
         writeln!(out, "element vertex {}", surface.positions.len())?;
+        let irradiances = surface.irradiance.len() == surface.positions.len();
         let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
         let (place, light) = (Width::of_positions(surface), Width::of_light(surface, errors));
-        for (width, names) in [
-            (place, ["x", "y", "z"]),
-            (Width::Float, ["nx", "ny", "nz"]),
-            (light, ["radiosity_r", "radiosity_g", "radiosity_b"]),
+        for (width, names, known) in [
+            (place, ["x", "y", "z"], true),
+            (Width::Float, ["nx", "ny", "nz"], true),
+            (light, ["radiosity_r", "radiosity_g", "radiosity_b"], true),
+            (light, ["irradiance_r", "irradiance_g", "irradiance_b"], irradiances),
         ] {
-            for name in names {
+            for name in names.into_iter().filter(|_| known) {
                 writeln!(out, "property {width} {name}")?;
             }
         }
@@ -70,6 +74,11 @@ pub fn write_ply_with_tone(
         for (v, ((position, normal), radiosity)) in vertices.enumerate() {
             for (width, vector) in [(place, position), (Width::Float, normal), (light, radiosity)] {
                 vector.to_array().into_iter().try_for_each(|x| width.write(out, x))?;
+            }
+            if irradiances {
+                // A reflectance next to none makes it larger than any float.
+                let irradiance = surface.irradiance[v].min(Rgb::splat(light.most()));
+                irradiance.to_array().into_iter().try_for_each(|x| light.write(out, x))?;
             }
             out.write_all(&tone.display(*radiosity))?;
             if errors {
@@ -111,6 +120,14 @@ impl Width {
     fn of(largest: f64, fine: bool) -> Width {
         let holds = largest == 0.0 || (1e-30..=f64::from(f32::MAX)).contains(&largest);
         if fine && holds { Width::Float } else { Width::Double }
+    }
+
+    /// The largest finite number.
+    fn most(self) -> f64 {
+        match self {
+            Width::Float => f64::from(f32::MAX),
+            Width::Double => f64::MAX,
+        }
     }
 
     fn write(self, out: &mut dyn Write, x: f64) -> std::io::Result<()> {

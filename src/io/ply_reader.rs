@@ -17,17 +17,30 @@ use crate::vertex::VertexMesh;
 const MAX_BYTES: u64 = 1 << 32;
 
 /// Properties of a vertex: first those that it must have.
-const NAMES: [&str; 10] =
-    ["x", "y", "z", "radiosity_r", "radiosity_g", "radiosity_b", "nx", "ny", "nz", "error"];
+const NAMES: [&str; 13] = [
+    "x",
+    "y",
+    "z",
+    "radiosity_r",
+    "radiosity_g",
+    "radiosity_b",
+    "nx",
+    "ny",
+    "nz",
+    "irradiance_r",
+    "irradiance_g",
+    "irradiance_b",
+    "error",
+];
 
 /// How many of them it must have.
 const NEEDED: usize = 6;
 
 /// Reads a mesh as [`write_ply`](super::write_ply) writes it, in ASCII or binary of either order.
 ///
-/// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz error`,
-/// numbers of any type; faces have a list `vertex_indices` or `vertex_index`, and become fans of
-/// triangles. Other properties and elements are skipped. The file may come from anywhere: memory
+/// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz`,
+/// `irradiance_r irradiance_g irradiance_b` and `error`, numbers of any type; faces have a list
+/// `vertex_indices` or `vertex_index`, and become fans of triangles. Other properties and elements are skipped. The file may come from anywhere: memory
 /// stays within a multiple of its length, whatever its header claims.
 ///
 /// # Errors
@@ -112,7 +125,7 @@ fn add_vertices(
         let remedy = "give radiosity_r, radiosity_g and radiosity_b in W/m², as `bake` writes them";
         return Err(wrong("element 'vertex'".into(), found, remedy));
     }
-    let error = has(&NAMES[9]);
+    let (irradiance, error) = (NAMES[9..12].iter().all(|name| has(name)), has(&NAMES[12]));
     for (v, Vertex(numbers)) in vertices.iter().enumerate() {
         if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
             let found = format!("{} {}", NAMES[k], numbers[k]);
@@ -122,7 +135,8 @@ fn add_vertices(
         mesh.positions.push(three(0));
         mesh.radiosity.push(three(3) as Rgb);
         mesh.normals.push(three(6));
-        mesh.error.extend(error.then_some(numbers[9]));
+        mesh.irradiance.extend(irradiance.then(|| three(9)));
+        mesh.error.extend(error.then_some(numbers[12]));
     }
     Ok(())
 }

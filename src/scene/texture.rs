@@ -72,10 +72,19 @@ impl Texture {
     /// Linear colour at `uv`, between the centres of the four texels around it. Beyond 0 and 1 the
     /// image repeats, or, `clamped`, goes on as its border.
     pub fn at(&self, uv: DVec2, clamped: bool) -> Rgb {
+        self.filtered(uv, 0.0, clamped)
+    }
+
+    /// The same, between the means of so many texels that one covers `area` of the image at most;
+    /// 1 is all of it. (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983)
+    fn filtered(&self, uv: DVec2, area: f64, clamped: bool) -> Rgb {
         if !uv.is_finite() {
             return self.whole_mean();
         }
-        let size = DVec2::new(self.width.into(), self.height.into());
+        let texels = area * f64::from(self.width) * f64::from(self.height);
+        let level = (0.5 * texels.log2()).max(0.0).min(self.levels.len() as f64) as usize;
+        let [columns, rows] = self.level_size(level);
+        let size = DVec2::new(self.width.into(), self.height.into()) * 0.5f64.powi(level as i32);
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
         let place = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
         let (first, part) = (place.floor(), place - place.floor());
@@ -85,8 +94,8 @@ impl Texture {
             (if clamped { k.clamp(0, count - 1) } else { k.rem_euclid(count) }) as u32
         };
         let texel = |dx: f64, dy: f64| {
-            let x = wrapped(first.x + dx, self.width);
-            self.cell(0, x, wrapped(first.y + dy, self.height))
+            let x = wrapped(first.x + dx, columns);
+            self.cell(level, x, wrapped(first.y + dy, rows))
         };
         let top = texel(0.0, 0.0).lerp(texel(1.0, 0.0), part.x);
         top.lerp(texel(0.0, 1.0).lerp(texel(1.0, 1.0), part.x), part.y)
@@ -252,6 +261,12 @@ impl TextureMap {
     /// The value at texture coordinates as the file has them.
     pub fn at(&self, uv: DVec2) -> Rgb {
         self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
+    }
+
+    /// The value at texture coordinates as the file has them, of which `area` is to be filtered.
+    pub(crate) fn filtered(&self, uv: DVec2, area: f64) -> Rgb {
+        let area = area * (self.scale.x * self.scale.y).abs();
+        self.value(self.texture.filtered(uv * self.scale + self.offset, area, self.clamped))
     }
 
     /// The mean over a triangle with these texture coordinates, as the file has them.

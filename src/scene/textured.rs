@@ -11,7 +11,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -51,17 +51,40 @@ impl Scene {
     /// Reflectance per channel of a point of triangle `t`, where its second and third corner have
     /// these weights: what the texture has there, if there is one.
     pub fn reflectance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
-        let mean = self.material(t).reflectance;
+        self.reflectance_around(t, barycentric, 0.0)
+    }
+
+    /// The same, filtered over a share of the triangle's area.
+    pub(crate) fn reflectance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
-        map.map_or(mean, |map| map.scaled(map.at(self.texture_place(t, barycentric)), mean))
+        self.filtered(t, map, self.material(t).reflectance, (barycentric, share))
     }
 
     /// Exitance per channel, W/m², of a point of triangle `t`, where its second and third corner
     /// have these weights: what the texture has there, if there is one.
     pub fn exitance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
-        let mean = self.material(t).exitance;
+        self.exitance_around(t, barycentric, 0.0)
+    }
+
+    /// The same, filtered over a share of the triangle's area.
+    pub(crate) fn exitance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
-        map.map_or(mean, |map| map.scaled(map.at(self.texture_place(t, barycentric)), mean))
+        self.filtered(t, map, self.material(t).exitance, (barycentric, share))
+    }
+
+    /// What `map` has at a place of triangle `t`, filtered over a share of its area, where the
+    /// material has this `mean`; the mean if there is no map.
+    fn filtered(
+        &self,
+        t: usize,
+        map: Option<&TextureMap>,
+        mean: Rgb,
+        (barycentric, share): ([f64; 2], f64),
+    ) -> Rgb {
+        let Some(map) = map else { return mean };
+        let [a, b, c] = WHOLE.map(|corner| self.texture_place(t, corner));
+        let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
+        map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
     }
 
     /// Exitance per channel, W/m², that triangle `t` lights others with: that of its material, or
@@ -165,8 +188,17 @@ impl Scene {
         numbers.into_iter().map(|number| Some(means[number? as usize])).collect()
     }
 
+    /// Weights of the second and third corner of triangle `t` at `position` in its plane.
+    pub(crate) fn barycentric(&self, t: usize, position: DVec3) -> [f64; 2] {
+        let [a, b, c] = self.corners(t);
+        let normal = self.normal(t);
+        let [ab, ac, to] = [b - a, c - a, position - a];
+        let double_area = ab.cross(ac).dot(normal);
+        [to.cross(ac).dot(normal) / double_area, ab.cross(to).dot(normal) / double_area]
+    }
+
     /// Texture coordinates of a point of triangle `t`; not finite where it has none.
-    fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+    pub(crate) fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let place = |[a, b, c]: [DVec2; 3]| a * (1.0 - u - v) + b * u + c * v;
         self.texture_coordinates(t).map_or(DVec2::NAN, place)
     }

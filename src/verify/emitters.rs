@@ -49,7 +49,7 @@ pub(super) struct Weights {
 
 impl Emitters {
     pub fn new(scene: &Scene) -> Emitters {
-        let exitance = |t: usize| scene.material(t).exitance.element_sum();
+        let exitance = |t: usize| scene.exitance(t).element_sum();
         let emits = |&t: &usize| exitance(t) > 0.0;
         let all: Vec<usize> = (0..scene.triangles().len()).filter(emits).collect();
         let brightest = all.iter().map(|&t| exitance(t)).fold(0.0, f64::max);

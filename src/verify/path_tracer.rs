@@ -63,7 +63,9 @@ pub struct SurfacePoint {
 /// What a point reflects, estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reflected {
-    /// Reflected radiosity: radiosity without the material's exitance, W/m² per channel.
+    /// Reflected radiosity: radiosity without the material's exitance, W/m² per channel. The point
+    /// itself has the reflectance of its material, also where that has a texture: it is the light
+    /// that is told. Whatever lights it has its textures.
     pub radiosity: Rgb,
     /// Its standard error per channel, W/m².
     pub standard_error: Rgb,
@@ -163,19 +165,20 @@ impl<'a> PathTracer<'a> {
                 Some(_) => return reflected,
                 None => return reflected + throughput * PI * self.scene.sky(),
             };
-            let material = self.scene.material(hit.triangle);
-            if material.exitance != Rgb::ZERO {
+            let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
+            let reflectance = self.scene.reflectance_at(hit.triangle, [hit.u, hit.v]);
+            if exitance != Rgb::ZERO {
                 let facing = self.normals[hit.triangle].dot(direction).abs();
                 let by_area = self.emitters.density(&weights, hit.triangle);
                 let light = by_area * hit.distance * hit.distance / facing;
                 let balance = cosine / PI / (cosine / PI + light);
-                reflected += throughput * material.exitance * balance;
+                reflected += throughput * exitance * balance;
             }
-            let survival = material.reflectance.max_element().min(MAX_SURVIVAL);
+            let survival = reflectance.max_element().min(MAX_SURVIVAL);
             if rng.f64() >= survival {
                 return reflected;
             }
-            throughput *= material.reflectance / survival;
+            throughput *= reflectance / survival;
             at = SurfacePoint {
                 triangle: hit.triangle,
                 position: at.position + hit.distance * direction,
@@ -187,7 +190,8 @@ impl<'a> PathTracer<'a> {
     /// heuristic leaves to it.
     fn next_event(&self, at: &SurfacePoint, weights: &Weights, rng: &mut Rng) -> Rgb {
         let Some(light) = self.emitters.choose(weights, rng) else { return Rgb::ZERO };
-        let to = random_point(self.scene.corners(light), rng) - at.position;
+        let place = random_barycentric(rng);
+        let to = point_at(self.scene.corners(light), place) - at.position;
         let (direction, distance) = to.normalize_and_length();
         let cosine = self.normals[at.triangle].dot(direction);
         let facing = -self.normals[light].dot(direction);
@@ -203,7 +207,7 @@ impl<'a> PathTracer<'a> {
             return Rgb::ZERO;
         }
         let density = self.emitters.density(weights, light) * distance * distance / facing;
-        self.scene.material(light).exitance / PI * cosine / (density + cosine / PI)
+        self.scene.exitance_at(light, place) / PI * cosine / (density + cosine / PI)
     }
 
     /// What a ray along `direction` (unit length) meets first. What lies in one place with the
@@ -250,10 +254,19 @@ pub(super) fn random_numbers(words: &[u64]) -> Rng {
     Rng::with_seed(words.iter().fold(0, hash))
 }
 
-/// A point of a triangle, uniform over its area (Osada et al. 2002).
-pub(super) fn random_point([a, b, c]: [DVec3; 3], rng: &mut Rng) -> DVec3 {
+/// A point of a triangle, uniform over its area.
+pub(super) fn random_point(corners: [DVec3; 3], rng: &mut Rng) -> DVec3 {
+    point_at(corners, random_barycentric(rng))
+}
+
+/// Weights of the second and third corner of a triangle, uniform over its area (Osada et al. 2002).
+fn random_barycentric(rng: &mut Rng) -> [f64; 2] {
     let (root, v) = (rng.f64().sqrt(), rng.f64());
-    a + root * (1.0 - v) * (b - a) + root * v * (c - a)
+    [root * (1.0 - v), root * v]
+}
+
+fn point_at([a, b, c]: [DVec3; 3], [u, v]: [f64; 2]) -> DVec3 {
+    a + u * (b - a) + v * (c - a)
 }
 
 /// A direction with density cos θ / π about `normal`, and cos θ, above zero.

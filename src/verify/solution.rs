@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::path_tracer::nearest_surface;
+use super::path_tracer::{SurfacePoint, nearest_surface};
 use crate::error::{Error, ErrorKind};
-use crate::scene::Rgb;
+use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
 use crate::visibility::ray_scene::RayScene;
 
@@ -18,9 +18,10 @@ pub(super) struct SolutionLookup<'a> {
 }
 
 impl<'a> SolutionLookup<'a> {
-    /// Checks `solution`, of a scene of this `diagonal`.
-    pub fn new(solution: &'a VertexMesh, diagonal: f64) -> Result<SolutionLookup<'a>, Error> {
-        let VertexMesh { positions, radiosity, faces, .. } = solution;
+    /// Checks `solution`, of `scene`.
+    pub fn new(solution: &'a VertexMesh, scene: &Scene) -> Result<SolutionLookup<'a>, Error> {
+        let diagonal = scene.bounds().diagonal();
+        let VertexMesh { positions, radiosity, irradiance, faces, .. } = solution;
         let wrong = |found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Scene, "solution", found, remedy))
         };
@@ -28,6 +29,15 @@ impl<'a> SolutionLookup<'a> {
         if vertices != values {
             let found = format!("{values} values of radiosity at {vertices} vertices");
             return wrong(found, "give one for each");
+        }
+        if scene.has_textures() && irradiance.len() != vertices {
+            let found = format!("{} values of irradiance at {vertices} vertices", irradiance.len());
+            return wrong(found, "give one for each, as `bake` writes them: there are textures");
+        }
+        let unknown = irradiance.iter().position(|e| !e.is_finite());
+        if let Some(v) = unknown.filter(|_| scene.has_textures()) {
+            let found = format!("vertex {} with irradiance {}", v + 1, irradiance[v]);
+            return wrong(found, "all numbers must be finite");
         }
         let finite = |(p, b): (&DVec3, &Rgb)| p.is_finite() && b.is_finite();
         if let Some(v) = positions.iter().zip(radiosity).position(|pair| !finite(pair)) {
@@ -53,12 +63,20 @@ impl<'a> SolutionLookup<'a> {
         Ok(SolutionLookup { solution, rays, normals, diagonal })
     }
 
-    /// Radiosity at `position` on a surface with unit `normal`, W/m²: that of the nearest face that
-    /// faces alike. None where there is none.
-    pub fn radiosity(&self, position: DVec3, normal: DVec3) -> Option<Rgb> {
+    /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m²: by
+    /// the nearest face that faces alike. None where there is none.
+    pub fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
+        let (position, normal) = (point.position, scene.normal(point.triangle));
         let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
         let face = self.solution.faces[hit.triangle];
-        let [a, b, c] = face.map(|v| self.solution.radiosity[v as usize]);
-        Some((1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c)
+        let interpolated = |values: &[Rgb]| {
+            let [a, b, c] = face.map(|v| values[v as usize]);
+            (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
+        };
+        let material = scene.material(point.triangle);
+        Some(match scene.textures(point.triangle) {
+            Some(_) => material.reflectance * interpolated(&self.solution.irradiance),
+            None => interpolated(&self.solution.radiosity) - material.exitance,
+        })
     }
 }

@@ -18,7 +18,7 @@ fn surface() -> VertexMesh {
     VertexMesh::new(&mesh, &ramp)
 }
 
-/// The colours are those of the tone curve that is given: after nine floats of each vertex.
+/// The colours are those of the tone curve that is given: after twelve floats of each vertex.
 #[test]
 fn ply_has_the_colours_of_a_picture() {
     let (surface, folder) = (surface(), tempfile::tempdir().unwrap());
@@ -27,8 +27,8 @@ fn ply_has_the_colours_of_a_picture() {
     write_ply_with_tone(&path, &surface, &tone).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-    let records = bytes[end..].chunks(39).take(surface.positions.len());
-    let colours: Vec<[u8; 3]> = records.map(|record| record[36..].try_into().unwrap()).collect();
+    let records = bytes[end..].chunks(51).take(surface.positions.len());
+    let colours: Vec<[u8; 3]> = records.map(|record| record[48..].try_into().unwrap()).collect();
     let of = |tone: &ToneCurve| -> Vec<[u8; 3]> {
         surface.radiosity.iter().map(|&b| tone.display(b)).collect()
     };
@@ -59,6 +59,9 @@ fn ply_reads_back_bit_for_bit() {
         "property float radiosity_r",
         "property float radiosity_g",
         "property float radiosity_b",
+        "property float irradiance_r",
+        "property float irradiance_g",
+        "property float irradiance_b",
         "property uchar red",
         "property uchar green",
         "property uchar blue",
@@ -67,13 +70,15 @@ fn ply_reads_back_bit_for_bit() {
         "end_header",
     ];
     assert_eq!(lines, want);
-    let (body, stride) = (&bytes[end..], 9 * 4 + 3);
+    let (body, stride) = (&bytes[end..], 12 * 4 + 3);
     for (v, record) in body.chunks(stride).take(surface.positions.len()).enumerate() {
         let float = |k: usize| f32::from_le_bytes(record[4 * k..4 * k + 4].try_into().unwrap());
         let three = |k: usize| [float(k), float(k + 1), float(k + 2)];
         assert_eq!(three(0), surface.positions[v].as_vec3().to_array());
         assert_eq!(three(3), surface.normals[v].as_vec3().to_array());
         assert_eq!(three(6), surface.radiosity[v].as_vec3().to_array());
+        // All of it is reflected, half of what arrives.
+        assert_eq!(three(9), (2.0 * surface.radiosity[v]).as_vec3().to_array());
     }
     let faces = &body[stride * surface.positions.len()..];
     assert_eq!(faces.len(), 13 * surface.faces.len());

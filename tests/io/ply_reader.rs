@@ -31,6 +31,7 @@ fn what_is_written_reads_back() {
     {
         let mut written = framed::even_surface(frame, radiosity);
         written.error = written.radiosity.iter().map(|b| b.x / 8.0).collect();
+        written.irradiance = written.radiosity.iter().map(|b| 3.0 * b).collect();
         written.comments = vec!["a comment".into()];
         write_ply(&path, &written).unwrap();
         let read = read_ply(&path).unwrap();
@@ -41,6 +42,8 @@ fn what_is_written_reads_back() {
         let dim = radiosity < 1e-30;
         let light = written.radiosity.iter().map(|b| b.map(|x| doubles(dim, x)));
         assert_eq!(read.radiosity, light.collect::<Vec<Rgb>>());
+        let irradiance = written.irradiance.iter().map(|e| e.map(|x| doubles(dim, x)));
+        assert_eq!(read.irradiance, irradiance.collect::<Vec<Rgb>>());
         let errors = written.error.iter().map(|&x| doubles(dim, x));
         assert_eq!(read.error, errors.collect::<Vec<_>>());
         let normals = written.normals.iter().map(|n| n.as_vec3().as_dvec3());

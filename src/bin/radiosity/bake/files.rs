@@ -188,7 +188,7 @@ impl Files {
         let (width, height) = self.image;
         if !self.pixel_gather {
             return progress::of_stage("drawing the picture", || {
-                camera.image(&baked.light.surface, width, height, SAMPLES)
+                camera.interpolated_image(&baked.light, width, height, SAMPLES)
             });
         }
         let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
