@@ -66,7 +66,7 @@
 //!
 //! # What it does not model
 //!
-//! Specular or glossy reflection, transparency, textures, participating media, polarisation, time.
+//! Specular or glossy reflection, transparency, participating media, polarisation, time.
 //! Light leaves and arrives diffusely, and an emitter is a surface.
 
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.

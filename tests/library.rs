@@ -19,6 +19,7 @@ mod io;
 mod mesh;
 mod scene;
 mod solver;
+mod textures;
 mod verify;
 mod vertex;
 mod view_factor;

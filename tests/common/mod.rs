@@ -10,6 +10,7 @@ pub mod hemicubes;
 pub mod measures;
 pub mod scenes;
 pub mod surface;
+pub mod textured;
 pub mod truth;
 pub mod view_factors;
 

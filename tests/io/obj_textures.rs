@@ -8,20 +8,7 @@ use radiosity::scene::WarningKind;
 use radiosity::{ObjSettings, Rgb, Scene};
 
 use super::obj_texts::{SQUARE, load, oddities, repaired};
-
-/// An uncompressed TGA image: rows from the top of texels of blue, green and red.
-fn tga(width: u16, texels: &[[u8; 3]]) -> Vec<u8> {
-    let height = (texels.len() / usize::from(width)) as u16;
-    let mut bytes = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0];
-    bytes.extend(width.to_le_bytes());
-    bytes.extend(height.to_le_bytes());
-    bytes.extend([24, 0x20]);
-    bytes.extend(texels.iter().flat_map(|&[r, g, b]| [b, g, r]));
-    bytes
-}
-
-const RED: [u8; 3] = [255, 0, 0];
-const GREEN: [u8; 3] = [0, 255, 0];
+use crate::common::textured::{GREEN, RED, tga};
 
 /// A square across u and v from 0 to 1, left half red and right half green.
 fn two_halves() -> (String, Vec<u8>) {

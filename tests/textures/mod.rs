@@ -1,0 +1,4 @@
+mod elements;
+mod light;
+mod pictures;
+mod results;

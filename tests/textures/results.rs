@@ -1,0 +1,90 @@
+//! What results of textured scenes say: files, and how far off they are.
+
+use radiosity::verify::{Settings, verify};
+use radiosity::{
+    Backend, BakeTarget, ErrorKind, GatheredMesh, Mesh, Rgb, Scene, VertexMesh, read_ply, write_ply,
+};
+
+use crate::common::keep_going;
+use crate::common::textured::{GREEN, RED, box_with_floor, box_with_wall, checkerboard, tga};
+
+fn baked(scene: &Scene, error: f64) -> GatheredMesh {
+    BakeTarget::Error(error).bake(scene.clone(), &Backend::Cpu, keep_going).unwrap().light
+}
+
+/// `irradiance` × ρ + exitance is the radiosity, in the file: at vertices whose elements are all
+/// of one material, and, of a texture, all of one reflectance.
+#[test]
+fn irradiance_makes_the_radiosity() {
+    let scene = box_with_wall("newmtl wall\nKd 0.5\nmap_Kd a.tga", &tga(2, &[RED, GREEN]));
+    let light = baked(&scene, 0.1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("it.ply");
+    write_ply(&path, &light.surface).unwrap();
+    let VertexMesh { positions, radiosity, irradiance, .. } = read_ply(&path).unwrap();
+    let mut textured = 0;
+    for (face, &e) in light.surface.faces.iter().zip(&light.surface.elements) {
+        let mesh: &Mesh = &light.mesh;
+        let e = e as usize;
+        let t = mesh.triangle(mesh.element(e));
+        for v in face.map(|v| v as usize) {
+            let at_edge = (positions[v].y - 0.5).abs() < 1e-6;
+            if at_edge && scene.textures(t).is_some() {
+                continue;
+            }
+            textured += usize::from(scene.textures(t).is_some());
+            let wanted = mesh.exitance(e) + mesh.reflectance(e) * irradiance[v];
+            // Numbers of 24 bits.
+            let off = radiosity[v].distance(wanted);
+            assert!(off < 1e-6 * wanted.length(), "{}: {wanted}", radiosity[v]);
+            assert!(irradiance[v].min_element() > 0.0 || mesh.reflectance(e).z == 0.0);
+        }
+    }
+    assert!(textured > 50, "{textured}");
+}
+
+/// At the edge between two halves a vertex reflects the mean of both.
+#[test]
+fn vertices_reflect_the_mean_around_them() {
+    let scene = box_with_wall("newmtl wall\nKd 0.5\nmap_Kd a.tga", &tga(2, &[RED, GREEN]));
+    let mesh = Mesh::new(scene, 0.3).unwrap();
+    let radiosity: Vec<Rgb> =
+        (0..mesh.element_count()).map(|e| mesh.exitance(e) + mesh.reflectance(e)).collect();
+    let surface = VertexMesh::new(&mesh, &radiosity);
+    let at_edge = |v: &usize| {
+        let (p, n) = (surface.positions[*v], surface.normals[*v]);
+        n.x > 0.9 && (p.y - 0.5).abs() < 1e-9 && p.z > 0.1 && p.z < 0.9
+    };
+    let found: Vec<Rgb> =
+        (0..surface.positions.len()).filter(at_edge).map(|v| surface.radiosity[v]).collect();
+    assert!(found.len() >= 3);
+    for value in found {
+        assert!(value.abs_diff_eq(Rgb::new(0.25, 0.25, 0.0), 1e-6), "{value}");
+    }
+}
+
+#[test]
+fn verify_compares_the_light() {
+    let scene = box_with_floor("newmtl floor\nKd 0.8\nmap_Kd a.tga", &checkerboard(4));
+    let light = baked(&scene, 0.03);
+    let mut settings = Settings::default();
+    (settings.precision, settings.time) = (0.2, None);
+    let found = verify(&scene, &light.surface, &settings, keep_going).unwrap();
+    // Asked for 3 %, and what is told is within a factor of 1.5 of what is measured, at any rate
+    // for scenes in the open.
+    let error = found.error.unwrap();
+    assert!(error.value < 0.045, "{error:?}");
+    // It sees errors of the light, and asks for it.
+    let mut brighter = light.surface.clone();
+    brighter.irradiance.iter_mut().for_each(|e| *e *= 1.3);
+    let found = verify(&scene, &brighter, &settings, keep_going).unwrap();
+    let floor = scene.groups().iter().position(|name| name == "floor").unwrap();
+    let floor = found.groups.iter().find(|group| group.group == floor).unwrap();
+    assert!((floor.error.unwrap().value - 0.3).abs() < 0.05, "{floor:?}");
+    brighter.irradiance.clear();
+    let error = verify(&scene, &brighter, &settings, keep_going).unwrap_err();
+    assert!(
+        error.kind() == ErrorKind::Scene && error.to_string().contains("irradiance"),
+        "{error}"
+    );
+}
