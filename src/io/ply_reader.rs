@@ -125,7 +125,7 @@ fn add_vertices(
         let remedy = "give radiosity_r, radiosity_g and radiosity_b in W/m², as `bake` writes them";
         return Err(wrong("element 'vertex'".into(), found, remedy));
     }
-    let (irradiance, error) = (NAMES[9..12].iter().all(|name| has(name)), has(&NAMES[12]));
+    let (irradiance, error) = (NAMES[9..12].iter().all(has), has(&NAMES[12]));
     for (v, Vertex(numbers)) in vertices.iter().enumerate() {
         if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
             let found = format!("{} {}", NAMES[k], numbers[k]);

@@ -72,7 +72,7 @@ pub fn noise(side: u16) -> Vec<u8> {
 
 /// A black and white board of so many squares along a side.
 pub fn checkerboard(squares: u16) -> Vec<u8> {
-    let texel = |k: u16| if (k % squares + k / squares) % 2 == 0 { [255; 3] } else { [0; 3] };
+    let texel = |k: u16| if (k % squares + k / squares) & 1 == 0 { [255; 3] } else { [0; 3] };
     tga(squares, &(0..squares * squares).map(texel).collect::<Vec<_>>())
 }
 
