@@ -122,7 +122,7 @@ impl<'m> PatchCut<'m> {
         let triangles = 0..mesh.scene().triangles().len();
         let area: f64 = triangles.clone().map(|t| mesh.scene().area(t)).sum();
         let distances = InverseDistanceMoments::in_cube_of_area(area);
-        let emits = |t: usize| mesh.scene().exitance(t) != Rgb::ZERO;
+        let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
         let emitter_elements: usize =
             triangles.filter(|&t| emits(t)).map(|t| mesh.elements_of(mesh.root(t)).len()).sum();
         let emitters_are_few = emitter_elements <= MAX_EMITTER_ELEMENTS;
