@@ -2,9 +2,10 @@
 //!
 //! The `tobj` crate reads geometry, groups and materials. A pass before it ([`statements`]) numbers
 //! the lines, keeps what tobj does not tell (smoothing groups, which faces are repaired), and hands
-//! on only what tobj can take. Here faces are cut into triangles, materials completed and repaired,
+//! on only what tobj can take. Then faces are cut into triangles, materials completed and repaired,
 //! and the scene is made, with a warning for each kind of thing that was odd.
 
+mod faces;
 mod materials;
 pub(super) mod repairs;
 mod settings;
@@ -15,18 +16,16 @@ use std::collections::HashSet;
 use std::io;
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
-
 use super::files::{self, FileSource};
 use super::lights;
-use super::mtl::{Library, MtlMaterial};
+use super::mtl::Library;
 use super::text::{self, Line};
 use crate::error::{Error, ErrorKind};
-use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
-use crate::scene::{Material, Scene, Triangle, Warning, WarningKind};
+use crate::scene::{Scene, WarningKind};
+use faces::Geometry;
 use repairs::Repairs;
 pub use settings::ObjSettings;
-use statements::{FaceNote, LineFeed, Statements, UNKNOWN_MATERIAL};
+use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 
 /// Loads a Wavefront OBJ file and the MTL files that it names.
 ///
@@ -253,121 +252,5 @@ impl<'a> ObjFile<'a> {
         }
         named.push(unknown);
         Ok(named)
-    }
-
-    /// The vertices that faces use, in the order of the file, and the faces as triangles.
-    fn geometry(&mut self, models: Vec<tobj::Model>, named: &[u32]) -> Result<Geometry, Error> {
-        let mut geometry = Geometry {
-            positions: vec![DVec3::NAN; self.statements.vertices as usize],
-            triangles: Vec::with_capacity(self.statements.faces.len()),
-            texture_coordinates: vec![],
-        };
-        let has_texture = |m: &MtlMaterial| m.textures.iter().any(Option::is_some);
-        let textured = self.library.materials.iter().any(has_texture);
-        let (mut face, mut bare) = (0, 0);
-        for tobj::Model { mesh, name } in models {
-            // A model that has no face has no number either.
-            let number = name.parse().ok();
-            let Some(&used) = number.and_then(|k: usize| self.statements.models.get(k)) else {
-                continue;
-            };
-            let by_name = used.map_or(named[named.len() - 1], |k| named[k as usize]);
-            let known = mesh.material_id.filter(|_| used.is_some());
-            let material = known.map_or(by_name, |id| id as u32);
-            // The number of each vertex in the file is its colour.
-            let numbers: Vec<u32> =
-                mesh.vertex_color.iter().step_by(3).map(|&n| n as u32).collect();
-            for (&number, p) in numbers.iter().zip(mesh.positions.chunks_exact(3)) {
-                geometry.positions[number as usize] = DVec3::new(p[0], p[1], p[2]);
-            }
-            let arity = |k: usize| mesh.face_arities.get(k).map_or(3, |&arity| arity as usize);
-            let (mut start, mut k) = (0, 0);
-            while start < mesh.indices.len() {
-                let corners = &mesh.indices[start..start + arity(k)];
-                let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
-                let places = textured.then(|| texture_coordinates(&mesh, start, corners.len()));
-                let FaceNote { group, smoothing, .. } = self.statements.faces[face];
-                let like = Triangle { group, material, smoothing, ..Default::default() };
-                self.cut(face, &corners, places.as_deref(), like, &mut geometry)?;
-                bare += usize::from(used.is_none());
-                (start, k, face) = (start + corners.len(), k + 1, face + 1);
-            }
-        }
-        if bare > 0 {
-            let default = Material::DEFAULT_REFLECTANCE;
-            let done = match bare == face {
-                true => format!("all of them reflect {default} and emit nothing"),
-                false => format!("before the first `usemtl`: reflect {default} and emit nothing"),
-            };
-            self.repairs.push(Warning::new(WarningKind::FaceWithoutMaterial, bare, done));
-        }
-        geometry.drop_unused();
-        Ok(geometry)
-    }
-
-    /// Appends the triangles of a face with these corners, and `places` in texture space if these
-    /// matter, each otherwise `like` that one.
-    fn cut(
-        &mut self,
-        face: usize,
-        corners: &[u32],
-        places: Option<&[DVec2]>,
-        like: Triangle,
-        geometry: &mut Geometry,
-    ) -> Result<(), Error> {
-        let points: Vec<DVec3> = corners.iter().map(|&i| geometry.positions[i as usize]).collect();
-        let pieces = match triangulate(&points) {
-            Some(pieces) => pieces,
-            None => {
-                let group = &self.statements.groups.list[like.group as usize];
-                let line = self.statements.faces[face].line as usize;
-                let place = || text::place(self.path, line);
-                let done = "cut into triangles as well as can be";
-                self.repairs.note_at(WarningKind::Polygon, place, group, done)?;
-                triangulate_anyhow(&points)
-            }
-        };
-        if let Some(places) = places {
-            let coordinates = pieces.iter().map(|t| t.map(|i| places[i]));
-            geometry.texture_coordinates.extend(coordinates);
-        }
-        let triangle = |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), ..like };
-        geometry.triangles.extend(pieces.into_iter().map(triangle));
-        Ok(())
-    }
-}
-
-/// Of `count` corners of `mesh` from `start` on; not finite where they have none.
-fn texture_coordinates(mesh: &tobj::Mesh, start: usize, count: usize) -> Vec<DVec2> {
-    let index = |k: usize| mesh.texcoord_indices.get(k).map(|&i| 2 * i as usize);
-    let place = |k| index(k).and_then(|at| mesh.texcoords.get(at..at + 2));
-    let corners = start..start + count;
-    corners.map(|k| place(k).map_or(DVec2::NAN, |uv| DVec2::new(uv[0], uv[1]))).collect()
-}
-
-/// Positions and faces of a scene.
-struct Geometry {
-    positions: Vec<DVec3>,
-    triangles: Vec<Triangle>,
-    /// Of the triangles' corners, where some material has a texture.
-    texture_coordinates: Vec<[DVec2; 3]>,
-}
-
-impl Geometry {
-    /// Drops the vertices that no face uses, which are those without a position.
-    fn drop_unused(&mut self) {
-        let mut used = 0;
-        let numbers: Vec<u32> = self
-            .positions
-            .iter()
-            .map(|p| {
-                used += u32::from(!p.is_nan());
-                used.saturating_sub(1)
-            })
-            .collect();
-        self.positions.retain(|p| !p.is_nan());
-        for triangle in &mut self.triangles {
-            triangle.corners = triangle.corners.map(|k| numbers[k as usize]);
-        }
     }
 }

@@ -1,0 +1,137 @@
+//! The faces of an OBJ file as triangles of a scene.
+//!
+//! tobj gives the faces by models, one for each stretch of lines with one material, and numbers the
+//! vertices of each anew; the colour of a vertex holds its number in the file. Here the faces get
+//! that numbering back, what [`super::statements`] noted of each, and are cut into triangles.
+
+use glam::{DVec2, DVec3};
+
+use super::super::mtl::MtlMaterial;
+use super::super::text;
+use super::ObjFile;
+use super::statements::FaceNote;
+use crate::error::Error;
+use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
+use crate::scene::{Material, Triangle, Warning, WarningKind};
+
+/// Positions and faces of a scene.
+pub(super) struct Geometry {
+    pub positions: Vec<DVec3>,
+    pub triangles: Vec<Triangle>,
+    /// Of the triangles' corners, where some material has a texture.
+    pub texture_coordinates: Vec<[DVec2; 3]>,
+}
+
+impl ObjFile<'_> {
+    /// The vertices that faces use, in the order of the file, and the faces as triangles.
+    pub(super) fn geometry(
+        &mut self,
+        models: Vec<tobj::Model>,
+        named: &[u32],
+    ) -> Result<Geometry, Error> {
+        let mut geometry = Geometry {
+            positions: vec![DVec3::NAN; self.statements.vertices as usize],
+            triangles: Vec::with_capacity(self.statements.faces.len()),
+            texture_coordinates: vec![],
+        };
+        let has_texture = |m: &MtlMaterial| m.textures.iter().any(Option::is_some);
+        let textured = self.library.materials.iter().any(has_texture);
+        let (mut face, mut bare) = (0, 0);
+        for tobj::Model { mesh, name } in models {
+            // A model that has no face has no number either.
+            let number = name.parse().ok();
+            let Some(&used) = number.and_then(|k: usize| self.statements.models.get(k)) else {
+                continue;
+            };
+            let by_name = used.map_or(named[named.len() - 1], |k| named[k as usize]);
+            let known = mesh.material_id.filter(|_| used.is_some());
+            let material = known.map_or(by_name, |id| id as u32);
+            // The number of each vertex in the file is its colour.
+            let numbers: Vec<u32> =
+                mesh.vertex_color.iter().step_by(3).map(|&n| n as u32).collect();
+            for (&number, p) in numbers.iter().zip(mesh.positions.chunks_exact(3)) {
+                geometry.positions[number as usize] = DVec3::new(p[0], p[1], p[2]);
+            }
+            let arity = |k: usize| mesh.face_arities.get(k).map_or(3, |&arity| arity as usize);
+            let (mut start, mut k) = (0, 0);
+            while start < mesh.indices.len() {
+                let corners = &mesh.indices[start..start + arity(k)];
+                let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
+                let places = textured.then(|| texture_coordinates(&mesh, start, corners.len()));
+                let FaceNote { group, smoothing, .. } = self.statements.faces[face];
+                let like = Triangle { group, material, smoothing, ..Default::default() };
+                self.cut(face, &corners, places.as_deref(), like, &mut geometry)?;
+                bare += usize::from(used.is_none());
+                (start, k, face) = (start + corners.len(), k + 1, face + 1);
+            }
+        }
+        if bare > 0 {
+            let default = Material::DEFAULT_REFLECTANCE;
+            let done = match bare == face {
+                true => format!("all of them reflect {default} and emit nothing"),
+                false => format!("before the first `usemtl`: reflect {default} and emit nothing"),
+            };
+            self.repairs.push(Warning::new(WarningKind::FaceWithoutMaterial, bare, done));
+        }
+        geometry.drop_unused();
+        Ok(geometry)
+    }
+
+    /// Appends the triangles of a face with these corners, and `places` in texture space if these
+    /// matter, each otherwise `like` that one.
+    fn cut(
+        &mut self,
+        face: usize,
+        corners: &[u32],
+        places: Option<&[DVec2]>,
+        like: Triangle,
+        geometry: &mut Geometry,
+    ) -> Result<(), Error> {
+        let points: Vec<DVec3> = corners.iter().map(|&i| geometry.positions[i as usize]).collect();
+        let pieces = match triangulate(&points) {
+            Some(pieces) => pieces,
+            None => {
+                let group = &self.statements.groups.list[like.group as usize];
+                let line = self.statements.faces[face].line as usize;
+                let place = || text::place(self.path, line);
+                let done = "cut into triangles as well as can be";
+                self.repairs.note_at(WarningKind::Polygon, place, group, done)?;
+                triangulate_anyhow(&points)
+            }
+        };
+        if let Some(places) = places {
+            let coordinates = pieces.iter().map(|t| t.map(|i| places[i]));
+            geometry.texture_coordinates.extend(coordinates);
+        }
+        let triangle = |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), ..like };
+        geometry.triangles.extend(pieces.into_iter().map(triangle));
+        Ok(())
+    }
+}
+
+impl Geometry {
+    /// Drops the vertices that no face uses, which are those without a position.
+    fn drop_unused(&mut self) {
+        let mut used = 0;
+        let numbers: Vec<u32> = self
+            .positions
+            .iter()
+            .map(|p| {
+                used += u32::from(!p.is_nan());
+                used.saturating_sub(1)
+            })
+            .collect();
+        self.positions.retain(|p| !p.is_nan());
+        for triangle in &mut self.triangles {
+            triangle.corners = triangle.corners.map(|k| numbers[k as usize]);
+        }
+    }
+}
+
+/// Of `count` corners of `mesh` from `start` on; not finite where they have none.
+fn texture_coordinates(mesh: &tobj::Mesh, start: usize, count: usize) -> Vec<DVec2> {
+    let index = |k: usize| mesh.texcoord_indices.get(k).map(|&i| 2 * i as usize);
+    let place = |k| index(k).and_then(|at| mesh.texcoords.get(at..at + 2));
+    let corners = start..start + count;
+    corners.map(|k| place(k).map_or(DVec2::NAN, |uv| DVec2::new(uv[0], uv[1]))).collect()
+}
