@@ -8,7 +8,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
@@ -84,7 +84,7 @@ impl<'a> FileSource<'a> {
 
     fn look_for(&self, name: &str) -> Option<String> {
         if self.is_below(name) && self.is_file(name) {
-            return Some(name.into());
+            return plain(name).to_str().map(String::from);
         }
         let slashes = name.replace('\\', "/");
         let parts: Vec<&str> = slashes.split('/').filter(|p| !["", "."].contains(p)).collect();
@@ -96,7 +96,7 @@ impl<'a> FileSource<'a> {
 
     /// Whether `name` is a plain path from the folder down.
     fn is_below(&self, name: &str) -> bool {
-        use std::path::Component::{CurDir, Normal};
+        use Component::{CurDir, Normal};
         !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Normal(_) | CurDir))
     }
 
@@ -144,7 +144,7 @@ impl<'a> FileSource<'a> {
     /// Whether there is a regular file of this name, and no link leads out of the folder.
     fn is_file(&self, name: &str) -> bool {
         match self.place {
-            Place::Memory(files) => files.iter().any(|f| Path::new(f.0) == Path::new(name)),
+            Place::Memory(files) => files.iter().any(|file| plain(file.0) == plain(name)),
             Place::Folder(folder) => {
                 let path = folder.join(name);
                 path.is_file() && is_inside(&path, folder)
@@ -157,7 +157,7 @@ impl<'a> FileSource<'a> {
         match self.place {
             Place::Folder(_) => read_bytes(&self.path(name), most),
             Place::Memory(files) => {
-                let named = |file: &&(&str, _)| Path::new(file.0) == Path::new(name);
+                let named = |file: &&(&str, _)| plain(file.0) == plain(name);
                 limited(files.iter().find(named).ok_or(ErrorKind::NotFound)?.1, most)
             }
         }
@@ -182,6 +182,11 @@ impl<'a> FileSource<'a> {
             _ => format!("{place} has {}", quoted(&names)),
         }
     }
+}
+
+/// `path` in one spelling, whether or not it has folders `.`.
+pub(super) fn plain(path: &str) -> PathBuf {
+    Path::new(path).components().filter(|part| *part != Component::CurDir).collect()
 }
 
 /// Whether `path` lies in `folder` when all links are followed.

@@ -115,8 +115,7 @@ impl Library {
         let Some(found) = files.find(name) else {
             return note_missing(line, name, files, repairs);
         };
-        let plain = |path: &str| path.trim_start_matches("./").replace("/./", "/");
-        if plain(&found) != plain(name) {
+        if files::plain(&found) != files::plain(name) {
             repairs.note(
                 WarningKind::LibraryElsewhere,
                 line,

@@ -1,11 +1,14 @@
 //! Textures of materials: where they are looked for, what they are multiplied with, and limits.
 
 use std::f64::consts::PI;
+use std::fs;
 use std::io::Write;
+use std::sync::Arc;
 
 use radiosity::glam::DVec2;
 use radiosity::scene::WarningKind;
-use radiosity::{ObjSettings, Rgb, Scene};
+use radiosity::{ObjSettings, Rgb, Scene, load_obj};
+use tempfile::TempDir;
 
 use super::obj_texts::{SQUARE, load, oddities, repaired};
 use crate::common::textured::{GREEN, RED, tga};
@@ -97,6 +100,34 @@ fn texture_that_is_not_there_is_its_kd() {
         let scene = self::scene(&format!("newmtl wall\nmap_Kd {name}\n"));
         assert!(scene.textures(0).is_some(), "{name}");
     }
+}
+
+#[test]
+fn image_is_read_once() {
+    let text = format!("mtllib room.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");
+    let image = tga(2, &[RED, GREEN]);
+    for name in ["./a.tga", "A.TGA", ".\\art\\..\\a.tga"] {
+        let library = format!("newmtl a\nmap_Kd a.tga\nnewmtl b\nmap_Kd {name}\n");
+        let library = ("room.mtl", library.as_bytes());
+        let scene = load(&[("room.obj", text.as_bytes()), library, ("a.tga", &image)]).unwrap();
+        let texture = |t| &scene.textures(t).unwrap().reflectance.as_ref().unwrap().texture;
+        assert!(Arc::ptr_eq(texture(0), texture(1)), "{name}");
+    }
+}
+
+#[test]
+fn file_of_an_image_may_have_256_mib() {
+    let folder = TempDir::new().unwrap();
+    let (text, _) = two_halves();
+    fs::write(folder.path().join("room.obj"), text).unwrap();
+    fs::write(folder.path().join("room.mtl"), "newmtl wall\nKd 0.3\nmap_Kd a.png\n").unwrap();
+    // With a hole, so that it takes no room on the disk.
+    fs::File::create(folder.path().join("a.png")).unwrap().set_len((1 << 28) + 1).unwrap();
+    let scene = load_obj(folder.path().join("room.obj")).unwrap();
+    assert_eq!(oddities(&scene), [WarningKind::LargeTexture]);
+    let warning = scene.warnings()[0].to_string();
+    assert!(warning.contains("more than 268435456 bytes"), "{warning}");
+    assert_eq!(scene.material(0).reflectance.to_array(), [0.3; 3]);
 }
 
 #[test]
