@@ -11,8 +11,8 @@
 //! the box of each primitive. (Khronos, "glTF 2.0 Specification", 2021.)
 
 mod document;
+mod primitives;
 
-use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -24,6 +24,7 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
+use primitives::{Primitive, primitives};
 
 /// Writes `light` as glTF 2.0 binary, `.glb`: the same bytes for the same light.
 ///
@@ -32,6 +33,11 @@ use crate::scene::Rgb;
 /// and `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
 /// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have
 /// reflectance and exitance. All numbers are 32-bit floats.
+///
+/// In a scene with textures, vertices whose corners have texture coordinates in the file have these as
+/// `TEXCOORD_0`, and `_IRRADIANCE` (W/m² per channel, linear): a program that has the textures
+/// multiplies it with them, where `COLOR_0` and `_RADIOSITY` have their means around each vertex.
+/// Textures themselves are not in the file.
 ///
 /// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF means
 /// metres with +y up: nothing is turned or scaled. A scene that lies more than 16 of its sizes from
@@ -75,6 +81,9 @@ const BINARY_CHUNK: u32 = 0x004E_4942;
 /// Bytes of three floats.
 const VECTOR_BYTES: u64 = 12;
 
+/// Bytes of two floats.
+const PLACE_BYTES: u64 = 8;
+
 /// Bytes of an index.
 const INDEX_BYTES: u64 = 4;
 
@@ -90,29 +99,39 @@ struct Model<'a> {
     origin: Vec3,
 }
 
-/// The faces of one group and one material.
-struct Primitive {
-    group: u32,
-    material: u32,
-    /// Vertices of the surface, in the order of the file.
-    vertices: Vec<u32>,
-    /// Faces, by the places of their corners in `vertices`.
-    faces: Vec<[u32; 3]>,
-}
-
-/// What a vertex has, each three floats, in the order of the file.
+/// What a vertex has, in the order of the file: three floats each, but for two of texture
+/// coordinates. The last two are those of vertices that have texture coordinates.
 #[derive(Clone, Copy, PartialEq)]
 enum Attribute {
     Position,
     Normal,
     Colour,
     Radiosity,
-    // Texture coordinates, two floats, come here: TEXCOORD_0, of vertices of surfaces that have
-    // them.
+    Irradiance,
+    TextureCoordinates,
 }
 
-const ATTRIBUTES: [Attribute; 4] =
-    [Attribute::Position, Attribute::Normal, Attribute::Colour, Attribute::Radiosity];
+const ATTRIBUTES: [Attribute; 6] = [
+    Attribute::Position,
+    Attribute::Normal,
+    Attribute::Colour,
+    Attribute::Radiosity,
+    Attribute::Irradiance,
+    Attribute::TextureCoordinates,
+];
+
+impl Attribute {
+    /// Bytes of one.
+    fn size(self) -> u64 {
+        if self == Attribute::TextureCoordinates { PLACE_BYTES } else { VECTOR_BYTES }
+    }
+
+    /// Whether vertices of `primitive` have it.
+    fn is_of(self, primitive: &Primitive) -> bool {
+        let of_textures = matches!(self, Attribute::Irradiance | Attribute::TextureCoordinates);
+        !of_textures || !primitive.places.is_empty()
+    }
+}
 
 impl Model<'_> {
     fn new<'a>(light: &'a GatheredMesh, tone: &'a ToneCurve) -> Model<'a> {
@@ -123,9 +142,15 @@ impl Model<'_> {
         Model { light, tone, primitives: primitives(light), origin }
     }
 
-    /// Vertices of all primitives.
-    fn vertex_count(&self) -> u64 {
-        self.primitives.iter().map(|primitive| primitive.vertices.len() as u64).sum()
+    /// The attributes that any primitive has.
+    fn attributes(&self) -> impl Iterator<Item = Attribute> {
+        ATTRIBUTES.into_iter().filter(|a| self.primitives.iter().any(|p| a.is_of(p)))
+    }
+
+    /// Vertices of all primitives that have an attribute.
+    fn vertex_count(&self, attribute: Attribute) -> u64 {
+        let having = self.primitives.iter().filter(|primitive| attribute.is_of(primitive));
+        having.map(|primitive| primitive.vertices.len() as u64).sum()
     }
 
     /// Faces of all primitives.
@@ -134,15 +159,18 @@ impl Model<'_> {
     }
 
     fn binary_length(&self) -> u64 {
-        let vectors = ATTRIBUTES.len() as u64 * self.vertex_count();
-        vectors * VECTOR_BYTES + 3 * self.face_count() * INDEX_BYTES
+        let bytes = |a: Attribute| self.vertex_count(a) * a.size();
+        self.attributes().map(bytes).sum::<u64>() + 3 * self.face_count() * INDEX_BYTES
     }
 
     fn write_binary(&self, out: &mut impl Write) -> io::Result<()> {
-        for attribute in ATTRIBUTES {
-            for &v in self.primitives.iter().flat_map(|primitive| &primitive.vertices) {
-                for x in self.value(attribute, v as usize).to_array() {
-                    out.write_all(&x.to_le_bytes())?;
+        for attribute in self.attributes() {
+            for primitive in self.primitives.iter().filter(|p| attribute.is_of(p)) {
+                for k in 0..primitive.vertices.len() {
+                    let numbers = self.value(attribute, primitive, k).to_array();
+                    for x in &numbers[..attribute.size() as usize / size_of::<f32>()] {
+                        out.write_all(&x.to_le_bytes())?;
+                    }
                 }
             }
         }
@@ -152,44 +180,18 @@ impl Model<'_> {
         Ok(())
     }
 
-    /// What vertex `v` of the surface has, as it is written.
-    fn value(&self, attribute: Attribute, v: usize) -> Vec3 {
-        let surface = &self.light.surface;
+    /// What vertex `k` of `primitive` has, as it is written.
+    fn value(&self, attribute: Attribute, primitive: &Primitive, k: usize) -> Vec3 {
+        let (surface, v) = (&self.light.surface, primitive.vertices[k] as usize);
+        let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3();
         match attribute {
             Attribute::Position => (surface.positions[v] - self.origin.as_dvec3()).as_vec3(),
             // glTF allows no other length than 1.
             Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
             Attribute::Colour => self.tone.linear(surface.radiosity[v]).as_vec3(),
-            Attribute::Radiosity => {
-                surface.radiosity[v].min(Rgb::splat(f64::from(f32::MAX))).as_vec3()
-            }
+            Attribute::Radiosity => light(surface.radiosity[v]),
+            Attribute::Irradiance => light(surface.irradiance.get(v).copied().unwrap_or(Rgb::ZERO)),
+            Attribute::TextureCoordinates => primitive.places[k].extend(0.0),
         }
     }
-}
-
-/// The faces of `light` by group, then material, in the order of the scene's.
-fn primitives(light: &GatheredMesh) -> Vec<Primitive> {
-    let (surface, mesh) = (&light.surface, &light.mesh);
-    let mut faces: BTreeMap<(u32, u32), Vec<[u32; 3]>> = BTreeMap::new();
-    for (&face, &element) in surface.faces.iter().zip(&surface.elements) {
-        let t = mesh.triangle(mesh.element(element as usize));
-        let triangle = mesh.scene().triangles()[t];
-        faces.entry((triangle.group, triangle.material)).or_default().push(face);
-    }
-    // Per vertex of the surface, the primitive that had it last, and its place there.
-    let mut places = vec![(usize::MAX, 0); surface.positions.len()];
-    let mut primitives = vec![];
-    for ((group, material), mut faces) in faces {
-        let mut vertices = vec![];
-        for corner in faces.as_flattened_mut() {
-            let place = &mut places[*corner as usize];
-            if place.0 != primitives.len() {
-                *place = (primitives.len(), vertices.len() as u32);
-                vertices.push(*corner);
-            }
-            *corner = place.1;
-        }
-        primitives.push(Primitive { group, material, vertices, faces });
-    }
-    primitives
 }

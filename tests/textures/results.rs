@@ -1,8 +1,11 @@
 //! What results of textured scenes say: files, and how far off they are.
 
+use gltf::mesh::Semantic;
+use radiosity::io::ToneCurve;
 use radiosity::verify::{Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, GatheredMesh, Mesh, Rgb, Scene, VertexMesh, read_ply, write_ply,
+    Backend, BakeTarget, ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb, Scene, VertexMesh,
+    read_ply, write_glb, write_ply,
 };
 
 use crate::common::keep_going;
@@ -41,6 +44,71 @@ fn irradiance_makes_the_radiosity() {
         }
     }
     assert!(textured > 50, "{textured}");
+}
+
+#[test]
+fn glb_has_texture_coordinates_and_irradiance() {
+    let map = "newmtl wall\nKd 0.5\nmap_Kd a.tga";
+    let image = tga(2, &[RED, GREEN]);
+    let scene = box_with_wall(map, &image);
+    let mesh = Mesh::new(scene, 0.3).unwrap();
+    let radiosity: Vec<Rgb> =
+        (0..mesh.element_count()).map(|e| mesh.exitance(e) + 2.0 * mesh.reflectance(e)).collect();
+    let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    write_glb(&path, &light, &ToneCurve::fit(&light.surface.radiosity)).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let document = gltf::Gltf::from_slice(&bytes).unwrap().document;
+    let binary = gltf::Glb::from_slice(&bytes).unwrap().bin.unwrap();
+    let irradiance_name = Semantic::Extras("IRRADIANCE".into());
+    let mut textured = 0;
+    for primitive in document.meshes().flat_map(|mesh| mesh.primitives()) {
+        let reader = primitive.reader(|_| Some(&binary));
+        let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+        let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
+        assert!(indices.iter().all(|&v| (v as usize) < positions.len()));
+        let is_wall = primitive.material().name() == Some("wall");
+        let irradiance = primitive.get(&irradiance_name);
+        assert_eq!((reader.read_tex_coords(0).is_some(), irradiance.is_some()), (is_wall, is_wall));
+        if !is_wall {
+            continue;
+        }
+        let places: Vec<[f32; 2]> = reader.read_tex_coords(0).unwrap().into_f32().collect();
+        let irradiance: Vec<[f32; 3]> =
+            gltf::accessor::Iter::new(irradiance.unwrap(), |_| Some(&binary[..]))
+                .unwrap()
+                .collect();
+        assert_eq!((places.len(), irradiance.len()), (positions.len(), positions.len()));
+        for ((p, place), e) in positions.iter().zip(places).zip(irradiance) {
+            // The wall lies along y and z, and v of glTF points down.
+            let wanted = [p[1], 1.0 - p[2]];
+            assert!((0..2).all(|k| (place[k] - wanted[k]).abs() < 1e-6), "{p:?}: {place:?}");
+            assert!((e[0] - 2.0).abs() < 1e-5 && e[2] == 0.0, "{e:?}");
+            textured += 1;
+        }
+    }
+    // A grid of 5 × 5 vertices: one material and no seam, so none is there twice.
+    assert_eq!(textured, 25);
+}
+
+#[test]
+fn vertices_on_seams_are_written_for_both_sides() {
+    let text = "mtllib box.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n\
+                vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\nf 2/1 5/2 6/3 3/4\n";
+    let image = tga(2, &[RED, GREEN]);
+    let library: &[u8] = b"newmtl wall\nKd 0.5\nmap_Kd a.tga";
+    let files = [("box.mtl", library), ("a.tga", &image)];
+    let scene = ObjSettings::default().read("box.obj", text.as_bytes(), &files).unwrap();
+    let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
+    let light = GatheredMesh::from_elements(&mesh, &[Rgb::ONE; 4]).unwrap();
+    assert_eq!(light.surface.positions.len(), 6);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    write_glb(&path, &light, &ToneCurve::fit(&light.surface.radiosity)).unwrap();
+    let document = gltf::Gltf::open(&path).unwrap().document;
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    assert_eq!(primitive.get(&Semantic::TexCoords(0)).unwrap().count(), 8);
 }
 
 /// At the edge between two halves a vertex reflects the mean of both.

@@ -1,10 +1,13 @@
 //! What the tests that compare shaders with their twins share: a scene, reading back, pictures.
 
+use std::sync::Arc;
+
 use bytemuck::Pod;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::device::Gpu;
 use crate::mesh::Mesh;
+use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
 use crate::scene::{Material, Rgb, Scene, Triangle};
 
 /// Shifts of pixel centres, pixels: none, then the other points of a grid of ±1/128 in steps of
@@ -20,6 +23,40 @@ pub fn offsets() -> Vec<[f64; 2]> {
 /// The device; tests that need one are ignored where RADIOSITY_NO_GPU says that none is there.
 pub fn gpu() -> Gpu {
     Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set")
+}
+
+/// The same scene with a texture on all walls and lights.
+pub fn textured_scene() -> Mesh {
+    let mesh = scene();
+    let plain = mesh.scene();
+    let texel = |k: u8| [k.wrapping_mul(67), k.wrapping_mul(151), k.wrapping_mul(29)];
+    let texture = Arc::new(Texture::new(5, 7, (0..35).map(texel).collect()).unwrap());
+    let map = |factor: Rgb| TextureMap {
+        texture: texture.clone(),
+        factor,
+        ceiling: f64::MAX,
+        mean: Rgb::ONE,
+        scale: DVec2::ONE,
+        offset: DVec2::ZERO,
+        clamped: false,
+    };
+    let textures = |(m, material): (u32, &Material)| {
+        let exitance = Some(map(material.exitance)).filter(|_| material.exitance != Rgb::ZERO);
+        (m, MaterialTextures { reflectance: Some(map(Rgb::splat(0.9))), exitance })
+    };
+    let place = |t: usize| {
+        let turned = DVec2::from_angle(t as f64);
+        [DVec2::ZERO, DVec2::X, DVec2::Y].map(|corner| turned.rotate(corner))
+    };
+    let scene = Scene::with_textures(
+        plain.positions().to_vec(),
+        plain.triangles().to_vec(),
+        plain.groups().to_vec(),
+        plain.materials().to_vec(),
+        (0..plain.triangles().len()).map(place).collect(),
+        (0..).zip(plain.materials()).map(textures).collect(),
+    );
+    mesh.with_scene(scene.unwrap()).unwrap()
 }
 
 /// A floor in quadtrees of uneven depth, and around it: a ceiling, a wall that reaches below the

@@ -12,7 +12,8 @@ use gltf_json::scene::Node;
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Accessor, Asset, Buffer, Index, Material, Mesh, Root, Scene, Value};
 
-use super::{ATTRIBUTES, Attribute, INDEX_BYTES, Model, Primitive, VECTOR_BYTES};
+use super::primitives::Primitive;
+use super::{Attribute, INDEX_BYTES, Model};
 use crate::scene::Rgb;
 
 /// The extension that shows a colour as it is.
@@ -26,7 +27,13 @@ impl Attribute {
             Attribute::Colour => Semantic::Colors(0),
             // Written with an underscore before it, as names must be that glTF does not know.
             Attribute::Radiosity => Semantic::Extras("RADIOSITY".into()),
+            Attribute::Irradiance => Semantic::Extras("IRRADIANCE".into()),
+            Attribute::TextureCoordinates => Semantic::TexCoords(0),
         }
+    }
+
+    fn type_(self) -> Type {
+        if self == Attribute::TextureCoordinates { Type::Vec2 } else { Type::Vec3 }
     }
 }
 
@@ -68,7 +75,6 @@ impl Model<'_> {
 
     /// A view of the binary chunk for each attribute, and one for the indices.
     fn add_views(&self, root: &mut Root) {
-        let vectors = self.vertex_count() * VECTOR_BYTES;
         let mut offset = 0;
         let mut add = |length: u64, stride: Option<Stride>, target: Target| {
             root.push(View {
@@ -83,8 +89,9 @@ impl Model<'_> {
             });
             offset += length;
         };
-        for _ in ATTRIBUTES {
-            add(vectors, Some(Stride(VECTOR_BYTES as usize)), Target::ArrayBuffer);
+        for attribute in self.attributes() {
+            let (count, size) = (self.vertex_count(attribute), attribute.size());
+            add(count * size, Some(Stride(size as usize)), Target::ArrayBuffer);
         }
         add(3 * self.face_count() * INDEX_BYTES, None, Target::ElementArrayBuffer);
     }
@@ -92,7 +99,7 @@ impl Model<'_> {
     /// A node and a mesh for each group that has faces.
     fn add_groups(&self, root: &mut Root) -> Vec<Index<Node>> {
         let mut materials = BTreeMap::new();
-        let (mut vertices, mut faces) = (0, 0);
+        let mut written = Written::default();
         let mut nodes = vec![];
         for of_group in self.primitives.chunk_by(|a, b| a.group == b.group) {
             let mut primitives = vec![];
@@ -100,9 +107,8 @@ impl Model<'_> {
                 let material = *materials
                     .entry(primitive.material)
                     .or_insert_with(|| root.push(self.material(primitive.material)));
-                primitives.push(self.primitive(root, primitive, material, vertices, faces));
-                vertices += primitive.vertices.len() as u64;
-                faces += primitive.faces.len() as u64;
+                primitives.push(self.primitive(root, primitive, material, &written));
+                written.add(primitive);
             }
             let name = self.light.mesh.scene().groups()[of_group[0].group as usize].clone();
             let mesh = root.push(Mesh {
@@ -118,30 +124,35 @@ impl Model<'_> {
         nodes
     }
 
-    /// A primitive that comes after so many vertices and faces.
+    /// A primitive that comes after what was `written`.
     fn primitive(
         &self,
         root: &mut Root,
         primitive: &Primitive,
         material: Index<Material>,
-        vertices: u64,
-        faces: u64,
+        written: &Written,
     ) -> gltf_json::mesh::Primitive {
         let mut attributes = BTreeMap::new();
-        for (view, attribute) in ATTRIBUTES.into_iter().enumerate() {
-            let mut accessor = accessor(view, vertices * VECTOR_BYTES, primitive.vertices.len());
+        let attributes_of_all = self.attributes().enumerate();
+        for (view, attribute) in attributes_of_all.filter(|(_, a)| a.is_of(primitive)) {
+            let offset = written.vertices_with(attribute) * attribute.size();
+            let mut accessor = Accessor {
+                type_: Valid(attribute.type_()),
+                ..accessor(view, offset, primitive.vertices.len())
+            };
             if attribute == Attribute::Position {
-                let values =
-                    || primitive.vertices.iter().map(|&v| self.value(attribute, v as usize));
+                let vertices = 0..primitive.vertices.len();
+                let values = || vertices.clone().map(|k| self.value(attribute, primitive, k));
                 accessor.min = Some(numbers(values().fold(Vec3::INFINITY, Vec3::min)));
                 accessor.max = Some(numbers(values().fold(Vec3::NEG_INFINITY, Vec3::max)));
             }
             attributes.insert(Valid(attribute.semantic()), root.push(accessor));
         }
+        let indices = self.attributes().count();
         let indices = Accessor {
             component_type: Valid(GenericComponentType(ComponentType::U32)),
             type_: Valid(Type::Scalar),
-            ..accessor(ATTRIBUTES.len(), 3 * faces * INDEX_BYTES, 3 * primitive.faces.len())
+            ..accessor(indices, 3 * written.faces * INDEX_BYTES, 3 * primitive.faces.len())
         };
         gltf_json::mesh::Primitive {
             attributes,
@@ -172,6 +183,30 @@ impl Model<'_> {
             extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
             extras: notes_of(&notes),
             ..Default::default()
+        }
+    }
+}
+
+/// What the primitives before one have.
+#[derive(Default)]
+struct Written {
+    vertices: u64,
+    /// Those of them with texture coordinates.
+    textured: u64,
+    faces: u64,
+}
+
+impl Written {
+    fn add(&mut self, primitive: &Primitive) {
+        self.vertices += primitive.vertices.len() as u64;
+        self.textured += primitive.places.len() as u64;
+        self.faces += primitive.faces.len() as u64;
+    }
+
+    fn vertices_with(&self, attribute: Attribute) -> u64 {
+        match attribute {
+            Attribute::Irradiance | Attribute::TextureCoordinates => self.textured,
+            _ => self.vertices,
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::backend::gpu::hemisphere_sum::weights;
 use crate::backend::gpu::layout::{LANES, Summation};
 use crate::backend::gpu::sources::{element_texels, quadtrees};
 use crate::backend::gpu::test_support::{
-    gpu, offsets, picture, read_buffer, read_texture, scene, shade,
+    gpu, offsets, picture, read_buffer, read_texture, scene, shade, textured_scene,
 };
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 
@@ -80,15 +80,31 @@ fn compare_columns(device: &Columns, twin: &Columns, n: u32, what: &str) {
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn radiance_and_hemisphere_sum_equal_their_twins() {
+    compare(&scene());
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn textured_radiance_equals_its_twin() {
+    let mesh = textured_scene();
+    let relative: Vec<Rgb> =
+        (0..mesh.element_count()).map(|e| mesh.relative_reflectance(e)).collect();
+    let low = relative.iter().fold(Rgb::INFINITY, |low, r| low.min(*r));
+    let high = relative.iter().fold(Rgb::ZERO, |high, r| high.max(*r));
+    assert!((high / low).min_element() > 1.5, "the texture matters: {low} {high}");
+    compare(&mesh);
+}
+
+/// What two points in `mesh` gather, pass by pass, on the device and by the twins.
+fn compare(mesh: &Mesh) {
     let gpu = gpu();
-    let mesh = scene();
     let corners: Vec<[u32; 3]> =
         (0..mesh.element_count() as u32).map(|e| [3 * e, 3 * e + 1, 3 * e + 2]).collect();
     let random = |k: u64| unit_interval(split_mix64_nth(k));
     let reflected: Vec<Rgb> = (0..3 * corners.len() as u64)
         .map(|k| Rgb::new(random(3 * k), random(3 * k + 1), random(3 * k + 2)))
         .collect();
-    let sources = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+    let sources = RadiosityField { mesh, corners: &corners, reflected: &reflected };
     let point = |x: f64, y: f64, normal: [f64; 3]| GatherPoint {
         position: DVec3::new(x, y, 0.01),
         normal: DVec3::from_array(normal).normalize(),
@@ -97,7 +113,7 @@ fn radiance_and_hemisphere_sum_equal_their_twins() {
     let points = [point(0.3, 0.4, [0.0, 0.0, 1.0]), point(0.9, 0.6, [0.1, 0.2, 1.0])];
     // Tiles wider than the hemicube; two tiles side by side; more than one line of threads.
     for n in [8, 40, 64] {
-        let mut gather = HemicubeGather::new(&gpu, &mesh, n).unwrap();
+        let mut gather = HemicubeGather::new(&gpu, mesh, n).unwrap();
         gather.gather(&sources, &points).unwrap();
         let Batches { radiance: passes, sum, .. } = gather.batches.as_ref().unwrap();
         let drawn = gather.drawn_scene(mesh.scene());
@@ -105,7 +121,7 @@ fn radiance_and_hemisphere_sum_equal_their_twins() {
         let triangles: Vec<_> = draws.iter().map(|&t| drawn.triangle(t)).collect();
         let positions = draws.iter().flat_map(|&t| mesh.scene().corners(t as usize));
         let positions = gather.coordinates.corners(positions);
-        let (lattices, nodes) = quadtrees(&mesh);
+        let (lattices, nodes) = quadtrees(mesh);
         let twin = radiance::Radiance {
             corners: &positions,
             triangles: &triangles,

@@ -1,0 +1,100 @@
+//! The faces of a solution, cut up by groups and materials, with texture coordinates.
+//!
+//! Vertices are shared within a primitive, but where texture coordinates jump: at a seam there is
+//! one for each side.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec2, Vec2};
+use rustc_hash::FxHashMap;
+
+use crate::gather::GatheredMesh;
+
+/// The faces of one group and one material.
+pub(super) struct Primitive {
+    pub group: u32,
+    pub material: u32,
+    /// Vertices of the surface, in the order of the file.
+    pub vertices: Vec<u32>,
+    /// Texture coordinates of each, v downwards; empty where a corner has none.
+    pub places: Vec<Vec2>,
+    /// Faces, by the places of their corners in `vertices`.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// A face of the surface, and its triangle of the scene.
+type Face = ([u32; 3], usize);
+
+/// Texture coordinates closer than this are those of one vertex: a hundredth of a texel of a large
+/// image, and far more than rounding makes of two triangles' coordinates along their common side.
+const SEAM: f64 = 1.0 / (1 << 20) as f64;
+
+/// The faces of `light` by group, then material, in the order of the scene's.
+pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive> {
+    let (surface, mesh) = (&light.surface, &light.mesh);
+    let mut faces: BTreeMap<(u32, u32), Vec<Face>> = BTreeMap::new();
+    for (&face, &element) in surface.faces.iter().zip(&surface.elements) {
+        let t = mesh.triangle(mesh.element(element as usize));
+        let triangle = mesh.scene().triangles()[t];
+        faces.entry((triangle.group, triangle.material)).or_default().push((face, t));
+    }
+    let mut places = Places::new(surface.positions.len());
+    let mut primitives = vec![];
+    for (k, ((group, material), faces)) in faces.into_iter().enumerate() {
+        primitives.push(if faces.iter().all(|&(_, t)| has_texture_coordinates(light, t)) {
+            textured(light, (group, material), &faces)
+        } else {
+            let mut vertices = vec![];
+            let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
+            let faces = faces.iter().map(of_face).collect();
+            Primitive { group, material, vertices, places: vec![], faces }
+        });
+    }
+    primitives
+}
+
+/// Per vertex of the surface, the primitive that had it last, and its place there.
+struct Places(Vec<(usize, u32)>);
+
+impl Places {
+    fn new(vertices: usize) -> Places {
+        Places(vec![(usize::MAX, 0); vertices])
+    }
+
+    /// The places of the corners of a face in the `vertices` of primitive `k`, to which those are
+    /// added that it does not have yet.
+    fn of_face(&mut self, k: usize, face: &[u32; 3], vertices: &mut Vec<u32>) -> [u32; 3] {
+        face.map(|v| {
+            let place = &mut self.0[v as usize];
+            if place.0 != k {
+                *place = (k, vertices.len() as u32);
+                vertices.push(v);
+            }
+            place.1
+        })
+    }
+}
+
+fn has_texture_coordinates(light: &GatheredMesh, t: usize) -> bool {
+    let corners = light.mesh.scene().texture_coordinates(t);
+    corners.is_some_and(|corners| corners.iter().all(|place| place.as_vec2().is_finite()))
+}
+
+/// The primitive of `faces`, each with its triangle of the scene.
+fn textured(light: &GatheredMesh, (group, material): (u32, u32), faces: &[Face]) -> Primitive {
+    let (surface, scene) = (&light.surface, light.mesh.scene());
+    let mut numbers: FxHashMap<(u32, [i64; 2]), u32> = FxHashMap::default();
+    let (mut vertices, mut places) = (vec![], vec![]);
+    let mut number = |v: u32, t: usize| {
+        let barycentric = scene.barycentric(t, surface.positions[v as usize]);
+        let place = scene.texture_place(t, barycentric);
+        let cell = (place / SEAM).round().to_array().map(|x| x as i64);
+        *numbers.entry((v, cell)).or_insert_with(|| {
+            vertices.push(v);
+            places.push(DVec2::new(place.x, 1.0 - place.y).as_vec2());
+            vertices.len() as u32 - 1
+        })
+    };
+    let faces = faces.iter().map(|(face, t)| face.map(|v| number(v, *t))).collect();
+    Primitive { group, material, vertices, places, faces }
+}
