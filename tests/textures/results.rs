@@ -88,8 +88,8 @@ fn glb_has_texture_coordinates_and_irradiance() {
             textured += 1;
         }
     }
-    // A grid of 5 × 5 vertices: one material and no seam, so none is there twice.
-    assert_eq!(textured, 25);
+    // A grid of 9 × 9 vertices: one material and no seam, so none is there twice.
+    assert_eq!(textured, 81);
 }
 
 #[test]
