@@ -15,6 +15,7 @@ mod up_axis;
 mod view_score;
 
 use std::f64::consts::PI;
+use std::ops::{ControlFlow, Range};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -59,6 +60,10 @@ const MAX_SIDE: u32 = 1 << 15;
 /// Primary rays along a pixel's side, at most. Chosen by hand.
 const MAX_SAMPLES: u32 = 256;
 
+/// Primary rays between two reports of progress: a tenth of a second on two cores. At least
+/// [`MAX_SAMPLES`]².
+const RAYS_PER_BAND: u32 = 1 << 18;
+
 /// Cosine between the view direction and the camera's up from which on another direction is up in
 /// the image. Chosen by hand.
 const VERTICAL_VIEW: f64 = 0.9999;
@@ -80,12 +85,15 @@ impl Camera {
         samples: u32,
     ) -> Result<RadianceImage, Error> {
         let rays = PrimaryRays::new(self, surface, width, height, samples)?;
-        Ok(rays.image(height, |hit| rays.interpolate(hit, &surface.radiosity)))
+        let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
+        let pixels = rays.pixels(0..width * height, &radiosity).collect();
+        Ok(RadianceImage { width, height, pixels, sky: surface.sky })
     }
 
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray meets
     /// a textured material, the irradiance between the vertices is reflected by the texture at that
-    /// point.
+    /// point. `progress` is called with the number of pixels done and of all pixels, several times a
+    /// second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`].
@@ -95,10 +103,21 @@ impl Camera {
         width: u32,
         height: u32,
         samples: u32,
-    ) -> Result<RadianceImage, Error> {
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
         let lit = LitSurface { rays, light };
-        Ok(lit.rays.image(height, |hit| lit.radiosity(hit)))
+        let count = width * height;
+        let band = RAYS_PER_BAND / (samples * samples);
+        let mut pixels = Vec::with_capacity(count as usize);
+        for start in (0..count).step_by(band as usize) {
+            let end = start.saturating_add(band).min(count);
+            pixels.par_extend(lit.rays.pixels(start..end, &|hit| lit.radiosity(hit)));
+            if progress(pixels.len(), count as usize).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
     }
 
     /// Right, up and forward of the view, unit length.
@@ -205,18 +224,19 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// An image of so many rows, of the radiosity (W/m²) of what is seen.
-    fn image(&self, height: u32, radiosity: impl Fn(&Hit) -> Rgb + Sync) -> RadianceImage {
-        let sky = self.surface.sky;
-        let pixel = |k: u32| {
+    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen.
+    fn pixels<'b>(
+        &'b self,
+        range: Range<u32>,
+        radiosity: &'b (impl Fn(&Hit) -> Rgb + Sync),
+    ) -> impl IndexedParallelIterator<Item = Rgb> + 'b {
+        range.into_par_iter().map(move |k| {
             let radiance = |seen: Seen| match seen {
                 Seen::Front(hit) => radiosity(&hit) / PI,
-                Seen::Sky => sky,
+                Seen::Sky => self.surface.sky,
             };
             self.seen(k).map(radiance).sum::<Rgb>() * self.weight
-        };
-        let pixels = (0..self.width * height).into_par_iter().map(pixel).collect();
-        RadianceImage { width: self.width, height, pixels, sky }
+        })
     }
 
     /// What the rays of pixel `k` see. The other rays hit backs.

@@ -52,6 +52,30 @@ fn draw(light: &GatheredMesh, gather: &mut dyn Gather, samples: u32) -> Radiance
 }
 
 #[test]
+fn picture_without_textures_is_that_of_its_surface() {
+    let light = lamp_over_floor(Rgb::new(0.5, 1.0, 2.0));
+    // Rays of several bands, the last of which is not whole.
+    let (width, height, samples) = (333, 101, 5);
+    let mut counts = vec![];
+    let image = CAMERA.interpolated_image(&light, width, height, samples, |done, of| {
+        counts.push((done, of));
+        ControlFlow::Continue(())
+    });
+    let plain = CAMERA.image(&light.surface, width, height, samples).unwrap();
+    assert!(image.unwrap().unwrap().pixels == plain.pixels);
+    let all = (width * height) as usize;
+    assert!(counts.len() > 2 && counts.is_sorted(), "{counts:?}");
+    assert_eq!(counts.last(), Some(&(all, all)));
+    // Stopped, it gives nothing, at once.
+    let mut calls = 0;
+    let stopped = CAMERA.interpolated_image(&light, width, height, samples, |_, _| {
+        calls += 1;
+        ControlFlow::Break(())
+    });
+    assert!(stopped.unwrap().is_none() && calls == 1);
+}
+
+#[test]
 fn gathered_radiance_matches_closed_form() {
     let light = lamp_over_floor(Rgb::ONE);
     let image = draw(&light, &mut RayGather::new(&light.mesh, 64).unwrap(), 1);

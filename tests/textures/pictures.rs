@@ -32,7 +32,8 @@ fn edges_of_a_texture_are_sharp() {
     let row: Vec<[u8; 3]> = (0..256).map(|k| if k < 128 { RED } else { GREEN }).collect();
     let light = evenly_lit(&tga(256, &row));
     let (width, height) = (65, 65);
-    let image = CAMERA.interpolated_image(&light, width, height, 4).unwrap();
+    let image = CAMERA.interpolated_image(&light, width, height, 4, keep_counting);
+    let image = image.unwrap().unwrap();
     let mut rays = RayGather::new(&light.mesh, 64).unwrap();
     let gathered = CAMERA.gathered_image(&light, &mut rays, width, height, 2, keep_counting);
     let gathered = gathered.unwrap().unwrap();
@@ -55,7 +56,7 @@ fn edges_of_a_texture_are_sharp() {
 #[test]
 fn textures_far_away_are_filtered() {
     let light = evenly_lit(&checkerboard(512));
-    let image = CAMERA.interpolated_image(&light, 33, 33, 2).unwrap();
+    let image = CAMERA.interpolated_image(&light, 33, 33, 2, keep_counting).unwrap().unwrap();
     let mean = light.mesh.scene().materials().iter().find(|m| m.name == "wall").unwrap();
     for pixel in &image.pixels {
         // Of 4 rays, each between means of 8 × 8 squares or so.

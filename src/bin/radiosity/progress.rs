@@ -8,7 +8,8 @@
 //!   shooting    orders of magnitude of the unshot share         time so far × (1 − share) / share
 //!   gathering   vertices of this pass                           the same
 //!   estimating  points                                          the same
-//!   drawing, writing  –                                         –
+//!   drawing     pixels                                          the same
+//!   writing     –                                               –
 //! ```
 //!
 //! The seconds between lines go on from stage to stage, so that many short ones are no silence.

@@ -186,17 +186,18 @@ impl Files {
         device: &Backend,
     ) -> Result<RadianceImage, Error> {
         let (width, height) = self.image;
-        if !self.pixel_gather {
-            return progress::of_stage("drawing the picture", || {
-                camera.interpolated_image(&baked.light, width, height, SAMPLES)
-            });
-        }
-        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
-        let mut gather =
-            progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
-        let image = progress::of_count("pixels of the picture", |report| {
-            camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
-        })?;
+        let image = if self.pixel_gather {
+            let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
+            let mut gather =
+                progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
+            progress::of_count("pixels gathered for the picture", |report| {
+                camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
+            })?
+        } else {
+            progress::of_count("pixels of the picture", |report| {
+                camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
+            })?
+        };
         Ok(image.expect("its progress never stops it"))
     }
 }
