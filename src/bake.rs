@@ -32,6 +32,7 @@ pub mod model;
 mod outcome;
 mod pipeline;
 mod progress;
+mod resolved_light;
 mod result;
 mod settings;
 mod shooting_phase;

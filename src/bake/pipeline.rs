@@ -7,7 +7,10 @@ use crate::backend::Backend;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::gather_phase::GatherPhase;
+use crate::bake::light_survey;
+use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
+use crate::bake::resolved_light::resolved_light;
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
 use crate::bake::shooting_phase;
@@ -49,21 +52,24 @@ pub(super) fn run(
     let mut reporter = Reporter { backend, callback: progress };
     let mut clock = StageClock::start();
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
-    let shot_light = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
     let baked = match &settings.gather {
         Some(gather) if shot.solution.stop != StopReason::Cancelled => {
             let sizing = shooting_phase::sizing(&settings.solve, scene, gather.element_size);
             let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?
                 .split_at_contacts(gather.contact_levels);
+            let diagonal = light_survey::diagonal(settings.solve.region.as_ref(), scene);
+            let footprint = model::pixel_footprint(settings.solve.hemicube_resolution) * diagonal;
+            let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
+            let source = GatheredMesh::from_elements(&shot.mesh, &resolved)?;
             let halves = (settings.solve.clone(), gather.clone());
-            GatherPhase::new(halves, target, mesh, &shot_light, &shot, backend)?
+            GatherPhase::new(halves, target, mesh, &source, &shot, backend)?
                 .run(&mut reporter, &mut clock)?
         }
         _ => shooting_phase::estimate_elements(
             &shot,
             settings,
             target,
-            shot_light,
+            GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?,
             backend,
             &mut reporter,
             &mut clock,

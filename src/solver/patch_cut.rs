@@ -3,8 +3,8 @@
 //!
 //! A patch is a cluster of triangles, a triangle, or a node of its quadtree. It shoots for all
 //! elements below it along one row, seen from one viewpoint. The cut begins with the largest
-//! patches; before a patch shoots, its error √s q ([`patch_error`](super::patch_error)) is compared
-//! with the tolerance, and where it is above, its parts take its place:
+//! patches; before a patch shoots, its error ([`patch_error`](super::patch_error)) is compared with
+//! the tolerance, and where it is above, its parts take its place:
 //!
 //! ```text
 //! clusters            ●                      ●
@@ -25,7 +25,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::flux_state::Flux;
-use super::patch_error::{InverseDistanceMoments, misplaced_share};
+use super::patch_error::{InverseDistanceMoments, patch_error};
 use crate::form_factor::Row;
 use crate::geometry::rounding::tie_stable_key;
 use crate::mesh::{Clusters, Mesh, NodeId};
@@ -53,10 +53,12 @@ pub(super) struct PatchCut<'m> {
     clusters: &'m Clusters,
     /// Centroid of each element.
     centroids: Vec<DVec3>,
+    /// Area of all surfaces, square of the scene's unit.
+    area: f64,
     patches: Vec<ShootingPatch>,
     /// Nodes that see mostly back faces.
     occluded_viewpoints: HashSet<NodeId>,
-    /// Highest √s q of a patch that shoots.
+    /// Highest error of a patch that shoots.
     tolerance: f64,
     /// Quadtree levels above the elements below which no patch is split.
     min_level: u32,
@@ -108,6 +110,7 @@ impl<'m> PatchCut<'m> {
             mesh,
             clusters: mesh.clusters(),
             centroids: centroids(mesh),
+            area: surface_area(mesh),
             patches: vec![],
             occluded_viewpoints: HashSet::new(),
             tolerance,
@@ -120,8 +123,7 @@ impl<'m> PatchCut<'m> {
     pub fn new(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
         let mut cut = PatchCut::empty(mesh, tolerance, min_level);
         let triangles = 0..mesh.scene().triangles().len();
-        let area: f64 = triangles.clone().map(|t| mesh.scene().area(t)).sum();
-        let distances = InverseDistanceMoments::in_cube_of_area(area);
+        let distances = InverseDistanceMoments::in_cube_of_area(cut.area);
         let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
         let emitter_elements: usize =
             triangles.filter(|&t| emits(t)).map(|t| mesh.elements_of(mesh.root(t)).len()).sum();
@@ -190,6 +192,7 @@ impl<'m> PatchCut<'m> {
         self.mesh = mesh;
         self.clusters = mesh.clusters();
         self.centroids = centroids(mesh);
+        self.area = surface_area(mesh);
     }
 
     /// Rejects the viewpoint `node`, which sees mostly back faces by now, so that its patch shoots
@@ -307,7 +310,7 @@ impl<'m> PatchCut<'m> {
         has_split
     }
 
-    /// √s q of a patch.
+    /// Error of a patch, as the tolerance has it.
     fn error(&self, patch: &ShootingPatch, flux: &Flux) -> f64 {
         let share = flux.leaving_share(&patch.elements);
         if share == 0.0 {
@@ -315,9 +318,8 @@ impl<'m> PatchCut<'m> {
         }
         let ShootingPatch { elements, distances, .. } = patch;
         let viewpoint = self.viewpoint(patch, flux);
-        let misplaced =
-            misplaced_share(self.mesh, &self.centroids, elements, viewpoint, *distances, flux);
-        share.sqrt() * misplaced
+        let surfaces = (&self.centroids[..], self.area);
+        patch_error(share, self.mesh, surfaces, elements, viewpoint, *distances, flux)
     }
 
     /// The node whose row `patch` is to shoot along: itself, where its middle is lit; else, as for
@@ -408,6 +410,10 @@ impl<'m> PatchCut<'m> {
 /// The indices in `ranges`.
 fn indices(ranges: &[Range<usize>]) -> impl Iterator<Item = usize> {
     ranges.iter().cloned().flatten()
+}
+
+fn surface_area(mesh: &Mesh) -> f64 {
+    (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum()
 }
 
 fn centroids(mesh: &Mesh) -> Vec<DVec3> {

@@ -1,3 +1,4 @@
+mod contacts;
 pub mod cornell_box;
 mod outcome;
 mod sky;
