@@ -33,9 +33,11 @@ struct Level {
 }
 
 /// A cell that the outline of a triangle cuts counts with its mean if it is this share of the
-/// triangle's area or smaller. Some 3 / √1e-7 = 1e4 cells lie along an outline, so what they vary
-/// within changes the mean by 1e-3 at most, and by far less where they are not all alike.
-const SMALLEST_CELL: f64 = 1e-7;
+/// triangle's area or smaller. Some 3 / √1e-5 = 1000 cells lie along an outline, half a cell beyond
+/// it each: where the texture has its edges there too, the mean is off by 5e-3 of their contrast at
+/// most, and by 1e-4 where cells are not alike. Large triangles on large images take a tenth of the
+/// time that 1e-7 takes, which there may be a hundred thousand of.
+const SMALLEST_CELL: f64 = 1e-5;
 
 /// Repetitions of a texture across a triangle beyond which all of the triangle has the mean of the
 /// whole. Chosen by hand.
