@@ -119,15 +119,18 @@ fn vertices_reflect_the_mean_around_them() {
     let radiosity: Vec<Rgb> =
         (0..mesh.element_count()).map(|e| mesh.exitance(e) + mesh.reflectance(e)).collect();
     let surface = VertexMesh::new(&mesh, &radiosity);
-    let at_edge = |v: &usize| {
-        let (p, n) = (surface.positions[*v], surface.normals[*v]);
-        n.x > 0.9 && (p.y - 0.5).abs() < 1e-9 && p.z > 0.1 && p.z < 0.9
-    };
-    let found: Vec<Rgb> =
-        (0..surface.positions.len()).filter(at_edge).map(|v| surface.radiosity[v]).collect();
-    assert!(found.len() >= 3);
-    for value in found {
-        assert!(value.abs_diff_eq(Rgb::new(0.25, 0.25, 0.0), 1e-6), "{value}");
+    // Across the edge at y = ½, and in the red half.
+    for (y, wanted) in [(0.5, Rgb::new(0.25, 0.25, 0.0)), (0.25, Rgb::new(0.5, 0.0, 0.0))] {
+        let is_there = |v: &usize| {
+            let (p, n) = (surface.positions[*v], surface.normals[*v]);
+            n.x > 0.9 && (p.y - y).abs() < 1e-9 && p.z > 0.1 && p.z < 0.9
+        };
+        let found: Vec<Rgb> =
+            (0..surface.positions.len()).filter(is_there).map(|v| surface.radiosity[v]).collect();
+        assert!(found.len() >= 3);
+        for value in found {
+            assert!(value.abs_diff_eq(wanted, 1e-6), "{value}, not {wanted}");
+        }
     }
 }
 
