@@ -90,10 +90,10 @@ impl Camera {
         Ok(RadianceImage { width, height, pixels, sky: surface.sky })
     }
 
-    /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray meets
-    /// a textured material, the irradiance between the vertices is reflected by the texture at that
-    /// point. `progress` is called with the number of pixels done and of all pixels, several times a
-    /// second. It may stop the work; the result is `None` then.
+    /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
+    /// meets a textured material, the irradiance between the vertices is reflected by the texture
+    /// at that point. `progress` is called with the number of pixels done and of all pixels,
+    /// several times a second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`].

@@ -18,11 +18,10 @@
 //!
 //! where B is the *reflected* radiosity, that is radiosity minus the material's exitance; lengths
 //! |·| are Euclidean over the three channels; and m is the mean of |B_true| over the area of all
-//! reflecting surfaces of the scene. A textured point is told and measured with the mean reflectance
-//! of its material: that compares the light, and no detail of the texture, which takes part where
-//! paths go on. What emits and does not reflect has no error and no weight. A
-//! group's error is the same root mean square over the group's own reflecting area, with the
-//! scene's m.
+//! reflecting surfaces of the scene. A textured point is told and measured with the mean
+//! reflectance of its material: that compares the light, and no detail of the texture, which takes
+//! part where paths go on. What emits and does not reflect has no error and no weight. A group's
+//! error is the same root mean square over the group's own reflecting area, with the scene's m.
 //!
 //! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
 //! more than 95 % of their hemisphere, weighted by the cosine; or in more than 40 % of it backs

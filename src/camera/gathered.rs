@@ -216,8 +216,8 @@ impl GatheredView<'_> {
         });
     }
 
-    /// Mean reflectance and exitance of what was hit, and the sum of the radiosity that the vertices
-    /// give it, which is `even` without a texture, W/m².
+    /// Mean reflectance and exitance of what was hit, and the sum of the radiosity that the
+    /// vertices give it, which is `even` without a texture, W/m².
     fn seen_of(&self, hits: &[Hit], even: Rgb) -> (Rgb, Rgb, Rgb) {
         let t = self.lit.triangle(&hits[0]);
         if self.lit.light.mesh.scene().textures(t).is_none() {

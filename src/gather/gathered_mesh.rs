@@ -21,8 +21,9 @@ pub struct GatheredMesh {
     /// Per element, the indices of its three corners in `reflected`.
     pub corners: Vec<[u32; 3]>,
     /// Reflected radiosity B − E at the vertices, W/m² per channel, as a source of light for
-    /// others, with the reflectance of the material: see [`RadiosityField`]. It differs from `surface` by what makes the mean over each element right: that of
-    /// the quadratic interpolant, which a linear one through the exact vertex values does not have.
+    /// others, with the reflectance of the material: see [`RadiosityField`]. It differs from
+    /// `surface` by what makes the mean over each element right: that of the quadratic interpolant,
+    /// which a linear one through the exact vertex values does not have.
     pub reflected: Vec<Rgb>,
     /// Points at which light was gathered, repeated attempts included.
     pub gather_count: u64,

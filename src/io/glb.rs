@@ -34,8 +34,8 @@ use primitives::{Primitive, primitives};
 /// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have
 /// reflectance and exitance. All numbers are 32-bit floats.
 ///
-/// In a scene with textures, vertices whose corners have texture coordinates in the file have these as
-/// `TEXCOORD_0`, and `_IRRADIANCE` (W/m² per channel, linear): a program that has the textures
+/// In a scene with textures, vertices whose corners have texture coordinates in the file have these
+/// as `TEXCOORD_0`, and `_IRRADIANCE` (W/m² per channel, linear): a program that has the textures
 /// multiplies it with them, where `COLOR_0` and `_RADIOSITY` have their means around each vertex.
 /// Textures themselves are not in the file.
 ///

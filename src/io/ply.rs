@@ -16,9 +16,10 @@ use crate::vertex::VertexMesh;
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
 /// (float, W/m² per channel, linear), `irradiance_r irradiance_g irradiance_b` (the same; what a
 /// program multiplies with its own textures; 0 in channels that a material does not reflect), `red
-/// green blue` (uchar, the radiosity tone-mapped for viewers), and, where it is known, `error` (float, W/m²: how far the radiosity may be off, a length over the
-/// channels). Faces: `vertex_indices`, triangles, counter-clockwise from the front. The surface's
-/// comments are in the header.
+/// green blue` (uchar, the radiosity tone-mapped for viewers), and, where it is known, `error`
+/// (float, W/m²: how far the radiosity may be off, a length over the channels). Faces:
+/// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
+/// header.
 ///
 /// Where 32 bits do not do, numbers are double: `x y z` of a mesh more than 16 of its sizes from
 /// the origin, and the radiosity and its error if the largest is above 3.4e38 or below 1e-30 W/m².

@@ -40,8 +40,9 @@ const NEEDED: usize = 6;
 ///
 /// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz`,
 /// `irradiance_r irradiance_g irradiance_b` and `error`, numbers of any type; faces have a list
-/// `vertex_indices` or `vertex_index`, and become fans of triangles. Other properties and elements are skipped. The file may come from anywhere: memory
-/// stays within a multiple of its length, whatever its header claims.
+/// `vertex_indices` or `vertex_index`, and become fans of triangles. Other properties and elements
+/// are skipped. The file may come from anywhere: memory stays within a multiple of its length,
+/// whatever its header claims.
 ///
 /// # Errors
 /// - [`ErrorKind::File`] when the file cannot be read, or has more than 4 GiB.

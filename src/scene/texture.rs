@@ -286,8 +286,8 @@ impl TextureMap {
         self.factor * colour
     }
 
-    /// What has `value` in this map, if `mean` is to be the mean over the triangles of the material.
-    /// Where all of it is 0 it is even.
+    /// What has `value` in this map, if `mean` is to be the mean over the triangles of the
+    /// material. Where all of it is 0 it is even.
     pub(crate) fn scaled(&self, value: Rgb, mean: Rgb) -> Rgb {
         let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), value / self.mean, Rgb::ONE);
         (mean * relative).min(Rgb::splat(self.ceiling))

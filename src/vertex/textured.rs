@@ -1,9 +1,9 @@
 //! Light at vertices, and what textured surfaces make of it.
 //!
 //! ```text
-//!   radiosity of elements ──► as if the material reflected alike ──► light at vertices ── ÷ ρ̄ ──► irradiance
-//!                             (÷ ρ of the element, × ρ̄)                    │
-//!                                                                          └── ρ, E around the vertex ──► radiosity
+//!   radiosity of elements ─ ÷ ρ of the element, × ρ̄ ─► light at vertices ─ ÷ ρ̄ ─► irradiance
+//!                                                            │
+//!                                                            └─ ρ, E around it ─► radiosity
 //! ```
 //!
 //! Light is smooth where textures are not. So vertices are given the light that a surface of the

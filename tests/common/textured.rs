@@ -34,8 +34,9 @@ fn read(text: &str, library: &str, image: &[u8]) -> Scene {
     ObjSettings::default().read("box.obj", text.as_bytes(), &files).unwrap()
 }
 
-/// A box under a ceiling that is its lamp. Of the wall x = 0 the half at y < ½ is of `materials[0]`,
-/// the other of `materials[1]`: those of `more`, with the texture `a.tga` once across the wall.
+/// A box under a ceiling that is its lamp. Of the wall x = 0 the half at y < ½ is of
+/// `materials[0]`, the other of `materials[1]`: those of `more`, with the texture `a.tga` once
+/// across the wall.
 pub fn box_with_halves(materials: [&str; 2], more: &str, image: &[u8]) -> Scene {
     let [first, second] = materials;
     let text = format!(
