@@ -32,12 +32,11 @@ struct Level {
     means: Vec<[f32; 3]>,
 }
 
-/// A cell that the outline of a triangle cuts counts with its mean if it is this share of the
-/// triangle's area or smaller. Some 3 / √1e-5 = 1000 cells lie along an outline, half a cell beyond
-/// it each: where the texture has its edges there too, the mean is off by 5e-3 of their contrast at
-/// most, and by 1e-4 where cells are not alike. Large triangles on large images take a tenth of the
-/// time that 1e-7 takes, which there may be a hundred thousand of.
-const SMALLEST_CELL: f64 = 1e-5;
+/// Cells along the outline of a triangle, at most: what the outline cuts of one that small counts
+/// with its mean. Half a cell lies beyond it each: where the texture has its edges there too, the
+/// mean of a triangle about as wide as high is off by 5e-3 of their contrast at most, and by 1e-4
+/// where cells are not alike.
+pub(super) const MAX_OUTLINE_CELLS: f64 = 1500.0;
 
 /// Repetitions of a texture across a triangle beyond which all of the triangle has the mean of the
 /// whole. Chosen by hand.
@@ -106,6 +105,11 @@ impl Texture {
     /// Linear mean over the triangle with these corners in texture space. Where that has no area,
     /// the colour at its middle.
     pub fn mean(&self, corners: [DVec2; 3], clamped: bool) -> Rgb {
+        self.mean_by_cells(corners, clamped, MAX_OUTLINE_CELLS)
+    }
+
+    /// The same, with so many cells along the triangle's outline, and as many repetitions.
+    fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
         let size = DVec2::new(self.width.into(), self.height.into());
         let [a, b, c] = corners;
         let low = a.min(b).min(c);
@@ -120,26 +124,29 @@ impl Texture {
         // Tiles from the one of the lowest corner, so that no digits are lost far out.
         let origin = low.floor();
         let tiles = (high - origin).ceil().max(DVec2::ONE);
-        if tiles.x * tiles.y > MAX_TILES {
+        if tiles.x * tiles.y > MAX_TILES.min(cells) {
             return self.whole_mean();
         }
+        let outline = [a - b, b - c, c - a].map(|edge| (edge * size).length()).iter().sum::<f64>();
+        let smallest = (outline / cells).powi(2);
         let (mut sum, mut covered) = (Rgb::ZERO, 0.0);
         for (i, j) in (0..tiles.y as u32).flat_map(|j| (0..tiles.x as u32).map(move |i| (i, j))) {
             let tile = origin + DVec2::new(i.into(), j.into());
             let inside = |p: DVec2| (DVec2::new(p.x - tile.x, 1.0 - (p.y - tile.y))) * size;
             let polygon = Polygon::new(&corners.map(inside));
-            self.add(self.levels.len(), [0, 0], &polygon, area, &mut (&mut sum, &mut covered));
+            self.add(self.levels.len(), [0, 0], &polygon, smallest, &mut (&mut sum, &mut covered));
         }
         if covered > 0.0 { sum / covered } else { self.at((a + b + c) / 3.0, clamped) }
     }
 
-    /// Adds what `polygon`, in texels, covers of a cell: colour times area, and area.
+    /// Adds what `polygon`, in texels, covers of a cell: colour times area, and area. Cells of no
+    /// more than `smallest` texels are not taken apart.
     fn add(
         &self,
         level: usize,
         [x, y]: [u32; 2],
         polygon: &Polygon,
-        area: f64,
+        smallest: f64,
         sums: &mut (&mut Rgb, &mut f64),
     ) {
         let corner = |k: u32, count: u32| f64::from(((u64::from(k) << level) as u32).min(count));
@@ -152,7 +159,7 @@ impl Texture {
         }
         let cell_area = (high.x - low.x) * (high.y - low.y);
         let whole = covered >= cell_area * (1.0 - 1e-12);
-        if level == 0 || whole || cell_area <= SMALLEST_CELL * area {
+        if level == 0 || whole || cell_area <= smallest {
             *sums.0 += covered * self.cell(level, x, y);
             *sums.1 += covered;
             return;
@@ -160,7 +167,7 @@ impl Texture {
         let [width, height] = self.level_size(level - 1);
         for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             if 2 * x + i < width && 2 * y + j < height {
-                self.add(level - 1, [2 * x + i, 2 * y + j], &cut, area, sums);
+                self.add(level - 1, [2 * x + i, 2 * y + j], &cut, smallest, sums);
             }
         }
     }
@@ -273,8 +280,13 @@ impl TextureMap {
 
     /// The mean over a triangle with these texture coordinates, as the file has them.
     pub fn mean(&self, corners: [DVec2; 3]) -> Rgb {
+        self.mean_by_cells(corners, MAX_OUTLINE_CELLS)
+    }
+
+    /// The same, with so many cells of the image along the triangle's outline.
+    pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], cells: f64) -> Rgb {
         let corners = corners.map(|uv| uv * self.scale + self.offset);
-        self.value(self.texture.mean(corners, self.clamped))
+        self.value(self.texture.mean_by_cells(corners, self.clamped, cells))
     }
 
     /// The mean of the whole image.
@@ -374,6 +386,12 @@ mod tests {
         Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
     }
 
+    /// Black on the left, white on the right.
+    fn two_halves(side: u32) -> Texture {
+        let texel = |k| [if k % side < side / 2 { 0 } else { 255 }; 3];
+        Texture::new(side, side, (0..side * side).map(texel).collect()).unwrap()
+    }
+
     /// The two triangles of a rectangle, and their mean.
     fn rectangle(texture: &Texture, low: DVec2, high: DVec2) -> Rgb {
         let [b, d] = [DVec2::new(high.x, low.y), DVec2::new(low.x, high.y)];
@@ -425,6 +443,28 @@ mod tests {
         // As does turning the other way round, to rounding.
         let mirrored = texture.mean([a, c, b], false);
         assert!(mirrored.abs_diff_eq(texture.mean(corners, false), 1e-12));
+    }
+
+    #[test]
+    fn few_cells_along_the_outline_are_enough() {
+        let (grey, halves) = (noise(512, 512), two_halves(512));
+        let corners = [DVec2::new(0.1, 0.2), DVec2::new(1.7, 0.35), DVec2::new(0.4, 2.2)];
+        // As thin as a texel, along the edge of the halves.
+        let thin = [DVec2::new(0.499, 0.0), DVec2::new(0.5, 30.0), DVec2::new(0.501, 0.0)];
+        // Of noise with a standard deviation of 0.3, a thin piece is some 512 texels in a row, and
+        // cells see their neighbours, too: 3 × 0.3 / √512.
+        for (texture, corners, tolerance, usual_tolerance) in [
+            (&grey, corners, 2e-3, 1e-4),
+            (&halves, corners, 1e-2, 1e-4),
+            (&grey, thin, 4e-2, 4e-2),
+            (&halves, thin, 1e-2, 1e-4),
+        ] {
+            let exact = texture.mean_by_cells(corners, false, 1e9);
+            let coarse = texture.mean_by_cells(corners, false, 64.0);
+            assert!(coarse.abs_diff_eq(exact, tolerance), "{coarse} {exact}");
+            let usual = texture.mean(corners, false);
+            assert!(usual.abs_diff_eq(exact, usual_tolerance), "{usual} {exact}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::texture::{MaterialTextures, TextureMap};
+use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
 
 /// A piece of a triangle: its index, and the weights of the second and third corner of the triangle
@@ -24,6 +24,14 @@ pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
 /// All of a triangle.
 const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+/// Cells of images along the outlines of all pieces that are looked at together: some 10 s on two
+/// cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`], so
+/// that the time is bounded for any number that each show all of a large image.
+const SCENE_OUTLINE_CELLS: f64 = 2e7;
+
+/// And this is the fewest that a piece gets: its mean is off by some 1e-2 of the contrast within.
+const MIN_OUTLINE_CELLS: f64 = 64.0;
 
 /// Textures of materials, and where they lie on triangles.
 #[derive(Clone, Debug, Default)]
@@ -184,7 +192,10 @@ impl Scene {
             }))
         };
         let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
-        let means: Vec<Rgb> = different.par_iter().map(|(map, place)| map.mean(*place)).collect();
+        let cells = SCENE_OUTLINE_CELLS / different.len().max(1) as f64;
+        let cells = cells.clamp(MIN_OUTLINE_CELLS, MAX_OUTLINE_CELLS);
+        let mean = |&(map, place): &(&TextureMap, _)| map.mean_by_cells(place, cells);
+        let means: Vec<Rgb> = different.par_iter().map(mean).collect();
         numbers.into_iter().map(|number| Some(means[number? as usize])).collect()
     }
 
