@@ -77,7 +77,11 @@ pub const ERRORS: RangeInclusive<f64> = 1e-4..=0.3;
 /// Longest edge of the elements that light is shot on, share of the diagonal: error ∝ edge^2.5.
 pub const SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.105, 0.4);
 
-/// The same for errors at which it is the larger of the two.
+/// Elements that light is shot on, contacts not counted: more are made larger. Chosen by hand, as
+/// many as there may be of those that gather.
+pub const MAX_SHOOTING_ELEMENTS: usize = 1 << 19;
+
+/// The shooting edge for errors at which it is the larger of the two.
 pub const COARSE_SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.6, 1.0);
 
 /// Longest edge of the elements whose corners gather first, share of the diagonal. It follows

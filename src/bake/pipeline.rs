@@ -12,7 +12,7 @@ use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
 use crate::bake::resolved_light::resolved_light;
 use crate::bake::result::BakeResult;
-use crate::bake::settings::BakeSettings;
+use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
@@ -54,9 +54,7 @@ pub(super) fn run(
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
     let baked = match &settings.gather {
         Some(gather) if shot.solution.stop != StopReason::Cancelled => {
-            let sizing = shooting_phase::sizing(&settings.solve, scene, gather.element_size);
-            let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?
-                .split_at_contacts(gather.contact_levels);
+            let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
             let diagonal = light_survey::diagonal(settings.solve.region.as_ref(), scene);
             let footprint = model::pixel_footprint(settings.solve.hemicube_resolution) * diagonal;
             let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
@@ -89,4 +87,19 @@ pub(super) fn run(
         device_failure: backend.failure(),
         timings: clock.timings,
     })
+}
+
+/// The mesh whose vertices gather first: coarser than asked for where that alone would be more than
+/// half of the elements that there may be, and not split at contacts where these would be all.
+fn first_gather_mesh(
+    solve: &SolveSettings,
+    gather: &GatherSettings,
+    scene: &Arc<Scene>,
+) -> Result<Mesh, Error> {
+    let most = gather.refinement.max_elements;
+    let sizing = shooting_phase::sizing(solve, scene, gather.element_size);
+    let sizing = sizing.within(scene, Mesh::MAX_DEPTH, most / 2);
+    let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?;
+    let at_contacts = mesh.split_at_contacts(gather.contact_levels);
+    Ok(if at_contacts.element_count() > most { mesh } else { at_contacts })
 }

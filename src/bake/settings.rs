@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use crate::bake::light_survey::{self, LightSurvey};
-use crate::bake::model;
+use crate::bake::{model, shooting_phase};
 use crate::error::Error;
 use crate::gather::RefinementSettings;
 use crate::mesh::Mesh;
@@ -115,8 +115,8 @@ impl BakeSettings {
     /// vertex gathers.
     pub fn elements_only(scene: &Scene) -> BakeSettings {
         let survey = LightSurvey::new(scene);
-        let mut settings = BakeSettings::by_survey(0.02, &survey);
-        settings.solve.element_size = survey.diagonal / 32.0;
+        let mut settings = BakeSettings::by_survey(0.02, &survey, scene);
+        settings.solve.element_size = settings.solve.element_size.max(survey.diagonal / 32.0);
         settings.solve.contact_levels = 3;
         settings.solve.hemicube_resolution = 128;
         settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
@@ -143,7 +143,7 @@ impl BakeSettings {
     /// Some hundred points look for the lights first, with rays on the CPU: lengths are shares of
     /// the diagonal of where the light is, and lights that mostly miss are gathered.
     pub fn for_error(error: f64, scene: &Scene) -> BakeSettings {
-        BakeSettings::by_survey(error, &LightSurvey::new(scene))
+        BakeSettings::by_survey(error, &LightSurvey::new(scene), scene)
     }
 
     /// Lengths on each group as shares of its own diagonal, where that is smaller than that of
@@ -164,7 +164,7 @@ impl BakeSettings {
         }
     }
 
-    fn by_survey(error: f64, survey: &LightSurvey) -> BakeSettings {
+    fn by_survey(error: f64, survey: &LightSurvey, scene: &Scene) -> BakeSettings {
         let e = model::clamped(error, model::ERRORS);
         let diagonal = survey.diagonal;
         let shooting_edge = model::SHOOTING_EDGE.setting(e);
@@ -173,7 +173,7 @@ impl BakeSettings {
             patch_tolerance: model::patch_tolerance(e),
             ..Solver::default()
         };
-        let solve = SolveSettings {
+        let mut solve = SolveSettings {
             element_size: diagonal * shooting_edge.max(model::COARSE_SHOOTING_EDGE.setting(e)),
             region: survey.region,
             gathered_materials: survey.gathered_materials.clone(),
@@ -188,6 +188,13 @@ impl BakeSettings {
             checkpoint: None,
             ambient: false,
         };
+        // Where the light is small and triangles are long, there would be millions.
+        let sizing = shooting_phase::sizing(&solve, scene, solve.element_size).within(
+            scene,
+            shooting_phase::MAX_DEPTH,
+            model::MAX_SHOOTING_ELEMENTS,
+        );
+        solve.element_size = sizing.size;
         let refinement = RefinementSettings {
             surplus_tolerance: model::SURPLUS_TOLERANCE
                 .setting(e)

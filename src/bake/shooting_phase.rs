@@ -41,7 +41,7 @@ const CHECKPOINT_INTERVAL: u32 = 10;
 
 /// Levels that a triangle is split at most: where sizes grow with the distance, a huge triangle may
 /// reach into the region of the light, and a device keeps four to the power of this for each.
-const MAX_DEPTH: u32 = 8;
+pub(super) const MAX_DEPTH: u32 = 8;
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {

@@ -46,6 +46,53 @@ impl ElementSizing {
     }
 }
 
+/// Elements grow by this factor until there are few enough: half as many a step.
+const COARSENING: f64 = std::f64::consts::SQRT_2;
+
+impl ElementSizing {
+    /// The same, with elements as much larger as it takes for `scene` to have at most `most` of
+    /// them at up to `max_depth` levels; its triangles are not merged.
+    pub fn within(&self, scene: &Scene, max_depth: u32, most: usize) -> ElementSizing {
+        let mut sizing = self.clone();
+        let triangles = scene.triangles().len();
+        let bound = most.max(triangles);
+        let longest = (0..triangles).map(|t| longest_edge(scene.corners(t))).fold(0.0, f64::max);
+        while sizing.size < longest && sizing.count(scene, max_depth, bound) > bound {
+            sizing.size *= COARSENING;
+        }
+        sizing
+    }
+
+    /// Elements of `scene`; those of the triangle that exceeds `bound` and after it not all counted.
+    fn count(&self, scene: &Scene, max_depth: u32, bound: usize) -> usize {
+        let mut count = 0;
+        for t in 0..scene.triangles().len() {
+            let is_inner = self.is_inner(scene, t, longest_edge(scene.corners(t)), max_depth);
+            count += leaves(&is_inner, bound);
+            if count > bound {
+                break;
+            }
+        }
+        count
+    }
+
+    /// Whether a cell of triangle `t`, whose longest edge is `length`, is split.
+    fn is_inner(
+        &self,
+        scene: &Scene,
+        t: usize,
+        length: f64,
+        max_depth: u32,
+    ) -> impl Fn(Cell) -> bool {
+        move |cell: Cell| {
+            let edge = length / f64::from(1u32 << cell.level) * (1.0 - 1e-12);
+            cell.level < max_depth
+                && edge > self.size
+                && edge > self.size_at(scene, t, &cell_corners(scene.corners(t), cell))
+        }
+    }
+}
+
 impl Mesh {
     /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
     /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes
@@ -63,13 +110,9 @@ impl Mesh {
         }
         let lengths: Vec<f64> =
             (0..scene.triangles().len()).map(|t| longest_edge(scene.corners(t))).collect();
-        let is_inner = |t: usize, cell: Cell| {
-            let edge = lengths[t] / f64::from(1u32 << cell.level) * (1.0 - 1e-12);
-            cell.level < max_depth
-                && edge > sizing.size
-                && edge > sizing.size_at(&scene, t, &cell_corners(scene.corners(t), cell))
-        };
-        let wanted: usize = lengths.iter().enumerate().map(|(t, _)| leaves(t, &is_inner)).sum();
+        let is_inner =
+            |t: usize, cell: Cell| sizing.is_inner(&scene, t, lengths[t], max_depth)(cell);
+        let wanted = sizing.count(&scene, max_depth, Mesh::MAX_ELEMENTS);
         if wanted > Mesh::MAX_ELEMENTS {
             let place = format!("element size {}", sizing.size);
             let found = format!("asks for {wanted} elements");
@@ -80,16 +123,16 @@ impl Mesh {
     }
 }
 
-/// Leaves of the quadtree of triangle `t` whose inner cells `is_inner` tells; those beyond
-/// [`Mesh::MAX_ELEMENTS`] are not counted.
-fn leaves(t: usize, is_inner: &impl Fn(usize, Cell) -> bool) -> usize {
+/// Leaves of the quadtree of a triangle whose inner cells `is_inner` tells; not all of those beyond
+/// `bound`.
+fn leaves(is_inner: &impl Fn(Cell) -> bool, bound: usize) -> usize {
     let mut pending = vec![Cell::ROOT];
     let mut count = 0;
     while let Some(cell) = pending.pop() {
-        if count > Mesh::MAX_ELEMENTS {
+        if count > bound {
             break;
         }
-        if is_inner(t, cell) { pending.extend(cell.children()) } else { count += 1 }
+        if is_inner(cell) { pending.extend(cell.children()) } else { count += 1 }
     }
     count
 }
@@ -117,6 +160,24 @@ mod tests {
         let triangles = vec![triangle([0, 1, 2]), triangle([0, 2, 3])];
         let materials = vec![Material::grey("grey", 0.5)];
         Arc::new(Scene::new(positions, triangles, vec!["plane".into()], materials).unwrap())
+    }
+
+    #[test]
+    fn elements_are_as_much_larger_as_it_takes() {
+        let scene = plane(100.0);
+        let fine = ElementSizing { size: 0.5, ..Default::default() };
+        let count = |sizing: &ElementSizing| {
+            Mesh::sized(scene.clone(), sizing, Mesh::MAX_DEPTH).unwrap().element_count()
+        };
+        for most in [10, 1000, 100_000] {
+            let sizing = fine.within(&scene, Mesh::MAX_DEPTH, most);
+            let found = count(&sizing);
+            // A level of the quadtree is a factor of four.
+            assert!(found <= most && 4 * found > most, "{found} of {most}");
+        }
+        assert_eq!(fine.within(&scene, Mesh::MAX_DEPTH, usize::MAX), fine);
+        // The triangles stay, however few elements there may be.
+        assert_eq!(count(&fine.within(&scene, Mesh::MAX_DEPTH, 1)), 2);
     }
 
     #[test]
