@@ -222,7 +222,8 @@ pub struct PointError {
 /// # Errors
 /// - [`ErrorKind::Setting`] for a setting out of range.
 /// - [`ErrorKind::Scene`] when nothing in the scene reflects or nothing emits, when the solution is
-///   malformed, or when more than one point in a hundred lies on none of its faces.
+///   malformed, emits something else than the scene, as far as its vertices tell that (they have
+///   irradiance), or when more than one point in a hundred lies on none of its faces.
 pub fn verify(
     scene: &Scene,
     solution: &VertexMesh,
@@ -313,10 +314,12 @@ impl<'a> Sampler<'a> {
         solution: &'a VertexMesh,
         settings: &'a Settings,
     ) -> Result<Sampler<'a>, Error> {
+        let lookup = SolutionLookup::new(solution, scene)?;
+        lookup.check_emission(scene)?;
         let stratum = |surface| Stratum { surface, drawn: 0, points: vec![] };
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
-            solution: SolutionLookup::new(solution, scene)?,
+            solution: lookup,
             tracer: PathTracer::new(scene),
             diagonal: scene.reflecting_bounds().diagonal(),
             scene,

@@ -1,12 +1,53 @@
 //! What a solution says of a point: its face there, interpolated.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::path_tracer::{SurfacePoint, nearest_surface};
-use crate::error::{Error, ErrorKind};
-use crate::scene::{Rgb, Scene};
+use crate::error::{Error, ErrorKind, shortened};
+use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::VertexMesh;
-use crate::visibility::ray_scene::RayScene;
+use crate::visibility::ray_scene::{Hit, RayScene};
+
+/// Places of a material at which it is looked up what the solution emits, at least. Chosen by hand.
+const EMISSION_PLACES: usize = 64;
+
+/// Where on the way from the centre of a triangle to its corners they are.
+const TO_CORNER: f64 = 0.5;
+
+/// Share of the radiosity below which emission is noise: files have six digits, and vertices at
+/// the edge of light may be smoothed. Chosen by hand.
+const EMISSION_NOISE: f64 = 1e-3;
+
+/// What the solution emits on the triangles of a material.
+#[derive(Clone, Copy, Default)]
+struct Emission {
+    places: usize,
+    /// Whether it is what the material emits, at any of the places.
+    agrees: bool,
+    /// What was found at the last of them, W/m².
+    told: Rgb,
+}
+
+/// The error that a solution has other light than a scene's `material`: it was found to emit
+/// `told`, W/m².
+fn other_emission(material: &Material, told: Rgb) -> Error {
+    // Four digits: what the vertices of a file tell is no more exact.
+    let digits = |x: f64| format!("{x:.3e}").parse().unwrap_or(x).to_string();
+    let radiance = |exitance: Rgb| {
+        let channels = exitance.max(Rgb::ZERO) / PI;
+        channels.to_array().map(digits).join(",")
+    };
+    let told = radiance(told);
+    let name = shortened(&material.name);
+    let found = format!(
+        "its material '{name}' emits radiance {told}, and {} in the scene",
+        radiance(material.exitance)
+    );
+    let remedy = format!("verify it with the materials it was baked with: --emit {name}={told}");
+    Error::new(ErrorKind::Scene, "solution", found, remedy)
+}
 
 /// A solution that can be asked at points.
 pub(super) struct SolutionLookup<'a> {
@@ -63,20 +104,71 @@ impl<'a> SolutionLookup<'a> {
         Ok(SolutionLookup { solution, rays, normals, diagonal })
     }
 
+    /// Refuses a solution whose surfaces emit something else than those of `scene`: what a vertex
+    /// emits is its radiosity less its irradiance times the reflectance. A material is refused
+    /// where that differs at every place of its triangles that is looked at. What has a texture is
+    /// not looked at: its vertices have means.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] with the material and what it emits in both.
+    pub fn check_emission(&self, scene: &Scene) -> Result<(), Error> {
+        if self.solution.irradiance.len() != self.solution.positions.len() {
+            return Ok(());
+        }
+        let mut of_materials = vec![Emission::default(); scene.materials().len()];
+        for (t, triangle) in scene.triangles().iter().enumerate() {
+            let emission = &mut of_materials[triangle.material as usize];
+            if emission.agrees || emission.places >= EMISSION_PLACES || scene.textures(t).is_some()
+            {
+                continue;
+            }
+            let material = scene.material(t);
+            for (told, noise) in self.emitted(scene, t) {
+                emission.places += 1;
+                emission.agrees |= told.abs_diff_eq(material.exitance, noise);
+                emission.told = told;
+            }
+        }
+        for (emission, material) in of_materials.iter().zip(scene.materials()) {
+            if emission.places > 0 && !emission.agrees {
+                return Err(other_emission(material, emission.told));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the solution emits at places of triangle `t` of `scene`, W/m², and how exactly that is
+    /// known.
+    fn emitted(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, f64)> {
+        let (corners, normal, reflectance) =
+            (scene.corners(t), scene.normal(t), scene.material(t).reflectance);
+        let centre = corners.into_iter().sum::<DVec3>() / 3.0;
+        let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
+        places.filter_map(move |position| {
+            let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
+            let radiosity = self.interpolated(&hit, &self.solution.radiosity);
+            let irradiance = self.interpolated(&hit, &self.solution.irradiance);
+            let reflected = reflectance * irradiance;
+            let noise = EMISSION_NOISE * radiosity.max_element().max(reflected.max_element());
+            Some((radiosity - reflected, noise))
+        })
+    }
+
+    /// Of one value a vertex, the one where the solution is hit.
+    fn interpolated(&self, hit: &Hit, values: &[Rgb]) -> Rgb {
+        let [a, b, c] = self.solution.faces[hit.triangle].map(|v| values[v as usize]);
+        (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
+    }
+
     /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m²: by
     /// the nearest face that faces alike. None where there is none.
     pub fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
         let (position, normal) = (point.position, scene.normal(point.triangle));
         let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
-        let face = self.solution.faces[hit.triangle];
-        let interpolated = |values: &[Rgb]| {
-            let [a, b, c] = face.map(|v| values[v as usize]);
-            (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
-        };
         let material = scene.material(point.triangle);
         Some(match scene.textures(point.triangle) {
-            Some(_) => material.reflectance * interpolated(&self.solution.irradiance),
-            None => interpolated(&self.solution.radiosity) - material.exitance,
+            Some(_) => material.reflectance * self.interpolated(&hit, &self.solution.irradiance),
+            None => self.interpolated(&hit, &self.solution.radiosity) - material.exitance,
         })
     }
 }

@@ -255,6 +255,15 @@ fn what_cannot_be_measured_is_refused() {
     refused(&scene, &VertexMesh::default(), &["no faces"]);
     refused(&cubes(&[(1.0, paint(0.0, 1.0))]), &good, &["reflects"]);
     refused(&cubes(&[(1.0, paint(0.5, 0.0))]), &good, &["emits"]);
+    // B = E + ρ H, of an irradiance H of 1: the scene's cube emits 1, the solution 0.4.
+    let dimmer = changed(|mesh| {
+        mesh.irradiance = vec![Rgb::ONE; mesh.positions.len()];
+        mesh.radiosity = vec![Rgb::splat(0.5 + 0.4); mesh.positions.len()];
+    });
+    refused(&scene, &dimmer, &["emits radiance 0.1273,", "and 0.3183,", "--emit"]);
+    let mut same = dimmer;
+    same.radiosity = vec![Rgb::splat(1.5); same.positions.len()];
+    assert!(verify(&scene, &same, &settings(1.0), |_| ControlFlow::Break(())).is_ok());
     for precision in [0.0, -1.0, f64::NAN, 2.0] {
         let error = verify(&scene, &good, &settings(precision), keep_going).unwrap_err();
         assert_eq!((error.kind(), error.place()), (ErrorKind::Setting, "precision"));
