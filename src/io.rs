@@ -37,7 +37,7 @@ pub use self::exr::write_exr;
 #[cfg(feature = "glb")]
 pub use self::glb::write_glb;
 #[cfg(feature = "png")]
-pub use self::png::write_png;
+pub use self::png::{write_png, write_png_with_tone};
 pub use obj::{ObjSettings, load_obj, read_obj};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;

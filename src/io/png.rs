@@ -7,12 +7,23 @@ use crate::camera::RadianceImage;
 use crate::error::Error;
 use crate::io::tone::ToneCurve;
 
-/// Writes the image through a tone curve as 8-bit sRGB PNG.
+/// Writes the image through a tone curve that fits it as 8-bit sRGB PNG.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
 pub fn write_png(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    let tone = ToneCurve::fit_image(image);
+    write_png_with_tone(path, image, &ToneCurve::fit_image(image))
+}
+
+/// [`write_png`] with a tone curve of radiance, such as that of another image.
+///
+/// # Errors
+/// Those of [`write_png`].
+pub fn write_png_with_tone(
+    path: impl AsRef<Path>,
+    image: &RadianceImage,
+    tone: &ToneCurve,
+) -> Result<(), Error> {
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|&c| tone.display(c)).collect();
     let mut png = std::io::Cursor::new(vec![]);
     image::write_buffer_with_format(

@@ -35,6 +35,12 @@ impl ToneCurve {
         ToneCurve { exposure: KEY / median.max(f64::MIN_POSITIVE) }
     }
 
+    /// The curve that multiplies with this exposure, above 0, in place of one that fits: what is
+    /// shown with the same exposure can be compared.
+    pub fn with_exposure(exposure: f64) -> ToneCurve {
+        ToneCurve { exposure }
+    }
+
     /// Fits the curve to an image; what is nothing but sky does not count.
     pub fn fit_image(image: &RadianceImage) -> ToneCurve {
         let is_sky = |colour: &Rgb| colour.distance(image.sky) <= 1e-9 * image.sky.length();

@@ -67,6 +67,15 @@ fn radiosity_is_shown_as_its_radiance() {
 }
 
 #[test]
+fn an_exposure_that_is_given_counts() {
+    let fitted = ToneCurve::fit(&[Rgb::splat(2.0)]);
+    assert_eq!(ToneCurve::with_exposure(fitted.exposure()), fitted);
+    // Twice the exposure shows what half the light does.
+    let (once, twice) = (ToneCurve::with_exposure(0.5), ToneCurve::with_exposure(1.0));
+    assert_eq!(twice.linear(Rgb::splat(0.3)), once.linear(Rgb::splat(0.6)));
+}
+
+#[test]
 fn black_pixels_do_not_count() {
     let grey = Rgb::splat(0.3);
     assert_eq!(ToneCurve::fit(&[Rgb::ZERO, grey, Rgb::ZERO]), ToneCurve::fit(&[grey]));
