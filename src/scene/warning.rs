@@ -115,7 +115,12 @@ impl Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (one, many) = self.kind.nouns();
-        write!(f, "{} {}", self.count, if self.count == 1 { one } else { many })?;
+        match (self.kind, self.count) {
+            // Of a scene as a whole, which is no matter of how many.
+            (WarningKind::NoLight, 1) => f.write_str(one)?,
+            (_, 1) => write!(f, "1 {one}")?,
+            (_, count) => write!(f, "{count} {many}")?,
+        }
         match (&self.place, self.count) {
             (Some(place), 1) => write!(f, ", at {place}")?,
             (Some(place), _) => write!(f, ", first at {place}")?,
@@ -163,7 +168,7 @@ impl WarningKind {
             ),
             Transparency => ("material with transparency", "materials with transparency"),
             AmbientAsRadiance => ("material with `Ka` above 1", "materials with `Ka` above 1"),
-            NoLight => ("scene without light", "scenes without light"),
+            NoLight => ("no light in the scene", "scenes without light"),
             Polygon => ("polygon that crosses itself", "polygons that cross themselves"),
             RepeatedCorner => ("corner given twice in a row", "corners given twice in a row"),
             FewCorners => ("face of fewer than three corners", "faces of fewer than three corners"),
@@ -182,7 +187,7 @@ impl WarningKind {
             UnknownStatement => ("line of unknown kind", "lines of unknown kind"),
             Encoding => ("text that is not UTF-8", "texts that are not UTF-8"),
             Degenerate => ("triangle without area", "triangles without area"),
-            Winding => ("group seen from behind", "groups seen from behind"),
+            Winding => ("group with faces seen from behind", "groups with faces seen from behind"),
         }
     }
 

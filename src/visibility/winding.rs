@@ -51,8 +51,8 @@ impl Scene {
         let named = (0..of_groups.len()).filter(|&g| inverted[g] || of_groups[g].is_inverted());
         let names: Vec<&str> = named.map(|g| &*self.groups()[g]).collect();
         if !names.is_empty() {
-            let done = "light is lost there: turn their faces if they are wound inside out, or \
-                        give them a second face";
+            let done = "light is lost there: turn their faces if they are wound inside out; where \
+                        they are seen from both sides, give each a second face";
             let names = names.into_iter();
             self.warn(Warning::new(WarningKind::Winding, names.len(), done).naming(names));
         }
