@@ -2,7 +2,7 @@
 #![cfg(feature = "cli")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 
 /// Runs `radiosity COMMAND ARGS…`.
 fn run(command: &str, args: &[&str]) -> Output {
@@ -111,6 +111,20 @@ fn bake_chooses_a_camera_that_can_be_typed_again() {
     let said = bake("chosen", &[]);
     let camera = said.split_whitespace().skip_while(|word| *word != "--camera").nth(1).unwrap();
     assert!(bake("typed", &["--camera", camera, "--write", "png"]).contains(camera));
+    // So does the exposure, for meshes too; another one shows other colours.
+    let exposure = said.split_whitespace().skip_while(|word| *word != "--exposure").nth(1).unwrap();
+    assert!(bake("exposed", &["--camera", camera, "--exposure", exposure]).contains(exposure));
+    for ending in ["png", "ply", "glb"] {
+        let [exposed, chosen] =
+            ["exposed", "chosen"].map(|s| read(&format!("{s}.{ending}")).unwrap());
+        assert!(exposed == chosen, "{ending}");
+    }
+    bake("bright", &["--camera", camera, "--exposure", "9"]);
+    for ending in ["png", "ply", "glb"] {
+        let [bright, chosen] =
+            ["bright", "chosen"].map(|s| read(&format!("{s}.{ending}")).unwrap());
+        assert!(bright != chosen, "{ending}");
+    }
     assert!(read("typed.png").unwrap() == read("chosen.png").unwrap(), "{camera}");
     assert!(
         read("typed.ply").is_err() && read("typed.json").is_err() && read("typed.exr").is_err()
@@ -233,6 +247,8 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     assert_eq!(lines[1][..3], ["floor", "100.00", "0.00"], "{table}");
     assert_eq!((lines[1][4], lines[2][4], lines[2][0]), ("12.50", "25.00", "all"), "{table}");
     assert!(lines[3].starts_with(&["known", "to"]) && !table.contains("lamp"), "{table}");
+    // Told 25 %, and measured 20 to 50 %; told 1 %, that is far off.
+    assert!(table.trim_end().ends_with("agree within a factor of 2"), "{table}");
     let text = std::fs::read_to_string(csv).unwrap();
     let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
     let measured: f64 = rows[2][5].parse().unwrap();
@@ -255,6 +271,10 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     let row: Vec<f64> =
         text.lines().nth(1).unwrap().split(',').map(|x| x.parse().unwrap()).collect();
     assert!((row[3] - 1.8817).abs() < 4.0 * row[6] && row[6] < 0.02, "{text}");
+    write(folder.path(), "lit.json", "{\"error\": {\"total\": 0.01}}");
+    let said = run("verify", &args[..4]).stdout;
+    let said = String::from_utf8_lossy(&said);
+    assert!(said.lines().last().unwrap().ends_with("times further off than it tells"), "{said}");
     // What cannot be.
     let wrong = |args: &[&str], words: &[&str]| {
         let out = run("verify", args);
@@ -397,6 +417,74 @@ fn a_sky_lights_what_has_no_lamp() {
     refused(&[cornell(), "--sky", "1,2,-3"], &["sky", "0"]);
 }
 
+/// What the solution emits has to be what the scene emits: forgotten lamps are found.
+#[test]
+fn verify_wants_the_lamps_of_the_bake() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "box.obj", &format!("usemtl wall\n{}", room(6)));
+    let (scene, ply) = (scene.display().to_string(), scene.with_extension("ply"));
+    let ply = ply.display().to_string();
+    let bake = |more: &[&str]| {
+        let mut args = vec![scene.as_str(), "--cpu", "--write", "ply"];
+        args.extend(more);
+        let out = run("bake", &args);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let verify = |more: &[&str]| {
+        let out = run("verify", &[&[scene.as_str(), ply.as_str()][..], more].concat());
+        (out.status.success(), String::from_utf8(out.stderr).unwrap())
+    };
+    let dark = bake(&["--error", "0.1"]);
+    assert!(dark.ends_with("there is no light to be exact about\n"), "{dark}");
+    let (fine, said) = verify(&["--emit", "wall=2"]);
+    assert!(!fine && said.contains("'wall' emits radiance 0,0,0, and 2,2,2"), "{said}");
+    let lit = bake(&["--emit", "wall=2", "--time", "0.5"]);
+    assert!(lit.lines().last().unwrap().starts_with("as exact as the time allowed: "), "{lit}");
+    let (fine, said) = verify(&["--emit", "wall=1"]);
+    assert!(!fine && said.contains("--emit wall=2,2,2"), "{said}");
+    let (fine, said) = verify(&["--emit", "wall=2", "--precision", "1"]);
+    assert!(fine, "{said}");
+}
+
+/// Ctrl-C: the work stops, what there is is written, and the exit status says that it was stopped.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_writes_what_there_is() {
+    use std::io::{BufRead, BufReader};
+
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("box");
+    let mut args = vec!["bake", cornell(), "--out", stem.to_str().unwrap(), "--cpu"];
+    // Hours of work.
+    args.extend(["--error", "0.00001", "--write", "ply,json"]);
+    let program = |args: &[&str]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+        program.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
+        program.spawn().expect("the program starts")
+    };
+    let interrupt = |child: &Child| {
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    };
+    let mut child = program(&args);
+    // The first line of progress says that the bake has begun.
+    let mut log = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    while !said.contains("shooting") && !said.contains("gathering") {
+        assert!(log.read_line(&mut said).unwrap() > 0, "{said}");
+    }
+    interrupt(&child);
+    log.read_line(&mut said).unwrap();
+    let out = child.wait_with_output().unwrap();
+    let report = String::from_utf8(out.stdout).unwrap();
+    assert_eq!(out.status.code(), Some(130), "{said}{report}");
+    assert!(report.contains("missed: it was stopped"), "{report}");
+    assert!(!radiosity::io::read_ply(stem.with_extension("ply")).unwrap().faces.is_empty());
+    let json = std::fs::read_to_string(stem.with_extension("json")).unwrap();
+    assert!(json.contains("\"stopped\": true"), "{json}");
+}
+
 #[test]
 fn bad_settings_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -417,6 +505,8 @@ fn bad_settings_are_refused() {
     with(&["--camera", "1,2,3"], &["camera", "7"]);
     with(&["--image", "0,5", "--camera", "278,273,-800,278,273,0,39"], &["0 × 5"]);
     with(&["--full-share", "much"], &["much"]);
+    with(&["--exposure", "0"], &["exposure 0", "above 0"]);
+    with(&["--error", "10%"], &["'10%'", "0.1 for 10 %"]);
     with(&["--rotations", "0"], &["zero"]);
     with(&["--viewpoints", "much"], &["much"]);
     with(&["--gather", "some"], &["some", "none, needed, all"]);

@@ -7,6 +7,8 @@ use std::str::FromStr;
 use lexopt::prelude::*;
 use radiosity::{Backend, Error, ErrorKind, ObjSettings, Rgb, Scene};
 
+use crate::interrupt;
+
 /// Why a command ended without having done its work.
 pub enum Stop {
     /// Its help was asked for.
@@ -17,6 +19,8 @@ pub enum Stop {
     Failed(Error),
     /// The work failed, and the user has been told of it.
     Reported,
+    /// Ctrl-C stopped the work; what there was has been written.
+    Interrupted,
 }
 
 impl Stop {
@@ -42,6 +46,7 @@ impl Stop {
                 ExitCode::FAILURE
             }
             Stop::Reported => ExitCode::FAILURE,
+            Stop::Interrupted => ExitCode::from(interrupt::EXIT_STATUS),
         }
     }
 }
@@ -78,6 +83,11 @@ pub fn numbers<T: FromStr, const N: usize>(
     let numbers: Result<Vec<T>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     let array = numbers.ok().and_then(|numbers| numbers.try_into().ok());
     array.ok_or_else(|| wrong_value(option, &text, expected))
+}
+
+/// How a command ends whose results are written.
+pub fn end() -> Result<(), Stop> {
+    if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(()) }
 }
 
 /// What an option of the command line does to how OBJ files are read.

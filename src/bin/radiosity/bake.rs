@@ -15,14 +15,14 @@ use radiosity::{
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
-use crate::progress;
 use crate::report::Report;
+use crate::{interrupt, progress};
 
 pub const USAGE: &str = "\
 usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
             [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
-            [--image W,H] [--pixel-gather] [--write FORMATS] [--elements]
-            [--adapter NAME | --cpu]
+            [--exposure X] [--image W,H] [--pixel-gather] [--write FORMATS]
+            [--elements] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.glb (the same for viewers
 of glTF), STEM.json (a report) and a picture, STEM.exr (linear radiance) and STEM.png. STEM is the
@@ -80,12 +80,19 @@ Files and devices:
   --write FORMATS   only these: some of ply, glb, json, exr, png, with commas between them [all]
   --camera ...      eye, target, vertical field of view in degrees; three more numbers are the
                     direction up [0,1,0]; the report names the camera that is chosen otherwise
+  --exposure X      what radiance is multiplied with for the colours of PNG, GLB and PLY, before
+                    highlights are rolled off; the report names the one that is chosen otherwise
   --image W,H       size of the picture in pixels [512,512]
   --pixel-gather    every pixel of the picture gathers the settled light for itself
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
-                    light goes along";
+                    light goes along
+
+Ctrl-C stops the bake, and what there is is written; again, it ends at once.";
+
+/// What an error is given as.
+const SHARE: &str = "a share, such as 0.1 for 10 %";
 
 /// What is said of a scene that stays dark, and what to do about it.
 const DARK: (&str, &str) = (
@@ -134,7 +141,7 @@ pub enum Gather {
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let report = Bake::parse(parser)?.run()?;
     println!("{}", report.table());
-    Ok(())
+    args::end()
 }
 
 impl Bake {
@@ -153,10 +160,10 @@ impl Bake {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
                 Long("error") => {
-                    bake.target = Target::Error(args::value(parser, "error", "a number")?);
+                    bake.target = Target::Error(args::value(parser, "error", SHARE)?);
                 }
                 Long("error-each") => {
-                    bake.target = Target::ErrorEach(args::value(parser, "error-each", "a number")?);
+                    bake.target = Target::ErrorEach(args::value(parser, "error-each", SHARE)?);
                 }
                 Long("time") => {
                     bake.target = Target::Seconds(args::value(parser, "time", "a number")?);
@@ -229,10 +236,12 @@ impl Bake {
         let device = progress::of_stage("opening the device", || self.device.open())?;
         let open = opening.elapsed().as_secs_f64();
         let unshot_goal = Cell::new(Solver::default().unshot);
+        interrupt::catch();
         let mut baked = progress::of_bake(
             || unshot_goal.get(),
             |report| self.bake(scene, &device, &unshot_goal, report),
         )?;
+        let stopped = interrupt::stopped();
         if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) {
             let scene = baked.mesh.scene();
             let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
@@ -245,7 +254,7 @@ impl Bake {
             baked.light.surface.sky = Rgb::ZERO;
         }
         let writing = Instant::now();
-        let camera = self.files.write(&baked, &device)?;
+        let picture = self.files.write(&baked, &device)?;
         let report = Report {
             scene: name,
             adapter: device.adapter(),
@@ -256,7 +265,8 @@ impl Bake {
             write: writing.elapsed().as_secs_f64(),
             total: start.elapsed().as_secs_f64(),
             warnings,
-            camera,
+            picture,
+            stopped,
             baked,
         };
         self.files.write_report(&report.to_json())?;

@@ -26,6 +26,8 @@ use radiosity::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
 
+use crate::interrupt;
+
 /// Steps of a bar from empty to full.
 const STEPS: u64 = 1000;
 
@@ -46,13 +48,13 @@ pub type OfBake<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
 /// Takes how much is done, and of how much.
 pub type OfCount<'a> = &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>;
 
-/// Runs `work` with the progress of a bake shown. `unshot_goal` gives the share of unshot light at
-/// which shooting ends.
+/// Runs `work` with the progress of a bake shown, and stops it on Ctrl-C. `unshot_goal` gives the
+/// share of unshot light at which shooting ends.
 pub fn of_bake<T>(unshot_goal: impl Fn() -> f64, work: impl FnOnce(OfBake) -> T) -> T {
     let mut display = Display::new("meshing");
     work(&mut |progress| {
         show(&mut display, progress, unshot_goal());
-        ControlFlow::Continue(())
+        interrupt::flow()
     })
 }
 

@@ -2,12 +2,12 @@
 //! and as a small table.
 
 use radiosity::backend::AdapterInfo;
-use radiosity::bake::{GroupError, Outcome};
+use radiosity::bake::{GroupError, Obstacle, Outcome};
 use radiosity::solver::Ledger;
-use radiosity::{BakeResult, Camera, ErrorEstimate, Rgb};
+use radiosity::{BakeResult, ErrorEstimate, Rgb};
 use serde_json::{Map, Value, json};
 
-use crate::bake::files::camera_value;
+use crate::bake::files::{Picture, camera_value};
 use crate::bake::{Target, settings};
 
 /// What the report tells of.
@@ -30,8 +30,10 @@ pub struct Report {
     pub total: f64,
     /// What deserves a look.
     pub warnings: Vec<String>,
-    /// Camera of the picture, if there is one.
-    pub camera: Option<Camera>,
+    /// How the picture was taken, if there is one.
+    pub picture: Option<Picture>,
+    /// Whether Ctrl-C stopped the bake.
+    pub stopped: bool,
     pub baked: BakeResult,
 }
 
@@ -77,10 +79,12 @@ impl Report {
                 "vertices": s.vertices, "certificate": s.estimate, "write": self.write,
                 "total": self.total,
             },
-            "camera": self.camera.map(|camera| json!({
+            "camera": self.picture.map(|Picture { camera, .. }| json!({
                 "eye": camera.eye.to_array(), "target": camera.target.to_array(),
                 "up": camera.up.to_array(), "vertical_fov": camera.vertical_fov,
             })),
+            "exposure": self.picture.map(|picture| picture.exposure),
+            "stopped": self.stopped,
             "warnings": self.warnings,
         })
     }
@@ -120,24 +124,41 @@ impl Report {
         if baked.groups.len() > 1 {
             lines.push(format!("groups     worst: {}", worst.join(", ")));
         }
-        let asked = match self.target {
-            Target::Error(error) => Some((error, "")),
-            Target::ErrorEach(error) => Some((error, " for each group")),
-            Target::Settings(_) | Target::Seconds(_) => None,
-        };
-        if let Some((error, each)) = asked {
-            let told = 100.0 * baked.estimate.total;
-            let remedy = match baked.outcome {
-                Outcome::Missed(obstacle) => {
-                    format!("; {}", obstacle.remedy(baked.settings.gather.as_ref()))
-                }
-                _ => String::new(),
-            };
-            let outcome = baked.outcome;
-            let asked = 100.0 * error;
-            lines.push(format!("{asked} %{each} {outcome} (about {told:.2} %){remedy}"));
-        }
+        lines.extend(self.outcome());
         lines
+    }
+
+    /// Whether what was asked for was reached.
+    fn outcome(&self) -> Option<String> {
+        let baked = &self.baked;
+        let told = 100.0 * baked.estimate.total;
+        if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) && !self.stopped {
+            return Some("there is no light to be exact about".into());
+        }
+        let (error, each) = match self.target {
+            Target::Error(error) => (error, ""),
+            Target::ErrorEach(error) => (error, " for each group"),
+            _ if self.stopped => {
+                return Some(format!("stopped: this is what there was, about {told:.2} % off"));
+            }
+            Target::Seconds(_) => {
+                return Some(format!("as exact as the time allowed: about {told:.2} %"));
+            }
+            Target::Settings(_) => return None,
+        };
+        let remedy = match baked.outcome {
+            Outcome::Missed(Obstacle::Elements) => {
+                let most = baked.settings.gather.as_ref().map(|g| g.refinement.max_elements);
+                let most = most.unwrap_or_default();
+                format!("; allow more than --max-elements {most}, which takes memory and time")
+            }
+            Outcome::Missed(obstacle) => {
+                format!("; {}", obstacle.remedy(baked.settings.gather.as_ref()))
+            }
+            _ => String::new(),
+        };
+        let (asked, outcome) = (100.0 * error, baked.outcome);
+        Some(format!("{asked} %{each} {outcome} (about {told:.2} %){remedy}"))
     }
 
     /// Why gathering stopped.
@@ -210,8 +231,9 @@ impl Report {
                 self.total
             ),
         ];
-        if let Some(camera) = &self.camera {
-            lines.push(format!("picture    --camera {}", camera_value(camera)));
+        if let Some(Picture { camera, exposure }) = &self.picture {
+            let camera = camera_value(camera);
+            lines.push(format!("picture    --camera {camera} --exposure {exposure}"));
         }
         lines.extend(self.verdict());
         lines.join("\n")

@@ -32,7 +32,7 @@ use reference::Reference;
 use surface_points::SurfacePoints;
 
 use crate::args::{self, Device, Stop};
-use crate::progress;
+use crate::{interrupt, progress};
 
 pub const USAGE: &str = "\
 usage: radiosity trade-off SCENE.obj [--truth FILE] [--out STEM] [--quick]
@@ -58,7 +58,8 @@ given.
 
 Seconds are those of the stages of a bake, the judging of its own error included; reading the file
 and opening the device come once and do not count. Short runs are done three times, and the least
-time is given; still, the machine should be idle. Errors are root mean squares over the area, as
+time is given; still, the machine should be idle. After Ctrl-C the
+table of the runs that are done is written. Errors are root mean squares over the area, as
 shares of the radiosity.";
 
 /// What is asked of the command.
@@ -102,7 +103,7 @@ const REFERENCE_FINER: f64 = 3.0;
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let options = Options::parse(parser)?;
     println!("{}", options.run()?.summary());
-    Ok(())
+    args::end()
 }
 
 impl Options {
@@ -142,13 +143,15 @@ impl Options {
         let scene = Arc::new(scene);
         args::print_warnings(&scene);
         let device = self.device.open()?;
-        let grid = Grid::new(&scene, self.quick);
+        let mut grid = Grid::new(&scene, self.quick);
+        interrupt::catch();
         BakeSettings::for_error(WARM_UP_ERROR, &scene).bake(scene.clone(), &device, go)?;
         let reference = match truth {
             Some(truth) => truth,
             None => finest_run(&grid, &scene, &device)?,
         };
         let measured = self.measure(&grid, &reference, &scene, &device)?;
+        grid.runs.truncate(measured.len());
         let results = Results {
             front: front(&grid.runs, &measured),
             grid,
@@ -157,7 +160,14 @@ impl Options {
             scene: self.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             adapter: device.adapter().name,
         };
-        self.write("csv", results.csv().as_bytes())?;
+        if !results.measured.is_empty() {
+            self.write("csv", results.csv().as_bytes())?;
+        }
+        if interrupt::stopped() {
+            let runs = results.measured.len();
+            eprintln!("stopped: the table has {runs} of the runs; no chart is drawn of a part");
+            return Ok(results);
+        }
         self.write("svg", chart::svg(&results).map_err(|e| self.bad_chart(&e))?.as_bytes())?;
         self.write("png", &chart::png(&results).map_err(|e| self.bad_chart(&e))?)?;
         Ok(results)
@@ -176,6 +186,10 @@ impl Options {
         for (k, Run { knob, value, target }) in grid.runs.iter().enumerate() {
             eprint!("run {} of {count}: {knob} {value}", k + 1);
             let baked = bake(target, scene, device)?;
+            if interrupt::stopped() {
+                eprintln!(": stopped");
+                return Ok(all);
+            }
             let one = Measured::new(&baked, reference).map_err(|found| self.bad_truth(&found))?;
             eprintln!(": {:.2} s, error {:.2} %", one.seconds, 100.0 * one.errors.area);
             all.push(one);
@@ -184,8 +198,11 @@ impl Options {
             eprintln!("short runs again, {} of {ROUNDS} times", round + 1);
             for (run, one) in grid.runs.iter().zip(&mut all) {
                 if one.seconds < SHORT_RUN {
-                    one.seconds =
-                        one.seconds.min(bake(&run.target, scene, device)?.timings.total());
+                    let seconds = bake(&run.target, scene, device)?.timings.total();
+                    if interrupt::stopped() {
+                        return Ok(all);
+                    }
+                    one.seconds = one.seconds.min(seconds);
                 }
             }
         }
@@ -241,9 +258,9 @@ fn bake(target: &Target, scene: &Arc<Scene>, device: &Backend) -> Result<BakeRes
     }
 }
 
-/// Progress that never stops the work.
+/// Progress that stops the work on Ctrl-C.
 fn go<T>(_: &T) -> ControlFlow<()> {
-    ControlFlow::Continue(())
+    interrupt::flow()
 }
 
 /// Fixed settings that no others are both faster and better than, by time.

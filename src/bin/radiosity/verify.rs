@@ -4,7 +4,6 @@ mod points;
 
 use std::fmt::Write;
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -14,7 +13,7 @@ use radiosity::{Error, ErrorKind, ObjSettings, Rgb, Scene, read_ply};
 use serde_json::Value as Json;
 
 use crate::args::{self, Stop};
-use crate::progress;
+use crate::{interrupt, progress};
 use points::Points;
 
 pub const USAGE: &str = "\
@@ -25,7 +24,8 @@ usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] 
 Measures how far off SOLUTION.ply is, independently of what made it: path traces SCENE.obj at random
 points of its surfaces, and prints for each group, and for all, the root mean square over the area
 of |B - true B| / max(|true B|, 5 % of its mean): B is the reflected radiosity, lengths are over
-the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there.
+the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there, and the last line
+compares the two. After Ctrl-C what was measured so far is printed.
 
   --precision X     go on until the standard error is below this share of the error [0.1]
   --time SECONDS    begin no round that would end later; inf for no limit [120]
@@ -70,7 +70,8 @@ enum What {
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let options = Options::parse(parser)?;
-    Ok(options.run()?)
+    options.run()?;
+    args::end()
 }
 
 impl Options {
@@ -151,15 +152,19 @@ impl Options {
         let told = Told::beside(ply);
         told.check_sky(scene, ply)?;
         let solution = progress::of_reading(ply, || read_ply(ply))?;
+        interrupt::catch();
         let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings, |progress| {
                 report(progress.done, progress.of)?;
-                ControlFlow::Continue(())
+                interrupt::flow()
             })
         })?;
         let lines = lines(scene, &found, &told);
         println!("{}", table(&lines));
         println!("{}", self.end(&found, start.elapsed()));
+        if let Some(verdict) = verdict(told.total(), found.error) {
+            println!("{verdict}");
+        }
         if let Some(file) = &self.csv {
             args::write_file(file, csv(&lines).as_bytes())?;
         }
@@ -177,6 +182,7 @@ impl Options {
             (Reason::Time, Some(time)) => {
                 format!("less exact than asked for: the limit of {} s was hit", time.as_secs_f64())
             }
+            (Reason::Cancelled, _) => "less exact than asked for: stopped".into(),
             (reason, _) => format!("less exact than asked for: {reason:?}").to_lowercase(),
         };
         let (points, paths) = (found.points.len(), found.paths);
@@ -204,6 +210,24 @@ impl Options {
         }
         end
     }
+}
+
+/// Whether the error `told` by the bake is within a factor of 2 of the one `measured`, give or take
+/// two of its standard errors.
+fn verdict(told: Option<f64>, measured: Option<Estimate>) -> Option<String> {
+    let told = told.filter(|&told| told > 0.0)?;
+    let Estimate { value, standard_error } = measured?;
+    let (low, high) = (value - 2.0 * standard_error, value + 2.0 * standard_error);
+    Some(if low > 2.0 * told {
+        let times = value / told;
+        format!("the solution is {times:.1} times further off than it tells")
+    } else if 2.0 * high < told {
+        format!("the solution is less than {:.2} times as far off as it tells", high / told)
+    } else if low < told / 2.0 || high > 2.0 * told {
+        "told and measured may agree within a factor of 2; measure for longer to be sure".into()
+    } else {
+        "told and measured agree within a factor of 2".into()
+    })
 }
 
 /// The limit of `--time`; none for inf.

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use lexopt::prelude::*;
 use radiosity::glam::DVec3;
-use radiosity::io::{ToneCurve, write_ply_with_tone};
+use radiosity::io::{ToneCurve, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
-    Backend, BakeResult, Camera, Error, ErrorEstimate, RadianceImage, VertexMesh, write_exr,
-    write_glb, write_png,
+    Backend, BakeResult, Camera, Error, ErrorEstimate, ErrorKind, RadianceImage, VertexMesh,
+    write_exr, write_glb,
 };
 
 use crate::args::{self, Stop};
@@ -44,12 +44,22 @@ pub struct Files {
     formats: Vec<Format>,
     /// The camera of the picture; one is chosen where none is given.
     camera: Option<Camera>,
+    /// Of all colours for viewers; one is chosen where none is given.
+    exposure: Option<f64>,
     /// Pixels of the picture: width and height.
     image: (u32, u32),
     /// Whether the pixels of the picture gather.
     pixel_gather: bool,
     /// Whether to write the elements' own values too.
     elements: bool,
+}
+
+/// How a picture was taken.
+#[derive(Clone, Copy)]
+pub struct Picture {
+    pub camera: Camera,
+    /// What radiance was multiplied with for its colours.
+    pub exposure: f64,
 }
 
 impl Files {
@@ -59,6 +69,7 @@ impl Files {
             stem: PathBuf::new(),
             formats: FORMATS.map(|(_, format)| format).to_vec(),
             camera: None,
+            exposure: None,
             image: (512, 512),
             pixel_gather: false,
             elements: false,
@@ -71,6 +82,7 @@ impl Files {
             "out" => self.stem = PathBuf::from(parser.value()?),
             "write" => self.formats = formats(parser)?,
             "camera" => self.camera = Some(camera(parser)?),
+            "exposure" => self.exposure = Some(args::value(parser, "exposure", "a number")?),
             "image" => {
                 let expected = "2 whole numbers with a comma between them";
                 let [width, height] = args::numbers(parser, "image", expected)?;
@@ -94,6 +106,13 @@ impl Files {
     /// Whether all of it can be written, before any work is done for it.
     pub fn check(&self) -> Result<(), Error> {
         args::check_writable(&self.stem)?;
+        if let Some(exposure) = self.exposure
+            && !(exposure > 0.0 && exposure.is_finite())
+        {
+            let place = format!("exposure {exposure}");
+            let remedy = "give a factor above 0, such as the one that a report names";
+            return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
+        }
         let (width, height) = self.image;
         // The one that will be chosen is good; sizes are checked with any.
         let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
@@ -109,24 +128,29 @@ impl Files {
         self.stem.with_added_extension(ending)
     }
 
-    /// Writes pictures and meshes, and gives the camera of the picture, if there is one.
-    pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Camera>, Error> {
-        let mut camera = None;
-        let mut tone = None;
+    /// Writes pictures and meshes, and tells how the picture was taken, if there is one.
+    pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Picture>, Error> {
+        let (mut picture, mut tone) = (None, self.exposure.map(ToneCurve::with_exposure));
         if self.writes(Format::Exr) || self.writes(Format::Png) {
-            let chosen = camera.insert(self.camera.unwrap_or_else(|| self.framing(baked)));
-            let image = self.picture(chosen, baked, device)?;
+            let camera = self.camera.unwrap_or_else(|| self.framing(baked));
+            let image = self.picture(&camera, baked, device)?;
+            let fitted = ToneCurve::fit_image(&image);
+            let shown = tone.unwrap_or(fitted);
             // Where the picture is black, what it does not show has its own exposure.
             if image.pixels.iter().any(|c| c.max_element() > 0.0) {
-                tone = Some(ToneCurve::fit_image(&image).of_radiosity());
+                tone = Some(shown);
             } else if baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0) {
                 eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
-            self.write_picture(&image)?;
+            self.write_picture(&image, &shown)?;
+            picture = Some(Picture { camera, exposure: shown.exposure() });
         }
-        let tone = tone.unwrap_or_else(|| ToneCurve::fit(&baked.light.surface.radiosity));
+        let tone = match tone {
+            Some(tone) => tone.of_radiosity(),
+            None => ToneCurve::fit(&baked.light.surface.radiosity),
+        };
         self.write_meshes(baked, &tone)?;
-        Ok(camera)
+        Ok(picture)
     }
 
     /// The camera where none is given.
@@ -137,12 +161,12 @@ impl Files {
         })
     }
 
-    fn write_picture(&self, image: &RadianceImage) -> Result<(), Error> {
+    fn write_picture(&self, image: &RadianceImage, tone: &ToneCurve) -> Result<(), Error> {
         if self.writes(Format::Exr) {
             progress::of_writing(&self.path("exr"), |path| write_exr(path, image))?;
         }
         if self.writes(Format::Png) {
-            progress::of_writing(&self.path("png"), |path| write_png(path, image))?;
+            progress::of_writing(&self.path("png"), |path| write_png_with_tone(path, image, tone))?;
         }
         Ok(())
     }

@@ -1,0 +1,40 @@
+//! Ctrl-C: the first one stops the work at its next progress report, so that what there is can be
+//! written; the second ends the program at once.
+//!
+//! ```text
+//! Ctrl-C ──► flag ──► next progress report: Break ──► results are written ──► exit status 130
+//! Ctrl-C again ─────────────────────────────────────────────────────────────► exit status 130
+//! ```
+//!
+//! Before [`catch`] is called, Ctrl-C ends the program as it does any other.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit status of a program that was interrupted: 128 + SIGINT, as shells have it.
+pub const EXIT_STATUS: u8 = 130;
+
+static STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// From here on the first Ctrl-C stops the work.
+pub fn catch() {
+    let caught = ctrlc::set_handler(|| {
+        if STOPPED.swap(true, Ordering::Relaxed) {
+            std::process::exit(EXIT_STATUS.into());
+        }
+        eprintln!("stopping, to write what there is; Ctrl-C again ends at once");
+    });
+    if let Err(error) = caught {
+        eprintln!("warning: Ctrl-C will lose what was done: {error}");
+    }
+}
+
+/// Whether Ctrl-C was pressed.
+pub fn stopped() -> bool {
+    STOPPED.load(Ordering::Relaxed)
+}
+
+/// What progress callbacks answer: break after Ctrl-C.
+pub fn flow() -> ControlFlow<()> {
+    if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
