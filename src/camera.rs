@@ -10,22 +10,21 @@
 
 mod framing;
 mod gathered;
+mod interpolated;
 mod textured;
 mod up_axis;
 mod view_score;
 
 use std::f64::consts::PI;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 use crate::visibility::ray_scene::{Hit, RayScene};
-use textured::LitSurface;
 
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,10 +59,6 @@ const MAX_SIDE: u32 = 1 << 15;
 /// Primary rays along a pixel's side, at most. Chosen by hand.
 const MAX_SAMPLES: u32 = 256;
 
-/// Primary rays between two reports of progress: a tenth of a second on two cores. At least
-/// [`MAX_SAMPLES`]².
-const RAYS_PER_BAND: u32 = 1 << 18;
-
 /// Cosine between the view direction and the camera's up from which on another direction is up in
 /// the image. Chosen by hand.
 const VERTICAL_VIEW: f64 = 0.9999;
@@ -88,36 +83,6 @@ impl Camera {
         let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
         let pixels = rays.pixels(0..width * height, &radiosity).collect();
         Ok(RadianceImage { width, height, pixels, sky: surface.sky })
-    }
-
-    /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
-    /// meets a textured material, the irradiance between the vertices is reflected by the texture
-    /// at that point. `progress` is called with the number of pixels done and of all pixels,
-    /// several times a second. It may stop the work; the result is `None` then.
-    ///
-    /// # Errors
-    /// Those of [`Camera::check`].
-    pub fn interpolated_image(
-        &self,
-        light: &GatheredMesh,
-        width: u32,
-        height: u32,
-        samples: u32,
-        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> Result<Option<RadianceImage>, Error> {
-        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
-        let lit = LitSurface { rays, light };
-        let count = width * height;
-        let band = RAYS_PER_BAND / (samples * samples);
-        let mut pixels = Vec::with_capacity(count as usize);
-        for start in (0..count).step_by(band as usize) {
-            let end = start.saturating_add(band).min(count);
-            pixels.par_extend(lit.rays.pixels(start..end, &|hit| lit.radiosity(hit)));
-            if progress(pixels.len(), count as usize).is_break() {
-                return Ok(None);
-            }
-        }
-        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
     }
 
     /// Right, up and forward of the view, unit length.

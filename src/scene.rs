@@ -8,6 +8,7 @@
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
 mod rgb;
+mod scene_textures;
 pub mod texture;
 mod textured;
 mod warning;
@@ -21,8 +22,8 @@ use glam::{DAffine3, DVec2, DVec3};
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
 pub use rgb::Rgb;
+use scene_textures::SceneTextures;
 use texture::MaterialTextures;
-use textured::SceneTextures;
 pub use warning::{Warning, WarningKind};
 
 /// How the front of a face reflects and emits. Backs only block light.

@@ -14,16 +14,17 @@
 mod boundary_fit;
 mod corner_singularity;
 pub(crate) mod hanging_nodes;
+mod irradiance;
 pub(crate) mod keys;
-pub(crate) mod textured;
+mod textured;
 
 use glam::DVec3;
 
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::{Material, Rgb};
 use hanging_nodes::HangingNodes;
+use irradiance::irradiance;
 use keys::{ElementLoops, Vertices};
-use textured::irradiance;
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only
 /// there.
@@ -82,7 +83,7 @@ impl VertexMesh {
         mesh: &Mesh,
         element_radiosity: &[Rgb],
     ) -> (VertexMesh, Vec<[u32; 3]>, Vec<Rgb>) {
-        let untextured = textured::untextured(mesh, element_radiosity);
+        let untextured = irradiance::untextured(mesh, element_radiosity);
         let with_textures = element_radiosity;
         let element_radiosity = untextured.as_deref().unwrap_or(element_radiosity);
         let topology = SurfaceTopology::new(mesh.scene());

@@ -97,7 +97,7 @@ fn first_gather_mesh(
     scene: &Arc<Scene>,
 ) -> Result<Mesh, Error> {
     let most = gather.refinement.max_elements;
-    let sizing = shooting_phase::sizing(solve, scene, gather.element_size);
+    let sizing = solve.sizing(scene, gather.element_size);
     let sizing = sizing.within(scene, Mesh::MAX_DEPTH, most / 2);
     let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?;
     let at_contacts = mesh.split_at_contacts(gather.contact_levels);

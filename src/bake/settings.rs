@@ -4,11 +4,11 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use crate::bake::light_survey::{self, LightSurvey};
-use crate::bake::{model, shooting_phase};
+use crate::bake::model;
 use crate::error::Error;
 use crate::gather::RefinementSettings;
-use crate::mesh::Mesh;
-use crate::scene::{Aabb, Scene};
+use crate::mesh::{ElementSizing, Mesh};
+use crate::scene::{Aabb, Material, Rgb, Scene};
 use crate::solver::{Method, Solver};
 
 /// All settings of a bake. Begin with [`BakeSettings::for_error`], [`BakeSettings::elements_only`]
@@ -104,6 +104,20 @@ impl SolveSettings {
     }
 }
 
+impl SolveSettings {
+    /// How large elements may be: `size` where the light is. What is black neither receives nor, if
+    /// it does not emit or is gathered, shoots.
+    pub(super) fn sizing(&self, scene: &Scene, size: f64) -> ElementSizing {
+        let is_idle = |(m, material): &(u32, &Material)| {
+            let shoots = material.exitance != Rgb::ZERO && !self.gathered_materials.contains(m);
+            !material.reflects() && !shoots
+        };
+        let idle = (0..).zip(scene.materials()).filter(is_idle);
+        let unsplit_materials = idle.map(|(m, _)| m).collect();
+        ElementSizing { size, region: self.region, unsplit_materials }
+    }
+}
+
 impl BakeSettings {
     /// Whether a bake would take these settings of gathering: worth asking before a long solve.
     /// What comes before that is checked where it is used.
@@ -189,9 +203,9 @@ impl BakeSettings {
             ambient: false,
         };
         // Where the light is small and triangles are long, there would be millions.
-        let sizing = shooting_phase::sizing(&solve, scene, solve.element_size).within(
+        let sizing = solve.sizing(scene, solve.element_size).within(
             scene,
-            shooting_phase::MAX_DEPTH,
+            model::MAX_SHOOTING_DEPTH,
             model::MAX_SHOOTING_ELEMENTS,
         );
         solve.element_size = sizing.size;

@@ -31,17 +31,13 @@ use crate::form_factor::viewpoints::AdaptiveViewpoints;
 use crate::gather::GatherPoint;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
-use crate::mesh::{ElementSizing, Mesh};
+use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::scene::{Material, Rgb, Scene};
+use crate::scene::{Rgb, Scene};
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 
 /// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
 const CHECKPOINT_INTERVAL: u32 = 10;
-
-/// Levels that a triangle is split at most: where sizes grow with the distance, a huge triangle may
-/// reach into the region of the light, and a device keeps four to the power of this for each.
-pub(super) const MAX_DEPTH: u32 = 8;
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {
@@ -62,9 +58,9 @@ pub(super) fn shoot(
     reporter: &mut Reporter,
     clock: &mut StageClock,
 ) -> Result<ShotLight, Error> {
-    let sizing = sizing(settings, scene, settings.element_size);
-    let mesh =
-        Mesh::sized(scene.clone(), &sizing, MAX_DEPTH)?.split_at_contacts(settings.contact_levels);
+    let sizing = settings.sizing(scene, settings.element_size);
+    let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?
+        .split_at_contacts(settings.contact_levels);
     let near = ProximityCorrection::new(backend.rows(&mesh, settings)?, &mesh, settings.near_reach);
     let mut rows = match settings.viewpoint_tolerance {
         Some(tolerance) => AdaptiveViewpoints::new(near, tolerance, u32::MAX),
@@ -109,18 +105,6 @@ fn solve(
             session.into_solution()
         }
     }
-}
-
-/// How large elements may be: `size` where the light is. What is black neither receives nor, if it
-/// does not emit or is gathered, shoots.
-pub(super) fn sizing(settings: &SolveSettings, scene: &Scene, size: f64) -> ElementSizing {
-    let is_idle = |(m, material): &(u32, &Material)| {
-        let shoots = material.exitance != Rgb::ZERO && !settings.gathered_materials.contains(m);
-        !material.reflects() && !shoots
-    };
-    let idle = (0..).zip(scene.materials()).filter(is_idle);
-    let unsplit_materials = idle.map(|(m, _)| m).collect();
-    ElementSizing { size, region: settings.region, unsplit_materials }
 }
 
 /// What the elements of `mesh` receive of the lights that are gathered, and of the sky.

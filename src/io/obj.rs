@@ -22,7 +22,6 @@ use super::mtl::Library;
 use super::text::{self, Line};
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Scene, WarningKind};
-use faces::Geometry;
 use repairs::Repairs;
 pub use settings::ObjSettings;
 use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
@@ -177,13 +176,12 @@ impl<'a> ObjFile<'a> {
             geometry.texture_coordinates = vec![];
         }
         let groups = std::mem::take(&mut self.statements.groups.list);
-        let Geometry { positions, triangles, texture_coordinates } = geometry;
         let scene = Scene::with_textures(
-            positions,
-            triangles,
+            geometry.positions,
+            geometry.triangles,
             groups,
             materials,
-            texture_coordinates,
+            geometry.texture_coordinates,
             textures,
         );
         let mut scene = scene.map_err(|e| e.inside(self.path))?;

@@ -15,6 +15,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
 
@@ -32,17 +33,6 @@ const SCENE_OUTLINE_CELLS: f64 = 2e7;
 
 /// And this is the fewest that a piece gets: its mean is off by some 1e-2 of the contrast within.
 const MIN_OUTLINE_CELLS: f64 = 64.0;
-
-/// Textures of materials, and where they lie on triangles.
-#[derive(Clone, Debug, Default)]
-pub(super) struct SceneTextures {
-    /// Of the corners of each triangle; empty where no material has textures, as are those.
-    coordinates: Vec<[DVec2; 3]>,
-    /// Of the materials that have some, by their indices.
-    of_materials: BTreeMap<u32, MaterialTextures>,
-    /// Exitance of each triangle over that of its material; empty where no texture emits.
-    relative_exitance: Vec<Rgb>,
-}
 
 impl Scene {
     /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`

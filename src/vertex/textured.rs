@@ -11,26 +11,10 @@
 //! vertex reflects and emits the means of the elements around it, weighted by area.
 
 use super::VertexMesh;
+use super::irradiance::irradiance;
 use super::keys::ElementLoops;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
-
-/// Radiosity of elements as if each had the reflectance and exitance of its material, W/m², from
-/// the `radiosity` that they have. None without textures, where it is the same.
-pub(super) fn untextured(mesh: &Mesh, radiosity: &[Rgb]) -> Option<Vec<Rgb>> {
-    let element = |e: usize| {
-        let reflected = (radiosity[e] - mesh.exitance(e)).max(Rgb::ZERO);
-        let emitted = mesh.material(mesh.element(e)).exitance;
-        emitted + reflected / mesh.relative_reflectance(e)
-    };
-    mesh.scene().has_textures().then(|| (0..radiosity.len()).map(element).collect())
-}
-
-/// Irradiance that is `reflected` by a surface of this `reflectance`, W/m²: 0, for unknown, where
-/// that is 0.
-pub(crate) fn irradiance(reflected: Rgb, reflectance: Rgb) -> Rgb {
-    Rgb::select(reflectance.cmpgt(Rgb::ZERO), reflected / reflectance, Rgb::ZERO)
-}
 
 impl VertexMesh {
     /// Sets the irradiance of the vertices on the `outlines` of the elements of `mesh`, and their

@@ -1,0 +1,46 @@
+//! Images of a solution by the light between its vertices, with its textures.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use super::textured::LitSurface;
+use super::{Camera, PrimaryRays, RadianceImage};
+use crate::error::Error;
+use crate::gather::GatheredMesh;
+
+/// Primary rays between two reports of progress: a tenth of a second on two cores. At least
+/// [`MAX_SAMPLES`]².
+const RAYS_PER_BAND: u32 = 1 << 18;
+
+impl Camera {
+    /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
+    /// meets a textured material, the irradiance between the vertices is reflected by the texture
+    /// at that point. `progress` is called with the number of pixels done and of all pixels,
+    /// several times a second. It may stop the work; the result is `None` then.
+    ///
+    /// # Errors
+    /// Those of [`Camera::check`].
+    pub fn interpolated_image(
+        &self,
+        light: &GatheredMesh,
+        width: u32,
+        height: u32,
+        samples: u32,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<RadianceImage>, Error> {
+        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let lit = LitSurface { rays, light };
+        let count = width * height;
+        let band = RAYS_PER_BAND / (samples * samples);
+        let mut pixels = Vec::with_capacity(count as usize);
+        for start in (0..count).step_by(band as usize) {
+            let end = start.saturating_add(band).min(count);
+            pixels.par_extend(lit.rays.pixels(start..end, &|hit| lit.radiosity(hit)));
+            if progress(pixels.len(), count as usize).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
+    }
+}
