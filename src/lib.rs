@@ -23,6 +23,25 @@
 //! # }
 //! ```
 //!
+//! A lamp and a sky that the file does not have; a picture and a GLB file in its colours:
+//!
+//! ```no_run
+//! # use std::ops::ControlFlow;
+//! # use radiosity::io::ToneCurve;
+//! # use radiosity::{Backend, BakeTarget, Camera, ObjSettings, Rgb, write_glb, write_png};
+//! # fn main() -> Result<(), radiosity::Error> {
+//! let mut obj = ObjSettings::default();
+//! obj.emit.push(("bulb".into(), Rgb::splat(15.0))); // radiance of a material
+//! obj.sky = Some(Rgb::ONE);
+//! let (scene, go) = (obj.load("scene.obj")?, |_: &_| ControlFlow::Continue(()));
+//! let light = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, go)?.light;
+//! let image = Camera::framing(&light, 1.5).image(&light.surface, 768, 512, 4)?;
+//! write_png("scene.png", &image)?;
+//! write_glb("scene.glb", &light, &ToneCurve::fit_image(&image).of_radiosity())?;
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Where to look
 //!
 //! Data flows one way: [`Scene`] → [`Mesh`] → [`FormFactors`] → [`Solver`] → [`GatheredMesh`] →

@@ -67,6 +67,15 @@ fn names_groups_wound_inside_out() {
     assert_eq!(named(&[room(), ("screen", screen[..2].to_vec())]), "'screen'");
 }
 
+/// What has a second face in the same place is met from the front on both sides.
+#[test]
+fn accepts_faces_back_to_back() {
+    let screen = boxed([0.5, 0.2, 0.2], [0.9, 0.8, 0.8], true)[..2].to_vec();
+    let turned: Vec<_> = screen.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    assert_eq!(named(&[room(), ("one", screen.clone()), ("other", turned.clone())]), "");
+    assert_eq!(named(&[("screen", [turned, screen].concat()), room()]), "");
+}
+
 #[test]
 fn accepts_groups_wound_right() {
     let block = |low, high| boxed(low, high, false);

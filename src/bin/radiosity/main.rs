@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
-//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 130 when Ctrl-C
-//! stopped it.
+//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 130 when
+//! Ctrl-C stopped it.
 
 mod args;
 mod bake;

@@ -24,8 +24,8 @@ usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] 
 Measures how far off SOLUTION.ply is, independently of what made it: path traces SCENE.obj at random
 points of its surfaces, and prints for each group, and for all, the root mean square over the area
 of |B - true B| / max(|true B|, 5 % of its mean): B is the reflected radiosity, lengths are over
-the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there, and the last line
-compares the two. After Ctrl-C what was measured so far is printed.
+the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there, and the
+last line compares the two. After Ctrl-C what was measured so far is printed.
 
   --precision X     go on until the standard error is below this share of the error [0.1]
   --time SECONDS    begin no round that would end later; inf for no limit [120]
