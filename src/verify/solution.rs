@@ -45,7 +45,8 @@ fn other_emission(material: &Material, told: Rgb) -> Error {
         "its material '{name}' emits radiance {told}, and {} in the scene",
         radiance(material.exitance)
     );
-    let remedy = format!("verify it with the materials it was baked with: --emit {name}={told}");
+    let remedy =
+        format!("verify it with the reflectances and lamps it had, such as --emit {name}={told}");
     Error::new(ErrorKind::Scene, "solution", found, remedy)
 }
 

@@ -1,6 +1,7 @@
 //! `radiosity verify`: how far off a solution is, by path tracing the user's own scene.
 
 mod points;
+mod verdict;
 
 use std::fmt::Write;
 use std::num::NonZeroUsize;
@@ -15,6 +16,7 @@ use serde_json::Value as Json;
 use crate::args::{self, Stop};
 use crate::{interrupt, progress};
 use points::Points;
+use verdict::verdict;
 
 pub const USAGE: &str = "\
 usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] [--places N]
@@ -210,24 +212,6 @@ impl Options {
         }
         end
     }
-}
-
-/// Whether the error `told` by the bake is within a factor of 2 of the one `measured`, give or take
-/// two of its standard errors.
-fn verdict(told: Option<f64>, measured: Option<Estimate>) -> Option<String> {
-    let told = told.filter(|&told| told > 0.0)?;
-    let Estimate { value, standard_error } = measured?;
-    let (low, high) = (value - 2.0 * standard_error, value + 2.0 * standard_error);
-    Some(if low > 2.0 * told {
-        let times = value / told;
-        format!("the solution is {times:.1} times further off than it tells")
-    } else if 2.0 * high < told {
-        format!("the solution is less than {:.2} times as far off as it tells", high / told)
-    } else if low < told / 2.0 || high > 2.0 * told {
-        "told and measured may agree within a factor of 2; measure for longer to be sure".into()
-    } else {
-        "told and measured agree within a factor of 2".into()
-    })
 }
 
 /// The limit of `--time`; none for inf.
