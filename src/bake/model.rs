@@ -77,9 +77,9 @@ pub const ERRORS: RangeInclusive<f64> = 1e-4..=0.3;
 /// Longest edge of the elements that light is shot on, share of the diagonal: error ∝ edge^2.5.
 pub const SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.105, 0.4);
 
-/// Levels that a triangle is split at most for elements that light is shot on: where sizes grow with
-/// the distance, a huge triangle may reach into the region of the light, and a device keeps four to
-/// the power of this for each.
+/// Levels that a triangle is split at most for elements that light is shot on: where sizes grow
+/// with the distance, a huge triangle may reach into the region of the light, and a device keeps
+/// four to the power of this for each.
 pub(super) const MAX_SHOOTING_DEPTH: u32 = 8;
 
 /// Elements that light is shot on, contacts not counted: more are made larger. Chosen by hand, as

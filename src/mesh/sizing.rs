@@ -63,7 +63,7 @@ impl ElementSizing {
         sizing
     }
 
-    /// Elements of `scene`; those of the triangle that exceeds `bound` and after it not all counted.
+    /// Elements of `scene`; beyond `bound` not all of them.
     fn count(&self, scene: &Scene, max_depth: u32, bound: usize) -> usize {
         let mut count = 0;
         for t in 0..scene.triangles().len() {

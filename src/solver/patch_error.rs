@@ -25,8 +25,8 @@
 //!
 //! The second term is for patches that touch something next to their viewpoint. All light of such a
 //! patch, from m₂ of area, is sent to a spot of area 1/d₂, which is so made m₂ d₂ times too bright:
-//! a relative error whose mean square over all surfaces is p². Of the light of the scene that may be
-//! next to nothing. Patches that are darker than the mean (their area is A_p) make dimmer spots.
+//! a relative error whose mean square over all surfaces is p². Of the light of the scene that may
+//! be next to nothing. Patches that are darker than the mean (their area is A_p) make dimmer spots.
 
 use std::ops::Range;
 

@@ -102,7 +102,8 @@ fn library_is_loaded_once() {
     assert_eq!((scene.materials().len(), oddities(&scene).len()), (1, 0));
     // As however it is spelled.
     let text = format!(
-        "mtllib ./room.mtl\nmtllib room.mtl\nmtllib .//././room.mtl\n{SQUARE}usemtl chalk\nf 1 2 3\n"
+        "mtllib ./room.mtl\nmtllib room.mtl\nmtllib .//././room.mtl\n\
+         {SQUARE}usemtl chalk\nf 1 2 3\n"
     );
     for name in ["room.mtl", "./room.mtl"] {
         let files = [("room.obj", text.as_bytes()), (name, CHALK.as_bytes())];
