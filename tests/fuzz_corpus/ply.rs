@@ -42,5 +42,7 @@ fn check(mesh: &VertexMesh, bytes: usize) {
     );
     assert_eq!([mesh.radiosity.len(), mesh.normals.len()], [vertices; 2]);
     assert!(mesh.error.is_empty() || mesh.error.len() == vertices);
+    assert!(mesh.irradiance.is_empty() || mesh.irradiance.len() == vertices);
+    assert!(mesh.irradiance.iter().all(|e| e.is_finite()));
     assert!(mesh.faces.iter().flatten().all(|&v| (v as usize) < vertices));
 }
