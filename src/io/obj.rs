@@ -43,7 +43,7 @@ use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
 /// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
-/// [`Material::DEFAULT_REFLECTANCE`].
+/// [`crate::Material::DEFAULT_REFLECTANCE`].
 ///
 /// What is merely odd is repaired, and said in [`Scene::warnings`]: libraries under other names or
 /// missing, materials that no library defines (grey), reflectances of 1 or more
