@@ -189,6 +189,13 @@ impl PrimaryRays<'_> {
         })
     }
 
+    /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.
+    fn bands(&self, pixels: u32, rays: u32) -> impl Iterator<Item = Range<u32>> + use<> {
+        let band = (rays / (self.samples * self.samples)).max(1);
+        let end = move |start: u32| start.saturating_add(band).min(pixels);
+        (0..pixels).step_by(band as usize).map(move |start| start..end(start))
+    }
+
     /// Radiance of these pixels, of the radiosity (W/m²) of what is seen.
     fn pixels<'b>(
         &'b self,

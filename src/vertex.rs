@@ -23,7 +23,7 @@ use glam::DVec3;
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::{Material, Rgb};
 use hanging_nodes::HangingNodes;
-use irradiance::irradiance;
+pub(crate) use irradiance::irradiance;
 use keys::{ElementLoops, Vertices};
 
 /// A triangle mesh with radiosity at its vertices, continuous over each smooth surface and only

@@ -77,6 +77,9 @@ pub const ERRORS: RangeInclusive<f64> = 1e-4..=0.3;
 /// Longest edge of the elements that light is shot on, share of the diagonal: error ∝ edge^2.5.
 pub const SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.105, 0.4);
 
+/// The same for errors at which it is the larger of the two.
+pub const COARSE_SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.6, 1.0);
+
 /// Levels that a triangle is split at most for elements that light is shot on: where sizes grow
 /// with the distance, a huge triangle may reach into the region of the light, and a device keeps
 /// four to the power of this for each.
@@ -85,9 +88,6 @@ pub(super) const MAX_SHOOTING_DEPTH: u32 = 8;
 /// Elements that light is shot on, contacts not counted: more are made larger. Chosen by hand, as
 /// many as there may be of those that gather.
 pub const MAX_SHOOTING_ELEMENTS: usize = 1 << 19;
-
-/// The shooting edge for errors at which it is the larger of the two.
-pub const COARSE_SHOOTING_EDGE: PowerLaw = PowerLaw::new(0.6, 1.0);
 
 /// Longest edge of the elements whose corners gather first, share of the diagonal. It follows
 /// the error slowly, since elements are split where light is not linear.

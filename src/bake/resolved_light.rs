@@ -15,6 +15,7 @@
 
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
+use crate::vertex::irradiance;
 
 /// The `radiosity` of the elements of `mesh`, W/m², with what is reflected averaged over clusters
 /// of triangles up to an area of `size`² (scene unit): the same irradiance for all of them.
@@ -37,7 +38,7 @@ pub(super) fn resolved_light(mesh: &Mesh, radiosity: &[Rgb], size: f64) -> Vec<R
             flux += (radiosity[e] - mesh.exitance(e)) * area;
             unit_flux += mesh.reflectance(e) * area;
         }
-        let irradiance = Rgb::select(unit_flux.cmpgt(Rgb::ZERO), flux / unit_flux, Rgb::ZERO);
+        let irradiance = irradiance(flux, unit_flux);
         for e in elements() {
             resolved[e] = mesh.exitance(e) + mesh.reflectance(e) * irradiance;
         }

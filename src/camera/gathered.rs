@@ -61,16 +61,16 @@ impl Camera {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let bands = rays.bands(width * height, RAYS_PER_BAND);
         let view = GatheredView::new(LitSurface { rays, light });
         let field = light.radiosity_field();
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let total = pixels.len();
-        let band = (RAYS_PER_BAND / (samples * samples)).max(1);
         let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
-        for start in (0..width * height).step_by(band as usize) {
-            let end = start.saturating_add(band).min(width * height);
+        for band in bands {
+            let end = band.end;
             let (gathering, others): (Vec<PixelPart>, Vec<PixelPart>) =
-                view.parts(start..end).into_iter().partition(|p| p.reflectance != Rgb::ZERO);
+                view.parts(band).into_iter().partition(|p| p.reflectance != Rgb::ZERO);
             for part in others {
                 pixels[part.pixel] += part.interpolated;
             }

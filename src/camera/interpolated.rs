@@ -9,8 +9,7 @@ use super::{Camera, PrimaryRays, RadianceImage};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 
-/// Primary rays between two reports of progress: a tenth of a second on two cores. At least
-/// [`MAX_SAMPLES`]².
+/// Primary rays between two reports of progress: a tenth of a second on two cores.
 const RAYS_PER_BAND: u32 = 1 << 18;
 
 impl Camera {
@@ -30,13 +29,12 @@ impl Camera {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
-        let lit = LitSurface { rays, light };
         let count = width * height;
-        let band = RAYS_PER_BAND / (samples * samples);
+        let bands = rays.bands(count, RAYS_PER_BAND);
+        let lit = LitSurface { rays, light };
         let mut pixels = Vec::with_capacity(count as usize);
-        for start in (0..count).step_by(band as usize) {
-            let end = start.saturating_add(band).min(count);
-            pixels.par_extend(lit.rays.pixels(start..end, &|hit| lit.radiosity(hit)));
+        for band in bands {
+            pixels.par_extend(lit.rays.pixels(band, &|hit| lit.radiosity(hit)));
             if progress(pixels.len(), count as usize).is_break() {
                 return Ok(None);
             }

@@ -25,8 +25,8 @@ pub struct Solver {
     /// one place: √s q, where s is the share of the emitted light that it carries and q the share
     /// of this that goes wrong, estimated from its size, the distance of its receivers and how
     /// uneven its light is; more for a patch next to a contact, whose light would all go to a spot
-    /// there. Patches are as large as this permits, from clusters of many triangles
-    /// down to elements. 0 makes every patch as small as `min_patch_level` allows. Elements of
+    /// there. Patches are as large as this permits, from clusters of many triangles down to
+    /// elements. 0 makes every patch as small as `min_patch_level` allows. Elements of
     /// emitters shoot by themselves where they are few. Rows are taken to be right for near
     /// receivers: see [`ProximityCorrection`](crate::form_factor::ProximityCorrection).
     pub patch_tolerance: f64,
