@@ -27,6 +27,7 @@ mod error_estimate;
 mod estimator;
 mod fallback;
 mod gather_phase;
+mod judge;
 mod light_survey;
 pub mod model;
 mod outcome;

@@ -18,6 +18,7 @@
 
 mod box_overlap;
 mod clusters;
+mod contact_cuts;
 mod contacts;
 mod quadtree;
 pub(crate) mod sizing;
@@ -35,6 +36,7 @@ use xxhash_rust::xxh3::Xxh3;
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Rgb, Scene, longest_edge};
 pub(crate) use clusters::Clusters;
+pub(crate) use contact_cuts::cut_at_contacts;
 pub(crate) use quadtree::Cell;
 pub(crate) use sizing::ElementSizing;
 pub(crate) use topology::{Side, SurfaceTopology};

@@ -7,6 +7,7 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+mod cut;
 mod rgb;
 mod scene_textures;
 pub mod texture;
@@ -21,6 +22,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+pub(crate) use cut::{Piece, SceneCut};
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 use texture::MaterialTextures;
@@ -70,6 +72,8 @@ pub struct Scene {
     sky: Rgb,
     /// Textures of materials, and where they lie on triangles.
     textures: Arc<SceneTextures>,
+    /// Per triangle, the sides across which its surface does not continue; empty for none.
+    cut_sides: Vec<[bool; 3]>,
 }
 
 impl Scene {
@@ -184,6 +188,7 @@ impl Scene {
             warnings,
             sky,
             textures: Arc::default(),
+            cut_sides: vec![],
         };
         if !textures.is_empty() {
             scene.lay_textures(texture_coordinates, textures);
@@ -338,7 +343,8 @@ impl Scene {
         }
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
-        let scene = Scene { sky: self.sky, textures: self.textures.clone(), ..scene };
+        let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
+        let scene = Scene { sky: self.sky, textures, cut_sides, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

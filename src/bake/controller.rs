@@ -29,7 +29,9 @@ impl ErrorTarget<'_> {
     /// Whether the estimate is below the target, safely: further rounds are not worth it.
     pub fn is_met(&self, judged: Judged) -> bool {
         let limit = model::SAFETY * self.error;
-        judged.by_light.total <= limit && self.is_below(limit, judged)
+        // What paths found beyond the estimate needs no room for what the estimate does not see.
+        let whole = if judged.whole.sources > 0.0 { model::TARGET_FRACTION } else { model::SAFETY };
+        judged.by_light.total <= limit && self.is_below(whole * self.error, judged)
     }
 
     /// Whether the estimate is at most the target.
@@ -119,6 +121,11 @@ pub(super) fn refined(
     target: &ErrorTarget,
 ) -> GatherSettings {
     let mut refined = gather.clone();
+    if whole.sources > 0.0 {
+        // All else is good enough.
+        refined.refinement.gather_passes += 1;
+        return refined;
+    }
     let allowed = model::allowed_error(target.error);
     let mut steps = Steps::default();
     // Of the whole the one that is further off.
@@ -138,7 +145,9 @@ pub(super) fn refined(
         if cautious(&group.estimate) <= model::SAFETY * target.error {
             continue;
         }
-        let own = Steps::to(&group.estimate, allowed);
+        // What paths find in one group only is what its elements miss.
+        let mesh = group.estimate.mesh.hypot(group.estimate.sources);
+        let own = Steps::to(&ErrorEstimate { mesh, ..group.estimate }, allowed);
         steps = steps.both(own);
         if let Some(step) = own.mesh.or(own.gaps) {
             let factors = &mut refined.refinement.group_factors;

@@ -65,11 +65,16 @@ pub struct ErrorEstimate {
     pub truncation: f64,
     /// Light that was not shot, if it fell as evenly as the ambient term.
     pub unshot: f64,
+    /// What the vertices gathered from is off: the error that paths find at random points beyond
+    /// all other parts.
+    pub sources: f64,
     /// An upper bound: no more than this share of all radiosity times area is missing because it
     /// was not shot, in the worst channel.
     pub unshot_bound: f64,
     /// Random points that were used.
     pub samples: usize,
+    /// Paths by which the error was measured at each of some more; none if it was not.
+    pub paths: usize,
 }
 
 /// The estimated error of one group of the scene.
@@ -297,6 +302,8 @@ fn parts(
         truncation: truncation.sqrt(),
         unshot: unshot.sqrt(),
         unshot_bound: conditions.unshot_bound,
+        sources: 0.0,
+        paths: 0,
         samples: strata.iter().map(|s| s.deviations.len()).sum(),
     }
 }

@@ -25,7 +25,7 @@ use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
-use crate::scene::Rgb;
+use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
 use crate::visibility::buried;
 
@@ -44,6 +44,12 @@ const INSET: f64 = 0.03;
 /// Reflected radiosity over the largest exitance, at and below which there is none: ten thousand
 /// times the rounding of their sum.
 const NEGLIGIBLE_REFLECTION: f64 = 1e-12;
+
+/// Reflected radiosity at and below which there is none in `scene`, W/m².
+pub(super) fn negligible_reflection(scene: &Scene) -> f64 {
+    let brightest = scene.materials().iter().map(|m| m.exitance.length()).fold(0.0, f64::max);
+    (NEGLIGIBLE_REFLECTION * brightest).max(f64::MIN_POSITIVE)
+}
 
 /// A result whose error is to be estimated.
 pub(super) struct ErrorEstimator<'a> {
@@ -163,9 +169,7 @@ impl ErrorEstimator<'_> {
     /// Reflected radiosity below which errors are relative to this instead, W/m². Where next to
     /// nothing is reflected, rounding of what is emitted is no error.
     fn radiosity_floor(&self) -> f64 {
-        let materials = self.light.mesh.scene().materials();
-        let brightest = materials.iter().map(|m| m.exitance.length()).fold(0.0, f64::max);
-        let negligible = (NEGLIGIBLE_REFLECTION * brightest).max(f64::MIN_POSITIVE);
+        let negligible = negligible_reflection(self.light.mesh.scene());
         self.light.radiosity_field().radiosity_floor().max(negligible)
     }
 

@@ -15,9 +15,9 @@
 use std::ops::ControlFlow;
 
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
-use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::estimator::{ErrorEstimator, EstimatedError};
 use crate::bake::fallback::ResilientBackend;
+use crate::bake::judge::Judge;
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
@@ -43,14 +43,13 @@ pub(super) struct GatherPhase<'a> {
     gatherer: Box<dyn Gather + 'a>,
     backend: &'a ResilientBackend<'a>,
     shot: &'a ShotLight,
+    judge: Judge<'a>,
 }
 
 /// A gathered mesh whose error was estimated.
 struct Estimated {
     light: GatheredMesh,
-    estimate: ErrorEstimate,
-    by_light: ErrorEstimate,
-    groups: Vec<GroupError>,
+    found: EstimatedError,
     /// Whether the callback stopped the bake.
     cancelled: bool,
 }
@@ -74,7 +73,9 @@ impl<'a> GatherPhase<'a> {
             gather.noise_tolerance,
             state.radiosity_floor(),
         )?;
-        let mut phase = GatherPhase { solve, gather, target, state, gatherer, backend, shot };
+        let judge = Judge::new(shot.mesh.scene(), target.is_some_and(|target| target.each_group))?;
+        let mut phase =
+            GatherPhase { solve, gather, target, state, gatherer, backend, shot, judge };
         if let Some(target) = target {
             phase.choose_rays(target)?;
         }
@@ -91,9 +92,10 @@ impl<'a> GatherPhase<'a> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
+        let mut previous_sources = f64::INFINITY;
         loop {
             let stop = self.gather(step, reporter)?;
-            let estimated = self.estimate(stop, reporter, clock)?;
+            let mut estimated = self.estimate(stop, reporter, clock)?;
             // Rounds for which next to nothing is gathered change nothing: what is left is not for
             // this mesh to resolve.
             let gathers = estimated.light.gather_count;
@@ -101,7 +103,16 @@ impl<'a> GatherPhase<'a> {
             idle_rounds = if has_progress { 0 } else { idle_rounds + 1 };
             let is_stuck = idle_rounds >= model::MAX_IDLE_ROUNDS;
             let rounds_left = if is_stuck { 0 } else { model::MAX_ROUNDS - rounds };
-            match self.next_step(&estimated, rounds_left)? {
+            let mut next = self.next_step(&estimated, rounds_left)?;
+            if next.is_err() && !estimated.cancelled {
+                // Gathers find nothing more to do; paths may.
+                estimated = self.judge(estimated, reporter, clock)?;
+                let sources = estimated.found.whole.sources;
+                let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
+                previous_sources = sources;
+                next = self.next_step(&estimated, if in_vain { 0 } else { rounds_left })?;
+            }
+            match next {
                 Ok(next) => step = next,
                 Err(outcome) => return Ok(self.into_result(estimated, outcome)),
             }
@@ -116,8 +127,8 @@ impl<'a> GatherPhase<'a> {
         estimated: &Estimated,
         rounds_left: u32,
     ) -> Result<Result<Step, Outcome>, Error> {
-        let Estimated { light, estimate, by_light, groups, cancelled } = estimated;
-        let judged = Judged { whole: estimate, by_light, groups };
+        let Estimated { light, found, cancelled } = estimated;
+        let judged = found.judged();
         let Some(target) = self.target else { return Ok(Err(Outcome::Unasked)) };
         let end = |obstacle| {
             let reached = target.is_reached(judged);
@@ -130,7 +141,7 @@ impl<'a> GatherPhase<'a> {
         } else if light.stop == StopReason::Elements {
             end(Obstacle::Elements)
         } else if rounds_left == 0 {
-            end(Obstacle::largest_part(estimate))
+            end(Obstacle::largest_part(judged.whole))
         } else {
             match self.refine_settings(target, judged)? {
                 Some(step) => Ok(Ok(step)),
@@ -224,12 +235,29 @@ impl<'a> GatherPhase<'a> {
             }
             counts = SampleCounts { total: 2 * counts.total, per_group: 2 * counts.per_group };
         };
-        let EstimatedError { whole: estimate, by_light, groups, vertices } = found;
-        light.surface.error = vertices;
         light.stop = stop;
         clock.timings.estimate += clock.lap();
-        cancelled |= reporter.report(BakeProgress::Estimated(estimate)).is_break();
-        Ok(Estimated { light, estimate, by_light, groups, cancelled })
+        cancelled |= reporter.report(BakeProgress::Estimated(found.whole)).is_break();
+        Ok(Estimated { light, found, cancelled })
+    }
+
+    /// Holds the estimate against paths.
+    fn judge(
+        &mut self,
+        estimated: Estimated,
+        reporter: &mut Reporter,
+        clock: &mut StageClock,
+    ) -> Result<Estimated, Error> {
+        let Estimated { light, found, mut cancelled } = estimated;
+        let paths = model::judge_paths(light.gather_count, self.gather.rays);
+        let limits = (self.target.map(|target| target.error), paths);
+        let found = self.judge.judge(found, &light.surface, limits, &mut |samples, of| {
+            cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+            if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        clock.timings.estimate += clock.lap();
+        cancelled |= reporter.report(BakeProgress::Estimated(found.whole)).is_break();
+        Ok(Estimated { light, found, cancelled })
     }
 
     /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points.
@@ -282,7 +310,9 @@ impl<'a> GatherPhase<'a> {
     }
 
     fn into_result(self, estimated: Estimated, outcome: Outcome) -> BakedLight {
-        let Estimated { light, estimate, groups, .. } = estimated;
+        let Estimated { mut light, found, .. } = estimated;
+        let EstimatedError { whole: estimate, groups, vertices, .. } = found;
+        light.surface.error = vertices;
         let settings = BakeSettings { solve: self.solve, gather: Some(self.gather) };
         BakedLight { light, estimate, groups, outcome, settings }
     }

@@ -1,6 +1,6 @@
 //! The model of error and cost that a bake is steered by: one table of its numbers.
 //!
-//! The error of a bake is that of [`ErrorEstimate`](crate::ErrorEstimate). It has five parts,
+//! The error of a bake is that of [`ErrorEstimate`](crate::ErrorEstimate). It has six parts,
 //! independent enough that their squares add up, and each follows one setting:
 //!
 //! | part | follows | as | cost of it |
@@ -10,6 +10,7 @@
 //! | sampling | rays n a vertex | n^−[`RQMC_EXPONENT`] | rays: n |
 //! | truncation | gather passes p | (mean reflectance)^p | gathers: p |
 //! | unshot | share u of the flux not yet shot | u | shots: ln 1/u; after that, gather passes |
+//! | sources | gather passes, then shooting edges h | (mean reflectance)^p, h | gathers, shots |
 //!
 //! The model is used four times:
 //!
@@ -379,6 +380,37 @@ pub const MAX_SAMPLES_PER_GROUP: usize = 768;
 /// Points over all for one on each group: where the whole is undecided, it takes up to this many
 /// times [`MAX_SAMPLES_PER_GROUP`].
 pub const SAMPLES_RATIO: usize = 4;
+
+/// Seed of the points at which paths measure a result: others than those of a later measurement.
+pub const JUDGE_SEED: u64 = 0x7261_6469_6f73;
+
+/// The standard error down to which an error is measured that is close to what was asked for, as a
+/// share of itself.
+pub const JUDGE_PRECISION: f64 = 0.1;
+
+/// Points at which paths measure a result, at least: rare errors take many points, of few paths.
+pub const JUDGE_POINTS: usize = 2048;
+
+/// A further bounce that leaves more than this share of the error of the sources was in vain.
+pub const MIN_SOURCES_STEP: f64 = 0.8;
+
+/// Points on each group at which paths measure a result, at least.
+pub const JUDGE_POINTS_PER_GROUP: usize = 2;
+
+/// The same where every group is asked for an error.
+pub const JUDGED_POINTS_PER_GROUP: usize = 64;
+
+/// Paths that a result is measured by, at most: so many,
+pub const JUDGE_PATHS: u64 = 1 << 18;
+
+/// or one for so many rays of the vertices, if that is more.
+pub const RAYS_PER_PATH: u64 = 32;
+
+/// Paths by which a result is measured, at most, for which vertices gathered so many times with so
+/// many rays.
+pub(super) fn judge_paths(gathers: u64, rays: u32) -> u64 {
+    (gathers * u64::from(rays) / RAYS_PER_PATH).max(JUDGE_PATHS)
+}
 
 /// Groups that get points of their own: the largest. All others are judged together.
 pub const MAX_GROUPS: usize = 64;

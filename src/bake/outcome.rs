@@ -36,17 +36,21 @@ pub enum Obstacle {
     Rays,
     /// After all rounds a further bounce would still change the light.
     Bounces,
+    /// After all rounds paths still find other light than the vertices have, for more than all
+    /// other parts: it was shot too coarsely, or falls where no vertex is.
+    Sources,
 }
 
 impl Obstacle {
     /// What most of `estimate` is from, after all rounds.
     pub(super) fn largest_part(estimate: &ErrorEstimate) -> Obstacle {
-        let ErrorEstimate { mesh, gaps, sampling, truncation, unshot, .. } = *estimate;
+        let ErrorEstimate { mesh, gaps, sampling, truncation, unshot, sources, .. } = *estimate;
         let parts = [
             (mesh, Obstacle::Edges),
             (gaps, Obstacle::Gaps),
             (sampling, Obstacle::Rays),
             (truncation.hypot(unshot), Obstacle::Bounces),
+            (sources, Obstacle::Sources),
         ];
         let largest = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         largest.map_or(Obstacle::Edges, |(_, obstacle)| obstacle)
@@ -65,6 +69,7 @@ impl Obstacle {
             Obstacle::Gaps => "look at surfaces that nearly touch".into(),
             Obstacle::Rays => "look for small bright sources that are no emitters".into(),
             Obstacle::Bounces => "lower reflectances that are near one".into(),
+            Obstacle::Sources => "ask for less, or set a smaller element size".into(),
         }
     }
 }
@@ -79,6 +84,7 @@ impl fmt::Display for Obstacle {
             Obstacle::Gaps => "gaps between surfaces that no mesh resolves",
             Obstacle::Rays => "noise, with as many rays as allowed",
             Obstacle::Bounces => "light that is still on its way",
+            Obstacle::Sources => "light that was shot too coarsely",
         })
     }
 }

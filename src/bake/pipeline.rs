@@ -16,7 +16,7 @@ use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, cut_at_contacts};
 use crate::progress::StopReason;
 use crate::scene::Scene;
 
@@ -51,6 +51,11 @@ pub(super) fn run(
     let backend = &ResilientBackend::new(backend);
     let mut reporter = Reporter { backend, callback: progress };
     let mut clock = StageClock::start();
+    let finest = match &settings.gather {
+        Some(gather) => gather.refinement.min_edge,
+        None => settings.solve.element_size,
+    };
+    let scene = &cut_at_contacts(scene, finest);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
     let baked = match &settings.gather {
         Some(gather) if shot.solution.stop != StopReason::Cancelled => {
@@ -100,6 +105,7 @@ fn first_gather_mesh(
     let sizing = solve.sizing(scene, gather.element_size);
     let sizing = sizing.within(scene, Mesh::MAX_DEPTH, most / 2);
     let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?;
-    let at_contacts = mesh.split_at_contacts(gather.contact_levels);
+    let at_contacts =
+        mesh.split_at_contacts(gather.contact_levels).split_beside_cuts(gather.contact_levels);
     Ok(if at_contacts.element_count() > most { mesh } else { at_contacts })
 }

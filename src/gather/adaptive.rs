@@ -83,6 +83,8 @@ pub fn gather_at_vertices(
 pub(crate) struct AdaptiveGather<'a> {
     /// The light that vertices gather.
     source: Cow<'a, GatheredMesh>,
+    /// The light that they gathered first: what it has between vertices, they may have missed.
+    shot: &'a GatheredMesh,
     samples: SampledMesh,
     scale: ErrorScale,
     /// Change of the values by the last pass, relative.
@@ -104,6 +106,7 @@ impl<'a> AdaptiveGather<'a> {
         AdaptiveGather {
             samples: SampledMesh::new(mesh, &field),
             source: Cow::Borrowed(source),
+            shot: source,
             scale,
             relative_change: 0.0,
             pass: 0,
@@ -268,9 +271,9 @@ impl<'a> AdaptiveGather<'a> {
                 .map(|e| (1.0, e))
                 .collect();
         }
-        let source = self.source.radiosity_field();
+        let shot = self.shot.radiosity_field();
         candidates
-            .map(|e| (refinement_indicator(&self.samples, &source, &self.scale, settings, e), e))
+            .map(|e| (refinement_indicator(&self.samples, &shot, &self.scale, settings, e), e))
             .filter(|&(indicator, _)| indicator > 1.0)
             .collect()
     }

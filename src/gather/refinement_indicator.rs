@@ -46,6 +46,10 @@ const END_DIFFERENCE_SHARE: f64 = 0.25;
 /// of all that is known.
 const UNKNOWN_INDICATOR: f64 = 1e3;
 
+/// Elements of the first mesh that are longer than this many of the shortest edges are split once,
+/// whatever their corners say: a beam of light may fall between them.
+const SCOUTED_SIZE: f64 = 4.0;
+
 /// A vertex is dim if it reflects less than this many times the floor: a quarter of the mean.
 pub(crate) const GAP_DIMNESS: f64 = 0.25 / RADIOSITY_FLOOR_SHARE;
 
@@ -142,6 +146,8 @@ pub(super) fn refinement_indicator(
         // Every corner sees something much nearer than the others are: what lies between is
         // unknown.
         None if gap_factor.is_finite() && samples.is_narrow(e) => UNKNOWN_INDICATOR,
+        // Corners far apart say little of what lies between them.
+        None if size > SCOUTED_SIZE * settings.min_edge * group_factor => UNKNOWN_INDICATOR,
         None => {
             let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
             // A vector over the channels as long as the root mean square.

@@ -40,9 +40,9 @@ const COPLANAR_COSINE: f64 = 1.0 - 5e-11;
 
 /// A line on a triangle along which another triangle touches or crosses it.
 #[derive(Clone, Copy, Debug)]
-struct ContactSegment {
+pub(super) struct ContactSegment {
     /// Both ends, by barycentric weights of the second and third corner.
-    ends: [DVec2; 2],
+    pub ends: [DVec2; 2],
     /// Distance from the plane to the other triangle, scene unit.
     gap: f64,
 }
@@ -128,7 +128,7 @@ impl Mesh {
     }
 
     /// Level of this mesh's element at the centroid of `cell` of triangle `t`.
-    fn level_at(&self, t: usize, cell: Cell) -> u32 {
+    pub(super) fn level_at(&self, t: usize, cell: Cell) -> u32 {
         let corners = cell.corners();
         let mean = |k: usize| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0;
         self.cell(self.element(self.element_at(t, mean(0), mean(1)).0)).level
@@ -163,7 +163,7 @@ impl ContactSegment {
 
 /// Per triangle, which of its sides end its plane: the diagonals of a flat polygon do not, and
 /// separate nothing.
-fn outer_edges(scene: &Scene) -> Vec<[bool; 3]> {
+pub(super) fn outer_edges(scene: &Scene) -> Vec<[bool; 3]> {
     let topology = SurfaceTopology::new(scene);
     let mut outer = vec![[true; 3]; topology.sides.len()];
     for [(s, l), (t, k)] in topology.shared_edges() {
@@ -176,7 +176,7 @@ fn outer_edges(scene: &Scene) -> Vec<[bool; 3]> {
 }
 
 /// The plane of a triangle, on which other triangles make contact segments.
-struct TrianglePlane {
+pub(super) struct TrianglePlane {
     corner: DVec3,
     edges: [DVec3; 2],
     normal: DVec3,
@@ -185,9 +185,14 @@ struct TrianglePlane {
 }
 
 impl TrianglePlane {
-    fn new(scene: &Scene, t: usize, tolerance: f64) -> TrianglePlane {
+    pub fn new(scene: &Scene, t: usize, tolerance: f64) -> TrianglePlane {
         let [a, b, c] = scene.corners(t);
         TrianglePlane { corner: a, edges: [b - a, c - a], normal: scene.normal(t), tolerance }
+    }
+
+    /// Height of `p` above the plane, scene unit.
+    pub fn height(&self, p: DVec3) -> f64 {
+        self.normal.dot(p - self.corner)
     }
 
     /// Barycentric position of `p`, projected along the normal.
@@ -201,7 +206,7 @@ impl TrianglePlane {
     /// Adds the segments along which the triangle with these `corners` touches or crosses this one,
     /// whose expanded box is `within`: the parts of its `outer` sides that lie within the tolerance
     /// of the plane, and its cut with the plane.
-    fn add_contacts(
+    pub fn add_contacts(
         &self,
         corners: &[DVec3; 3],
         outer: &[bool; 3],
@@ -209,7 +214,7 @@ impl TrianglePlane {
         segments: &mut Vec<ContactSegment>,
     ) {
         let tolerance = self.tolerance;
-        let height = corners.map(|p| self.normal.dot(p - self.corner));
+        let height = corners.map(|p| self.height(p));
         if height.iter().all(|&h| h > tolerance) || height.iter().all(|&h| h < -tolerance) {
             return;
         }

@@ -101,7 +101,8 @@ impl SurfaceTopology {
             // More than two triangles at a side have no one surface to continue.
             let &[(t, k), (s, l)] = sharing.as_slice() else { continue };
             let opposite = sides[t][k].reversed != sides[s][l].reversed;
-            if !opposite || !continues(scene, t, s, &crease_angle) {
+            let is_cut = scene.is_cut(t, k) || scene.is_cut(s, l);
+            if is_cut || !opposite || !continues(scene, t, s, &crease_angle) {
                 continue;
             }
             let id = sides[t][k].id.min(sides[s][l].id);

@@ -206,13 +206,14 @@ impl Report {
             ),
             format!(
                 "error      about {:.2} %: mesh {:.2}, gaps {:.2}, sampling {:.2}, \
-                 truncation {:.2}, unshot {:.2}",
+                 truncation {:.2}, unshot {:.2}, sources {:.2}",
                 100.0 * error.total,
                 100.0 * error.mesh,
                 100.0 * error.gaps,
                 100.0 * error.sampling,
                 100.0 * error.truncation,
-                100.0 * error.unshot
+                100.0 * error.unshot,
+                100.0 * error.sources
             ),
             format!(
                 "seconds    load {:.2}, open {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, \
@@ -248,7 +249,8 @@ fn parts(error: &ErrorEstimate) -> Value {
     json!({
         "total": error.total, "uncertainty": error.uncertainty, "mesh": error.mesh,
         "gaps": error.gaps, "sampling": error.sampling, "settling": error.truncation,
-        "unshot": error.unshot, "places": error.samples,
+        "unshot": error.unshot, "sources": error.sources, "places": error.samples,
+        "paths": error.paths,
     })
 }
 

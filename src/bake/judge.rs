@@ -1,0 +1,160 @@
+//! The estimate of a result held against paths: an unbiased measurement at random points.
+//!
+//! What random points gather says how far vertices are off from what lit them; where that is itself
+//! off, no gather of it tells. Paths do ([`crate::verify`]): their mean has no bias, but noise. So
+//! the error that is told is the estimate as far as the paths leave it open, and else theirs:
+//!
+//! ```text
+//!              ┌──── open ────┐
+//!   ──────┼────┼──────┼───────┼─────►  error        v: measured   s: its standard error
+//!    estimate  √(v² − 4s² − β) v + s              β: how much too large v² is
+//!         └───►│ told
+//! ```
+//!
+//! What is told above the estimate is a part of its own, the *sources*: what the vertices gathered
+//! from. Points and paths are kept for all rounds of a bake.
+
+use std::ops::ControlFlow;
+
+use crate::bake::error_estimate::{ErrorEstimate, GroupError};
+use crate::bake::estimator::{EstimatedError, negligible_reflection};
+use crate::bake::model;
+use crate::error::Error;
+use crate::scene::{Rgb, Scene};
+use crate::verify::{
+    Estimate as Measured, GroupError as MeasuredGroup, Limits, Progress, Settings, Verification,
+    Verifier,
+};
+use crate::vertex::VertexMesh;
+
+/// Measures the results of a bake.
+pub(super) struct Judge<'a> {
+    /// None where there is nothing to measure.
+    verifier: Option<Verifier<'a>>,
+    /// Mean reflected radiosity that is rounding, W/m².
+    negligible: f64,
+}
+
+impl<'a> Judge<'a> {
+    /// Of results for `scene`, with more points where `each_group` is judged.
+    pub fn new(scene: &'a Scene, each_group: bool) -> Result<Judge<'a>, Error> {
+        let has_light = scene.has_emitter() || scene.sky() != Rgb::ZERO;
+        let triangles = 0..scene.triangles().len();
+        let has_error = has_light && triangles.clone().any(|t| scene.material(t).reflects());
+        let settings = Settings {
+            seed: model::JUDGE_SEED,
+            precision: model::JUDGE_PRECISION,
+            points_per_group: if each_group {
+                model::JUDGED_POINTS_PER_GROUP
+            } else {
+                model::JUDGE_POINTS_PER_GROUP
+            },
+            time: None,
+            ..Settings::default()
+        };
+        let verifier = || Verifier::new(scene, settings, model::JUDGE_POINTS);
+        let verifier = has_error.then(verifier).transpose()?;
+        Ok(Judge { verifier, negligible: negligible_reflection(scene) })
+    }
+
+    /// `found`, the estimate of `surface`, held against paths: so many that it is known whether
+    /// `error` is met, but no more than `paths` in all. `progress` is told how many points are done
+    /// of how many; if it stops the measurement, the estimate stays as it is.
+    pub fn judge(
+        &mut self,
+        found: EstimatedError,
+        surface: &VertexMesh,
+        (error, paths): (Option<f64>, u64),
+        progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<EstimatedError, Error> {
+        let Some(verifier) = &mut self.verifier else { return Ok(found) };
+        let limits = Limits { error, paths: Some(paths) };
+        let mut stopped = false;
+        let verification = verifier.measure(surface, limits, &mut |p: &Progress| {
+            let flow = progress(p.done, p.of);
+            stopped |= flow.is_break();
+            flow
+        })?;
+        let is_dark = verification.mean_reflected <= self.negligible;
+        Ok(if stopped || is_dark { found } else { held_against(found, &verification) })
+    }
+}
+
+/// `found` where `measured` leaves it open.
+fn held_against(found: EstimatedError, measured: &Verification) -> EstimatedError {
+    let EstimatedError { whole, by_light, groups, mut vertices } = found;
+    let Some(error) = measured.error else {
+        return EstimatedError { whole, by_light, groups, vertices };
+    };
+    let told = whole.held_against(error, measured.bias, measured.paths);
+    let growth = if whole.total > 0.0 { told.total / whole.total } else { 1.0 };
+    vertices.iter_mut().for_each(|error| *error *= growth);
+    let of_group = |group: GroupError| {
+        let same = measured.groups.iter().find(|other| other.group == group.group as usize);
+        let hold = |other: &MeasuredGroup| {
+            Some(group.estimate.held_against(other.error?, other.bias, measured.paths))
+        };
+        GroupError { estimate: same.and_then(hold).unwrap_or(group.estimate), ..group }
+    };
+    let groups = groups.into_iter().map(of_group).collect();
+    EstimatedError { whole: told, by_light, groups, vertices }
+}
+
+impl ErrorEstimate {
+    /// The estimate as far as `measured`, by so many `paths` a point, leaves it open; its square is
+    /// too large by about `bias`.
+    fn held_against(self, measured: Measured, bias: f64, paths: usize) -> ErrorEstimate {
+        let Measured { value, standard_error } = measured;
+        let low = (value.powi(2) - (2.0 * standard_error).powi(2) - bias).max(0.0).sqrt();
+        let told = self.total.clamp(low, value + standard_error);
+        if told >= self.total {
+            let sources = (told.powi(2) - self.total.powi(2)).sqrt();
+            let is_open = told == self.total;
+            let uncertainty = if is_open { self.uncertainty } else { standard_error };
+            return ErrorEstimate { total: told, uncertainty, sources, paths, ..self };
+        }
+        let share = told / self.total;
+        ErrorEstimate {
+            total: told,
+            uncertainty: standard_error,
+            mesh: share * self.mesh,
+            gaps: share * self.gaps,
+            sampling: share * self.sampling,
+            truncation: share * self.truncation,
+            unshot: share * self.unshot,
+            paths,
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_stand_where_paths_leave_them_open() {
+        let parts = ErrorEstimate { total: 0.05, mesh: 0.03, sampling: 0.04, ..Default::default() };
+        let told = |value, standard_error| {
+            let told = parts.held_against(Measured { value, standard_error }, 0.0, 64);
+            let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, sources, .. } =
+                told;
+            let squares = [mesh, gaps, sampling, truncation, unshot, sources].map(|p| p * p);
+            assert!((squares.iter().sum::<f64>().sqrt() - total).abs() < 1e-15, "parts add up");
+            total
+        };
+        // Nothing is known but that it is no more than 0.1.
+        assert_eq!(told(0.0, 0.1), 0.05);
+        assert_eq!(told(0.1, 0.06), 0.05);
+        assert_eq!(told(0.05, 0.01), 0.05);
+        // Known exactly.
+        assert_eq!(told(0.2, 0.0), 0.2);
+        assert_eq!(told(0.01, 0.0), 0.01);
+        // Known to a quarter of itself.
+        assert!((told(0.1, 0.025) - 0.1 * 0.75f64.sqrt()).abs() < 1e-15);
+        assert_eq!(told(0.02, 0.005), 0.025);
+        // Known to be no more than the noise of what it is relative to.
+        let measured = Measured { value: 0.1, standard_error: 0.0 };
+        assert_eq!(parts.held_against(measured, 0.01, 64).total, 0.05);
+    }
+}

@@ -1,0 +1,250 @@
+//! Triangles cut along the lines where others touch or cross them, so that no element lies on both
+//! sides of a wall (Baum, Mann, Smith and Winget, "Making radiosity usable", 1991; the
+//! discontinuities of order zero of Heckbert, "Discontinuity meshing for radiosity", 1992).
+//!
+//! ```text
+//!   ┌─────────────┐        ┌─────────────┐     The foot of a wall is a contact segment on the
+//!   │      ┃      │        │╲   ╱┃╲   ╱ ╱│     floor. A constrained Delaunay triangulation has it
+//!   │      ┃ wall │   ─►   │ ╲ ╱ ┃ ╲ ╱ ╱ │     as sides of triangles, and the surface does not
+//!   │      ┃      │        │  ╳──●──╳ ╱  │     continue across these: light may be another on
+//!   └─────────────┘        └─────────────┘     each side. Around its end it does.
+//! ```
+//!
+//! Only walls and plates with light on both sides are worth it, and only what elements could
+//! resolve: see [`openness`]. What is nearer than [`SNAP_DISTANCE`] is one point: see [`snapping`].
+
+mod openness;
+mod snapping;
+mod triangulation;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::box_overlap::overlapping_pairs;
+use super::contacts::{TrianglePlane, outer_edges};
+use super::{Cell, Mesh, Side, SurfaceTopology};
+use crate::geometry::aabb::Aabb;
+use crate::scene::{Piece, Scene, SceneCut, longest_edge};
+use openness::Openness;
+use snapping::{Cuts, STEPS, Snapping};
+use triangulation::CutTriangle;
+
+/// What comes nearer to a triangle's plane than this touches it, in units of the finest edge: a
+/// slit as narrow lets next to no light through. Chosen by hand.
+const CONTACT_DISTANCE: f64 = 0.05;
+
+/// Points nearer than this are one, in units of the finest edge: no piece need be thinner. Chosen
+/// by hand.
+const SNAP_DISTANCE: f64 = 0.02;
+
+/// Contact segments there are at most, over all triangles: more are not cut at all, since each
+/// makes some pieces, and a mesh that fine resolves little of them.
+const MAX_SEGMENTS: usize = 1 << 17;
+
+/// `scene` with its reflecting triangles that are longer than `finest` (scene unit) cut where
+/// others touch them; as it is where none are.
+pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
+    let topology = SurfaceTopology::new(scene);
+    let mut cuts = find_cuts(scene, &topology, finest);
+    let segments: usize = cuts.iter().map(|cuts| cuts.segments.len()).sum();
+    if segments == 0 || segments > MAX_SEGMENTS {
+        return scene.clone();
+    }
+    share_side_points(&topology, &mut cuts);
+    let cut = |(t, cuts): (usize, &Cuts)| {
+        CutTriangle { corners: scene.corners(t), sides: topology.sides[t], finest }.pieces(cuts)
+    };
+    let pieces: Vec<Vec<Piece>> = cuts.par_iter().enumerate().map(cut).collect();
+    Arc::new(scene.cut(SceneCut { pieces }))
+}
+
+impl Mesh {
+    /// The same mesh with elements split further, `levels` times, that have a corner where the
+    /// scene was cut: shadows begin there.
+    pub(crate) fn split_beside_cuts(&self, levels: u32) -> Mesh {
+        let scene = self.scene();
+        let touches = |t: usize, cell: Cell| {
+            let steps = 1 << cell.level;
+            let on_side = |k: usize, [i, j]: [u32; 2]| [j == 0, i + j == steps, i == 0][k];
+            let corners = cell.lattice_corners();
+            (0..3).any(|k| scene.is_cut(t, k) && corners.iter().any(|&corner| on_side(k, corner)))
+        };
+        Mesh::refined_where(self.scene.clone(), |t, cell| {
+            let level = self.level_at(t, cell);
+            let deepest = (level + levels).min(Mesh::MAX_DEPTH);
+            cell.level < level || cell.level < deepest && touches(t, cell)
+        })
+    }
+}
+
+/// The contact segments on each triangle that is to be cut.
+fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts> {
+    let count = scene.triangles().len();
+    let tolerance = CONTACT_DISTANCE * finest;
+    let boxes: Vec<Aabb> =
+        (0..count).map(|t| Aabb::from_points(scene.corners(t)).expanded(tolerance / 2.0)).collect();
+    let nearby = overlapping_pairs(&boxes, |t| scene.area(t));
+    let outer = outer_edges(scene);
+    let neighbours = neighbours(topology);
+    let openness = Openness::new(scene, tolerance, finest);
+    let cuts = |t: usize| {
+        let corners = scene.corners(t);
+        if longest_edge(corners) <= finest || !scene.material(t).reflects() {
+            return Cuts::default();
+        }
+        let plane = TrianglePlane::new(scene, t, tolerance);
+        let is_near =
+            |s: usize| scene.corners(s).iter().all(|&p| plane.height(p).abs() <= tolerance);
+        let mut others: Vec<usize> = nearby[t].iter().map(|&s| s as usize).collect();
+        others.sort_unstable();
+        let mut segments = vec![];
+        for s in others {
+            let mut sides = outer[s];
+            if is_near(s) {
+                // Of what lies on the triangle, its outline.
+                for (k, side) in sides.iter_mut().enumerate() {
+                    *side &= !neighbours[s][k].is_some_and(|n| is_near(n as usize));
+                }
+            }
+            plane.add_contacts(&scene.corners(s), &sides, &boxes[t], &mut segments);
+        }
+        segments.retain(|segment| openness.has_light_on_both_sides(segment, corners));
+        Snapping::new(corners, SNAP_DISTANCE * finest).cuts(&segments)
+    };
+    (0..count).into_par_iter().map(cuts).collect()
+}
+
+/// Per triangle and side, the triangle that the surface continues to.
+fn neighbours(topology: &SurfaceTopology) -> Vec<[Option<u32>; 3]> {
+    let mut neighbours = vec![[None; 3]; topology.sides.len()];
+    for [(s, l), (t, k)] in topology.shared_edges() {
+        neighbours[s][l] = Some(t as u32);
+        neighbours[t][k] = Some(s as u32);
+    }
+    neighbours
+}
+
+/// Gives the points on each side to both triangles that share it.
+fn share_side_points(topology: &SurfaceTopology, cuts: &mut [Cuts]) {
+    let mut shared: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+    let from_start = |side: Side, step: u32| if side.reversed { STEPS - step } else { step };
+    for (cuts, sides) in cuts.iter().zip(&topology.sides) {
+        for (points, &side) in cuts.on_sides.iter().zip(sides) {
+            if !points.is_empty() {
+                let list = shared.entry(side.id).or_default();
+                list.extend(points.iter().map(|&step| from_start(side, step)));
+            }
+        }
+    }
+    for (cuts, sides) in cuts.iter_mut().zip(&topology.sides) {
+        for (points, &side) in cuts.on_sides.iter_mut().zip(sides) {
+            if let Some(list) = shared.get(&side.id) {
+                *points = list.iter().map(|&step| from_start(side, step)).collect();
+                points.sort_unstable();
+                points.dedup();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Material, Triangle};
+
+    /// A scene of grey quads, each a group of its own.
+    fn quads(corners: &[[[f64; 3]; 4]]) -> Arc<Scene> {
+        let positions = corners.iter().flatten().map(|&p| DVec3::from_array(p)).collect();
+        let pair = |q: u32| {
+            [[0, 1, 2], [0, 2, 3]].map(|corners| Triangle {
+                corners: corners.map(|c| 4 * q + c),
+                group: q,
+                ..Default::default()
+            })
+        };
+        let count = corners.len() as u32;
+        let groups = (0..count).map(|q| q.to_string()).collect();
+        let triangles = (0..count).flat_map(pair).collect();
+        Arc::new(Scene::new(positions, triangles, groups, vec![Material::grey("m", 0.5)]).unwrap())
+    }
+
+    const FLOOR: [[f64; 3]; 4] =
+        [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 8.0, 0.0], [0.0, 8.0, 0.0]];
+
+    /// Pieces of the floor, and how many smooth surfaces they are.
+    fn floor_of(scene: &Scene) -> (Vec<[DVec3; 3]>, usize) {
+        let topology = SurfaceTopology::new(scene);
+        let surfaces = topology.surfaces();
+        let all = 0..scene.triangles().len();
+        let floor: Vec<usize> = all.filter(|&t| scene.triangles()[t].group == 0).collect();
+        let different: std::collections::HashSet<u32> =
+            floor.iter().map(|&t| surfaces[t]).collect();
+        (floor.into_iter().map(|t| scene.corners(t)).collect(), different.len())
+    }
+
+    fn area(pieces: &[[DVec3; 3]]) -> f64 {
+        pieces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length() / 2.0).sum()
+    }
+
+    #[test]
+    fn no_piece_is_on_both_sides_of_a_wall() {
+        // From side to side, through the floor, and a hair above it.
+        for bottom in [0.0, -1.0, 1e-3] {
+            let wall = [[4.0, 0.0, bottom], [5.0, 8.0, bottom], [5.0, 8.0, 3.0], [4.0, 0.0, 3.0]];
+            let scene = quads(&[FLOOR, wall]);
+            let cut = cut_at_contacts(&scene, 0.1);
+            let (pieces, surfaces) = floor_of(&cut);
+            assert!((area(&pieces) - 80.0).abs() < 1e-9);
+            // Distance to the wall's plane.
+            let beyond = |p: &DVec3| (p.x - 4.0 - p.y / 8.0) / (1.0 + 1.0 / 64.0f64).sqrt();
+            for piece in &pieces {
+                let [low, high] =
+                    [f64::min, f64::max].map(|fold| piece.iter().map(beyond).reduce(fold).unwrap());
+                assert!(low > -1e-6 || high < 1e-6, "{bottom}: {piece:?}");
+            }
+            assert_eq!(surfaces, 2, "{bottom}");
+        }
+    }
+
+    #[test]
+    fn surfaces_continue_around_the_end_of_a_wall() {
+        let wall = [[4.0, 0.0, 0.0], [4.0, 5.0, 0.0], [4.0, 5.0, 3.0], [4.0, 0.0, 3.0]];
+        let cut = cut_at_contacts(&quads(&[FLOOR, wall]), 0.1);
+        let (pieces, surfaces) = floor_of(&cut);
+        assert!(pieces.len() > 2 && surfaces == 1);
+        // Along the wall there are two vertices in each place.
+        let topology = SurfaceTopology::new(&cut);
+        let mut foot = vec![];
+        for (t, corners) in topology.corners.iter().enumerate() {
+            for (k, p) in cut.corners(t).into_iter().enumerate() {
+                if cut.triangles()[t].group == 0 && p.abs_diff_eq(DVec3::X * 4.0, 1e-6) {
+                    foot.push(corners[k]);
+                }
+            }
+        }
+        foot.sort_unstable();
+        foot.dedup();
+        assert_eq!(foot.len(), 2);
+    }
+
+    #[test]
+    fn what_is_hidden_or_small_is_not_cut() {
+        let (low, high) = ([3.0, 3.0], [6.0, 6.0]);
+        let [a, b, c, d] =
+            [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]];
+        let at = |[x, y]: [f64; 2], z: f64| [x, y, z];
+        let side = |p, q| [at(p, 0.0), at(q, 0.0), at(q, 2.0), at(p, 2.0)];
+        let top = [at(a, 2.0), at(b, 2.0), at(c, 2.0), at(d, 2.0)];
+        let solid = [FLOOR, side(a, b), side(b, c), side(c, d), side(d, a), top];
+        let scene = quads(&solid);
+        assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
+        // Without its lid people do.
+        let open = quads(&solid[..5]);
+        assert!(cut_at_contacts(&open, 0.1).triangles().len() > open.triangles().len());
+        assert!(Arc::ptr_eq(&open, &cut_at_contacts(&open, 1.0)), "four of the finest long");
+    }
+}

@@ -1,0 +1,65 @@
+//! Where a cut is worth it: where light may fall on both sides of a contact segment.
+//!
+//! What is inside a solid that stands on a surface is dark, and nobody sees it; values at vertices
+//! there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor is there
+//! other light, or none, that is seen.
+
+use glam::DVec3;
+
+use super::snapping::clipped;
+use crate::mesh::contacts::ContactSegment;
+use crate::sampling::hemisphere::HemisphereSamples;
+use crate::scene::Scene;
+use crate::visibility::buried;
+use crate::visibility::ray_scene::RayScene;
+
+/// Rays by which it is found out whether a place is inside a solid.
+const OPENNESS_RAYS: u32 = 32;
+
+/// Shares of a segment's length at which both its sides are looked at.
+const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
+
+/// Shorter segments are not cut along, in units of the finest edge: light that leaks there stays
+/// within some elements.
+const MIN_LENGTH: f64 = 4.0;
+
+/// Looks on which side of a contact segment light may fall.
+pub(super) struct Openness {
+    rays: RayScene,
+    directions: HemisphereSamples,
+    /// How far above the surface, and how far beside the segment; scene unit.
+    above: f64,
+    beside: f64,
+}
+
+impl Openness {
+    pub fn new(scene: &Scene, above: f64, beside: f64) -> Openness {
+        let directions = HemisphereSamples::progressive(OPENNESS_RAYS);
+        Openness { rays: RayScene::of_scene(scene), directions, above, beside }
+    }
+
+    /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
+    /// the triangle with these `corners`. What is inside is dark, and nobody sees it.
+    pub fn has_light_on_both_sides(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
+        let Some(ends) = clipped(segment.ends) else { return false };
+        let [from, to] = ends.map(|p| a + p.x * (b - a) + p.y * (c - a));
+        if from.distance(to) < MIN_LENGTH * self.beside {
+            return false;
+        }
+        let normal = (b - a).cross(c - a).normalize();
+        let across = normal.cross(to - from).normalize_or_zero() * self.beside;
+        OPENNESS_PLACES.into_iter().any(|share| {
+            let place = from.lerp(to, share) + self.above * normal;
+            self.is_open(place + across, normal) && self.is_open(place - across, normal)
+        })
+    }
+
+    fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
+        let meets_back = |&direction: &DVec3| {
+            let hit = self.rays.closest_hit(place, direction, 0.0, None);
+            hit.is_some_and(|hit| !hit.front)
+        };
+        let backs = self.directions.directions(normal, 0.5).filter(meets_back).count();
+        (backs as f64) < buried::BURIED * f64::from(OPENNESS_RAYS)
+    }
+}

@@ -1,0 +1,146 @@
+//! Contact segments as lines between points of a lattice, those near one another made one.
+//!
+//! The lattice is one of barycentric weights: what is on a side is exactly on it, and the two
+//! triangles that share the side agree on it.
+
+use glam::{DVec2, DVec3};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::mesh::contacts::ContactSegment;
+
+/// Steps of the lattice along a side.
+pub(super) const STEPS: u32 = 1 << 24;
+
+/// A point of a triangle on the lattice: the weights of its second and third corner, in steps.
+pub(super) type LatticePoint = [u32; 2];
+
+/// Where a triangle is to be cut.
+#[derive(Debug, Default)]
+pub(super) struct Cuts {
+    pub segments: Vec<[LatticePoint; 2]>,
+    /// Points on each side, steps from its first corner.
+    pub on_sides: [Vec<u32>; 3],
+}
+
+/// Points of a triangle, those near one another made one.
+pub(super) struct Snapping {
+    corners: [DVec3; 3],
+    /// Height of each corner above the side opposite, scene unit.
+    heights: [f64; 3],
+    distance: f64,
+    /// Points so far, by the cell of a grid that they are in.
+    known: FxHashMap<[i64; 3], Vec<(DVec3, LatticePoint)>>,
+}
+
+impl Snapping {
+    pub fn new(corners: [DVec3; 3], distance: f64) -> Snapping {
+        let [a, b, c] = corners;
+        let double_area = (b - a).cross(c - a).length();
+        let opposite = [b.distance(c), c.distance(a), a.distance(b)];
+        let heights = opposite.map(|side| double_area / side);
+        Snapping { corners, heights, distance, known: FxHashMap::default() }
+    }
+
+    pub fn cuts(mut self, segments: &[ContactSegment]) -> Cuts {
+        let mut cuts = Cuts::default();
+        let mut known = FxHashSet::default();
+        for segment in segments {
+            let Some(ends) = clipped(segment.ends) else { continue };
+            let [from, to] = ends.map(|end| self.snapped(end));
+            let together = [from, to].map(sides_of);
+            let along_side = (0..3).any(|k| together[0][k] && together[1][k]);
+            if from != to && !along_side && known.insert([from.min(to), from.max(to)]) {
+                cuts.segments.push([from, to]);
+            }
+        }
+        for point in cuts.segments.iter().flatten() {
+            for (k, step) in side_steps(*point).into_iter().enumerate() {
+                cuts.on_sides[k].extend(step);
+            }
+        }
+        cuts
+    }
+
+    /// The point of the lattice for one with these weights of the second and third corner: a
+    /// corner, a point on a side or another point, where these are near.
+    fn snapped(&mut self, point: DVec2) -> LatticePoint {
+        let weights = [1.0 - point.x - point.y, point.x, point.y].map(|w| w.clamp(0.0, 1.0));
+        let place = |w: [f64; 3]| (0..3).map(|k| w[k] * self.corners[k]).sum::<DVec3>();
+        let corner = (0..3).find(|&k| place(weights).distance(self.corners[k]) < self.distance);
+        if let Some(k) = corner {
+            return [[0, 0], [STEPS, 0], [0, STEPS]][k];
+        }
+        let steps = |w: f64| ((w * f64::from(STEPS)).round() as u32).min(STEPS);
+        let near_side =
+            (0..3).filter(|&k| weights[k] * self.heights[k] < self.distance).min_by(|&k, &l| {
+                (weights[k] * self.heights[k]).total_cmp(&(weights[l] * self.heights[l]))
+            });
+        let lattice = match near_side {
+            Some(0) => {
+                let v = steps(weights[2] / (weights[1] + weights[2]));
+                [STEPS - v, v]
+            }
+            Some(1) => [0, steps(weights[2] / (weights[0] + weights[2]))],
+            Some(_) => [steps(weights[1] / (weights[0] + weights[1])), 0],
+            None => {
+                let u = steps(weights[1]);
+                [u, steps(weights[2]).min(STEPS - u)]
+            }
+        };
+        let [u, v] = lattice.map(|k| f64::from(k) / f64::from(STEPS));
+        let position = place([1.0 - u - v, u, v]);
+        let cell = (position / self.distance).floor().as_i64vec3().to_array();
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                for dz in -1..=1 {
+                    let [x, y, z] = cell;
+                    let same_sides = |other: LatticePoint| {
+                        // A point on a side stays on it.
+                        let (a, b) = (sides_of(lattice), sides_of(other));
+                        (0..3).all(|k| !a[k] || b[k])
+                    };
+                    let near = self.known.get(&[x + dx, y + dy, z + dz]).into_iter().flatten();
+                    let mut near = near.filter(|(p, other)| {
+                        p.distance(position) < self.distance && same_sides(*other)
+                    });
+                    if let Some(&(_, known)) = near.next() {
+                        return known;
+                    }
+                }
+            }
+        }
+        self.known.entry(cell).or_default().push((position, lattice));
+        lattice
+    }
+}
+
+/// The part of a segment that lies in the triangle; none if there is none. Clipped against the
+/// three sides one by one (Liang and Barsky 1984).
+pub(super) fn clipped(ends: [DVec2; 2]) -> Option<[DVec2; 2]> {
+    let [start, end] = ends.map(|p| [1.0 - p.x - p.y, p.x, p.y]);
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (start, end) in start.into_iter().zip(end) {
+        if start < 0.0 && end < 0.0 {
+            return None;
+        }
+        let crossing = start / (start - end);
+        if start < 0.0 {
+            from = from.max(crossing);
+        } else if end < 0.0 {
+            to = to.min(crossing);
+        }
+    }
+    (from < to).then(|| [ends[0].lerp(ends[1], from), ends[0].lerp(ends[1], to)])
+}
+
+/// Which sides a point is on, counted by the corner that they start at.
+fn sides_of([u, v]: LatticePoint) -> [bool; 3] {
+    [v == 0, u + v == STEPS, u == 0]
+}
+
+/// Steps from the start of each side that a point is within.
+pub(super) fn side_steps([u, v]: LatticePoint) -> [Option<u32>; 3] {
+    let within = |step: u32| (0 < step && step < STEPS).then_some(step);
+    let [first, second, third] = sides_of([u, v]);
+    [within(u).filter(|_| first), within(v).filter(|_| second), within(STEPS - v).filter(|_| third)]
+}

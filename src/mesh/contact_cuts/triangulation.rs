@@ -1,0 +1,214 @@
+//! A triangle in pieces: a constrained Delaunay triangulation of its contact segments, with points
+//! added until angles are not too sharp (Ruppert, "A Delaunay refinement algorithm for quality
+//! 2-dimensional mesh generation", 1995; both by the `spade` crate).
+
+use glam::{DVec2, DVec3};
+use spade::handles::DirectedEdgeHandle;
+use spade::{
+    AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation,
+};
+
+use super::snapping::{Cuts, LatticePoint, STEPS};
+use crate::mesh::Side;
+use crate::scene::Piece;
+
+/// Pieces with less than this share of their triangle's area are left out: the rounding of where
+/// segments cross. Their neighbours do not continue one another.
+const MIN_AREA_SHARE: f64 = 1e-10;
+
+/// Weights are rounded to multiples of one over this: finer than the lattice, so that its points
+/// stay what they are, and those where segments meet and cross twice become one.
+const ROUNDING: f64 = 4.0 * STEPS as f64;
+
+/// Angles that are sharper than this are mended by further points, degrees: below 20.7 that ends
+/// (Ruppert 1995).
+const LEAST_ANGLE: f64 = 20.0;
+
+/// But no piece is made smaller than this for its angles, in units of the square of the finest edge.
+const LEAST_AREA: f64 = 0.1;
+
+/// Points that are added to a triangle at most.
+const MAX_POINTS: usize = 1000;
+
+/// A triangle that is to be cut.
+pub(super) struct CutTriangle {
+    pub corners: [DVec3; 3],
+    /// Its sides on the smooth surface.
+    pub sides: [Side; 3],
+    /// Edge below which no element is split, scene unit.
+    pub finest: f64,
+}
+
+impl CutTriangle {
+    /// The pieces that `cuts` make: all of it, if there are none.
+    pub fn pieces(&self, cuts: &Cuts) -> Vec<Piece> {
+        let is_whole = cuts.segments.is_empty() && cuts.on_sides.iter().all(Vec::is_empty);
+        let pieces = if is_whole { None } else { self.triangulated(cuts) };
+        pieces.unwrap_or_else(|| vec![Piece::whole(self.corners)])
+    }
+
+    fn triangulated(&self, cuts: &Cuts) -> Option<Vec<Piece>> {
+        let [a, b, c] = self.corners;
+        // A power of two, so that points on a side stay exactly on it, and angles are about right.
+        let stretch = (b.distance(a) / c.distance(a)).log2().round().exp2();
+        let place = |[u, v]: LatticePoint| {
+            let [u, v] = [u, v].map(|k| f64::from(k) / f64::from(STEPS));
+            Point2::new(u * stretch, v)
+        };
+        let mut triangulation = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+        for k in 0..3 {
+            let mut steps = vec![0, STEPS];
+            steps.extend(&cuts.on_sides[k]);
+            steps.sort_unstable();
+            let on_side = |step: u32| [[step, 0], [STEPS - step, step], [0, STEPS - step]][k];
+            for pair in steps.windows(2) {
+                let from = triangulation.insert(place(on_side(pair[0]))).ok()?;
+                let to = triangulation.insert(place(on_side(pair[1]))).ok()?;
+                triangulation.add_constraint(from, to);
+            }
+        }
+        for &[from, to] in &cuts.segments {
+            let from = triangulation.insert(place(from)).ok()?;
+            let to = triangulation.insert(place(to)).ok()?;
+            triangulation.add_constraint_and_split(from, to, |point| point);
+        }
+        // The whole triangle has an area of half the stretch here.
+        let area = 0.5 * (b - a).cross(c - a).length();
+        let least_area = LEAST_AREA * self.finest.powi(2) / area * stretch / 2.0;
+        triangulation.refine(
+            RefinementParameters::new()
+                .keep_constraint_edges()
+                .with_min_required_area(least_area)
+                .with_max_additional_vertices(MAX_POINTS)
+                .with_angle_limit(AngleLimit::from_deg(LEAST_ANGLE)),
+        );
+        let weights_of = |edge: DirectedEdgeHandle<'_, _, _, _, _>| {
+            let Point2 { x, y }: Point2<f64> = edge.from().position();
+            [x / stretch, y].map(|w| (w * ROUNDING).round() / ROUNDING)
+        };
+        let is_sliver = |edges: [DirectedEdgeHandle<'_, _, _, _, _>; 3]| {
+            let [p, q, r] = edges.map(|edge| DVec2::from_array(weights_of(edge)));
+            (q - p).perp_dot(r - p) < MIN_AREA_SHARE
+        };
+        let pieces = triangulation.inner_faces().filter_map(|face| {
+            let edges = face.adjacent_edges();
+            if is_sliver(edges) {
+                return None;
+            }
+            let weights = edges.map(weights_of);
+            let cut = [0, 1, 2].map(|k| {
+                let other = edges[k].rev().face().as_inner();
+                let is_cut = edges[k].is_constraint_edge()
+                    || other.is_some_and(|other| is_sliver(other.adjacent_edges()));
+                is_cut && !is_on_side([weights[k], weights[(k + 1) % 3]])
+            });
+            Some(Piece { corners: weights.map(|w| self.position(w)), weights, cut })
+        });
+        Some(pieces.collect())
+    }
+
+    /// Where the second and third corner have these weights: on a side bit for bit what the other
+    /// triangle there has.
+    fn position(&self, [u, v]: [f64; 2]) -> DVec3 {
+        let on_side = |k: usize, share: f64| {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % 3]);
+            match self.sides[k].reversed {
+                true => to * share + from * (1.0 - share),
+                false => from * (1.0 - share) + to * share,
+            }
+        };
+        let [a, b, c] = self.corners;
+        match (u, v) {
+            (0.0, 0.0) => a,
+            (1.0, 0.0) => b,
+            (0.0, 1.0) => c,
+            (u, 0.0) => on_side(0, u),
+            (u, v) if u + v == 1.0 => on_side(1, v),
+            (0.0, v) => on_side(2, 1.0 - v),
+            (u, v) => a * (1.0 - u - v) + b * u + c * v,
+        }
+    }
+}
+
+/// Whether both points are on one side of the triangle.
+fn is_on_side(points: [[f64; 2]; 2]) -> bool {
+    let all = |on: fn([f64; 2]) -> bool| points.into_iter().all(on);
+    all(|[u, _]| u == 0.0) || all(|[_, v]| v == 0.0) || all(|[u, v]| u + v == 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::contact_cuts::snapping::side_steps;
+    use fastrand::Rng;
+
+    /// The triangle of the property below, scene unit.
+    const CORNERS: [DVec3; 3] =
+        [DVec3::new(1.0, 2.0, 3.0), DVec3::new(7.0, 1.0, 2.0), DVec3::new(2.0, 9.0, 8.0)];
+
+    fn triangle(finest: f64) -> CutTriangle {
+        let side = |reversed| Side { id: 0, reversed };
+        CutTriangle { corners: CORNERS, sides: [side(false), side(true), side(false)], finest }
+    }
+
+    #[test]
+    fn pieces_cover_a_triangle_whatever_cuts_it() {
+        let mut rng = Rng::with_seed(7);
+        let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a) / 2.0;
+        let whole = area(CORNERS);
+        for round in 0..500 {
+            // Coarse lattices make points coincide and segments overlap or meet in one point.
+            let coarse = STEPS >> rng.u32(1..12);
+            let mut point = || {
+                let u = rng.u32(0..=STEPS / coarse);
+                [u * coarse, rng.u32(0..=STEPS / coarse - u) * coarse]
+            };
+            let count = 1 + round % 12;
+            let segments: Vec<_> = (0..count).map(|_| [point(), point()]).collect();
+            let inside = |s: &[LatticePoint; 2]| s[0] != s[1];
+            let segments: Vec<_> = segments.into_iter().filter(inside).collect();
+            let on_sides = [vec![coarse], vec![], vec![coarse, STEPS - coarse]];
+            let within =
+                |steps: Vec<u32>| steps.into_iter().filter(|&s| s < STEPS).collect::<Vec<_>>();
+            let mut on_sides = on_sides.map(within);
+            for end in segments.iter().flatten() {
+                for (steps, step) in on_sides.iter_mut().zip(side_steps(*end)) {
+                    steps.extend(step);
+                }
+            }
+            let cuts = Cuts { segments, on_sides };
+            let pieces = triangle(0.5).pieces(&cuts);
+            let areas = pieces.iter().map(|piece| area(piece.corners));
+            let sum: DVec3 = areas.clone().sum();
+            assert!(sum.distance(whole) < 1e-9 * whole.length(), "{round}: {cuts:?}");
+            assert!(areas.clone().all(|a| a.dot(whole) > 0.0), "{round}: {cuts:?}");
+            // Every side but the triangle's own has two pieces, so that the surface continues. Where
+            // segments overlap, what they cut may differ by rounding.
+            let mut sides = std::collections::HashMap::new();
+            for Piece { weights, cut, .. } in &pieces {
+                for k in 0..3 {
+                    let ends = [weights[k], weights[(k + 1) % 3]];
+                    if !cut[k] && !is_on_side(ends) {
+                        let key = ends.map(|w| w.map(f64::to_bits));
+                        let key = [key[0].min(key[1]), key[0].max(key[1])];
+                        *sides.entry(key).or_insert(0) += 1;
+                    }
+                }
+            }
+            assert!(sides.values().all(|&count| count == 2), "{round}: {cuts:?}");
+        }
+    }
+
+    #[test]
+    fn sides_of_pieces_are_cut_where_segments_are() {
+        let half = STEPS / 2;
+        let cuts = Cuts {
+            segments: vec![[[half, 0], [0, half]]],
+            on_sides: [vec![half], vec![], vec![half]],
+        };
+        let pieces = triangle(100.0).pieces(&cuts);
+        let cut: usize = pieces.iter().flat_map(|p| p.cut).filter(|&cut| cut).count();
+        assert_eq!((pieces.len(), cut), (3, 2), "one side, of a piece before and one behind");
+        assert_eq!(triangle(1.0).pieces(&Cuts::default()).len(), 1);
+    }
+}

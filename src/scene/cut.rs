@@ -1,0 +1,61 @@
+//! A scene whose triangles are cut into pieces.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::{Scene, Triangle};
+
+/// A piece of a triangle of a scene.
+pub(crate) struct Piece {
+    /// Where its corners are, scene unit.
+    pub corners: [DVec3; 3],
+    /// Weights of the second and third corner of the triangle at each.
+    pub weights: [[f64; 2]; 3],
+    /// Sides, from corner k to k + 1, across which the surface does not continue.
+    pub cut: [bool; 3],
+}
+
+impl Piece {
+    /// All of a triangle with these `corners`.
+    pub fn whole(corners: [DVec3; 3]) -> Piece {
+        Piece { corners, weights: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], cut: [false; 3] }
+    }
+}
+
+/// The pieces of each triangle of a scene.
+pub(crate) struct SceneCut {
+    pub pieces: Vec<Vec<Piece>>,
+}
+
+impl Scene {
+    /// The same surfaces in pieces.
+    pub(crate) fn cut(&self, cut: SceneCut) -> Scene {
+        let mut scene = Scene { positions: vec![], triangles: vec![], ..self.clone() };
+        let mut textures = (*self.textures).clone();
+        textures.coordinates.clear();
+        textures.relative_exitance.clear();
+        scene.cut_sides.clear();
+        for (t, pieces) in cut.pieces.into_iter().enumerate() {
+            for piece in pieces {
+                let first = scene.positions.len() as u32;
+                scene.positions.extend(piece.corners);
+                let corners = [first, first + 1, first + 2];
+                scene.triangles.push(Triangle { corners, ..self.triangles[t] });
+                scene.cut_sides.push(piece.cut);
+                if let Some([a, b, c]) = self.texture_coordinates(t) {
+                    let place = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
+                    textures.coordinates.push(piece.weights.map(place));
+                }
+                textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
+            }
+        }
+        scene.textures = Arc::new(textures);
+        scene
+    }
+
+    /// Whether the surface does not continue across side `k` of triangle `t`.
+    pub(crate) fn is_cut(&self, t: usize, k: usize) -> bool {
+        self.cut_sides.get(t).is_some_and(|sides| sides[k])
+    }
+}

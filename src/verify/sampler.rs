@@ -1,0 +1,286 @@
+//! Random points of groups, what paths find there, and what a solution tells.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use super::path_tracer::{PathTracer, SurfacePoint, random_numbers};
+use super::solution::SolutionLookup;
+use super::statistics::{FLOOR, MeanSquare, PARTS, Sample, SquareError};
+use super::surfaces::ReflectingGroup;
+use super::{GroupError, PointError, Settings, Stop, Verification};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::progress::BatchSizer;
+use crate::scene::{Rgb, Scene};
+use crate::vertex::VertexMesh;
+
+/// A point is hidden where more than this share of its rays meets backs first,
+const HIDDEN: f64 = 0.95;
+
+/// or more than this share meets backs that are near:
+const HIDDEN_NEAR: f64 = 0.4;
+
+/// nearer than this share of the diagonal of all that reflects.
+const NEAR: f64 = 0.002;
+
+/// It is hidden in a crack, too, where the mean of 1/distance to what it sees is above one over
+/// this share of that diagonal.
+const CRACK: f64 = 1e-4;
+
+/// Rays that find that out.
+const HIDDEN_RAYS: usize = 128;
+
+/// A solution is of another scene if more than this share of the points lie on none of its faces.
+const MISSING_SHARE: f64 = 0.01;
+
+/// Points of groups, and what was traced at them so far.
+pub(super) struct Sampler<'a> {
+    scene: &'a Scene,
+    settings: Settings,
+    tracer: PathTracer<'a>,
+    strata: Vec<Stratum>,
+    /// Of all that reflects, scene unit.
+    diagonal: f64,
+    /// Paths done at every point but the new ones.
+    paths: usize,
+}
+
+/// A group, and its points.
+struct Stratum {
+    surface: ReflectingGroup,
+    points: Vec<TracedPoint>,
+}
+
+/// A point, and the paths that began there.
+#[derive(Clone, Copy)]
+struct TracedPoint {
+    /// Number among those of its group.
+    index: usize,
+    point: SurfacePoint,
+    /// What the solution tells, W/m²; none before it is asked, and where it has no face.
+    told: Option<Rgb>,
+    /// Known with the first paths.
+    hidden: bool,
+    paths: usize,
+    /// What the paths found, part by part: sums, W/m².
+    sums: [Rgb; PARTS],
+}
+
+impl<'a> Sampler<'a> {
+    pub fn new(scene: &'a Scene, settings: &Settings) -> Result<Sampler<'a>, Error> {
+        let stratum = |surface| Stratum { surface, points: vec![] };
+        Ok(Sampler {
+            strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
+            tracer: PathTracer::new(scene),
+            diagonal: scene.reflecting_bounds().diagonal(),
+            scene,
+            settings: settings.clone(),
+            paths: 0,
+        })
+    }
+
+    /// What is asked of `solution`: it has to be one of the scene.
+    pub fn lookup<'s>(&self, solution: &'s VertexMesh) -> Result<SolutionLookup<'s>, Error> {
+        let lookup = SolutionLookup::new(solution, self.scene)?;
+        lookup.check_emission(self.scene)?;
+        Ok(lookup)
+    }
+
+    /// Adds points until there are about `points` of them, spread over the area, and as many in
+    /// each group as it has at least.
+    pub fn add_points(&mut self, points: usize) {
+        for Stratum { surface, points: list } in &mut self.strata {
+            let by_area = (surface.share * points as f64).ceil() as usize;
+            while list.len() < by_area.max(self.settings.points_per_group) {
+                let index = list.len();
+                let words = [self.settings.seed, surface.group as u64, index as u64];
+                let point = surface.point(self.scene, &mut random_numbers(&words));
+                let sums = [Rgb::ZERO; PARTS];
+                list.push(TracedPoint { index, point, told: None, hidden: false, paths: 0, sums });
+            }
+        }
+    }
+
+    /// Forgets what a solution told.
+    pub fn forget(&mut self) {
+        for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
+            point.told = None;
+        }
+    }
+
+    /// Asks `solution` at all points that know nothing of it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] where too many points lie on none of its faces.
+    pub fn tell(&mut self, solution: &SolutionLookup) -> Result<(), Error> {
+        let scene = self.scene;
+        let points = self.strata.iter_mut().flat_map(|stratum| &mut stratum.points);
+        let unknown: Vec<&mut TracedPoint> = points.filter(|p| p.told.is_none()).collect();
+        unknown.into_par_iter().for_each(|p| p.told = solution.reflected(scene, &p.point));
+        let (drawn, missing) = (self.drawn(), self.missing());
+        let mut lost = self.traced().filter(|(_, point)| point.told.is_none());
+        match lost.next() {
+            Some((group, lost)) if missing as f64 > MISSING_SHARE * drawn as f64 => {
+                let (group, at) = (quoted(&scene.groups()[group..=group]), lost.point.position);
+                let found = format!(
+                    "{missing} of {drawn} random points of the scene lie on none of its faces, \
+                     the first at {at} in group {group}"
+                );
+                let remedy = "give the solution of this scene, in the same place and unit";
+                Err(Error::new(ErrorKind::Scene, "solution", found, remedy))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Points there are.
+    pub fn drawn(&self) -> usize {
+        self.strata.iter().map(|stratum| stratum.points.len()).sum()
+    }
+
+    fn missing(&self) -> usize {
+        self.traced().filter(|(_, point)| point.told.is_none()).count()
+    }
+
+    /// Traces until every point has `paths`. Stopped, it changes nothing.
+    pub fn trace(
+        &mut self,
+        paths: usize,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let jobs: Vec<(usize, TracedPoint)> = self.traced().filter(|p| p.1.paths < paths).collect();
+        let (mut remaining, mut done) = (&jobs[..], vec![]);
+        let mut batches = BatchSizer::new(rayon::current_num_threads());
+        while !remaining.is_empty() {
+            done.extend(batches.next(&mut remaining, |batch| {
+                let traced =
+                    |(group, point): &(usize, TracedPoint)| self.more(*group, point, paths);
+                batch.par_iter().map(traced).collect::<Vec<_>>()
+            }));
+            progress(done.len(), jobs.len())?;
+        }
+        let mut done = done.into_iter();
+        for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
+            if point.paths < paths
+                && let Some(more) = done.next()
+            {
+                *point = more;
+            }
+        }
+        self.paths = paths;
+        ControlFlow::Continue(())
+    }
+
+    /// All points, with the groups that they are of.
+    fn traced(&self) -> impl Iterator<Item = (usize, TracedPoint)> {
+        self.strata.iter().flat_map(|s| s.points.iter().map(|&point| (s.surface.group, point)))
+    }
+
+    /// `point` with as many paths as to have `paths`.
+    fn more(&self, group: usize, point: &TracedPoint, paths: usize) -> TracedPoint {
+        let mut traced = *point;
+        let (before, index) = (point.paths as u64, point.index as u64);
+        for (part, sum) in (1..).zip(&mut traced.sums) {
+            let mut rng = random_numbers(&[self.settings.seed, group as u64, index, part, before]);
+            *sum += self.tracer.sum(&point.point, (paths - point.paths) / PARTS, &mut rng);
+        }
+        if point.paths == 0 {
+            let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
+            let hits = self.tracer.hits(&point.point, HIDDEN_RAYS, &mut rng);
+            let backs = |nearer: f64| {
+                let near = hits.iter().filter(|hit| !hit.front && hit.distance < nearer);
+                near.count() as f64 / HIDDEN_RAYS as f64
+            };
+            let inverse = hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>();
+            traced.hidden = backs(f64::INFINITY) > HIDDEN
+                || backs(NEAR * self.diagonal) > HIDDEN_NEAR
+                || inverse / HIDDEN_RAYS as f64 * CRACK * self.diagonal > 1.0;
+        }
+        traced.paths = paths;
+        traced
+    }
+
+    /// The mean length of reflected radiosity over all that reflects, W/m².
+    fn mean_reflected(&self) -> f64 {
+        let mean = |s: &Stratum| {
+            let lengths = s.points.iter().map(|p| p.sample().found().length());
+            s.surface.share * lengths.sum::<f64>() / (s.points.len() as f64).max(1.0)
+        };
+        self.strata.iter().map(mean).sum()
+    }
+
+    /// The mean square error of every group, and the share that it counts with.
+    fn by_group(&self, hidden: bool) -> Vec<Option<(f64, MeanSquare)>> {
+        let floor = FLOOR * self.mean_reflected();
+        let group = |s: &Stratum| {
+            let counts = |p: &&TracedPoint| p.told.is_some() && (hidden || !p.hidden);
+            let counting = s.points.iter().filter(counts);
+            let squares: Vec<SquareError> =
+                counting.map(|p| p.sample().square_error(floor)).collect();
+            let share = s.surface.share * squares.len() as f64 / s.points.len() as f64;
+            Some((share, MeanSquare::of_group(&squares)?))
+        };
+        self.strata.iter().map(group).collect()
+    }
+
+    /// The mean square error of all that reflects.
+    pub fn mean_square(&self, hidden: bool) -> MeanSquare {
+        MeanSquare::stratified(self.by_group(hidden).into_iter().flatten())
+    }
+
+    /// What is known so far.
+    pub fn verification(&self) -> Verification {
+        let mean_reflected = self.mean_reflected();
+        let by_group = self.by_group(self.settings.hidden);
+        let group = |(s, error): (&Stratum, Option<(f64, MeanSquare)>)| GroupError {
+            group: s.surface.group,
+            area_share: s.surface.share,
+            points: s.points.len(),
+            hidden_share: s.hidden_share(),
+            error: error.map(|(_, error)| error.root()),
+            bias: error.map_or(0.0, |(_, error)| error.bias),
+        };
+        let point = |(group, traced): (usize, TracedPoint)| {
+            let sample = traced.sample();
+            Some(PointError {
+                position: traced.point.position,
+                normal: self.scene.normal(traced.point.triangle),
+                group,
+                told: traced.told?,
+                found: sample.found(),
+                standard_error: sample.variance().sqrt(),
+                error: sample.square_error(FLOOR * mean_reflected).value.max(0.0).sqrt(),
+                hidden: traced.hidden,
+            })
+        };
+        let is_told = self.paths > 0 && self.missing() < self.drawn();
+        let error = |hidden| is_told.then(|| self.mean_square(hidden).root());
+        Verification {
+            error: error(self.settings.hidden),
+            bias: self.mean_square(self.settings.hidden).bias,
+            error_with_hidden: error(true),
+            hidden_share: self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum(),
+            groups: self.strata.iter().zip(by_group).map(group).collect(),
+            points: self.traced().filter_map(point).collect(),
+            mean_reflected,
+            paths: self.paths,
+            missing: self.missing(),
+            stop: Stop::Cancelled,
+        }
+    }
+}
+
+impl Stratum {
+    /// The share of the points that is hidden.
+    fn hidden_share(&self) -> f64 {
+        let hidden = self.points.iter().filter(|point| point.hidden).count();
+        hidden as f64 / (self.points.len() as f64).max(1.0)
+    }
+}
+
+impl TracedPoint {
+    fn sample(&self) -> Sample {
+        let paths = (self.paths / PARTS).max(1) as f64;
+        Sample { told: self.told.unwrap_or(Rgb::ZERO), parts: self.sums.map(|sum| sum / paths) }
+    }
+}
