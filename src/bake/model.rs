@@ -389,7 +389,7 @@ pub const JUDGE_SEED: u64 = 0x7261_6469_6f73;
 pub const JUDGE_PRECISION: f64 = 0.1;
 
 /// Points at which paths measure a result, at least: rare errors take many points, of few paths.
-pub const JUDGE_POINTS: usize = 2048;
+pub const JUDGE_POINTS: usize = 1024;
 
 /// A further bounce that leaves more than this share of the error of the sources was in vain.
 pub const MIN_SOURCES_STEP: f64 = 0.8;

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use radiosity::bake::{Obstacle, Outcome};
+use radiosity::verify;
 use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Material, Rgb, Scene};
 
 use crate::common::scenes::{facing_up, quads};
@@ -76,4 +77,25 @@ fn a_lamp_alone_has_no_error() {
     let baked = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, keep_going).unwrap();
     assert_eq!(baked.outcome, Outcome::Reached);
     assert!(baked.estimate.total < 1e-3, "{:?}", baked.estimate);
+}
+
+/// Light shot on two elements a wall is off, and what the vertices gather from it too.
+#[test]
+fn light_shot_too_coarsely_is_told() {
+    let coarse = |settings: &mut BakeSettings| {
+        settings.solve.element_size = 1e3;
+        settings.solve.contact_levels = 0;
+        settings.solve.near_reach = -1.0;
+        if let Some(gather) = &mut settings.gather {
+            gather.refinement.gather_passes = 1;
+        }
+    };
+    let target = BakeTarget::Error(0.05);
+    let baked = target.bake_with(cornell(), &Backend::Cpu, coarse, keep_going).unwrap();
+    let settings = verify::Settings::default();
+    let proceed = |_: &verify::Progress| ControlFlow::Continue(());
+    let measured = verify::verify(&cornell(), &baked.light.surface, &settings, proceed).unwrap();
+    let (told, measured) = (baked.estimate, measured.error.unwrap().value);
+    println!("{}, told {told:?}, measured {measured}", baked.outcome);
+    assert!((0.7..1.4).contains(&(told.total / measured)), "{told:?} {measured}");
 }
