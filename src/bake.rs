@@ -5,6 +5,9 @@
 //! BakeTarget ──► BakeSettings::for_error          all settings, by the model of error and cost and
 //!                      │                          a survey of where the light falls
 //!                      ▼
+//!                triangles cut                    along walls that stand on them
+//!                      │
+//!                      ▼
 //!                shooting phase                   light is shot on a mesh of fine elements
 //!                      │                          (form factors, solver)
 //!                      ▼
@@ -15,6 +18,9 @@
 //!                      │                      │   with what the vertices interpolate to
 //!                      ├─ too large ──────────┘   more of what the largest parts of the error
 //!                      ▼                          follow: rays, passes, smaller elements
+//!                    paths                        the estimate is held against paths, which have no
+//!                      │                          bias; where they find more, all gather once more
+//!                      ▼
 //!                  BakeResult                     the light, its error by groups, and whether the
 //!                                                 target was reached
 //! ```

@@ -12,7 +12,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
     ("visibility", "error geometry sampling scene"),
-    ("mesh", "error geometry scene"),
+    ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
     ("form_factor", "error geometry mesh scene"),
     ("solver", "error form_factor geometry mesh progress scene visibility"),
@@ -27,12 +27,12 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "error form_factor gather geometry hemicube mesh progress sampling scene visibility",
     ),
     ("camera", "error gather geometry mesh progress sampling scene vertex visibility"),
+    ("verify", "error geometry progress scene vertex visibility"),
     (
         "bake",
-        "backend error form_factor gather geometry mesh progress sampling scene solver vertex \
-         visibility",
+        "backend error form_factor gather geometry mesh progress sampling scene solver verify \
+         vertex visibility",
     ),
-    ("verify", "error geometry progress scene vertex visibility"),
     ("io", "camera error gather geometry mesh scene vertex view_factor"),
 ];
 

@@ -31,7 +31,8 @@
 //! truncation continues the change as a geometric series in the mean reflectance. Light not shot is
 //! added as if it fell like the ambient term. Dim points that see surfaces nearer than their
 //! element is large are a part of their own, the gaps: what no mesh resolves is mostly there. This
-//! file does no gathering: see [`estimator`](super::estimator).
+//! file does no gathering: see [`estimator`](super::estimator). Where the light that is gathered is
+//! itself off, no gather shows it; the [`judge`](super::judge) has paths for that.
 
 use glam::DVec3;
 
