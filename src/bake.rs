@@ -18,8 +18,8 @@
 //!                      │                      │   with what the vertices interpolate to
 //!                      ├─ too large ──────────┘   more of what the largest parts of the error
 //!                      ▼                          follow: rays, passes, smaller elements
-//!                    paths                        the estimate is held against paths, which have no
-//!                      │                          bias; where they find more, all gather once more
+//!                    paths                        the estimate is held against paths, which have
+//!                      │                          no bias; where they find more, all gather again
 //!                      ▼
 //!                  BakeResult                     the light, its error by groups, and whether the
 //!                                                 target was reached

@@ -36,21 +36,23 @@
 mod emitters;
 mod path_tracer;
 mod sampler;
+mod settings;
 mod solution;
 mod statistics;
 mod surfaces;
+mod verification;
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use glam::DVec3;
-
-use crate::error::{Error, ErrorKind};
-use crate::scene::{Rgb, Scene};
+use crate::error::Error;
+use crate::scene::Scene;
 use crate::vertex::VertexMesh;
 pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
+pub use settings::Settings;
 pub use statistics::Estimate;
+pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 
 /// Points of the first round, at least.
 const FIRST_POINTS: usize = 512;
@@ -64,139 +66,6 @@ const ROUGHLY: f64 = 0.25;
 /// An error surely below this share is negligible, however well it is known.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// How well, and how long, to look.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Settings {
-    /// The same seed gives the same points and paths.
-    pub seed: u64,
-    /// The standard error wanted, as a share of the error of the whole scene.
-    pub precision: f64,
-    /// Points that each group has at least.
-    pub points_per_group: usize,
-    /// No round is begun that would end later; the first always is.
-    pub time: Option<Duration>,
-    /// Whether points count that are hidden: see the measure.
-    pub hidden: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        let time = Some(Duration::from_secs(120));
-        Settings { seed: 0, precision: 0.1, points_per_group: 16, time, hidden: false }
-    }
-}
-
-impl Settings {
-    fn check(&self) -> Result<(), Error> {
-        let wrong =
-            |place, found, remedy| Err(Error::new(ErrorKind::Setting, place, found, remedy));
-        if !(self.precision > 0.0 && self.precision <= 1.0) {
-            let found = self.precision.to_string();
-            return wrong("precision", found, "give a share of the error above 0, and up to 1");
-        }
-        if !(2..=1 << 20).contains(&self.points_per_group) {
-            let found = self.points_per_group.to_string();
-            return wrong("points per group", found, "give at least 2, and no more than a million");
-        }
-        Ok(())
-    }
-}
-
-/// How far a verification has come.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Progress {
-    /// Points done in this round.
-    pub done: usize,
-    /// Points of this round.
-    pub of: usize,
-    /// What the rounds before found, after the first.
-    pub error: Option<Estimate>,
-}
-
-/// Why a verification stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// The error is known as well as was asked for.
-    Precise,
-    /// The error is surely below 0.01 %.
-    Negligible,
-    /// Another round would have taken longer than there was time.
-    Time,
-    /// There are as many points or paths as there may be.
-    Rounds,
-    /// The progress callback said so.
-    Cancelled,
-}
-
-/// How far off a solution is.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Verification {
-    /// The error of all that reflects, and its standard error, as shares (0.01 for 1 %); none if
-    /// the first round was cancelled.
-    pub error: Option<Estimate>,
-    /// About how much too large the square of the error is: see the statistics.
-    pub(crate) bias: f64,
-    /// The same with what is hidden.
-    pub error_with_hidden: Option<Estimate>,
-    /// Share of the area that reflects which is hidden.
-    pub hidden_share: f64,
-    /// The groups that reflect, in the scene's order.
-    pub groups: Vec<GroupError>,
-    /// The points, group by group.
-    pub points: Vec<PointError>,
-    /// Mean length of the reflected radiosity over the area that reflects, W/m².
-    pub mean_reflected: f64,
-    /// Paths traced at each point.
-    pub paths: usize,
-    /// Points left out because they lie on no face of the solution.
-    pub missing: usize,
-    /// Why it ended.
-    pub stop: Stop,
-}
-
-/// How far off a solution is on a group.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct GroupError {
-    /// Index of the group in the scene.
-    pub group: usize,
-    /// The group's share of the area that reflects.
-    pub area_share: f64,
-    /// Points of the group, hidden ones too.
-    pub points: usize,
-    /// The share of them that is hidden.
-    pub hidden_share: f64,
-    /// The error and its standard error, as shares; none of fewer than two points that count.
-    pub error: Option<Estimate>,
-    /// As that of [`Verification`].
-    pub(crate) bias: f64,
-}
-
-/// How far off a solution is at a point.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct PointError {
-    /// Where, scene unit.
-    pub position: DVec3,
-    /// Unit normal of the front.
-    pub normal: DVec3,
-    /// Index of the group in the scene.
-    pub group: usize,
-    /// Reflected radiosity that the solution tells, W/m².
-    pub told: Rgb,
-    /// Reflected radiosity that the paths found, W/m².
-    pub found: Rgb,
-    /// Length of the standard error of `found`, W/m².
-    pub standard_error: f64,
-    /// The error e, as a share: zero where less than noise is left.
-    pub error: f64,
-    /// Whether the point is hidden: see the measure.
-    pub hidden: bool,
-}
-
 /// Measures how far `solution` is off on `scene`. `progress` hears several times a second how far
 /// it has come; with a break, what the rounds before found is given.
 ///
@@ -204,8 +73,8 @@ pub struct PointError {
 /// where time runs out, how many rounds there are depends on the machine.
 ///
 /// # Errors
-/// - [`ErrorKind::Setting`] for a setting out of range.
-/// - [`ErrorKind::Scene`] when nothing in the scene reflects or nothing emits, when the solution is
+/// - [`Setting`](crate::ErrorKind::Setting) for a setting out of range.
+/// - [`Scene`](crate::ErrorKind::Scene) when nothing in the scene reflects or nothing emits, when the solution is
 ///   malformed, emits something else than the scene, as far as its vertices tell that (they have
 ///   irradiance), or when more than one point in a hundred lies on none of its faces.
 pub fn verify(

@@ -73,7 +73,7 @@ impl<'a> GatherPhase<'a> {
             gather.noise_tolerance,
             state.radiosity_floor(),
         )?;
-        let judge = Judge::new(shot.mesh.scene(), target.is_some_and(|target| target.each_group))?;
+        let judge = Judge::new(shot.mesh.scene(), target.is_some_and(|target| target.each_group));
         let mut phase =
             GatherPhase { solve, gather, target, state, gatherer, backend, shot, judge };
         if let Some(target) = target {
@@ -106,7 +106,7 @@ impl<'a> GatherPhase<'a> {
             let mut next = self.next_step(&estimated, rounds_left)?;
             if next.is_err() && !estimated.cancelled {
                 // Gathers find nothing more to do; paths may.
-                estimated = self.judge(estimated, reporter, clock)?;
+                estimated = self.judge(estimated, reporter, clock);
                 let sources = estimated.found.whole.sources;
                 let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
                 previous_sources = sources;
@@ -247,17 +247,17 @@ impl<'a> GatherPhase<'a> {
         estimated: Estimated,
         reporter: &mut Reporter,
         clock: &mut StageClock,
-    ) -> Result<Estimated, Error> {
+    ) -> Estimated {
         let Estimated { light, found, mut cancelled } = estimated;
         let paths = model::judge_paths(light.gather_count, self.gather.rays);
         let limits = (self.target.map(|target| target.error), paths);
         let found = self.judge.judge(found, &light.surface, limits, &mut |samples, of| {
             cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
             if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })?;
+        });
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(found.whole)).is_break();
-        Ok(Estimated { light, found, cancelled })
+        Estimated { light, found, cancelled }
     }
 
     /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points.

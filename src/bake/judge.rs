@@ -20,7 +20,7 @@ use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::estimator::{EstimatedError, negligible_reflection};
 use crate::bake::model;
 use crate::error::Error;
-use crate::scene::{Rgb, Scene};
+use crate::scene::Scene;
 use crate::verify::{
     Estimate as Measured, GroupError as MeasuredGroup, Limits, Progress, Settings, Verification,
     Verifier,
@@ -29,54 +29,67 @@ use crate::vertex::VertexMesh;
 
 /// Measures the results of a bake.
 pub(super) struct Judge<'a> {
-    /// None where there is nothing to measure.
+    scene: &'a Scene,
+    each_group: bool,
+    /// None before the first result.
     verifier: Option<Verifier<'a>>,
-    /// Mean reflected radiosity that is rounding, W/m².
-    negligible: f64,
 }
 
 impl<'a> Judge<'a> {
     /// Of results for `scene`, with more points where `each_group` is judged.
-    pub fn new(scene: &'a Scene, each_group: bool) -> Result<Judge<'a>, Error> {
-        let has_light = scene.has_emitter() || scene.sky() != Rgb::ZERO;
-        let triangles = 0..scene.triangles().len();
-        let has_error = has_light && triangles.clone().any(|t| scene.material(t).reflects());
-        let settings = Settings {
-            seed: model::JUDGE_SEED,
-            precision: model::JUDGE_PRECISION,
-            points_per_group: if each_group {
-                model::JUDGED_POINTS_PER_GROUP
-            } else {
-                model::JUDGE_POINTS_PER_GROUP
-            },
-            time: None,
-            ..Settings::default()
-        };
-        let verifier = || Verifier::new(scene, settings, model::JUDGE_POINTS);
-        let verifier = has_error.then(verifier).transpose()?;
-        Ok(Judge { verifier, negligible: negligible_reflection(scene) })
+    pub fn new(scene: &'a Scene, each_group: bool) -> Judge<'a> {
+        Judge { scene, each_group, verifier: None }
     }
 
     /// `found`, the estimate of `surface`, held against paths: so many that it is known whether
     /// `error` is met, but no more than `paths` in all. `progress` is told how many points are done
-    /// of how many; if it stops the measurement, the estimate stays as it is.
+    /// of how many; if it stops the measurement, the estimate stays as it is. So it does where
+    /// nothing can be measured: in a scene without light, or where next to nothing is reflected.
     pub fn judge(
         &mut self,
         found: EstimatedError,
         surface: &VertexMesh,
         (error, paths): (Option<f64>, u64),
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> Result<EstimatedError, Error> {
-        let Some(verifier) = &mut self.verifier else { return Ok(found) };
+    ) -> EstimatedError {
         let limits = Limits { error, paths: Some(paths) };
         let mut stopped = false;
-        let verification = verifier.measure(surface, limits, &mut |p: &Progress| {
-            let flow = progress(p.done, p.of);
-            stopped |= flow.is_break();
-            flow
-        })?;
-        let is_dark = verification.mean_reflected <= self.negligible;
-        Ok(if stopped || is_dark { found } else { held_against(found, &verification) })
+        let measured = self.verifier().and_then(|verifier| {
+            verifier.measure(surface, limits, &mut |p: &Progress| {
+                let flow = progress(p.done, p.of);
+                stopped |= flow.is_break();
+                flow
+            })
+        });
+        match measured {
+            Ok(measured)
+                if !stopped && measured.mean_reflected > negligible_reflection(self.scene) =>
+            {
+                held_against(found, &measured)
+            }
+            _ => found,
+        }
+    }
+
+    fn verifier(&mut self) -> Result<&mut Verifier<'a>, Error> {
+        let verifier = match self.verifier.take() {
+            Some(verifier) => verifier,
+            None => Verifier::new(self.scene, self.settings(), model::JUDGE_POINTS)?,
+        };
+        Ok(self.verifier.insert(verifier))
+    }
+
+    fn settings(&self) -> Settings {
+        Settings {
+            seed: model::JUDGE_SEED,
+            precision: model::JUDGE_PRECISION,
+            points_per_group: match self.each_group {
+                true => model::JUDGED_POINTS_PER_GROUP,
+                false => model::JUDGE_POINTS_PER_GROUP,
+            },
+            time: None,
+            ..Settings::default()
+        }
     }
 }
 

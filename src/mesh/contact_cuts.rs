@@ -218,6 +218,18 @@ mod tests {
         assert!(pieces.len() > 2 && surfaces == 1);
         // Along the wall there are two vertices in each place.
         let topology = SurfaceTopology::new(&cut);
+        let mesh = Mesh::new(cut.clone(), f64::INFINITY).unwrap();
+        let split = mesh.split_beside_cuts(2);
+        let foot_of = |mesh: &Mesh| {
+            let at_foot = |p: &DVec3| (p.x - 4.0).abs() < 1e-6 && p.y < 5.1;
+            let sizes = (0..mesh.element_count()).filter_map(|e| {
+                let node = mesh.element(e);
+                let at_foot = mesh.corners(node).iter().filter(|p| at_foot(p)).count() == 2;
+                (mesh.group(node) == 0 && at_foot).then(|| mesh.longest_edge(node))
+            });
+            sizes.fold(0.0, f64::max)
+        };
+        assert!(foot_of(&split) < 0.3 * foot_of(&mesh), "two levels finer");
         let mut foot = vec![];
         for (t, corners) in topology.corners.iter().enumerate() {
             for (k, p) in cut.corners(t).into_iter().enumerate() {

@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::path_tracer::{PathTracer, SurfacePoint, random_numbers};
+use super::settings::Settings;
 use super::solution::SolutionLookup;
 use super::statistics::{FLOOR, MeanSquare, PARTS, Sample, SquareError};
 use super::surfaces::ReflectingGroup;
-use super::{GroupError, PointError, Settings, Stop, Verification};
+use super::verification::{GroupError, PointError, Stop, Verification};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::progress::BatchSizer;
 use crate::scene::{Rgb, Scene};

@@ -91,3 +91,13 @@ pub fn mean_of(mesh: &Mesh, elements: &[usize], values: &[Rgb]) -> Rgb {
     let sum: Rgb = elements.iter().map(|&e| values[e] * area(e)).sum();
     sum / elements.iter().map(|&e| area(e)).sum::<f64>()
 }
+
+/// The same with an open wall across the floor, from one side to the other.
+pub fn box_with_divided_floor(more: &str, image: &[u8]) -> Scene {
+    let text = format!(
+        "{BOX}g wall\nusemtl grey\nf 1 4 8 5\ng floor\nusemtl floor\nf 1/1 2/3 3/6 4/4\n\
+         v 0 0.3 0\nv 1 0.4 0\nv 1 0.4 0.5\nv 0 0.3 0.5\ng divider\nusemtl grey\n\
+         f 11 12 13 14\nf 14 13 12 11\n"
+    );
+    read(&text, &library(more), image)
+}

@@ -8,7 +8,8 @@ use radiosity::solver::Method;
 use radiosity::{Backend, BakeTarget, Gather, GatheredMesh, Mesh, Rgb, Scene, Solver};
 
 use crate::common::textured::{
-    GREEN, RED, box_with_floor, box_with_halves, checkerboard, elements_of, tga,
+    GREEN, RED, box_with_divided_floor, box_with_floor, box_with_halves, checkerboard, elements_of,
+    tga,
 };
 use crate::common::{closed_forms, gpu, keep_going};
 
@@ -114,4 +115,30 @@ fn black_pieces_lose_no_light() {
             assert!((a / b - 1.0).abs().truncate().max_element() < 0.1, "{a} {b}");
         }
     }
+}
+
+/// A wall that stands on a textured floor cuts it: each piece has its part of the texture.
+#[test]
+fn pieces_of_a_cut_floor_keep_the_texture() {
+    let scene =
+        box_with_divided_floor("newmtl floor\nKd 0.5\nmap_Kd a.tga", &tga(2, &[RED, GREEN]));
+    let baked = BakeTarget::Error(0.1).bake(scene.clone(), &Backend::Cpu, keep_going).unwrap();
+    let cut = baked.mesh.scene();
+    assert!(cut.triangles().len() > scene.triangles().len());
+    let mut seen = [0; 2];
+    for t in (0..cut.triangles().len()).filter(|&t| cut.textures(t).is_some()) {
+        for barycentric in [[0.2, 0.2], [0.6, 0.2], [0.2, 0.6]] {
+            let [u, v] = barycentric;
+            let [a, b, c] = cut.corners(t);
+            let x = (a * (1.0 - u - v) + b * u + c * v).x;
+            // Bilinear between the middles of two texels that repeat.
+            if (0.3..0.45).contains(&x) || (0.8..0.95).contains(&x) {
+                let reflectance = cut.reflectance_at(t, barycentric);
+                let left = reflectance.x > reflectance.y;
+                seen[usize::from(left)] += 1;
+                assert_eq!(left, x < 0.5, "{x}: {reflectance}");
+            }
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 0), "{seen:?}");
 }

@@ -493,3 +493,24 @@ fn rejects_settings_out_of_range() {
         assert_eq!(error.kind(), ErrorKind::Setting);
     }
 }
+
+#[test]
+fn a_beam_between_corners_is_found() {
+    // A bright spot in an otherwise even floor, half-way between corners of its two elements.
+    let corners = facing_up([0.0, 10.0], [0.0, 10.0], 0.0);
+    let mesh = Mesh::new(quads(&[(corners, grey())]), 1e3).unwrap();
+    let dark = vec![Rgb::ZERO; mesh.element_count()];
+    let beam = |p: &GatherPoint| p.position.truncate().distance([5.0, 0.3].into()) < 1.0;
+    let mut light = Known(|_: &RadiosityField, p: &GatherPoint| if beam(p) { 9.0 } else { 1.0 });
+    let mut brightest = |min_edge: f64| {
+        let settings = RefinementSettings::new(min_edge);
+        let found =
+            gather_at_vertices(&shot(&mesh, &dark), &mesh, &settings, &mut light, keep_going);
+        let radiosity = found.unwrap().surface.radiosity;
+        radiosity.iter().map(|b| b.x).fold(0.0, f64::max) / grey().reflectance.x
+    };
+    // Elements of 14: where 4 is the shortest edge their corners are believed; where it is 1, their
+    // parts are looked at.
+    assert!(brightest(4.0) < 1.5);
+    assert!(brightest(1.0) > 8.0);
+}

@@ -24,7 +24,7 @@ const ROUNDING: f64 = 4.0 * STEPS as f64;
 /// (Ruppert 1995).
 const LEAST_ANGLE: f64 = 20.0;
 
-/// But no piece is made smaller than this for its angles, in units of the square of the finest edge.
+/// But no piece is made smaller than this for its angles, in units of the finest edge squared.
 const LEAST_AREA: f64 = 0.1;
 
 /// Points that are added to a triangle at most.
@@ -182,8 +182,8 @@ mod tests {
             let sum: DVec3 = areas.clone().sum();
             assert!(sum.distance(whole) < 1e-9 * whole.length(), "{round}: {cuts:?}");
             assert!(areas.clone().all(|a| a.dot(whole) > 0.0), "{round}: {cuts:?}");
-            // Every side but the triangle's own has two pieces, so that the surface continues. Where
-            // segments overlap, what they cut may differ by rounding.
+            // Every side but the triangle's own has two pieces, so that the surface continues:
+            // where segments overlap, what they cut may differ by rounding.
             let mut sides = std::collections::HashMap::new();
             for Piece { weights, cut, .. } in &pieces {
                 for k in 0..3 {
