@@ -74,9 +74,10 @@ const NEGLIGIBLE: f64 = 1e-4;
 ///
 /// # Errors
 /// - [`Setting`](crate::ErrorKind::Setting) for a setting out of range.
-/// - [`Scene`](crate::ErrorKind::Scene) when nothing in the scene reflects or nothing emits, when the solution is
-///   malformed, emits something else than the scene, as far as its vertices tell that (they have
-///   irradiance), or when more than one point in a hundred lies on none of its faces.
+/// - [`Scene`](crate::ErrorKind::Scene) when nothing in the scene reflects or nothing emits, when
+///   the solution is malformed, emits something else than the scene, as far as its vertices tell
+///   that (they have irradiance), or when more than one point in a hundred lies on none of its
+///   faces.
 pub fn verify(
     scene: &Scene,
     solution: &VertexMesh,
