@@ -133,14 +133,7 @@ impl Report {
         let baked = &self.baked;
         let told = 100.0 * baked.estimate.total;
         if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) && !self.stopped {
-            let scene = baked.mesh.scene();
-            let is_lit = scene.has_emitter() || scene.sky() != Rgb::ZERO;
-            let why = if is_lit {
-                "nothing reflects the light there is: reflectances are 0, or it meets backs alone"
-            } else {
-                "there is no light to be exact about"
-            };
-            return Some(why.into());
+            return Some("no light falls on what reflects: there is no error to tell".into());
         }
         let (error, each) = match self.target {
             Target::Error(error) => (error, ""),
