@@ -22,7 +22,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
-pub(crate) use cut::{Piece, SceneCut};
+pub(crate) use cut::Piece;
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 use texture::MaterialTextures;

@@ -26,7 +26,7 @@ use super::box_overlap::overlapping_pairs;
 use super::contacts::{TrianglePlane, outer_edges};
 use super::{Cell, Mesh, Side, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
-use crate::scene::{Piece, Scene, SceneCut, longest_edge};
+use crate::scene::{Piece, Scene, longest_edge};
 use openness::Openness;
 use snapping::{Cuts, STEPS, Snapping};
 use triangulation::CutTriangle;
@@ -57,7 +57,7 @@ pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
         CutTriangle { corners: scene.corners(t), sides: topology.sides[t], finest }.pieces(cuts)
     };
     let pieces: Vec<Vec<Piece>> = cuts.par_iter().enumerate().map(cut).collect();
-    Arc::new(scene.cut(SceneCut { pieces }))
+    Arc::new(scene.cut(pieces))
 }
 
 impl Mesh {
@@ -86,7 +86,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
     let boxes: Vec<Aabb> =
         (0..count).map(|t| Aabb::from_points(scene.corners(t)).expanded(tolerance / 2.0)).collect();
     let nearby = overlapping_pairs(&boxes, |t| scene.area(t));
-    let outer = outer_edges(scene);
+    let outer = outer_edges(scene, topology);
     let neighbours = neighbours(topology);
     let openness = Openness::new(scene, tolerance, finest);
     let cuts = |t: usize| {

@@ -66,7 +66,7 @@ impl Mesh {
             .map(|t| Aabb::from_points(self.scene.corners(t)).expanded(tolerances[t]))
             .collect();
         let nearby = overlapping_pairs(&boxes, |t| self.scene.area(t));
-        let outer_edges = outer_edges(self.scene());
+        let outer_edges = outer_edges(self.scene(), &SurfaceTopology::new(self.scene()));
         let separated_in = |t: usize| {
             let plane = TrianglePlane::new(self.scene(), t, tolerances[t]);
             let mut segments = vec![];
@@ -143,28 +143,31 @@ impl ContactSegment {
             let [u, v] = cell.local(p.x, p.y);
             [1.0 - u - v, u, v]
         });
-        // Clipped against the three sides one by one (Liang and Barsky 1984).
-        let (mut from, mut to) = (0.0f64, 1.0f64);
-        for k in 0..3 {
-            let (start, end) = (start[k] - margin, end[k] - margin);
-            if start < 0.0 && end < 0.0 {
-                return false;
-            }
-            let crossing = start / (start - end);
-            if start < 0.0 {
-                from = from.max(crossing);
-            } else if end < 0.0 {
-                to = to.min(crossing);
-            }
-        }
-        from < to
+        part_inside([start, end].map(|weights| weights.map(|w| w - margin))).is_some()
     }
+}
+
+/// From and to which share of its length a segment has no weight below zero, given the three at
+/// both ends; none if nowhere. Clipped against the three sides one by one (Liang and Barsky 1984).
+pub(super) fn part_inside([start, end]: [[f64; 3]; 2]) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (start, end) in start.into_iter().zip(end) {
+        if start < 0.0 && end < 0.0 {
+            return None;
+        }
+        let crossing = start / (start - end);
+        if start < 0.0 {
+            from = from.max(crossing);
+        } else if end < 0.0 {
+            to = to.min(crossing);
+        }
+    }
+    (from < to).then_some([from, to])
 }
 
 /// Per triangle, which of its sides end its plane: the diagonals of a flat polygon do not, and
 /// separate nothing.
-pub(super) fn outer_edges(scene: &Scene) -> Vec<[bool; 3]> {
-    let topology = SurfaceTopology::new(scene);
+pub(super) fn outer_edges(scene: &Scene, topology: &SurfaceTopology) -> Vec<[bool; 3]> {
     let mut outer = vec![[true; 3]; topology.sides.len()];
     for [(s, l), (t, k)] in topology.shared_edges() {
         if scene.normal(s).dot(scene.normal(t)) > COPLANAR_COSINE {

@@ -23,20 +23,15 @@ impl Piece {
     }
 }
 
-/// The pieces of each triangle of a scene.
-pub(crate) struct SceneCut {
-    pub pieces: Vec<Vec<Piece>>,
-}
-
 impl Scene {
-    /// The same surfaces in pieces.
-    pub(crate) fn cut(&self, cut: SceneCut) -> Scene {
+    /// The same surfaces in `pieces` of each triangle.
+    pub(crate) fn cut(&self, pieces: Vec<Vec<Piece>>) -> Scene {
         let mut scene = Scene { positions: vec![], triangles: vec![], ..self.clone() };
         let mut textures = (*self.textures).clone();
         textures.coordinates.clear();
         textures.relative_exitance.clear();
         scene.cut_sides.clear();
-        for (t, pieces) in cut.pieces.into_iter().enumerate() {
+        for (t, pieces) in pieces.into_iter().enumerate() {
             for piece in pieces {
                 let first = scene.positions.len() as u32;
                 scene.positions.extend(piece.corners);

@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::mesh::contacts::ContactSegment;
+use crate::mesh::contacts::{ContactSegment, part_inside};
 
 /// Steps of the lattice along a side.
 pub(super) const STEPS: u32 = 1 << 24;
@@ -114,23 +114,10 @@ impl Snapping {
     }
 }
 
-/// The part of a segment that lies in the triangle; none if there is none. Clipped against the
-/// three sides one by one (Liang and Barsky 1984).
+/// The part of a segment that lies in the triangle; none if there is none.
 pub(super) fn clipped(ends: [DVec2; 2]) -> Option<[DVec2; 2]> {
-    let [start, end] = ends.map(|p| [1.0 - p.x - p.y, p.x, p.y]);
-    let (mut from, mut to) = (0.0f64, 1.0f64);
-    for (start, end) in start.into_iter().zip(end) {
-        if start < 0.0 && end < 0.0 {
-            return None;
-        }
-        let crossing = start / (start - end);
-        if start < 0.0 {
-            from = from.max(crossing);
-        } else if end < 0.0 {
-            to = to.min(crossing);
-        }
-    }
-    (from < to).then(|| [ends[0].lerp(ends[1], from), ends[0].lerp(ends[1], to)])
+    let shares = part_inside(ends.map(|p| [1.0 - p.x - p.y, p.x, p.y]))?;
+    Some(shares.map(|share| ends[0].lerp(ends[1], share)))
 }
 
 /// Which sides a point is on, counted by the corner that they start at.
