@@ -11,6 +11,7 @@
 //! the box of each primitive. (Khronos, "glTF 2.0 Specification", 2021.)
 
 mod document;
+mod images;
 mod primitives;
 
 use std::io::{self, Write};
@@ -24,6 +25,7 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
+use images::{Images, before_image, mean_radiosity};
 use primitives::{Primitive, primitives};
 
 /// Writes `light` as glTF 2.0 binary, `.glb`: the same bytes for the same light.
@@ -34,10 +36,12 @@ use primitives::{Primitive, primitives};
 /// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have
 /// reflectance and exitance. All numbers are 32-bit floats.
 ///
-/// In a scene with textures, vertices whose corners have texture coordinates in the file have these
-/// as `TEXCOORD_0`, and `_IRRADIANCE` (W/m² per channel, linear): a program that has the textures
-/// multiplies it with them, where `COLOR_0` and `_RADIOSITY` have their means around each vertex.
-/// Textures themselves are not in the file.
+/// In a scene with textures, vertices whose corners have texture coordinates in the file have
+/// `TEXCOORD_0`, after `-s` and `-o`, and `_IRRADIANCE` (W/m² per channel, linear), which a
+/// program multiplies with a texture of reflectance; `_RADIOSITY` has its mean around each vertex.
+/// The image of `map_Ke`, else of `map_Kd`, is in the file as PNG, as the colour of the material:
+/// viewers multiply it with `COLOR_0`, which is divided by its mean over the material, so that the
+/// image takes part in the tone curve by its mean alone.
 ///
 /// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF means
 /// metres with +y up: nothing is turned or scaled. A scene that lies more than 16 of its sizes from
@@ -51,7 +55,7 @@ pub fn write_glb(
     tone: &ToneCurve,
 ) -> Result<(), Error> {
     let path = path.as_ref();
-    let model = Model::new(light, tone);
+    let model = Model::new(light, tone).map_err(|e| cannot_write(path, io::Error::other(e)))?;
     let mut json = model.document().to_vec().map_err(|e| cannot_write(path, e))?;
     json.resize(json.len().next_multiple_of(4), b' ');
     let binary = model.binary_length();
@@ -94,7 +98,8 @@ const FAR_AWAY: f64 = 16.0;
 struct Model<'a> {
     light: &'a GatheredMesh,
     tone: &'a ToneCurve,
-    primitives: Vec<Primitive>,
+    primitives: Vec<Primitive<'a>>,
+    images: Images,
     /// The place that positions are relative to, scene unit.
     origin: Vec3,
 }
@@ -127,19 +132,21 @@ impl Attribute {
     }
 
     /// Whether vertices of `primitive` have it.
-    fn is_of(self, primitive: &Primitive) -> bool {
+    fn is_of(self, primitive: &Primitive<'_>) -> bool {
         let of_textures = matches!(self, Attribute::Irradiance | Attribute::TextureCoordinates);
         !of_textures || !primitive.places.is_empty()
     }
 }
 
 impl Model<'_> {
-    fn new<'a>(light: &'a GatheredMesh, tone: &'a ToneCurve) -> Model<'a> {
+    fn new<'a>(light: &'a GatheredMesh, tone: &'a ToneCurve) -> image::ImageResult<Model<'a>> {
         let bounds = Aabb::from_points(light.surface.positions.iter().copied());
         let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
         let far = reach > FAR_AWAY * bounds.longest_side();
         let origin = if far { bounds.centre().as_vec3() } else { Vec3::ZERO };
-        Model { light, tone, primitives: primitives(light), origin }
+        let primitives = primitives(light);
+        let images = Images::of(&primitives)?;
+        Ok(Model { light, tone, primitives, images, origin })
     }
 
     /// The attributes that any primitive has.
@@ -158,7 +165,13 @@ impl Model<'_> {
         self.primitives.iter().map(|primitive| primitive.faces.len() as u64).sum()
     }
 
+    /// Bytes of the binary chunk, a multiple of four.
     fn binary_length(&self) -> u64 {
+        (self.geometry_length() + self.images.length()).next_multiple_of(4)
+    }
+
+    /// Bytes of attributes and indices.
+    fn geometry_length(&self) -> u64 {
         let bytes = |a: Attribute| self.vertex_count(a) * a.size();
         self.attributes().map(bytes).sum::<u64>() + 3 * self.face_count() * INDEX_BYTES
     }
@@ -177,20 +190,32 @@ impl Model<'_> {
         for &v in self.primitives.iter().flat_map(|primitive| primitive.faces.as_flattened()) {
             out.write_all(&v.to_le_bytes())?;
         }
-        Ok(())
+        for image in &self.images.encoded {
+            out.write_all(image)?;
+        }
+        let padding = self.binary_length() - self.geometry_length() - self.images.length();
+        out.write_all(&[0; 4][..padding as usize])
     }
 
     /// What vertex `k` of `primitive` has, as it is written.
-    fn value(&self, attribute: Attribute, primitive: &Primitive, k: usize) -> Vec3 {
+    fn value(&self, attribute: Attribute, primitive: &Primitive<'_>, k: usize) -> Vec3 {
         let (surface, v) = (&self.light.surface, primitive.vertices[k] as usize);
         let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3();
+        let irradiance = || surface.irradiance.get(v).copied().unwrap_or(Rgb::ZERO);
         match attribute {
             Attribute::Position => (surface.positions[v] - self.origin.as_dvec3()).as_vec3(),
             // glTF allows no other length than 1.
             Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
-            Attribute::Colour => self.tone.linear(surface.radiosity[v]).as_vec3(),
+            Attribute::Colour => {
+                let Some(map) = primitive.map else {
+                    return self.tone.linear(surface.radiosity[v]).as_vec3();
+                };
+                let material = &self.light.mesh.scene().materials()[primitive.material as usize];
+                let colour = self.tone.linear(mean_radiosity(material, irradiance()));
+                before_image(map, colour).as_vec3()
+            }
             Attribute::Radiosity => light(surface.radiosity[v]),
-            Attribute::Irradiance => light(surface.irradiance.get(v).copied().unwrap_or(Rgb::ZERO)),
+            Attribute::Irradiance => light(irradiance()),
             Attribute::TextureCoordinates => primitive.places[k].extend(0.0),
         }
     }

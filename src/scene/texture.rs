@@ -65,6 +65,11 @@ impl Texture {
         [self.width, self.height]
     }
 
+    /// All texels, rows from the top, as sRGB.
+    pub fn texels(&self) -> &[[u8; 3]] {
+        &self.texels
+    }
+
     /// Linear mean of all texels.
     pub fn whole_mean(&self) -> Rgb {
         self.cell(self.levels.len(), 0, 0)

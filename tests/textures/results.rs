@@ -92,6 +92,92 @@ fn glb_has_texture_coordinates_and_irradiance() {
     assert_eq!(textured, 81);
 }
 
+/// Texels of the only image of a glTF file.
+fn image_of(document: &gltf::Document, binary: &[u8]) -> image::RgbImage {
+    assert_eq!(document.images().len(), 1);
+    let gltf::image::Source::View { view, mime_type } = document.images().next().unwrap().source()
+    else {
+        panic!("an image outside of the file");
+    };
+    assert_eq!(mime_type, "image/png");
+    let bytes = &binary[view.offset()..view.offset() + view.length()];
+    image::load_from_memory_with_format(bytes, image::ImageFormat::Png).unwrap().into_rgb8()
+}
+
+fn texture_of<'a>(primitive: &gltf::Primitive<'a>) -> Option<gltf::Texture<'a>> {
+    let colour = primitive.material().pbr_metallic_roughness().base_color_texture();
+    colour.map(|info| info.texture())
+}
+
+/// The image is in the file as it was read, and what viewers make of it and of `COLOR_0` has the
+/// tone of the light where the image has its mean: of light that is reflected, and of a lamp's.
+#[test]
+fn glb_shows_textures_with_the_light_on_them() {
+    // Of sRGB 128, linear 0.2159 (IEC 61966-2-1), and white; the file doubles and shifts them.
+    let texels = [[128; 3], [255; 3]];
+    for (maps, reflected, emitted) in [
+        ("map_Kd -s 2 1 -o 0.25 0.5 -clamp on a.tga", [0.3, 0.4, 0.5], [0.0; 3]),
+        ("map_Kd a.tga", [0.3, 0.4, 0.5], [0.0; 3]),
+        ("Ke 3 2 1\nmap_Ke a.tga", [0.3, 0.4, 0.5], [3.0, 2.0, 1.0]),
+    ] {
+        let map = format!("newmtl wall\nKd 0.3 0.4 0.5\n{maps}");
+        let scene = box_with_wall(&map, &tga(2, &texels));
+        let mesh = Mesh::new(scene, 0.3).unwrap();
+        let irradiance = 2.0;
+        let element = |e| mesh.exitance(e) + irradiance * mesh.reflectance(e);
+        let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(element).collect();
+        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        let tone = ToneCurve::fit(&light.surface.radiosity);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        write_glb(&path, &light, &tone).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let document = gltf::Gltf::from_slice(&bytes).unwrap().document;
+        let binary = gltf::Glb::from_slice(&bytes).unwrap().bin.unwrap();
+        assert_eq!(document.buffers().next().unwrap().length(), binary.len());
+        assert_eq!(image_of(&document, &binary).into_raw(), texels.as_flattened());
+
+        let is_wall = |p: &gltf::Primitive<'_>| p.material().name() == Some("wall");
+        let primitives: Vec<_> = document.meshes().flat_map(|mesh| mesh.primitives()).collect();
+        assert!(primitives.iter().all(|p| texture_of(p).is_some() == is_wall(p)));
+        let wall = primitives.into_iter().find(is_wall).unwrap();
+        let clamped = maps.contains("-clamp");
+        let wrapped = if clamped {
+            gltf::texture::WrappingMode::ClampToEdge
+        } else {
+            gltf::texture::WrappingMode::Repeat
+        };
+        let sampler = texture_of(&wall).unwrap().sampler();
+        assert_eq!([sampler.wrap_s(), sampler.wrap_t()], [wrapped; 2]);
+
+        let reader = wall.reader(|_| Some(&binary));
+        let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+        let places: Vec<[f32; 2]> = reader.read_tex_coords(0).unwrap().into_f32().collect();
+        let [scale, offset] =
+            if clamped { [[2.0, 1.0], [0.25, 0.5]] } else { [[1.0; 2], [0.0; 2]] };
+        for (p, place) in positions.iter().zip(places) {
+            let wanted = [p[1] * scale[0] + offset[0], 1.0 - (p[2] * scale[1] + offset[1])];
+            assert!((0..2).all(|k| (place[k] - wanted[k]).abs() < 1e-6), "{p:?}: {place:?}");
+        }
+        // The mean of both texels, where the image is not cut off; else what the scene says.
+        let mean = match clamped {
+            false => Rgb::splat((0.2158605 + 1.0) / 2.0),
+            true => {
+                mesh.scene().materials().iter().find(|m| m.name == "wall").unwrap().reflectance
+                    / Rgb::from(reflected)
+            }
+        };
+        let is_textured = if maps.contains("Kd") { mean } else { Rgb::ONE };
+        let exitance = std::f64::consts::PI * mean * Rgb::from(emitted);
+        let wanted = tone.linear(exitance + irradiance * is_textured * Rgb::from(reflected));
+        let colours = reader.read_colors(0).unwrap().into_rgb_f32();
+        for colour in colours.map(|c| Rgb::from(c.map(f64::from))) {
+            // Numbers of 24 bits; glTF has no colour above 1.
+            assert!(colour.abs_diff_eq((wanted / mean).min(Rgb::ONE), 1e-6), "{colour} {wanted}");
+        }
+    }
+}
+
 #[test]
 fn vertices_on_seams_are_written_for_both_sides() {
     let text = "mtllib box.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n\

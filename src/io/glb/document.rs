@@ -6,15 +6,18 @@ use glam::Vec3;
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Stride, Target, View};
 use gltf_json::extras::RawValue;
+use gltf_json::image::MimeType;
 use gltf_json::material::PbrMetallicRoughness;
 use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::scene::Node;
+use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Accessor, Asset, Buffer, Index, Material, Mesh, Root, Scene, Value};
+use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
 
 use super::primitives::Primitive;
 use super::{Attribute, INDEX_BYTES, Model};
 use crate::scene::Rgb;
+use crate::scene::texture::TextureMap;
 
 /// The extension that shows a colour as it is.
 const UNLIT: &str = "KHR_materials_unlit";
@@ -49,6 +52,7 @@ impl Model<'_> {
             extras: None,
         });
         self.add_views(&mut root);
+        self.add_images(&mut root);
         let groups = self.add_groups(&mut root);
         let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
         let top = Node { children: Some(groups), translation, ..Default::default() };
@@ -64,6 +68,7 @@ impl Model<'_> {
             ("unit", Value::from("that of the scene's file")),
             ("_RADIOSITY", Value::from("W/m2 per channel, linear BT.709")),
             ("COLOR_0", Value::from("_RADIOSITY times exposure, highlights rolled off")),
+            ("images", Value::from("their mean is divided out of COLOR_0")),
             ("exposure", Value::from(self.tone.exposure())),
         ]);
         Asset {
@@ -76,14 +81,14 @@ impl Model<'_> {
     /// A view of the binary chunk for each attribute, and one for the indices.
     fn add_views(&self, root: &mut Root) {
         let mut offset = 0;
-        let mut add = |length: u64, stride: Option<Stride>, target: Target| {
+        let mut add = |length: u64, stride: Option<Stride>, target: Option<Target>| {
             root.push(View {
                 buffer: Index::new(0),
                 byte_length: length.into(),
                 byte_offset: Some(offset.into()),
                 byte_stride: stride,
                 name: None,
-                target: Some(Valid(target)),
+                target: target.map(Valid),
                 extensions: None,
                 extras: None,
             });
@@ -91,9 +96,27 @@ impl Model<'_> {
         };
         for attribute in self.attributes() {
             let (count, size) = (self.vertex_count(attribute), attribute.size());
-            add(count * size, Some(Stride(size as usize)), Target::ArrayBuffer);
+            add(count * size, Some(Stride(size as usize)), Some(Target::ArrayBuffer));
         }
-        add(3 * self.face_count() * INDEX_BYTES, None, Target::ElementArrayBuffer);
+        add(3 * self.face_count() * INDEX_BYTES, None, Some(Target::ElementArrayBuffer));
+        for image in &self.images.encoded {
+            add(image.len() as u64, None, None);
+        }
+    }
+
+    /// An image for each texture that is shown, in the views after those of the indices.
+    fn add_images(&self, root: &mut Root) {
+        let first = self.attributes().count() + 1;
+        for k in 0..self.images.encoded.len() {
+            root.push(Image {
+                buffer_view: Some(Index::new((first + k) as u32)),
+                mime_type: Some(MimeType("image/png".into())),
+                name: None,
+                uri: None,
+                extensions: None,
+                extras: None,
+            });
+        }
     }
 
     /// A node and a mesh for each group that has faces.
@@ -105,8 +128,11 @@ impl Model<'_> {
             let mut primitives = vec![];
             for primitive in of_group {
                 let material = *materials
-                    .entry(primitive.material)
-                    .or_insert_with(|| root.push(self.material(primitive.material)));
+                    .entry((primitive.material, primitive.map.is_some()))
+                    .or_insert_with(|| {
+                        let material = self.material(root, primitive);
+                        root.push(material)
+                    });
                 primitives.push(self.primitive(root, primitive, material, &written));
                 written.add(primitive);
             }
@@ -128,7 +154,7 @@ impl Model<'_> {
     fn primitive(
         &self,
         root: &mut Root,
-        primitive: &Primitive,
+        primitive: &Primitive<'_>,
         material: Index<Material>,
         written: &Written,
     ) -> gltf_json::mesh::Primitive {
@@ -165,9 +191,9 @@ impl Model<'_> {
         }
     }
 
-    /// White and unlit: all colour is in the vertices.
-    fn material(&self, index: u32) -> Material {
-        let material = &self.light.mesh.scene().materials()[index as usize];
+    /// Unlit: all colour is in the vertices, and in the image if there is one.
+    fn material(&self, root: &mut Root, primitive: &Primitive<'_>) -> Material {
+        let material = &self.light.mesh.scene().materials()[primitive.material as usize];
         let channels = |c: Rgb| Value::from(c.to_array().to_vec());
         let notes = BTreeMap::from([
             ("reflectance", channels(material.reflectance)),
@@ -177,6 +203,7 @@ impl Model<'_> {
         Material {
             name: Some(material.name.clone()),
             pbr_metallic_roughness: PbrMetallicRoughness {
+                base_color_texture: primitive.map.and_then(|map| self.texture(root, map)),
                 metallic_factor: gltf_json::material::StrengthFactor(0.0),
                 ..Default::default()
             },
@@ -184,6 +211,27 @@ impl Model<'_> {
             extras: notes_of(&notes),
             ..Default::default()
         }
+    }
+
+    /// The image of `map`, repeated or not, smoothly filtered.
+    fn texture(&self, root: &mut Root, map: &TextureMap) -> Option<Info> {
+        let wrap =
+            Valid(if map.clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
+        let sampler = root.push(Sampler {
+            mag_filter: Some(Valid(MagFilter::Linear)),
+            min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
+            wrap_s: wrap,
+            wrap_t: wrap,
+            ..Default::default()
+        });
+        let texture = root.push(Texture {
+            sampler: Some(sampler),
+            source: Index::new(self.images.number(&map.texture)? as u32),
+            name: None,
+            extensions: None,
+            extras: None,
+        });
+        Some(Info { index: texture, tex_coord: 0, extensions: None, extras: None })
     }
 }
 
@@ -197,7 +245,7 @@ struct Written {
 }
 
 impl Written {
-    fn add(&mut self, primitive: &Primitive) {
+    fn add(&mut self, primitive: &Primitive<'_>) {
         self.vertices += primitive.vertices.len() as u64;
         self.textured += primitive.places.len() as u64;
         self.faces += primitive.faces.len() as u64;

@@ -5,19 +5,23 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, Vec2};
+use glam::Vec2;
 use rustc_hash::FxHashMap;
 
+use super::images::{image_place, shown};
 use crate::gather::GatheredMesh;
+use crate::scene::texture::TextureMap;
 
 /// The faces of one group and one material.
-pub(super) struct Primitive {
+pub(super) struct Primitive<'a> {
     pub group: u32,
     pub material: u32,
     /// Vertices of the surface, in the order of the file.
     pub vertices: Vec<u32>,
     /// Texture coordinates of each, v downwards; empty where a corner has none.
     pub places: Vec<Vec2>,
+    /// The texture that it is shown with, where it has texture coordinates.
+    pub map: Option<&'a TextureMap>,
     /// Faces, by the places of their corners in `vertices`.
     pub faces: Vec<[u32; 3]>,
 }
@@ -30,7 +34,7 @@ type Face = ([u32; 3], usize);
 const SEAM: f64 = 1.0 / (1 << 20) as f64;
 
 /// The faces of `light` by group, then material, in the order of the scene's.
-pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive> {
+pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     let (surface, mesh) = (&light.surface, &light.mesh);
     let mut faces: BTreeMap<(u32, u32), Vec<Face>> = BTreeMap::new();
     for (&face, &element) in surface.faces.iter().zip(&surface.elements) {
@@ -47,7 +51,7 @@ pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive> {
             let mut vertices = vec![];
             let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
             let faces = faces.iter().map(of_face).collect();
-            Primitive { group, material, vertices, places: vec![], faces }
+            Primitive { group, material, vertices, places: vec![], map: None, faces }
         });
     }
     primitives
@@ -81,20 +85,25 @@ fn has_texture_coordinates(light: &GatheredMesh, t: usize) -> bool {
 }
 
 /// The primitive of `faces`, each with its triangle of the scene.
-fn textured(light: &GatheredMesh, (group, material): (u32, u32), faces: &[Face]) -> Primitive {
+fn textured<'a>(
+    light: &'a GatheredMesh,
+    (group, material): (u32, u32),
+    faces: &[Face],
+) -> Primitive<'a> {
     let (surface, scene) = (&light.surface, light.mesh.scene());
+    let map = faces.first().and_then(|&(_, t)| shown(scene.textures(t)?));
     let mut numbers: FxHashMap<(u32, [i64; 2]), u32> = FxHashMap::default();
     let (mut vertices, mut places) = (vec![], vec![]);
     let mut number = |v: u32, t: usize| {
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
-        let place = scene.texture_place(t, barycentric);
+        let place = image_place(map, scene.texture_place(t, barycentric));
         let cell = (place / SEAM).round().to_array().map(|x| x as i64);
         *numbers.entry((v, cell)).or_insert_with(|| {
             vertices.push(v);
-            places.push(DVec2::new(place.x, 1.0 - place.y).as_vec2());
+            places.push(place.as_vec2());
             vertices.len() as u32 - 1
         })
     };
     let faces = faces.iter().map(|(face, t)| face.map(|v| number(v, *t))).collect();
-    Primitive { group, material, vertices, places, faces }
+    Primitive { group, material, vertices, places, map, faces }
 }
