@@ -43,8 +43,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     let w = dot(d, view.forward);
     var out: Varying;
     out.position = clip_position(x, y, w, view.bottom, view.near);
-    if triangle == view.own_triangle {
-        out.position = vec4f(0.0, 0.0, -1.0, 1.0);
+    if triangle == view.own_triangle || shows_covered_back(index, view.eye, view.eye_low) {
+        out.position = NOWHERE;
     }
     let grid = triangles[triangle];
     out.lattice = lattice_corner(index % 3u, grid.side);

@@ -58,6 +58,9 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     let w = dot(d, views[view_index].forward);
     var out: Varying;
     out.position = clip_position(x, y, w, views[view_index].bottom, views[view_index].near);
+    if shows_covered_back(index, views[view_index].eye, views[view_index].eye_low) {
+        out.position = NOWHERE;
+    }
     let lattice = lattices[triangle.index];
     out.lattice = lattice_corner(index % 3u, lattice.side);
     out.first = lattice.first;

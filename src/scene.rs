@@ -7,6 +7,7 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+mod covered_backs;
 mod cut;
 mod rgb;
 mod scene_textures;
@@ -16,7 +17,7 @@ mod warning;
 
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -74,6 +75,8 @@ pub struct Scene {
     textures: Arc<SceneTextures>,
     /// Per triangle, the sides across which its surface does not continue; empty for none.
     cut_sides: Vec<[bool; 3]>,
+    /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
+    covered_backs: OnceLock<Vec<bool>>,
 }
 
 impl Scene {
@@ -189,6 +192,7 @@ impl Scene {
             sky,
             textures: Arc::default(),
             cut_sides: vec![],
+            covered_backs: OnceLock::new(),
         };
         if !textures.is_empty() {
             scene.lay_textures(texture_coordinates, textures);
@@ -276,6 +280,13 @@ impl Scene {
     pub fn area(&self, t: usize) -> f64 {
         let [a, b, c] = self.corners(t);
         0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Whether all of the back of triangle `t` lies where others have their fronts: nothing meets
+    /// it, and what comes from that side meets those.
+    pub(crate) fn is_back_covered(&self, t: usize) -> bool {
+        let covered = self.covered_backs.get_or_init(|| covered_backs::covered_backs(self));
+        covered.get(t).is_some_and(|&covered| covered)
     }
 
     /// The axis-aligned box around all triangles.

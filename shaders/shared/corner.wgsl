@@ -3,9 +3,9 @@
 // A corner in two parts that add up to it.
 struct Corner {
     high: vec3f,          // from the middle of the scene, in units of its size
-    padding: u32,
+    back_is_covered: u32, // 1: fronts in the same place cover its triangle's back
     low: vec3f,           // what rounding took off
-    padding_2: u32,
+    padding: u32,
 }
 
 // From the eye, itself in two parts, to a corner. Of corners near the eye the first difference is
@@ -13,6 +13,21 @@ struct Corner {
 fn from_eye(corner: Corner, eye: vec3f, eye_low: vec3f) -> vec3f {
     return (corner.high - eye) + (corner.low - eye_low);
 }
+
+// Whether the triangle of corner `index` shows the eye a back that is covered: it is not drawn.
+fn shows_covered_back(index: u32, eye: vec3f, eye_low: vec3f) -> bool {
+    let first = index - index % 3u;
+    if corners[first].back_is_covered == 0u {
+        return false;
+    }
+    let a = from_eye(corners[first], eye, eye_low);
+    let b = from_eye(corners[first + 1u], eye, eye_low);
+    let c = from_eye(corners[first + 2u], eye, eye_low);
+    return dot(a, cross(b - a, c - a)) >= 0.0;
+}
+
+// Where what is not drawn goes: beyond the far end.
+const NOWHERE: vec4f = vec4f(0.0, 0.0, -1.0, 1.0);
 
 // Clip coordinates of a point with view coordinates x, y and w (along the view's axis). Lines from
 // tangent `bottom` to 1 fill the viewport; depth near/w is reversed, its far end infinite.

@@ -6,6 +6,8 @@
 //!           boxes grown by a margin)
 //! ```
 //!
+//! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met.
+//!
 //! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
 //! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
 //! whatever the order of traversal, so that results do not depend on the hierarchy.
@@ -82,7 +84,11 @@ impl RayScene {
 
     /// For the triangles of `scene`, by their numbers.
     pub fn of_scene(scene: &Scene) -> RayScene {
-        RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)))
+        let mut rays = RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)));
+        for (t, plane) in rays.triangles.iter_mut().enumerate() {
+            plane.back_is_covered = scene.is_back_covered(t);
+        }
+        rays
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and
@@ -159,12 +165,15 @@ impl RayScene {
         direction: DVec3,
         reach: Range<f64>,
     ) -> Option<Hit> {
-        let TrianglePlane { corner, normal, gradients } = self.triangles[triangle];
+        let TrianglePlane { corner, normal, gradients, back_is_covered } = self.triangles[triangle];
         let (facing, to) = (normal.dot(direction), corner - from);
         // Most are too far off or behind, which is told without a division. Written so that NaN is
         // no hit, as of a line in the plane.
         let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
         if !(rise > reach.start * steep && rise <= reach.end * steep) || steep == 0.0 {
+            return None;
+        }
+        if back_is_covered && facing > 0.0 {
             return None;
         }
         let distance = rise / steep;
@@ -185,6 +194,8 @@ struct TrianglePlane {
     normal: DVec3,
     /// Gradients of the barycentric weights of the second and third corner.
     gradients: [DVec3; 2],
+    /// Whether nothing meets its back.
+    back_is_covered: bool,
 }
 
 impl TrianglePlane {
@@ -198,7 +209,7 @@ impl TrianglePlane {
         let gradient =
             |edge: DVec3| if square > 0.0 { edge / (square * size) } else { DVec3::ZERO };
         let gradients = [gradient(v.cross(normal)), gradient(normal.cross(u))];
-        TrianglePlane { corner: a, normal, gradients }
+        TrianglePlane { corner: a, normal, gradients, back_is_covered: false }
     }
 }
 

@@ -14,9 +14,6 @@
 //! surface, or in a room that is inverted as a whole. What they meet counts only for triangles
 //! whose front is never met.
 
-use std::cell::Cell;
-
-use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::sampling::hemisphere::HemisphereSamples;
@@ -33,10 +30,6 @@ const RAYS_PER_SAMPLE: u32 = 32;
 /// Hits from which on a verdict is given of a triangle or a group. Chosen by hand; no measurement
 /// was kept.
 const MIN_HITS: u32 = 16;
-
-/// Faces are in one place whose distances along a ray differ by no more than this share. Chosen by
-/// hand: far above rounding, far below the thickness of a sheet.
-const SAME_PLACE: f64 = 1e-9;
 
 impl Scene {
     /// Adds a warning that names the groups with faces that seem to be wound inside out: those that
@@ -91,29 +84,6 @@ impl HitCounts {
     }
 }
 
-/// What a ray along `direction` from `eye` on triangle `from` meets first, further off than
-/// `start`. Of two faces back to back in one place that is the front.
-fn first_hit(
-    rays: &RayScene,
-    eye: DVec3,
-    direction: DVec3,
-    start: f64,
-    from: usize,
-) -> Option<Hit> {
-    let hit = rays.closest_hit(eye, direction, start, Some(from))?;
-    let twin = Cell::new(None);
-    let place = hit.distance * (1.0 - SAME_PLACE)..hit.distance * (1.0 + SAME_PLACE);
-    if !hit.front {
-        rays.occluded(eye, direction, place, |other| {
-            if other.front {
-                twin.set(Some(*other));
-            }
-            other.front
-        });
-    }
-    Some(twin.get().unwrap_or(hit))
-}
-
 /// Casts rays from points on all fronts, and counts how often every triangle is met.
 fn sample_orientation(scene: &Scene) -> Vec<HitCounts> {
     let count = scene.triangles().len();
@@ -127,7 +97,7 @@ fn sample_orientation(scene: &Scene) -> Vec<HitCounts> {
         let eye = a + (b - a) * u + (c - a) * v;
         let start = offset::RAY_START * scene.area(t).sqrt();
         let directions = samples.directions(scene.normal(t), v);
-        directions.map(|d| first_hit(&rays, eye, d, start, t)).collect()
+        directions.map(|d| rays.closest_hit(eye, d, start, Some(t))).collect()
     };
     let hits_of_points: Vec<_> = points.into_par_iter().map(trace).collect();
     let mut counts = vec![HitCounts::default(); count];

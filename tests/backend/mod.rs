@@ -1,2 +1,3 @@
 mod cpu_gather;
+mod doubled_faces;
 mod gpu;

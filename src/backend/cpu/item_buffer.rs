@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::rasterizer::{DepthTest, Image, Viewport};
 use super::shared::{
-    cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
+    NOWHERE, cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
+    shows_covered_back,
 };
 use crate::backend::gpu::layout::{BACK, Corner, FaceView, OPEN, TriangleCells};
 use crate::hemicube::Face;
@@ -48,13 +49,14 @@ impl ItemBuffer<'_> {
     fn vertex(&self, index: u32, view: &FaceView) -> Varying {
         let triangle = index / 3;
         let corner = &self.corners[index as usize];
-        let d = from_eye(corner, view.eye.into(), view.eye_low.into());
+        let [eye, eye_low] = [view.eye, view.eye_low].map(Vec3::from);
+        let d = from_eye(corner, eye, eye_low);
         let x = d.dot(Vec3::from(view.right));
         let y = d.dot(Vec3::from(view.up));
         let w = d.dot(Vec3::from(view.forward));
         let mut position = clip_position(x, y, w, view.bottom, view.near);
-        if triangle == view.own_triangle {
-            position = Vec4::new(0.0, 0.0, -1.0, 1.0);
+        if triangle == view.own_triangle || shows_covered_back(self.corners, index, eye, eye_low) {
+            position = NOWHERE;
         }
         let lattice = lattice_corner(index % 3, self.triangles[triangle as usize].side);
         Varying { position, lattice }

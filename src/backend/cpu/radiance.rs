@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::rasterizer::{DepthTest, Fragment, Image, Viewport};
 use super::shared::{
-    cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
+    NOWHERE, cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
+    shows_covered_back,
 };
 use crate::backend::gpu::layout::{
     Corner, ELEMENTS_A_LINE, INNER, Lattice, RadianceTriangle, RadianceView,
@@ -86,14 +87,18 @@ impl Radiance<'_> {
     fn vertex(&self, index: u32, view: &RadianceView) -> Varying {
         let triangle = &self.triangles[index as usize / 3];
         let corner = &self.corners[index as usize];
-        let d = from_eye(corner, view.eye.into(), view.eye_low.into());
+        let [eye, eye_low] = [view.eye, view.eye_low].map(Vec3::from);
+        let d = from_eye(corner, eye, eye_low);
         let x = d.dot(Vec3::from(view.right));
         let y = d.dot(Vec3::from(view.up));
         let w = d.dot(Vec3::from(view.forward));
         let grid = self.lattices[triangle.index as usize];
         let has_tile = view.lights[..view.light_count as usize].contains(&triangle.light);
+        let is_hidden = shows_covered_back(self.corners, index, eye, eye_low);
+        let position =
+            if is_hidden { NOWHERE } else { clip_position(x, y, w, view.bottom, view.near) };
         Varying {
-            position: clip_position(x, y, w, view.bottom, view.near),
+            position,
             lattice: lattice_corner(index % 3, grid.side),
             exitance: if has_tile { Vec3::ZERO } else { triangle.exitance.into() },
             grid,

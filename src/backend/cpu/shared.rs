@@ -9,6 +9,16 @@ pub fn from_eye(corner: &Corner, eye: Vec3, eye_low: Vec3) -> Vec3 {
     (Vec3::from(corner.high) - eye) + (Vec3::from(corner.low) - eye_low)
 }
 
+/// Whether the triangle of corner `index` shows the eye a back that is covered: it is not drawn.
+pub fn shows_covered_back(corners: &[Corner], index: u32, eye: Vec3, eye_low: Vec3) -> bool {
+    let first = (index - index % 3) as usize;
+    let [a, b, c] = [0, 1, 2].map(|k| from_eye(&corners[first + k], eye, eye_low));
+    corners[first].back_is_covered != 0 && a.dot((b - a).cross(c - a)) >= 0.0
+}
+
+/// Where what is not drawn goes: beyond the far end.
+pub const NOWHERE: Vec4 = Vec4::new(0.0, 0.0, -1.0, 1.0);
+
 /// Clip coordinates of a point with view coordinates `x`, `y` and `w`.
 pub fn clip_position(x: f32, y: f32, w: f32, bottom: f32, near: f32) -> Vec4 {
     Vec4::new(x, (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom), near, w)

@@ -19,9 +19,9 @@ use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Corner {
     pub high: [f32; 3],
-    pub padding: u32,
+    pub back_is_covered: u32,
     pub low: [f32; 3],
-    pub padding_2: u32,
+    pub padding: u32,
 }
 
 /// One face of one hemicube, as `item_buffer.wgsl` draws it.
@@ -249,7 +249,7 @@ mod tests {
         for module in [&item, &radiance] {
             assert_eq!(
                 wgsl_layout(module, "Corner"),
-                rust_layout!(Corner { high, padding, low, padding_2 })
+                rust_layout!(Corner { high, back_is_covered, low, padding })
             );
         }
         assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));

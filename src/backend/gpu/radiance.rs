@@ -109,8 +109,7 @@ impl Radiance {
     /// For images of `size`.
     pub fn new(memory: &Memory, drawn: DrawnScene, size: TargetSize) -> Result<Radiance, Error> {
         let (draws, lights) = drawn.draws();
-        let corners = draws.iter().flat_map(|&t| drawn.scene.corners(t as usize));
-        let corners = drawn.coordinates.corners(corners);
+        let corners = drawn.coordinates.corners(drawn.scene, &draws);
         let triangles: Vec<_> = draws.iter().map(|&t| drawn.triangle(t)).collect();
         let device = &memory.device;
         let views = u64::from(size.batch * (5 + size.tiles)) * size_of::<RadianceView>() as u64;

@@ -106,8 +106,7 @@ impl HemicubeRows {
         let coordinates = SplitFloat::new(mesh.scene());
         let (table, draw_list) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
         let order = &draw_list.order;
-        let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
-        let corners = coordinates.corners(corners);
+        let corners = coordinates.corners(mesh.scene(), order);
         let triangles: Vec<_> = order.iter().map(|&t| table.triangles[t as usize]).collect();
         let batches = gpu.retry_with_smaller_batches(preferred_batch, |memory, hemicubes| {
             let item_buffer = ItemBuffer::new(&memory, &corners, &triangles, hemicubes)?;

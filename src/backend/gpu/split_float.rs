@@ -34,13 +34,17 @@ impl SplitFloat {
         [high.to_array(), (p - high.as_dvec3()).as_vec3().to_array()]
     }
 
-    /// Corners one after the other, as `item_buffer.wgsl` and `radiance.wgsl` read them.
-    pub fn corners(&self, corners: impl Iterator<Item = DVec3>) -> Vec<Corner> {
-        let corner = |p| {
-            let [high, low] = self.parts(p);
-            Corner { high, padding: 0, low, padding_2: 0 }
+    /// Corners of `triangles` of `scene` one after the other, as `item_buffer.wgsl` and
+    /// `radiance.wgsl` read them.
+    pub fn corners(&self, scene: &Scene, triangles: &[u32]) -> Vec<Corner> {
+        let corners = |&t: &u32| {
+            let back_is_covered = scene.is_back_covered(t as usize).into();
+            scene.corners(t as usize).map(|p| {
+                let [high, low] = self.parts(p);
+                Corner { high, back_is_covered, low, padding: 0 }
+            })
         };
-        corners.map(corner).collect()
+        triangles.iter().flat_map(corners).collect()
     }
 
     /// A length.

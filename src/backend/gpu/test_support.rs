@@ -60,8 +60,8 @@ pub fn textured_scene() -> Mesh {
 }
 
 /// A floor in quadtrees of uneven depth, and around it: a ceiling, a wall that reaches below the
-/// horizon and behind the eye, a triangle that shows its back, and two lights with something in
-/// front of the first.
+/// horizon and behind the eye, a triangle that shows its back, one that has a front on either
+/// side, and two lights with something in front of the first.
 pub fn scene() -> Mesh {
     let triangles = [
         ([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0),
@@ -71,6 +71,8 @@ pub fn scene() -> Mesh {
         ([[0.4, 0.3, 1.0], [0.5, 0.9, 1.05], [1.0, 0.4, 0.95]], 1),
         ([[0.5, 0.45, 0.6], [0.55, 0.7, 0.62], [0.8, 0.5, 0.58]], 0),
         ([[1.8, 1.6, 0.9], [1.5, 1.9, 0.5], [1.9, 1.9, 0.6]], 2),
+        ([[1.2, 0.1, 0.4], [1.6, 0.5, 0.5], [1.5, 0.1, 0.9]], 0),
+        ([[1.2, 0.1, 0.4], [1.5, 0.1, 0.9], [1.6, 0.5, 0.5]], 0),
     ];
     let positions = triangles.iter().flat_map(|t| t.0.map(DVec3::from_array)).collect();
     let triangles = (0..).zip(triangles).map(|(t, (_, material))| Triangle {

@@ -119,8 +119,7 @@ fn compare(mesh: &Mesh) {
         let drawn = gather.drawn_scene(mesh.scene());
         let (draws, of_lights) = drawn.draws();
         let triangles: Vec<_> = draws.iter().map(|&t| drawn.triangle(t)).collect();
-        let positions = draws.iter().flat_map(|&t| mesh.scene().corners(t as usize));
-        let positions = gather.coordinates.corners(positions);
+        let positions = gather.coordinates.corners(mesh.scene(), &draws);
         let (lattices, nodes) = quadtrees(mesh);
         let twin = radiance::Radiance {
             corners: &positions,

@@ -32,8 +32,7 @@ fn item_buffer_and_reduce_equal_their_twins() {
         let patches = [(mesh.element(0), 0.3), (mesh.element(2), 1.1), (mesh.root(1), 0.7)];
         rows.draw_batch(&mesh, &patches, 0).unwrap();
         let order = &rows.draw_list.order;
-        let corners = order.iter().flat_map(|&t| mesh.scene().corners(t as usize));
-        let corners = rows.coordinates.corners(corners);
+        let corners = rows.coordinates.corners(mesh.scene(), order);
         let triangles: Vec<_> = order.iter().map(|&t| table.triangles[t as usize]).collect();
         let twin = item_buffer::ItemBuffer { corners: &corners, triangles: &triangles };
         let slots = rows.slots;

@@ -1,0 +1,210 @@
+//! Backs that nobody can see, because fronts lie in the same place.
+//!
+//! Where a file has a surface once for each side, two fronts lie in one plane and face opposite
+//! ways. Each is the other's back: what comes from a side meets that side's front.
+//!
+//! ```text
+//!     \   ray               front of t     ┐ the same place: of both
+//!   ───▼──────────── t ─── back of s       ┘ the ray meets t
+//!   ──────────────── s ─── back of t
+//!                           front of s
+//! ```
+
+use glam::DVec3;
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+
+use super::{Scene, longest_edge};
+use crate::geometry::polygon::{polygon_area, polygon_difference};
+use crate::geometry::weld::Weld;
+
+/// Fronts lie in the same place as a triangle up to this distance, in units of the longer of their
+/// longest edges: well above what a file's six digits leave of a flat polygon.
+const SAME_PLACE: f64 = 1e-4;
+
+/// They face the opposite way up to a cosine of this: some 1e-3 radians, the same of edges ten times
+/// shorter.
+const OPPOSITE_COSINE: f64 = -1.0 + 5e-7;
+
+/// Share of a triangle's area that may stay open where it counts as covered: what rounding leaves
+/// of slivers between outlines.
+const OPEN_SHARE: f64 = 1e-6;
+
+/// Corners at which more triangles meet are passed over, and so many are looked at for one
+/// triangle: thousands that meet in a point would each look at all of them. Chosen by hand.
+const MAX_TRIANGLES: usize = 256;
+
+/// For each triangle of `scene`, whether all of its back is covered by the fronts of others that
+/// share corners with it, or with others that do; empty where none is.
+pub(super) fn covered_backs(scene: &Scene) -> Vec<bool> {
+    let count = scene.triangles().len();
+    let mut weld = Weld::default();
+    let corners: Vec<[u32; 3]> =
+        (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
+    let mut first = vec![0u32; weld.positions.len() + 1];
+    for &v in corners.as_flattened() {
+        first[v as usize + 1] += 1;
+    }
+    for v in 1..first.len() {
+        first[v] += first[v - 1];
+    }
+    let mut meeting = vec![0u32; 3 * count];
+    let mut next = first.clone();
+    for (t, corners) in (0..).zip(&corners) {
+        for &v in corners {
+            meeting[next[v as usize] as usize] = t;
+            next[v as usize] += 1;
+        }
+    }
+    let surfaces = Surfaces { scene, corners, first, meeting };
+    let covered: Vec<bool> = (0..count).into_par_iter().map(|t| surfaces.is_covered(t)).collect();
+    if covered.contains(&true) { covered } else { vec![] }
+}
+
+/// Triangles by the positions of their corners.
+struct Surfaces<'a> {
+    scene: &'a Scene,
+    /// Per triangle, the positions of its corners by number.
+    corners: Vec<[u32; 3]>,
+    /// Where the triangles that meet at each position begin in `meeting`.
+    first: Vec<u32>,
+    meeting: Vec<u32>,
+}
+
+impl Surfaces<'_> {
+    fn meeting_at(&self, v: u32) -> &[u32] {
+        let v = v as usize;
+        let meeting = &self.meeting[self.first[v] as usize..self.first[v + 1] as usize];
+        if meeting.len() > MAX_TRIANGLES { &[] } else { meeting }
+    }
+
+    /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards.
+    fn is_covered(&self, t: usize) -> bool {
+        let corners = self.scene.corners(t);
+        let area = self.scene.area(t);
+        let mut open = vec![corners.to_vec()];
+        let mut known: FxHashSet<u32> = FxHashSet::default();
+        let mut queue: Vec<u32> = self.corners[t].to_vec();
+        let mut k = 0;
+        while k < queue.len() && known.len() < MAX_TRIANGLES {
+            for &s in self.meeting_at(queue[k]) {
+                let Some(cover) = self.cover(t, s as usize).filter(|_| known.insert(s)) else {
+                    continue;
+                };
+                let parts = open.len();
+                let taken_off =
+                    |part: &Vec<DVec3>| polygon_difference(part, &cover, -self.scene.normal(t));
+                let left: Vec<Vec<DVec3>> = open.iter().flat_map(taken_off).collect();
+                // Only what covers some of it leads on.
+                if left.len() != parts || left.iter().zip(&open).any(|(a, b)| a != b) {
+                    let further = self.corners[s as usize];
+                    queue.extend(further.iter().filter(|v| !self.corners[t].contains(v)));
+                    open = left;
+                }
+            }
+            if open.iter().map(|part| polygon_area(part)).sum::<f64>() <= OPEN_SHARE * area {
+                return true;
+            }
+            k += 1;
+        }
+        false
+    }
+
+    /// Triangle `s` in the plane of triangle `t`, if it lies there and faces the other way.
+    fn cover(&self, t: usize, s: usize) -> Option<[DVec3; 3]> {
+        let normal = self.scene.normal(t);
+        if normal.dot(self.scene.normal(s)) > OPPOSITE_COSINE {
+            return None;
+        }
+        let (corners, of_s) = (self.scene.corners(t), self.scene.corners(s));
+        let height = |p: DVec3| normal.dot(p - corners[0]);
+        let reach = SAME_PLACE * longest_edge(corners).max(longest_edge(of_s));
+        let in_plane = of_s.iter().all(|&p| height(p).abs() <= reach);
+        in_plane.then(|| of_s.map(|p| p - height(p) * normal))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Triangle};
+
+    /// Which backs of these triangles are covered.
+    fn covered(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<bool> {
+        let triangles: Vec<Triangle> =
+            triangles.iter().map(|&corners| Triangle { corners, ..Default::default() }).collect();
+        let material = Material::grey("m", 0.5);
+        let count = triangles.len();
+        let scene = Scene::new(positions.to_vec(), triangles, vec!["g".into()], vec![material]);
+        let scene = scene.unwrap();
+        (0..count).map(|t| scene.is_back_covered(t)).collect()
+    }
+
+    /// Corners of a regular polygon in a skew plane, as a file with six digits has them.
+    fn polygon(corners: u32) -> Vec<DVec3> {
+        let [x, y] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
+        let corner = |k: u32| {
+            let (sin, cos) = (f64::from(k) / f64::from(corners) * std::f64::consts::TAU).sin_cos();
+            ((3.0 * cos * x + 2.0 * sin * y + 7.0) * 1e6).round() / 1e6
+        };
+        (0..corners).map(corner).collect()
+    }
+
+    fn fan(corners: u32, first: u32) -> impl Iterator<Item = [u32; 3]> {
+        (1..corners - 1).map(move |k| [0, k, k + 1].map(|v| (v + first) % corners))
+    }
+
+    fn reversed([a, b, c]: [u32; 3]) -> [u32; 3] {
+        [c, b, a]
+    }
+
+    #[test]
+    fn surfaces_that_a_file_has_for_each_side_are_covered() {
+        for corners in [3, 4, 5, 12, 40] {
+            for first in [0, 1, corners / 2] {
+                let front: Vec<[u32; 3]> = fan(corners, 0).collect();
+                let both: Vec<_> =
+                    front.iter().copied().chain(fan(corners, first).map(reversed)).collect();
+                let found = covered(&polygon(corners), &both);
+                assert!(found.iter().all(|&c| c), "{corners} from {first}: {found:?}");
+                assert!(!covered(&polygon(corners), &front).contains(&true));
+                // Twice the same way round: no front behind any of them.
+                let twice = [&front[..], &front[..]].concat();
+                assert!(!covered(&polygon(corners), &twice).contains(&true));
+            }
+        }
+    }
+
+    #[test]
+    fn a_back_that_is_open_somewhere_is_not_covered() {
+        // A quad, and behind it one of the triangles of its other diagonal: that one is covered,
+        // and of the quad neither triangle is.
+        let found = covered(&polygon(4), &[[0, 1, 2], [0, 2, 3], [3, 1, 0]]);
+        assert_eq!(found, [false, false, true]);
+    }
+
+    #[test]
+    fn bodies_are_not_covered_however_thin() {
+        // A plate whose other face lies a millionth of its size behind: it has corners of its own.
+        let back = |p: &DVec3| *p - 3e-6 * DVec3::new(-0.64, -0.6, 0.48);
+        let front = polygon(4);
+        let positions = [&front[..], &front.iter().map(back).collect::<Vec<_>>()].concat();
+        let faces: Vec<[u32; 3]> =
+            fan(4, 0).chain(fan(4, 0).map(|t| reversed(t).map(|v| v + 4))).collect();
+        assert!(!covered(&positions, &faces).contains(&true));
+    }
+
+    #[test]
+    fn crowds_of_triangles_at_a_corner_take_no_quadratic_time() {
+        // A disc of a hundred thousand triangles around its middle, for each side: each looks at
+        // the few that meet at the rim. All pairs would be ten thousand million.
+        let corners = 100_000;
+        let mut positions = polygon(corners);
+        positions.push(DVec3::splat(7.0));
+        let slice = |k: u32| [corners, k, (k + 1) % corners];
+        let both: Vec<_> = (0..corners).flat_map(|k| [slice(k), reversed(slice(k))]).collect();
+        let found = covered(&positions, &both);
+        let open = found.iter().filter(|&&covered| !covered).count();
+        assert!(open == 0, "{open}");
+    }
+}
