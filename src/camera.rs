@@ -22,6 +22,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
+use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -187,6 +188,21 @@ impl PrimaryRays<'_> {
             samples,
             weight,
         })
+    }
+
+    /// The same for the surface of `light`, which knows what its backs are covered by.
+    fn of_light<'a>(
+        camera: &Camera,
+        light: &'a GatheredMesh,
+        width: u32,
+        height: u32,
+        samples: u32,
+    ) -> Result<PrimaryRays<'a>, Error> {
+        let rays = PrimaryRays::new(camera, &light.surface, width, height, samples)?;
+        let GatheredMesh { mesh, surface, .. } = light;
+        let triangle = |face: usize| mesh.triangle(mesh.element(surface.elements[face] as usize));
+        let covered = |face| mesh.scene().is_back_covered(triangle(face));
+        Ok(PrimaryRays { scene: rays.scene.with_covered_backs(covered), ..rays })
     }
 
     /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.

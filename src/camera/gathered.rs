@@ -60,7 +60,7 @@ impl Camera {
         samples: u32,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
         let bands = rays.bands(width * height, RAYS_PER_BAND);
         let view = GatheredView::new(LitSurface { rays, light });
         let field = light.radiosity_field();

@@ -28,7 +28,7 @@ impl Camera {
         samples: u32,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let rays = PrimaryRays::new(self, &light.surface, width, height, samples)?;
+        let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
         let count = width * height;
         let bands = rays.bands(count, RAYS_PER_BAND);
         let lit = LitSurface { rays, light };

@@ -25,7 +25,7 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
-use images::{Images, before_image, mean_radiosity};
+use images::{Images, irradiance, mean_radiosity};
 use primitives::{Primitive, primitives};
 
 /// Writes `light` as glTF 2.0 binary, `.glb`: the same bytes for the same light.
@@ -39,9 +39,9 @@ use primitives::{Primitive, primitives};
 /// In a scene with textures, vertices whose corners have texture coordinates in the file have
 /// `TEXCOORD_0`, after `-s` and `-o`, and `_IRRADIANCE` (W/m² per channel, linear), which a
 /// program multiplies with a texture of reflectance; `_RADIOSITY` has its mean around each vertex.
-/// The image of `map_Ke`, else of `map_Kd`, is in the file as PNG, as the colour of the material:
-/// viewers multiply it with `COLOR_0`, which is divided by its mean over the material, so that the
-/// image takes part in the tone curve by its mean alone.
+/// The file has an image for each material with `map_Ke`, else `map_Kd`, as its colour (PNG): the
+/// texture as `tone` shows it under the median light on that material. Viewers multiply it with
+/// `COLOR_0`, which is how much brighter or darker the light at a vertex shows the texture's mean.
 ///
 /// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF means
 /// metres with +y up: nothing is turned or scaled. A scene that lies more than 16 of its sizes from
@@ -145,7 +145,7 @@ impl Model<'_> {
         let far = reach > FAR_AWAY * bounds.longest_side();
         let origin = if far { bounds.centre().as_vec3() } else { Vec3::ZERO };
         let primitives = primitives(light);
-        let images = Images::of(&primitives)?;
+        let images = Images::new(light, tone, &primitives)?;
         Ok(Model { light, tone, primitives, images, origin })
     }
 
@@ -190,8 +190,8 @@ impl Model<'_> {
         for &v in self.primitives.iter().flat_map(|primitive| primitive.faces.as_flattened()) {
             out.write_all(&v.to_le_bytes())?;
         }
-        for image in &self.images.encoded {
-            out.write_all(image)?;
+        for image in self.images.iter() {
+            out.write_all(&image.png)?;
         }
         let padding = self.binary_length() - self.geometry_length() - self.images.length();
         out.write_all(&[0; 4][..padding as usize])
@@ -201,18 +201,20 @@ impl Model<'_> {
     fn value(&self, attribute: Attribute, primitive: &Primitive<'_>, k: usize) -> Vec3 {
         let (surface, v) = (&self.light.surface, primitive.vertices[k] as usize);
         let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3();
-        let irradiance = || surface.irradiance.get(v).copied().unwrap_or(Rgb::ZERO);
+        let irradiance = || irradiance(self.light, primitive.vertices[k]);
         match attribute {
             Attribute::Position => (surface.positions[v] - self.origin.as_dvec3()).as_vec3(),
             // glTF allows no other length than 1.
             Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
             Attribute::Colour => {
-                let Some(map) = primitive.map else {
+                let Some(image) =
+                    self.images.get(primitive.material).filter(|_| primitive.shown.is_some())
+                else {
                     return self.tone.linear(surface.radiosity[v]).as_vec3();
                 };
                 let material = &self.light.mesh.scene().materials()[primitive.material as usize];
                 let colour = self.tone.linear(mean_radiosity(material, irradiance()));
-                before_image(map, colour).as_vec3()
+                image.vertex_colour(colour).as_vec3()
             }
             Attribute::Radiosity => light(surface.radiosity[v]),
             Attribute::Irradiance => light(irradiance()),

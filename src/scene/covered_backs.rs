@@ -22,10 +22,6 @@ use crate::geometry::weld::Weld;
 /// longest edges: well above what a file's six digits leave of a flat polygon.
 const SAME_PLACE: f64 = 1e-4;
 
-/// They face the opposite way up to a cosine of this: some 1e-3 radians, the same of edges ten times
-/// shorter.
-const OPPOSITE_COSINE: f64 = -1.0 + 5e-7;
-
 /// Share of a triangle's area that may stay open where it counts as covered: what rounding leaves
 /// of slivers between outlines.
 const OPEN_SHARE: f64 = 1e-6;
@@ -113,7 +109,7 @@ impl Surfaces<'_> {
     /// Triangle `s` in the plane of triangle `t`, if it lies there and faces the other way.
     fn cover(&self, t: usize, s: usize) -> Option<[DVec3; 3]> {
         let normal = self.scene.normal(t);
-        if normal.dot(self.scene.normal(s)) > OPPOSITE_COSINE {
+        if normal.dot(self.scene.normal(s)) >= 0.0 {
             return None;
         }
         let (corners, of_s) = (self.scene.corners(t), self.scene.corners(s));
@@ -127,7 +123,7 @@ impl Surfaces<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Material, Triangle};
+    use crate::scene::{Material, Piece, Triangle};
 
     /// Which backs of these triangles are covered.
     fn covered(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<bool> {
@@ -192,6 +188,25 @@ mod tests {
         let faces: Vec<[u32; 3]> =
             fan(4, 0).chain(fan(4, 0).map(|t| reversed(t).map(|v| v + 4))).collect();
         assert!(!covered(&positions, &faces).contains(&true));
+    }
+
+    #[test]
+    fn pieces_are_covered_as_their_triangles() {
+        let both: Vec<[u32; 3]> = fan(4, 0).chain(fan(4, 0).map(reversed)).collect();
+        let triangles =
+            both.iter().map(|&corners| Triangle { corners, ..Default::default() }).collect();
+        let material = Material::grey("m", 0.5);
+        let scene = Scene::new(polygon(4), triangles, vec!["g".into()], vec![material]).unwrap();
+        // The first is halved, and what lies behind it is not.
+        let [a, b, c] = scene.corners(0);
+        let half = |corners, weights| Piece { corners, weights, cut: [false; 3] };
+        let halves = vec![
+            half([a, b, b.midpoint(c)], [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]]),
+            half([a, b.midpoint(c), c], [[0.0, 0.0], [0.5, 0.5], [0.0, 1.0]]),
+        ];
+        let whole = (1..4).map(|t| vec![Piece::whole(scene.corners(t))]);
+        let cut = scene.cut([halves].into_iter().chain(whole).collect());
+        assert!((0..5).all(|t| cut.is_back_covered(t)));
     }
 
     #[test]

@@ -65,9 +65,9 @@ impl Texture {
         [self.width, self.height]
     }
 
-    /// All texels, rows from the top, as sRGB.
-    pub fn texels(&self) -> &[[u8; 3]] {
-        &self.texels
+    /// Linear colours of all texels, rows from the top.
+    pub fn linear_texels(&self) -> impl Iterator<Item = Rgb> {
+        self.texels.iter().map(|texel| Rgb::from_array(texel.map(|s| linear()[s as usize])))
     }
 
     /// Linear mean of all texels.

@@ -82,13 +82,18 @@ impl RayScene {
         RayScene { bvh, triangles, origin, scale }
     }
 
+    /// The same, where nothing meets the backs of triangles that are `covered`.
+    pub fn with_covered_backs(mut self, covered: impl Fn(usize) -> bool) -> RayScene {
+        for (t, plane) in self.triangles.iter_mut().enumerate() {
+            plane.back_is_covered = covered(t);
+        }
+        self
+    }
+
     /// For the triangles of `scene`, by their numbers.
     pub fn of_scene(scene: &Scene) -> RayScene {
-        let mut rays = RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)));
-        for (t, plane) in rays.triangles.iter_mut().enumerate() {
-            plane.back_is_covered = scene.is_back_covered(t);
-        }
-        rays
+        RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)))
+            .with_covered_backs(|t| scene.is_back_covered(t))
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and

@@ -1,15 +1,19 @@
 //! Surfaces that a scene has once for each side, in one place: whoever looks sees a front.
 
+use std::f64::consts::PI;
+
+use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::HemicubeGather;
 use radiosity::mesh::NodeId;
 use radiosity::{
-    Backend, BakeTarget, FormFactors, Gather, HemicubeRows, Material, Mesh, RayRows, Rgb, Scene,
+    Backend, BakeTarget, Camera, FormFactors, Gather, GatheredMesh, HemicubeRows, Material, Mesh,
+    RayRows, Rgb, Scene,
 };
 
 use crate::common::fakes::GivenRadiosity;
 use crate::common::scenes::{facing_up, grey, lamp, walls};
-use crate::common::{gpu, keep_going, quads};
+use crate::common::{gpu, keep_counting, keep_going, quads};
 
 /// A table leaf in a closed room with this ceiling: once for each side, `apart` from one another, the
 /// lower one cut along the other diagonal.
@@ -55,6 +59,20 @@ fn hemicubes_draw_fronts() {
     let (light, gpu) = (even_light(), gpu());
     check_rows(HemicubeRows::new(&gpu, &light.mesh, 64).unwrap(), &light.mesh);
     check_gather(HemicubeGather::new(&gpu, &light.mesh, 64).unwrap(), &light);
+}
+
+#[test]
+fn pictures_show_fronts() {
+    let mesh = Mesh::new(room(0.0, grey()), 0.1).unwrap();
+    let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]).unwrap();
+    // From above the leaf, and from below it.
+    for z in [0.9, 0.1] {
+        let (eye, target) = (DVec3::new(0.1, 0.2, z), DVec3::new(0.5, 0.5, 0.4));
+        let camera = Camera { eye, target, up: DVec3::Z, vertical_fov: 60.0 };
+        let image = camera.interpolated_image(&light, 64, 64, 1, keep_counting).unwrap().unwrap();
+        let even = |pixel: &Rgb| pixel.abs_diff_eq(Rgb::splat(1.0 / PI), 1e-9);
+        assert!(image.pixels.iter().all(even), "from {z}");
+    }
 }
 
 /// The same light as where the two sides are a hundred-thousandth of the room apart.

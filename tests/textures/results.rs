@@ -1,6 +1,10 @@
 //! What results of textured scenes say: files, and how far off they are.
 
+use std::f64::consts::PI;
+
 use gltf::mesh::Semantic;
+use gltf::texture::WrappingMode;
+use radiosity::glam::{DVec3, Vec3};
 use radiosity::io::ToneCurve;
 use radiosity::verify::{Settings, verify};
 use radiosity::{
@@ -109,24 +113,33 @@ fn texture_of<'a>(primitive: &gltf::Primitive<'a>) -> Option<gltf::Texture<'a>> 
     colour.map(|info| info.texture())
 }
 
-/// The image is in the file as it was read, and what viewers make of it and of `COLOR_0` has the
-/// tone of the light where the image has its mean: of light that is reflected, and of a lamp's.
+/// What viewers make of the image and of `COLOR_0` is the tone of the texture under the light, in
+/// the median light and, of the mean, in any other: of light that is reflected, and of a lamp's.
 #[test]
-fn glb_shows_textures_with_the_light_on_them() {
-    // Of sRGB 128, linear 0.2159 (IEC 61966-2-1), and white; the file doubles and shifts them.
+fn glb_shows_textures_in_the_light_on_them() {
+    // Of sRGB 128, linear 0.2158605 (IEC 61966-2-1), and white.
     let texels = [[128; 3], [255; 3]];
-    for (maps, reflected, emitted) in [
-        ("map_Kd -s 2 1 -o 0.25 0.5 -clamp on a.tga", [0.3, 0.4, 0.5], [0.0; 3]),
-        ("map_Kd a.tga", [0.3, 0.4, 0.5], [0.0; 3]),
-        ("Ke 3 2 1\nmap_Ke a.tga", [0.3, 0.4, 0.5], [3.0, 2.0, 1.0]),
+    let linear = [Rgb::splat(0.2158605), Rgb::ONE];
+    let reflectance = Rgb::new(0.3, 0.4, 0.5);
+    for (maps, emitted, clamped) in [
+        // The image is doubled and shifted.
+        ("map_Kd -s 2 1 -o 0.25 0.5 -clamp on a.tga", Rgb::ZERO, true),
+        ("map_Kd a.tga", Rgb::ZERO, false),
+        ("Ke 3 2 1\nmap_Ke a.tga", PI * Rgb::new(3.0, 2.0, 1.0), false),
     ] {
         let map = format!("newmtl wall\nKd 0.3 0.4 0.5\n{maps}");
-        let scene = box_with_wall(&map, &tga(2, &texels));
-        let mesh = Mesh::new(scene, 0.3).unwrap();
-        let irradiance = 2.0;
-        let element = |e| mesh.exitance(e) + irradiance * mesh.reflectance(e);
+        let mesh = Mesh::new(box_with_wall(&map, &tga(2, &texels)), 0.3).unwrap();
+        let wall = mesh.scene().materials().iter().find(|m| m.name == "wall").unwrap();
+        // Lit more to the top, which is at z = 1.
+        let irradiance = |p: DVec3| 1.0 + p.z;
+        let element = |e| {
+            let light = irradiance(mesh.centroid(mesh.element(e)));
+            mesh.exitance(e) + light * mesh.reflectance(e)
+        };
         let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(element).collect();
-        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        let mut light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        let known = light.surface.positions.iter().map(|&p| Rgb::splat(irradiance(p)));
+        light.surface.irradiance = known.collect();
         let tone = ToneCurve::fit(&light.surface.radiosity);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.glb");
@@ -135,22 +148,17 @@ fn glb_shows_textures_with_the_light_on_them() {
         let document = gltf::Gltf::from_slice(&bytes).unwrap().document;
         let binary = gltf::Glb::from_slice(&bytes).unwrap().bin.unwrap();
         assert_eq!(document.buffers().next().unwrap().length(), binary.len());
-        assert_eq!(image_of(&document, &binary).into_raw(), texels.as_flattened());
+        let image: Vec<[u8; 3]> =
+            image_of(&document, &binary).pixels().map(|pixel| pixel.0).collect();
 
         let is_wall = |p: &gltf::Primitive<'_>| p.material().name() == Some("wall");
         let primitives: Vec<_> = document.meshes().flat_map(|mesh| mesh.primitives()).collect();
         assert!(primitives.iter().all(|p| texture_of(p).is_some() == is_wall(p)));
-        let wall = primitives.into_iter().find(is_wall).unwrap();
-        let clamped = maps.contains("-clamp");
-        let wrapped = if clamped {
-            gltf::texture::WrappingMode::ClampToEdge
-        } else {
-            gltf::texture::WrappingMode::Repeat
-        };
-        let sampler = texture_of(&wall).unwrap().sampler();
+        let primitive = primitives.into_iter().find(is_wall).unwrap();
+        let sampler = texture_of(&primitive).unwrap().sampler();
+        let wrapped = if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat };
         assert_eq!([sampler.wrap_s(), sampler.wrap_t()], [wrapped; 2]);
-
-        let reader = wall.reader(|_| Some(&binary));
+        let reader = primitive.reader(|_| Some(&binary));
         let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
         let places: Vec<[f32; 2]> = reader.read_tex_coords(0).unwrap().into_f32().collect();
         let [scale, offset] =
@@ -159,23 +167,44 @@ fn glb_shows_textures_with_the_light_on_them() {
             let wanted = [p[1] * scale[0] + offset[0], 1.0 - (p[2] * scale[1] + offset[1])];
             assert!((0..2).all(|k| (place[k] - wanted[k]).abs() < 1e-6), "{p:?}: {place:?}");
         }
-        // The mean of both texels, where the image is not cut off; else what the scene says.
-        let mean = match clamped {
-            false => Rgb::splat((0.2158605 + 1.0) / 2.0),
-            true => {
-                mesh.scene().materials().iter().find(|m| m.name == "wall").unwrap().reflectance
-                    / Rgb::from(reflected)
-            }
-        };
-        let is_textured = if maps.contains("Kd") { mean } else { Rgb::ONE };
-        let exitance = std::f64::consts::PI * mean * Rgb::from(emitted);
-        let wanted = tone.linear(exitance + irradiance * is_textured * Rgb::from(reflected));
-        let colours = reader.read_colors(0).unwrap().into_rgb_f32();
-        for colour in colours.map(|c| Rgb::from(c.map(f64::from))) {
+        let colours: Vec<Rgb> = reader
+            .read_colors(0)
+            .unwrap()
+            .into_rgb_f32()
+            .map(|c| Rgb::from(c.map(f64::from)))
+            .collect();
+        // The light in the middle is the median's.
+        let light_at = |p: &[f32; 3]| irradiance(Vec3::from(*p).as_dvec3());
+        let middle = positions.iter().position(|p| (p[2] - 0.5).abs() < 1e-6).unwrap();
+        for (shown, texel) in image.iter().zip(linear) {
+            let radiosity = if emitted == Rgb::ZERO {
+                1.5 * reflectance * texel
+            } else {
+                emitted * texel + 1.5 * wall.reflectance
+            };
+            let wanted = tone.linear(radiosity);
+            // A channel of an image is off by half a step at most; the lightest, where sRGB is
+            // steepest, is 2.4 / 1.055 / 255 = 0.009 wide.
+            let found = colours[middle] * linear_of(*shown);
+            assert!(found.abs_diff_eq(wanted, 0.0045), "{found}, not {wanted}: {maps}");
+        }
+        for (p, colour) in positions.iter().zip(&colours) {
+            let mean = |light: f64| tone.linear(wall.exitance + light * wall.reflectance);
+            let wanted = mean(light_at(p)) / mean(1.5);
             // Numbers of 24 bits; glTF has no colour above 1.
-            assert!(colour.abs_diff_eq((wanted / mean).min(Rgb::ONE), 1e-6), "{colour} {wanted}");
+            let wanted = (colours[middle] * wanted).min(Rgb::ONE);
+            assert!(colour.abs_diff_eq(wanted, 1e-5), "{colour}, not {wanted}: {maps}");
         }
     }
+}
+
+/// Linear colour of sRGB, by IEC 61966-2-1.
+fn linear_of(texel: [u8; 3]) -> Rgb {
+    let linear = |s: u8| match f64::from(s) / 255.0 {
+        x if x <= 0.04045 => x / 12.92,
+        x => ((x + 0.055) / 1.055).powf(2.4),
+    };
+    Rgb::from(texel.map(linear))
 }
 
 #[test]

@@ -17,7 +17,6 @@ use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Sce
 use super::primitives::Primitive;
 use super::{Attribute, INDEX_BYTES, Model};
 use crate::scene::Rgb;
-use crate::scene::texture::TextureMap;
 
 /// The extension that shows a colour as it is.
 const UNLIT: &str = "KHR_materials_unlit";
@@ -68,7 +67,12 @@ impl Model<'_> {
             ("unit", Value::from("that of the scene's file")),
             ("_RADIOSITY", Value::from("W/m2 per channel, linear BT.709")),
             ("COLOR_0", Value::from("_RADIOSITY times exposure, highlights rolled off")),
-            ("images", Value::from("their mean is divided out of COLOR_0")),
+            (
+                "images",
+                Value::from(
+                    "textures in the median light of a material; COLOR_0 is relative to that",
+                ),
+            ),
             ("exposure", Value::from(self.tone.exposure())),
         ]);
         Asset {
@@ -99,15 +103,15 @@ impl Model<'_> {
             add(count * size, Some(Stride(size as usize)), Some(Target::ArrayBuffer));
         }
         add(3 * self.face_count() * INDEX_BYTES, None, Some(Target::ElementArrayBuffer));
-        for image in &self.images.encoded {
-            add(image.len() as u64, None, None);
+        for image in self.images.iter() {
+            add(image.png.len() as u64, None, None);
         }
     }
 
     /// An image for each texture that is shown, in the views after those of the indices.
     fn add_images(&self, root: &mut Root) {
         let first = self.attributes().count() + 1;
-        for k in 0..self.images.encoded.len() {
+        for k in 0..self.images.iter().count() {
             root.push(Image {
                 buffer_view: Some(Index::new((first + k) as u32)),
                 mime_type: Some(MimeType("image/png".into())),
@@ -128,7 +132,7 @@ impl Model<'_> {
             let mut primitives = vec![];
             for primitive in of_group {
                 let material = *materials
-                    .entry((primitive.material, primitive.map.is_some()))
+                    .entry((primitive.material, primitive.shown.is_some()))
                     .or_insert_with(|| {
                         let material = self.material(root, primitive);
                         root.push(material)
@@ -203,7 +207,7 @@ impl Model<'_> {
         Material {
             name: Some(material.name.clone()),
             pbr_metallic_roughness: PbrMetallicRoughness {
-                base_color_texture: primitive.map.and_then(|map| self.texture(root, map)),
+                base_color_texture: self.texture(root, primitive),
                 metallic_factor: gltf_json::material::StrengthFactor(0.0),
                 ..Default::default()
             },
@@ -213,10 +217,10 @@ impl Model<'_> {
         }
     }
 
-    /// The image of `map`, repeated or not, smoothly filtered.
-    fn texture(&self, root: &mut Root, map: &TextureMap) -> Option<Info> {
-        let wrap =
-            Valid(if map.clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
+    /// The image of a primitive, repeated or not, smoothly filtered; none without a texture.
+    fn texture(&self, root: &mut Root, primitive: &Primitive<'_>) -> Option<Info> {
+        let clamped = primitive.shown?.map.clamped;
+        let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
         let sampler = root.push(Sampler {
             mag_filter: Some(Valid(MagFilter::Linear)),
             min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
@@ -226,7 +230,7 @@ impl Model<'_> {
         });
         let texture = root.push(Texture {
             sampler: Some(sampler),
-            source: Index::new(self.images.number(&map.texture)? as u32),
+            source: Index::new(self.images.number(primitive.material)? as u32),
             name: None,
             extensions: None,
             extras: None,

@@ -1,28 +1,135 @@
-//! The images of a glTF file: the texture that a material is shown with, as PNG.
+//! The images of a glTF file: how each textured material looks under the light on it, as PNG.
 //!
-//! A viewer multiplies the image with `COLOR_0`. So that the product is the colour of the light
-//! around a vertex where the image has its mean, `COLOR_0` is that colour divided by the mean.
+//! A viewer multiplies the image with `COLOR_0`, but highlights are rolled off by luminance, after
+//! texture and light have been multiplied. So the image is the texture as the tone curve shows it
+//! under one light, that of the material's median vertex, and `COLOR_0` says how much brighter or
+//! darker the light at a vertex makes the texture's mean: exact at either, close between them.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
-use glam::DVec2;
 use image::ExtendedColorType::Rgb8;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageResult};
+use rayon::prelude::*;
 
 use super::primitives::Primitive;
-use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
+use crate::gather::GatheredMesh;
+use crate::io::tone::{ToneCurve, srgb};
+use crate::scene::texture::{MaterialTextures, TextureMap};
 use crate::scene::{Material, Rgb};
 
-/// The image that a surface is shown with: of the light that it emits, else of what it reflects.
-pub(super) fn shown(textures: &MaterialTextures) -> Option<&TextureMap> {
-    textures.exitance.as_ref().or(textures.reflectance.as_ref())
+/// The texture that a surface is shown with.
+#[derive(Clone, Copy)]
+pub(super) struct Shown<'a> {
+    pub map: &'a TextureMap,
+    /// Whether it is that of the light that is emitted, and not of what is reflected.
+    emits: bool,
 }
 
-/// Texture coordinates of `map`'s image, v downwards as in glTF, at `place` of the scene's file.
-pub(super) fn image_place(map: Option<&TextureMap>, place: DVec2) -> DVec2 {
-    let place = map.map_or(place, |map| place * map.scale + map.offset);
-    DVec2::new(place.x, 1.0 - place.y)
+impl Shown<'_> {
+    /// The texture of what is emitted, else of what is reflected.
+    pub fn of(textures: &MaterialTextures) -> Option<Shown<'_>> {
+        let emitted = textures.exitance.as_ref().map(|map| Shown { map, emits: true });
+        emitted.or(textures.reflectance.as_ref().map(|map| Shown { map, emits: false }))
+    }
+}
+
+/// The images of a file, one for each textured material.
+pub(super) struct Images {
+    of_materials: BTreeMap<u32, Image>,
+}
+
+/// A textured material as it looks under one light.
+pub(super) struct Image {
+    pub png: Vec<u8>,
+    /// What the image is multiplied with to look so: its brightest channel is 1.
+    peak: f64,
+    /// The colour that the material's mean has in that light, linear.
+    mean: Rgb,
+}
+
+impl Images {
+    /// The images of all materials of `primitives` with a texture.
+    ///
+    /// # Errors
+    /// When one cannot be encoded.
+    pub fn new(
+        light: &GatheredMesh,
+        tone: &ToneCurve,
+        primitives: &[Primitive<'_>],
+    ) -> ImageResult<Images> {
+        let mut textured: BTreeMap<u32, (Shown<'_>, Vec<Rgb>)> = BTreeMap::new();
+        for primitive in primitives {
+            let Some(shown) = primitive.shown else { continue };
+            let (_, irradiances) = textured.entry(primitive.material).or_insert((shown, vec![]));
+            irradiances.extend(primitive.vertices.iter().map(|&v| irradiance(light, v)));
+        }
+        let image = |(number, (shown, irradiances)): (u32, (Shown<'_>, Vec<Rgb>))| {
+            let material = &light.mesh.scene().materials()[number as usize];
+            let image = Image::new(material, shown, median(irradiances, material, tone), tone)?;
+            Ok((number, image))
+        };
+        let of_materials = textured.into_iter().map(image).collect::<ImageResult<_>>()?;
+        Ok(Images { of_materials })
+    }
+
+    /// In the order of materials.
+    pub fn iter(&self) -> impl Iterator<Item = &Image> {
+        self.of_materials.values()
+    }
+
+    pub fn get(&self, material: u32) -> Option<&Image> {
+        self.of_materials.get(&material)
+    }
+
+    /// The place of a material's image among all.
+    pub fn number(&self, material: u32) -> Option<usize> {
+        self.of_materials.keys().position(|&known| known == material)
+    }
+
+    /// Bytes of all.
+    pub fn length(&self) -> u64 {
+        self.iter().map(|image| image.png.len() as u64).sum()
+    }
+}
+
+impl Image {
+    fn new(
+        material: &Material,
+        Shown { map, emits }: Shown<'_>,
+        irradiance: Rgb,
+        tone: &ToneCurve,
+    ) -> ImageResult<Image> {
+        let colour = |texel: Rgb| {
+            let scaled = |mean: Rgb| map.scaled(map.factor * texel, mean);
+            tone.linear(if emits {
+                scaled(material.exitance) + material.reflectance * irradiance
+            } else {
+                material.exitance + scaled(material.reflectance) * irradiance
+            })
+        };
+        let colours: Vec<Rgb> = map.texture.linear_texels().map(colour).collect();
+        let peak = colours.iter().fold(0.0, |peak: f64, c| peak.max(c.max_element()));
+        let byte = |c: &Rgb| (*c / if peak > 0.0 { peak } else { 1.0 }).to_array().map(srgb);
+        let bytes: Vec<[u8; 3]> = colours.par_iter().map(byte).collect();
+        let mut png = vec![];
+        let [width, height] = map.texture.size();
+        PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
+            .write_image(bytes.as_flattened(), width, height, Rgb8)?;
+        Ok(Image { png, peak, mean: tone.linear(mean_radiosity(material, irradiance)) })
+    }
+
+    /// `COLOR_0` where light gives the material's mean this `colour`: within [0, 1], as glTF has
+    /// it.
+    pub fn vertex_colour(&self, colour: Rgb) -> Rgb {
+        let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), colour / self.mean, Rgb::ONE);
+        (self.peak * relative).min(Rgb::ONE)
+    }
+}
+
+/// Irradiance of a vertex; 0 where it is not known.
+pub(super) fn irradiance(light: &GatheredMesh, vertex: u32) -> Rgb {
+    light.surface.irradiance.get(vertex as usize).copied().unwrap_or(Rgb::ZERO)
 }
 
 /// Radiosity of a surface that has the means of its material's textures everywhere, W/m².
@@ -30,53 +137,15 @@ pub(super) fn mean_radiosity(material: &Material, irradiance: Rgb) -> Rgb {
     material.exitance + material.reflectance * irradiance
 }
 
-/// What makes `colour` when it is multiplied with the mean of `map`'s image, over the triangles of
-/// its material: in [0, 1], as glTF has it, so that dark images cannot be shown brighter than they
-/// are.
-pub(super) fn before_image(map: &TextureMap, colour: Rgb) -> Rgb {
-    let mean = map.mean / map.factor;
-    // Where the image, or what it is multiplied with, has nothing, any number does.
-    let lit = map.mean.cmpgt(Rgb::ZERO) & map.factor.cmpgt(Rgb::ZERO);
-    Rgb::select(lit, colour / mean, Rgb::ONE).min(Rgb::ONE)
-}
-
-/// The images of all primitives, each once.
-#[derive(Default)]
-pub(super) struct Images {
-    textures: Vec<Arc<Texture>>,
-    /// The same as PNG files.
-    pub encoded: Vec<Vec<u8>>,
-}
-
-impl Images {
-    /// # Errors
-    /// When an image has more bytes than memory has room for.
-    pub fn of(primitives: &[Primitive<'_>]) -> ImageResult<Images> {
-        let mut images = Images::default();
-        for texture in primitives.iter().filter_map(|p| Some(&p.map?.texture)) {
-            if images.number(texture).is_none() {
-                images.encoded.push(encoded(texture)?);
-                images.textures.push(texture.clone());
-            }
-        }
-        Ok(images)
+/// The irradiance whose mean radiosity is shown with the median brightness, of those that are lit;
+/// where none is, one that the curve shows well.
+fn median(mut irradiances: Vec<Rgb>, material: &Material, tone: &ToneCurve) -> Rgb {
+    let brightness = |e: &Rgb| tone.linear(mean_radiosity(material, *e)).element_sum();
+    irradiances.retain(|e| brightness(e) > 0.0);
+    if irradiances.is_empty() {
+        return Rgb::splat(1.0 / tone.exposure());
     }
-
-    pub fn number(&self, texture: &Arc<Texture>) -> Option<usize> {
-        self.textures.iter().position(|known| Arc::ptr_eq(known, texture))
-    }
-
-    /// Bytes of all.
-    pub fn length(&self) -> u64 {
-        self.encoded.iter().map(|image| image.len() as u64).sum()
-    }
-}
-
-fn encoded(texture: &Texture) -> ImageResult<Vec<u8>> {
-    let mut bytes = vec![];
-    let [width, height] = texture.size();
-    let texels = texture.texels().as_flattened();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(texels, width, height, Rgb8)?;
-    Ok(bytes)
+    let middle = irradiances.len() / 2;
+    let order = |a: &Rgb, b: &Rgb| brightness(a).total_cmp(&brightness(b));
+    *irradiances.select_nth_unstable_by(middle, order).1
 }

@@ -5,12 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use rustc_hash::FxHashMap;
 
-use super::images::{image_place, shown};
+use super::images::Shown;
 use crate::gather::GatheredMesh;
-use crate::scene::texture::TextureMap;
 
 /// The faces of one group and one material.
 pub(super) struct Primitive<'a> {
@@ -21,7 +20,7 @@ pub(super) struct Primitive<'a> {
     /// Texture coordinates of each, v downwards; empty where a corner has none.
     pub places: Vec<Vec2>,
     /// The texture that it is shown with, where it has texture coordinates.
-    pub map: Option<&'a TextureMap>,
+    pub shown: Option<Shown<'a>>,
     /// Faces, by the places of their corners in `vertices`.
     pub faces: Vec<[u32; 3]>,
 }
@@ -51,7 +50,7 @@ pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
             let mut vertices = vec![];
             let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
             let faces = faces.iter().map(of_face).collect();
-            Primitive { group, material, vertices, places: vec![], map: None, faces }
+            Primitive { group, material, vertices, places: vec![], shown: None, faces }
         });
     }
     primitives
@@ -91,12 +90,14 @@ fn textured<'a>(
     faces: &[Face],
 ) -> Primitive<'a> {
     let (surface, scene) = (&light.surface, light.mesh.scene());
-    let map = faces.first().and_then(|&(_, t)| shown(scene.textures(t)?));
+    let shown = faces.first().and_then(|&(_, t)| Shown::of(scene.textures(t)?));
     let mut numbers: FxHashMap<(u32, [i64; 2]), u32> = FxHashMap::default();
     let (mut vertices, mut places) = (vec![], vec![]);
     let mut number = |v: u32, t: usize| {
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
-        let place = image_place(map, scene.texture_place(t, barycentric));
+        let place = scene.texture_place(t, barycentric);
+        let place = shown.map_or(place, |Shown { map, .. }| place * map.scale + map.offset);
+        let place = DVec2::new(place.x, 1.0 - place.y);
         let cell = (place / SEAM).round().to_array().map(|x| x as i64);
         *numbers.entry((v, cell)).or_insert_with(|| {
             vertices.push(v);
@@ -105,5 +106,5 @@ fn textured<'a>(
         })
     };
     let faces = faces.iter().map(|(face, t)| face.map(|v| number(v, *t))).collect();
-    Primitive { group, material, vertices, places, map, faces }
+    Primitive { group, material, vertices, places, shown, faces }
 }
