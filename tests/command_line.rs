@@ -10,6 +10,18 @@ fn run(command: &str, args: &[&str]) -> Output {
     program.arg(command).args(args).output().expect("the program starts")
 }
 
+#[test]
+fn output_that_nobody_reads_is_no_failure() {
+    for args in [["--help"], ["--version"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+        let out = program.args(args).stdout(writer).stderr(Stdio::piped()).output().unwrap();
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success() && error.is_empty(), "{args:?}: {error}");
+    }
+}
+
 /// The command fails, prints one error that contains every one of `words`, and writes no PLY.
 fn refused(args: &[&str], words: &[&str]) {
     let out = run("bake", args);

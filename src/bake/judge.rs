@@ -12,7 +12,9 @@
 //! ```
 //!
 //! What is told above the estimate is a part of its own, the *sources*: what the vertices gathered
-//! from. Points and paths are kept for all rounds of a bake.
+//! from. Below it is told only what the paths know better than the estimate, by the standard error
+//! of each as a share of itself: points that have missed what is rare find little, and s with it.
+//! Points and paths are kept for all rounds of a bake.
 
 use std::ops::ControlFlow;
 
@@ -119,7 +121,9 @@ impl ErrorEstimate {
     fn held_against(self, measured: Measured, bias: f64, paths: usize) -> ErrorEstimate {
         let Measured { value, standard_error } = measured;
         let low = (value.powi(2) - (2.0 * standard_error).powi(2) - bias).max(0.0).sqrt();
-        let told = self.total.clamp(low, value + standard_error);
+        let know_more = standard_error * self.total <= self.uncertainty * value;
+        let high = if know_more { value + standard_error } else { f64::INFINITY };
+        let told = self.total.clamp(low, high);
         if told >= self.total {
             let sources = (told.powi(2) - self.total.powi(2)).sqrt();
             let is_open = told == self.total;
@@ -147,7 +151,14 @@ mod tests {
 
     #[test]
     fn estimates_stand_where_paths_leave_them_open() {
-        let parts = ErrorEstimate { total: 0.05, mesh: 0.03, sampling: 0.04, ..Default::default() };
+        let uncertainty = 0.0125;
+        let parts = ErrorEstimate {
+            total: 0.05,
+            uncertainty,
+            mesh: 0.03,
+            sampling: 0.04,
+            ..Default::default()
+        };
         let told = |value, standard_error| {
             let told = parts.held_against(Measured { value, standard_error }, 0.0, 64);
             let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, sources, .. } =
@@ -166,6 +177,9 @@ mod tests {
         // Known to a quarter of itself.
         assert!((told(0.1, 0.025) - 0.1 * 0.75f64.sqrt()).abs() < 1e-15);
         assert_eq!(told(0.02, 0.005), 0.025);
+        // Less than that, where the estimate is known to a quarter of itself too: it stands.
+        assert_eq!(told(0.02, 0.0051), 0.05);
+        assert_eq!(told(0.01, 0.02), 0.05);
         // Known to be no more than the noise of what it is relative to.
         let measured = Measured { value: 0.1, standard_error: 0.0 };
         assert_eq!(parts.held_against(measured, 0.01, 64).total, 0.05);

@@ -32,7 +32,7 @@ impl Stop {
     pub fn report(self, command: &str, usage: &str) -> ExitCode {
         match self {
             Stop::Help => {
-                println!("{usage}");
+                say!("{usage}");
                 ExitCode::SUCCESS
             }
             Stop::Usage(message) => {

@@ -140,7 +140,7 @@ pub enum Gather {
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let report = Bake::parse(parser)?.run()?;
-    println!("{}", report.table());
+    say!("{}", report.table());
     args::end()
 }
 

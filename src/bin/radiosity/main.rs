@@ -11,6 +11,14 @@
 //! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 130 when
 //! Ctrl-C stopped it.
 
+/// Prints a line, also where nobody reads on, as behind `| head`: `println!` panics there.
+macro_rules! say {
+    ($($line:tt)*) => {{
+        use std::io::Write as _;
+        _ = writeln!(std::io::stdout(), $($line)*);
+    }};
+}
+
 mod args;
 mod bake;
 mod interrupt;
@@ -66,7 +74,7 @@ fn command(parser: &mut lexopt::Parser) -> Result<Option<&'static Command>, Stop
     match parser.next()? {
         Some(Long("help") | Short('h')) => Err(Stop::Help),
         Some(Long("version") | Short('V')) => {
-            println!("radiosity {}", env!("CARGO_PKG_VERSION"));
+            say!("radiosity {}", env!("CARGO_PKG_VERSION"));
             Ok(None)
         }
         Some(Value(name)) => {

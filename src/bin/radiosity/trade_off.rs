@@ -102,7 +102,7 @@ const REFERENCE_FINER: f64 = 3.0;
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let options = Options::parse(parser)?;
-    println!("{}", options.run()?.summary());
+    say!("{}", options.run()?.summary());
     args::end()
 }
 

@@ -47,13 +47,13 @@ Radiosity at given points, to judge this instrument itself:
                     radiosity, and \"se\", its standard error, prints how far the paths are off in
                     units of the standard error of both; with --csv writes radiosity and standard
                     error
-  --paths N         paths a point [16384]";
+  --paths N         paths a point [65536]";
 
 /// Groups in the printed table at most.
 const MAX_PRINTED: usize = 20;
 
 /// Paths a point for given points, where no number is asked for.
-const DEFAULT_PATHS: usize = 16384;
+const DEFAULT_PATHS: usize = 65536;
 
 /// What is asked of the command.
 struct Options {
@@ -143,7 +143,7 @@ impl Options {
             What::Points { json, paths } => {
                 let points = Points::read(json)?;
                 let traced = points.trace(&scene, *paths, self.settings.seed, json)?;
-                println!("{}", traced.summary());
+                say!("{}", traced.summary());
                 self.csv.iter().try_for_each(|f| args::write_file(f, traced.csv().as_bytes()))
             }
         }
@@ -162,10 +162,10 @@ impl Options {
             })
         })?;
         let lines = lines(scene, &found, &told);
-        println!("{}", table(&lines));
-        println!("{}", self.end(&found, start.elapsed()));
+        say!("{}", table(&lines));
+        say!("{}", self.end(&found, start.elapsed()));
         if let Some(verdict) = verdict(told.total(), found.error) {
-            println!("{verdict}");
+            say!("{verdict}");
         }
         if let Some(file) = &self.csv {
             args::write_file(file, csv(&lines).as_bytes())?;

@@ -152,7 +152,7 @@ impl Options {
         let start = Instant::now();
         let mut matrix = self.method.matrix(scene)?;
         let seconds = start.elapsed().as_secs_f64();
-        println!("{}: {} groups, {seconds:.3} s", path.display(), matrix.names.len());
+        say!("{}: {} groups, {seconds:.3} s", path.display(), matrix.names.len());
         print_checks(&matrix);
         if self.enforce {
             matrix = enforce(&matrix);
@@ -184,7 +184,7 @@ impl Method {
                 let device = device.open()?;
                 let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
                 let AdapterInfo { name, kind, .. } = device.adapter();
-                println!("{} elements, {name} ({kind})", mesh.element_count());
+                say!("{} elements, {name} ({kind})", mesh.element_count());
                 progress::of_count("elements", |report| {
                     ViewFactors::sampled(&mesh, &mut rows, report)
                 })?
@@ -197,7 +197,7 @@ impl Method {
 /// Makes the matrix keep closure and reciprocity, and prints what that changed.
 fn enforce(matrix: &ViewFactors) -> ViewFactors {
     let (enforced, report) = matrix.enforced();
-    println!(
+    say!(
         "enforced: factors changed by {:.1e} RMS, {:.1e} at most; {} of {} rows closed; \
          closure left {:.1e}",
         report.rms_change,
@@ -227,13 +227,13 @@ fn print_checks(m: &ViewFactors) {
     let checks = m.checks();
     let name = |i: usize| &m.names[i];
     let (r, b) = (checks.reciprocity, checks.bounds);
-    println!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.max);
-    println!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.max);
+    say!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.max);
+    say!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.max);
     if b.max > 0.0 {
         let (from, to) = (name(b.at.0), name(b.at.1));
-        println!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.max);
+        say!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.max);
     } else {
-        println!("bounds: kept");
+        say!("bounds: kept");
     }
     if let Some(&worst) = m.rows_over_unity().first() {
         eprintln!(
@@ -253,16 +253,16 @@ fn print_checks(m: &ViewFactors) {
             m.open[worst].value
         );
     } else {
-        println!("closed: no group sees out");
+        say!("closed: no group sees out");
     }
 }
 
 /// Prints the factors of every group, each with its error.
 fn print_factors(m: &ViewFactors) {
     let width = m.names.iter().map(|n| n.chars().count()).max().unwrap_or(0).max(4);
-    println!("{:>width$} → {:<width$} {:>12} {:>9}", "from", "to", "F", "± error");
+    say!("{:>width$} → {:<width$} {:>12} {:>9}", "from", "to", "F", "± error");
     let line = |from: &str, to: &str, e: Estimate| {
-        println!("{from:>width$} → {to:<width$} {:12.9} {:9.1e}", e.value, e.error);
+        say!("{from:>width$} → {to:<width$} {:12.9} {:9.1e}", e.value, e.error);
     };
     for (i, from) in m.names.iter().enumerate() {
         for f in &m.factors[i] {
