@@ -15,8 +15,8 @@ use crate::common::fakes::GivenRadiosity;
 use crate::common::scenes::{facing_up, grey, lamp, walls};
 use crate::common::{gpu, keep_counting, keep_going, quads};
 
-/// A table leaf in a closed room with this ceiling: once for each side, `apart` from one another, the
-/// lower one cut along the other diagonal.
+/// A table leaf in a closed room with this ceiling: once for each side, `apart` from one another,
+/// the lower one cut along the other diagonal.
 fn room(apart: f64, ceiling: Material) -> Scene {
     let material = |k: usize| if k == 5 { ceiling.clone() } else { grey() };
     let walls =

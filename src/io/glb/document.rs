@@ -54,7 +54,8 @@ impl Model<'_> {
         self.add_images(&mut root);
         let groups = self.add_groups(&mut root);
         let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
-        let top = Node { children: Some(groups), translation, ..Default::default() };
+        let name = Some("scene".into());
+        let top = Node { name, children: Some(groups), translation, ..Default::default() };
         let nodes = vec![root.push(top)];
         let scene = Scene { nodes, name: None, extensions: None, extras: None };
         root.scene = Some(root.push(scene));

@@ -12,27 +12,10 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageResult};
 use rayon::prelude::*;
 
-use super::primitives::Primitive;
+use super::primitives::{Primitive, Shown};
 use crate::gather::GatheredMesh;
 use crate::io::tone::{ToneCurve, srgb};
-use crate::scene::texture::{MaterialTextures, TextureMap};
 use crate::scene::{Material, Rgb};
-
-/// The texture that a surface is shown with.
-#[derive(Clone, Copy)]
-pub(super) struct Shown<'a> {
-    pub map: &'a TextureMap,
-    /// Whether it is that of the light that is emitted, and not of what is reflected.
-    emits: bool,
-}
-
-impl Shown<'_> {
-    /// The texture of what is emitted, else of what is reflected.
-    pub fn of(textures: &MaterialTextures) -> Option<Shown<'_>> {
-        let emitted = textures.exitance.as_ref().map(|map| Shown { map, emits: true });
-        emitted.or(textures.reflectance.as_ref().map(|map| Shown { map, emits: false }))
-    }
-}
 
 /// The images of a file, one for each textured material.
 pub(super) struct Images {

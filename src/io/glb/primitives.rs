@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use glam::{DVec2, Vec2};
 use rustc_hash::FxHashMap;
 
-use super::images::Shown;
 use crate::gather::GatheredMesh;
+use crate::scene::texture::{MaterialTextures, TextureMap};
 
 /// The faces of one group and one material.
 pub(super) struct Primitive<'a> {
@@ -23,6 +23,22 @@ pub(super) struct Primitive<'a> {
     pub shown: Option<Shown<'a>>,
     /// Faces, by the places of their corners in `vertices`.
     pub faces: Vec<[u32; 3]>,
+}
+
+/// The texture that a surface is shown with.
+#[derive(Clone, Copy)]
+pub(super) struct Shown<'a> {
+    pub map: &'a TextureMap,
+    /// Whether it is that of the light that is emitted, and not of what is reflected.
+    pub emits: bool,
+}
+
+impl Shown<'_> {
+    /// The texture of what is emitted, else of what is reflected.
+    pub fn of(textures: &MaterialTextures) -> Option<Shown<'_>> {
+        let emitted = textures.exitance.as_ref().map(|map| Shown { map, emits: true });
+        emitted.or(textures.reflectance.as_ref().map(|map| Shown { map, emits: false }))
+    }
 }
 
 /// A face of the surface, and its triangle of the scene.
