@@ -2,6 +2,7 @@
 
 pub(crate) mod aabb;
 pub(crate) mod bvh;
+pub(crate) mod incidence;
 pub(crate) mod plane;
 pub(crate) mod polygon;
 pub(crate) mod quadrature;

@@ -10,18 +10,6 @@ fn run(command: &str, args: &[&str]) -> Output {
     program.arg(command).args(args).output().expect("the program starts")
 }
 
-#[test]
-fn output_that_nobody_reads_is_no_failure() {
-    for args in [["--help"], ["--version"]] {
-        let (reader, writer) = std::io::pipe().unwrap();
-        drop(reader);
-        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
-        let out = program.args(args).stdout(writer).stderr(Stdio::piped()).output().unwrap();
-        let error = String::from_utf8_lossy(&out.stderr);
-        assert!(out.status.success() && error.is_empty(), "{args:?}: {error}");
-    }
-}
-
 /// The command fails, prints one error that contains every one of `words`, and writes no PLY.
 fn refused(args: &[&str], words: &[&str]) {
     let out = run("bake", args);
@@ -302,6 +290,18 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     wrong(&[args[0], "--points", args[1]], &["lit.ply", "points"]);
     write(folder.path(), "off.json", "{\"points\": [{\"p\": [5, 5, 5], \"n\": [0, 0, 1]}]}");
     wrong(&[args[0], "--points", &place("off.json")], &["off.json: point 1", "no surface"]);
+}
+
+#[test]
+fn output_that_nobody_reads_is_no_failure() {
+    for args in [["--help"], ["--version"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+        let out = program.args(args).stdout(writer).stderr(Stdio::piped()).output().unwrap();
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success() && error.is_empty(), "{args:?}: {error}");
+    }
 }
 
 #[test]

@@ -16,10 +16,10 @@ fn from_eye(corner: Corner, eye: vec3f, eye_low: vec3f) -> vec3f {
 
 // Whether the triangle of corner `index` shows the eye a back that is covered: it is not drawn.
 fn shows_covered_back(index: u32, eye: vec3f, eye_low: vec3f) -> bool {
-    let first = index - index % 3u;
-    if corners[first].back_is_covered == 0u {
+    if corners[index].back_is_covered == 0u {
         return false;
     }
+    let first = index - index % 3u;
     let a = from_eye(corners[first], eye, eye_low);
     let b = from_eye(corners[first + 1u], eye, eye_low);
     let c = from_eye(corners[first + 2u], eye, eye_low);

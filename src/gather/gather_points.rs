@@ -13,6 +13,7 @@
 use glam::DVec3;
 
 use super::{GatherPoint, IrradianceSample};
+use crate::geometry::incidence::Incidence;
 use crate::mesh::Mesh;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::keys::Vertices;
@@ -22,10 +23,8 @@ use crate::visibility::{buried, offset};
 pub(super) struct VertexGatherPoints<'a> {
     mesh: &'a Mesh,
     vertices: &'a Vertices,
-    /// Elements with each vertex on their outline: those of vertex v from `first[v]` to
-    /// `first[v + 1]`.
-    around: Vec<u32>,
-    first: Vec<u32>,
+    /// Elements with each vertex on their outline.
+    around: Incidence,
     /// Unit normals, weighted by area over the elements around a vertex.
     normals: Vec<DVec3>,
     /// Square root of the smallest element's area around each vertex, scene unit.
@@ -52,25 +51,13 @@ impl<'a> VertexGatherPoints<'a> {
     /// For the `vertices` of `mesh`; surfaces nearer than `touching` (scene unit) touch.
     pub fn new(mesh: &'a Mesh, vertices: &'a Vertices, touching: f64) -> VertexGatherPoints<'a> {
         let count = vertices.positions.len();
-        let mut first = vec![0u32; count + 1];
-        for (_, outline) in vertices.outlines.iter() {
-            for &v in outline {
-                first[v as usize + 1] += 1;
-            }
-        }
-        for v in 0..count {
-            first[v + 1] += first[v];
-        }
-        let mut next = first.clone();
-        let mut around = vec![0; first[count] as usize];
+        let around = Incidence::new(count, || vertices.outlines.iter());
         let mut normals = vec![DVec3::ZERO; count];
         let mut sizes = vec![f64::INFINITY; count];
         for (e, outline) in vertices.outlines.iter() {
             let node = mesh.element(e);
             let area = mesh.area(node);
             for v in outline.iter().map(|&v| v as usize) {
-                around[next[v] as usize] = e as u32;
-                next[v] += 1;
                 normals[v] += mesh.normal(node) * area;
                 sizes[v] = sizes[v].min(area.sqrt());
             }
@@ -79,12 +66,11 @@ impl<'a> VertexGatherPoints<'a> {
             *normal = normal.normalize_or(DVec3::Z);
         }
         let offset = SurfaceOffset::new(mesh.scene());
-        VertexGatherPoints { mesh, vertices, around, first, normals, sizes, offset, touching }
+        VertexGatherPoints { mesh, vertices, around, normals, sizes, offset, touching }
     }
 
     fn around(&self, v: u32) -> &[u32] {
-        let v = v as usize;
-        &self.around[self.first[v] as usize..self.first[v + 1] as usize]
+        self.around.at(v)
     }
 
     /// Reflectance of the surface that vertex `v` is on.

@@ -207,9 +207,8 @@ impl Model<'_> {
             // glTF allows no other length than 1.
             Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
             Attribute::Colour => {
-                let Some(image) =
-                    self.images.get(primitive.material).filter(|_| primitive.shown.is_some())
-                else {
+                let image = primitive.shown.and_then(|_| self.images.get(primitive.material));
+                let Some(image) = image else {
                     return self.tone.linear(surface.radiosity[v]).as_vec3();
                 };
                 let material = &self.light.mesh.scene().materials()[primitive.material as usize];

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::{Scene, longest_edge};
+use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::geometry::weld::Weld;
 
@@ -37,22 +38,10 @@ pub(super) fn covered_backs(scene: &Scene) -> Vec<bool> {
     let mut weld = Weld::default();
     let corners: Vec<[u32; 3]> =
         (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
-    let mut first = vec![0u32; weld.positions.len() + 1];
-    for &v in corners.as_flattened() {
-        first[v as usize + 1] += 1;
-    }
-    for v in 1..first.len() {
-        first[v] += first[v - 1];
-    }
-    let mut meeting = vec![0u32; 3 * count];
-    let mut next = first.clone();
-    for (t, corners) in (0..).zip(&corners) {
-        for &v in corners {
-            meeting[next[v as usize] as usize] = t;
-            next[v as usize] += 1;
-        }
-    }
-    let surfaces = Surfaces { scene, corners, first, meeting };
+    let meeting = Incidence::new(weld.positions.len(), || {
+        corners.iter().map(<[u32; 3]>::as_slice).enumerate()
+    });
+    let surfaces = Surfaces { scene, corners, meeting };
     let covered: Vec<bool> = (0..count).into_par_iter().map(|t| surfaces.is_covered(t)).collect();
     if covered.contains(&true) { covered } else { vec![] }
 }
@@ -62,43 +51,38 @@ struct Surfaces<'a> {
     scene: &'a Scene,
     /// Per triangle, the positions of its corners by number.
     corners: Vec<[u32; 3]>,
-    /// Where the triangles that meet at each position begin in `meeting`.
-    first: Vec<u32>,
-    meeting: Vec<u32>,
+    /// The triangles that meet at each position.
+    meeting: Incidence,
 }
 
 impl Surfaces<'_> {
     fn meeting_at(&self, v: u32) -> &[u32] {
-        let v = v as usize;
-        let meeting = &self.meeting[self.first[v] as usize..self.first[v + 1] as usize];
+        let meeting = self.meeting.at(v);
         if meeting.len() > MAX_TRIANGLES { &[] } else { meeting }
     }
 
     /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards.
     fn is_covered(&self, t: usize) -> bool {
-        let corners = self.scene.corners(t);
-        let area = self.scene.area(t);
+        let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
+        let still_open = OPEN_SHARE * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
         let mut known: FxHashSet<u32> = FxHashSet::default();
         let mut queue: Vec<u32> = self.corners[t].to_vec();
         let mut k = 0;
         while k < queue.len() && known.len() < MAX_TRIANGLES {
             for &s in self.meeting_at(queue[k]) {
-                let Some(cover) = self.cover(t, s as usize).filter(|_| known.insert(s)) else {
-                    continue;
-                };
-                let parts = open.len();
-                let taken_off =
-                    |part: &Vec<DVec3>| polygon_difference(part, &cover, -self.scene.normal(t));
+                let cover = self.cover(corners, normal, s as usize);
+                let Some(cover) = cover.filter(|_| known.insert(s)) else { continue };
+                let taken_off = |part: &Vec<DVec3>| polygon_difference(part, &cover, -normal);
                 let left: Vec<Vec<DVec3>> = open.iter().flat_map(taken_off).collect();
                 // Only what covers some of it leads on.
-                if left.len() != parts || left.iter().zip(&open).any(|(a, b)| a != b) {
+                if left != open {
                     let further = self.corners[s as usize];
                     queue.extend(further.iter().filter(|v| !self.corners[t].contains(v)));
                     open = left;
                 }
             }
-            if open.iter().map(|part| polygon_area(part)).sum::<f64>() <= OPEN_SHARE * area {
+            if open.iter().map(|part| polygon_area(part)).sum::<f64>() <= still_open {
                 return true;
             }
             k += 1;
@@ -106,13 +90,13 @@ impl Surfaces<'_> {
         false
     }
 
-    /// Triangle `s` in the plane of triangle `t`, if it lies there and faces the other way.
-    fn cover(&self, t: usize, s: usize) -> Option<[DVec3; 3]> {
-        let normal = self.scene.normal(t);
+    /// Triangle `s` in the plane of a triangle with these `corners` and unit `normal`, if it lies
+    /// there and faces the other way.
+    fn cover(&self, corners: [DVec3; 3], normal: DVec3, s: usize) -> Option<[DVec3; 3]> {
         if normal.dot(self.scene.normal(s)) >= 0.0 {
             return None;
         }
-        let (corners, of_s) = (self.scene.corners(t), self.scene.corners(s));
+        let of_s = self.scene.corners(s);
         let height = |p: DVec3| normal.dot(p - corners[0]);
         let reach = SAME_PLACE * longest_edge(corners).max(longest_edge(of_s));
         let in_plane = of_s.iter().all(|&p| height(p).abs() <= reach);

@@ -15,6 +15,7 @@
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::rgb::Rgb;
 
@@ -66,8 +67,8 @@ impl Texture {
     }
 
     /// Linear colours of all texels, rows from the top.
-    pub fn linear_texels(&self) -> impl Iterator<Item = Rgb> {
-        self.texels.iter().map(|texel| Rgb::from_array(texel.map(|s| linear()[s as usize])))
+    pub fn linear_texels(&self) -> impl IndexedParallelIterator<Item = Rgb> {
+        self.texels.par_iter().map(|&texel| linear_colour(texel))
     }
 
     /// Linear mean of all texels.
@@ -196,7 +197,7 @@ impl Texture {
     fn cell(&self, level: usize, x: u32, y: u32) -> Rgb {
         let index = |width: u32| y as usize * width as usize + x as usize;
         match level {
-            0 => Rgb::from_array(self.texels[index(self.width)].map(|s| linear()[s as usize])),
+            0 => linear_colour(self.texels[index(self.width)]),
             _ => {
                 let level = &self.levels[level - 1];
                 Rgb::from_array(level.means[index(level.width)].map(f64::from))
@@ -238,6 +239,11 @@ impl std::fmt::Debug for Texture {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Texture({} × {})", self.width, self.height)
     }
+}
+
+/// Linear colour of an 8-bit sRGB texel.
+fn linear_colour(texel: [u8; 3]) -> Rgb {
+    Rgb::from_array(texel.map(|s| linear()[s as usize]))
 }
 
 /// Linear values of 8-bit sRGB.

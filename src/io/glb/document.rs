@@ -112,7 +112,7 @@ impl Model<'_> {
     /// An image for each texture that is shown, in the views after those of the indices.
     fn add_images(&self, root: &mut Root) {
         let first = self.attributes().count() + 1;
-        for k in 0..self.images.iter().count() {
+        for (k, _) in self.images.iter().enumerate() {
             root.push(Image {
                 buffer_view: Some(Index::new((first + k) as u32)),
                 mime_type: Some(MimeType("image/png".into())),

@@ -91,10 +91,11 @@ impl Image {
                 material.exitance + scaled(material.reflectance) * irradiance
             })
         };
-        let colours: Vec<Rgb> = map.texture.linear_texels().map(colour).collect();
-        let peak = colours.iter().fold(0.0, |peak: f64, c| peak.max(c.max_element()));
-        let byte = |c: &Rgb| (*c / if peak > 0.0 { peak } else { 1.0 }).to_array().map(srgb);
-        let bytes: Vec<[u8; 3]> = colours.par_iter().map(byte).collect();
+        // Twice, since all colours of a large image would take gigabytes.
+        let colours = || map.texture.linear_texels().map(colour);
+        let peak = colours().map(Rgb::max_element).reduce(|| 0.0, f64::max);
+        let byte = |c: Rgb| (c / if peak > 0.0 { peak } else { 1.0 }).to_array().map(srgb);
+        let bytes: Vec<[u8; 3]> = colours().map(byte).collect();
         let mut png = vec![];
         let [width, height] = map.texture.size();
         PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
