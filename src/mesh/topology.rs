@@ -5,16 +5,30 @@
 //!
 //! ```text
 //!        b                    The surface continues from t to s across side ab if
-//!       ╱│╲                   - no third triangle has that side,
-//!      ╱ │ ╲                  - t runs along it from a to b, and s from b to a,
+//!       ╱│╲                   - both look into one wedge of space around it, with no third
+//!      ╱ │ ╲                    triangle in between,
 //!     ╱ t│s ╲                 - both are of one group and one material, and
 //!     ╲  │  ╱                 - their normals differ by at most the crease angle.
 //!      ╲ │ ╱                  Then t and s share the side's identity, and the corners at a
 //!        a                    and at b.
 //! ```
 //!
+//! Of two triangles t runs along the side from a to b then, and s from b to a. Where more meet,
+//! each is next to at most one, by the order of their angles around the side: of a plate that a
+//! file has once for each side, the triangles of either side continue one another.
+//!
+//! ```text
+//!                     the front of
+//!          front      │ t, seen along the side, looks to larger angles; that of
+//!     ──t────┐ ┌────s─┤ s to smaller ones, and s is the next after t
+//!     ──u────┘ └────v─┤
+//!          front      │ likewise v and u: the next after v, all around
+//! ```
+//!
 //! A corner's identity is shared by all triangles that are connected across such sides around it,
 //! so that one position has a vertex for each smooth surface that meets there.
+
+use std::f64::consts::TAU;
 
 use rustc_hash::FxHashMap;
 
@@ -44,6 +58,10 @@ pub(crate) struct Side {
     /// Whether this triangle runs along it from the higher to the lower of the welded positions.
     pub reversed: bool,
 }
+
+/// Triangles at one side lie in one place up to this angle, radians: what six digits of their
+/// corners leave of it, as for covered backs.
+const SAME_ANGLE: f64 = 1e-4;
 
 /// A triangle, and the number of one of its sides.
 type TriangleSide = (usize, usize);
@@ -98,19 +116,18 @@ impl SurfaceTopology {
             for &(t, k) in sharing {
                 edges[t][k] = edge;
             }
-            // More than two triangles at a side have no one surface to continue.
-            let &[(t, k), (s, l)] = sharing.as_slice() else { continue };
-            let opposite = sides[t][k].reversed != sides[s][l].reversed;
-            let is_cut = scene.is_cut(t, k) || scene.is_cut(s, l);
-            if is_cut || !opposite || !continues(scene, t, s, &crease_angle) {
-                continue;
+            for [(t, k), (s, l)] in facing_pairs(scene, &sides, sharing) {
+                let is_cut = scene.is_cut(t, k) || scene.is_cut(s, l);
+                if is_cut || !continues(scene, t, s, &crease_angle) {
+                    continue;
+                }
+                let id = sides[t][k].id.min(sides[s][l].id);
+                sides[t][k].id = id;
+                sides[s][l].id = id;
+                // Opposite windings: where one side starts, the other ends.
+                corners.join(3 * t + k, 3 * s + (l + 1) % 3);
+                corners.join(3 * t + (k + 1) % 3, 3 * s + l);
             }
-            let id = sides[t][k].id.min(sides[s][l].id);
-            sides[t][k].id = id;
-            sides[s][l].id = id;
-            // Opposite windings: where one side starts, the other ends.
-            corners.join(3 * t + k, 3 * s + (l + 1) % 3);
-            corners.join(3 * t + (k + 1) % 3, 3 * s + l);
         }
         let corners =
             (0..count).map(|t| [0, 1, 2].map(|k| corners.find(3 * t + k) as u32)).collect();
@@ -148,6 +165,62 @@ fn side_ends(scene: &Scene) -> Vec<[(u32, u32); 3]> {
     (0..scene.triangles().len()).map(ends).collect()
 }
 
+/// Of triangles with sides between the same two positions, those whose fronts look into one wedge
+/// of space with no other triangle in between: the first to larger angles around the side, the
+/// second to smaller ones. Each is in one pair at most.
+fn facing_pairs(
+    scene: &Scene,
+    sides: &[[Side; 3]],
+    sharing: &[TriangleSide],
+) -> Vec<[TriangleSide; 2]> {
+    let looks_back = |(t, k): TriangleSide| sides[t][k].reversed;
+    if let &[t, s] = sharing {
+        // Two are next to each other in whichever order.
+        return if looks_back(t) == looks_back(s) { vec![] } else { vec![[t, s]] };
+    }
+    let mut around = by_angle(scene, sides, sharing);
+    // Of those in one place, what looks to smaller angles lies before what looks to larger ones.
+    let mut start = 0;
+    for end in 1..=around.len() {
+        if end == around.len() || around[end].0 - around[end - 1].0 > SAME_ANGLE {
+            around[start..end].sort_by_key(|&(_, side)| (!looks_back(side), side));
+            start = end;
+        }
+    }
+    let next = around.iter().cycle().skip(1);
+    let pairs = around.iter().zip(next).map(|(&(_, t), &(_, s))| [t, s]);
+    pairs.filter(|&[t, s]| !looks_back(t) && looks_back(s)).collect()
+}
+
+/// Triangles with sides between the same two positions in the order of their angles around the
+/// side, radians, from the first.
+fn by_angle(
+    scene: &Scene,
+    sides: &[[Side; 3]],
+    sharing: &[TriangleSide],
+) -> Vec<(f64, TriangleSide)> {
+    // Within the triangle and at right angles to the side, which all run along alike.
+    let across = |(t, k): TriangleSide| {
+        let corners = scene.corners(t);
+        let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
+        let along = if sides[t][k].reversed { a - b } else { b - a };
+        let along = along.normalize();
+        (along, (c - a).reject_from_normalized(along))
+    };
+    let Some(&first) = sharing.first() else { return vec![] };
+    let (axis, zero) = across(first);
+    let quarter = axis.cross(zero);
+    let angle = |side: TriangleSide| {
+        let (_, out) = across(side);
+        // What lies with the first is at its angle on both sides of it.
+        let angle = out.dot(quarter).atan2(out.dot(zero));
+        if angle < -SAME_ANGLE { angle + TAU } else { angle }
+    };
+    let mut around: Vec<_> = sharing.iter().map(|&side| (angle(side), side)).collect();
+    around.sort_by(|a, b| a.0.total_cmp(&b.0));
+    around
+}
+
 /// Whether triangles `t` and `s`, which share a side, are of one group and material and differ by
 /// no more than the crease angle, degrees.
 fn continues(
@@ -178,6 +251,60 @@ mod tests {
         let triangles = vec![triangle([0, 1, 2], smoothing[0]), triangle([1, 0, 3], smoothing[1])];
         let (points, material) = (points.map(DVec3::from_array), Material::grey("m", 0.5));
         Scene::new(points.to_vec(), triangles, vec!["g".into()], vec![material]).unwrap()
+    }
+
+    /// Triangles at the side from the origin to +z, given by the angle at which each lies around
+    /// it, degrees, and whether its front looks to larger angles.
+    fn fan(sheets: &[(f64, bool)]) -> SurfaceTopology {
+        let mut points = vec![DVec3::ZERO, DVec3::Z];
+        let mut triangles = vec![];
+        for (k, &(degrees, forward)) in sheets.iter().enumerate() {
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            // At another height each: of one place, but with other corners.
+            points.push(DVec3::new(cos, sin, 0.1 + 0.2 * k as f64));
+            let corner = k as u32 + 2;
+            let corners = if forward { [0, 1, corner] } else { [1, 0, corner] };
+            triangles.push(Triangle { corners, ..Default::default() });
+        }
+        let material = Material::grey("m", 0.5);
+        let scene = Scene::new(points, triangles, vec!["g".into()], vec![material]).unwrap();
+        SurfaceTopology::new(&scene)
+    }
+
+    #[test]
+    fn each_side_of_a_plate_continues_by_itself() {
+        // Every order of the four, of both sides of a plate that is bent by 10°: what looks into
+        // the wedge of 170° is joined, and what looks into that of 190°.
+        let [t, s, u, v] = [(0.0, true), (170.0, false), (0.0, false), (170.0, true)];
+        let sheets = [t, s, u, v];
+        // One of a pair in one place is off by what six digits leave, to either side.
+        for (turn, off) in [(0.0, 1e-4), (45.0, -1e-4), (100.0, 1e-4), (-90.0, -1e-4)] {
+            for order in 0..24 {
+                let mut left = vec![0, 1, 2, 3];
+                let picks = [order / 6, order % 6 / 2, order % 2, 0];
+                let order = picks.map(|k| left.remove(k));
+                let turned = |k: usize| (sheets[k].0 + turn + off * (k / 2) as f64, sheets[k].1);
+                let surfaces = fan(&order.map(turned)).surfaces();
+                let place = |k| surfaces[order.iter().position(|&o| o == k).unwrap()];
+                assert_eq!(place(0), place(1), "{order:?}");
+                assert_eq!(place(2), place(3), "{order:?}");
+                assert_ne!(place(0), place(2), "{order:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_stands_on_a_plate_parts_the_side_it_stands_on() {
+        // A plate for both sides with a third sheet that stands on its upper side.
+        let plate = [(0.0, true), (170.0, false), (0.0, false), (170.0, true)];
+        for post in [true, false] {
+            let surfaces = fan(&[&plate[..], &[(85.0, post)]].concat()).surfaces();
+            assert_ne!(surfaces[0], surfaces[1]);
+            assert_eq!(surfaces[2], surfaces[3]);
+        }
+        // Two boxes that touch along a side: each keeps its own crease, and nothing is joined.
+        let boxes = [(0.0, true), (90.0, false), (180.0, true), (270.0, false)];
+        assert_eq!(fan(&boxes).surfaces(), [0, 1, 2, 3]);
     }
 
     const SAME: [[Option<u32>; 2]; 2] = [[None, None], [Some(3), Some(3)]];
