@@ -255,7 +255,7 @@ mod tests {
 
     /// Triangles at the side from the origin to +z, given by the angle at which each lies around
     /// it, degrees, and whether its front looks to larger angles.
-    fn fan(sheets: &[(f64, bool)]) -> SurfaceTopology {
+    fn fan(sheets: &[(f64, bool)]) -> Vec<u32> {
         let mut points = vec![DVec3::ZERO, DVec3::Z];
         let mut triangles = vec![];
         for (k, &(degrees, forward)) in sheets.iter().enumerate() {
@@ -266,9 +266,13 @@ mod tests {
             let corners = if forward { [0, 1, corner] } else { [1, 0, corner] };
             triangles.push(Triangle { corners, ..Default::default() });
         }
+        // Another that has only the origin: sides then run from it to +z, whoever is first.
+        let count = points.len() as u32;
+        points.extend([DVec3::new(7.0, 0.0, -1.0), DVec3::new(0.0, 7.0, -1.0)]);
+        triangles.insert(0, Triangle { corners: [0, count, count + 1], ..Default::default() });
         let material = Material::grey("m", 0.5);
         let scene = Scene::new(points, triangles, vec!["g".into()], vec![material]).unwrap();
-        SurfaceTopology::new(&scene)
+        SurfaceTopology::new(&scene).surfaces().split_off(1)
     }
 
     #[test]
@@ -284,7 +288,7 @@ mod tests {
                 let picks = [order / 6, order % 6 / 2, order % 2, 0];
                 let order = picks.map(|k| left.remove(k));
                 let turned = |k: usize| (sheets[k].0 + turn + off * (k / 2) as f64, sheets[k].1);
-                let surfaces = fan(&order.map(turned)).surfaces();
+                let surfaces = fan(&order.map(turned));
                 let place = |k| surfaces[order.iter().position(|&o| o == k).unwrap()];
                 assert_eq!(place(0), place(1), "{order:?}");
                 assert_eq!(place(2), place(3), "{order:?}");
@@ -298,13 +302,13 @@ mod tests {
         // A plate for both sides with a third sheet that stands on its upper side.
         let plate = [(0.0, true), (170.0, false), (0.0, false), (170.0, true)];
         for post in [true, false] {
-            let surfaces = fan(&[&plate[..], &[(85.0, post)]].concat()).surfaces();
+            let surfaces = fan(&[&plate[..], &[(85.0, post)]].concat());
             assert_ne!(surfaces[0], surfaces[1]);
             assert_eq!(surfaces[2], surfaces[3]);
         }
         // Two boxes that touch along a side: each keeps its own crease, and nothing is joined.
         let boxes = [(0.0, true), (90.0, false), (180.0, true), (270.0, false)];
-        assert_eq!(fan(&boxes).surfaces(), [0, 1, 2, 3]);
+        assert_eq!(fan(&boxes), [1, 2, 3, 4]);
     }
 
     const SAME: [[Option<u32>; 2]; 2] = [[None, None], [Some(3), Some(3)]];
