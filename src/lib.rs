@@ -78,8 +78,9 @@
 //! - Channels are linear (r, g, b); for radiometry use them as any three bands.
 //! - Lengths are in the scene's own unit. Radiosity does not depend on it; W are W/m² times that
 //!   unit squared.
-//! - A face's front is where its corners run counter-clockwise. The front reflects and emits; both
-//!   sides block; light that meets a back is lost there, and counted.
+//! - A face's front is where its corners run counter-clockwise. The front reflects and emits, and
+//!   the back reflects if its material says so ([`Sides`]; in files, if light reaches it). Both
+//!   block; light that meets the back of others is lost there, and counted.
 //! - Shares of light are whole numbers of 1/[`Row::TOTAL`](form_factor::Row::TOTAL), so rows sum to
 //!   one exactly and a solve gives the same bits on every run with the same adapter.
 //!
@@ -130,7 +131,7 @@ pub use io::write_png;
 pub use io::{ObjSettings, load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
-pub use scene::{Material, Rgb, Scene, Triangle, Warning};
+pub use scene::{Material, Rgb, Scene, Sides, Triangle, Warning};
 pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;
 pub use view_factor::ViewFactors;

@@ -11,6 +11,7 @@ mod covered_backs;
 mod cut;
 mod rgb;
 mod scene_textures;
+mod sides;
 pub mod texture;
 mod textured;
 mod warning;
@@ -26,10 +27,12 @@ pub use crate::geometry::aabb::Aabb;
 pub(crate) use cut::Piece;
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
+pub use sides::Sides;
+pub(crate) use sides::Treatment;
 use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
 
-/// How the front of a face reflects and emits. Backs only block light.
+/// How faces reflect and emit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name, for messages and look-up.
@@ -40,6 +43,8 @@ pub struct Material {
     /// Exitance E per channel, W/m²: π times the emitted radiance. Of a texture the mean over all
     /// triangles of the material; [`Scene::exitance_at`] has it in detail.
     pub exitance: Rgb,
+    /// Which sides do: fronts, unless set. Backs of others only block light.
+    pub sides: Sides,
 }
 
 /// A face of the scene: counter-clockwise corners seen from its front.
@@ -80,8 +85,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Checks and takes a scene: `positions` in any length unit, `groups` by name. Whether groups
-    /// are wound inside out is looked at by [`Scene::check_winding`] only.
+    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
     ///
     /// ```
     /// use radiosity::glam::DVec3;
@@ -374,7 +378,8 @@ impl Material {
 
     /// A surface that reflects `reflectance` in every channel and emits nothing.
     pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
-        Material { name: name.into(), reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO }
+        let (reflectance, exitance) = (Rgb::splat(reflectance), Rgb::ZERO);
+        Material { name: name.into(), reflectance, exitance, sides: Sides::Front }
     }
 
     /// Whether any light is reflected, in any channel.

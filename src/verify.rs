@@ -85,7 +85,8 @@ pub fn verify(
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Verification, Error> {
     settings.check()?;
-    let mut verifier = Verifier::new(scene, settings.clone(), FIRST_POINTS)?;
+    let scene = scene.resolve_sides();
+    let mut verifier = Verifier::new(&scene, settings.clone(), FIRST_POINTS)?;
     verifier.measure(solution, Limits::default(), &mut progress)
 }
 

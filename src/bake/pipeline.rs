@@ -19,6 +19,7 @@ use crate::gather::GatheredMesh;
 use crate::mesh::{Mesh, cut_at_contacts};
 use crate::progress::StopReason;
 use crate::scene::Scene;
+use crate::visibility::lit_sides;
 
 impl BakeSettings {
     /// Bakes `scene` as far as these settings go, without regard to the estimated error.
@@ -35,7 +36,7 @@ impl BakeSettings {
         backend: &Backend,
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
-        run(self, &scene.into(), backend, None, &mut progress)
+        run(self, &lit_sides::resolved(scene.into()), backend, None, &mut progress)
     }
 }
 

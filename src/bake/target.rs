@@ -13,6 +13,7 @@ use crate::bake::settings::BakeSettings;
 use crate::bake::{model, pipeline};
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
+use crate::visibility::lit_sides;
 
 /// What is asked of a bake.
 ///
@@ -92,7 +93,7 @@ impl BakeTarget {
         overrides: impl Fn(&mut BakeSettings),
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
-        let scene = &scene.into();
+        let scene = &lit_sides::resolved(scene.into());
         match self {
             BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => {
                 let each_group = matches!(self, BakeTarget::ErrorEach(_));

@@ -80,8 +80,12 @@ pub enum WarningKind {
     Encoding,
     /// A triangle without area.
     Degenerate,
-    /// A group whose faces are met from behind.
+    /// A triangle that is there twice.
+    RepeatedTriangle,
+    /// A triangle that light reaches from behind only.
     Winding,
+    /// A triangle that light reaches on both sides.
+    BothSides,
 }
 
 impl Warning {
@@ -187,7 +191,9 @@ impl WarningKind {
             UnknownStatement => ("line of unknown kind", "lines of unknown kind"),
             Encoding => ("text that is not UTF-8", "texts that are not UTF-8"),
             Degenerate => ("triangle without area", "triangles without area"),
-            Winding => ("group with faces seen from behind", "groups with faces seen from behind"),
+            RepeatedTriangle => ("triangle given again", "triangles given again"),
+            Winding => ("triangle lit from behind", "triangles lit from behind"),
+            BothSides => ("triangle lit from both sides", "triangles lit from both sides"),
         }
     }
 

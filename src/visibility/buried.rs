@@ -9,13 +9,11 @@
 //! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | another viewpoint is tried |
 //! | [`NEAR_BACKS`] | 0.4 | sample of the error estimate | left out, if they are very near too |
 //! | [`HIDDEN`] | 0.95 | sample of the error estimate | left out |
-//! | [`ENCLOSED`] | 0.75 | sample of the winding check | its back hits are no evidence |
 //! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
 //! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
 //!
 //! Why they differ: another viewpoint is cheap, and a left-out sample is guarded by a second
-//! condition, so that more likely than not is enough for both. The winding check needs more than a
-//! half, so that inverted walls of a room are still reported. The sample of a gather point is
+//! condition, so that more likely than not is enough for both. The sample of a gather point is
 //! replaced by an extrapolation, so that a dark sample is rather kept; without the second condition
 //! only what seams let through, a ray or two, may see a front.
 //!
@@ -41,9 +39,6 @@ pub(crate) const CRACK: f64 = 1e-4;
 
 /// A sample of the error estimate that sees more than this share of backs lies inside a solid.
 pub(crate) const HIDDEN: f64 = 0.95;
-
-/// A sample of the winding check that meets more than this share of backs is enclosed.
-pub(crate) const ENCLOSED: f64 = 0.75;
 
 /// A gather point that sees more than this share of backs is buried, if they are near.
 pub(crate) const BURIED: f64 = 0.9;

@@ -1,1 +1,1 @@
-mod winding;
+mod sides;

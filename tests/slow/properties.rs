@@ -77,9 +77,9 @@ impl Room {
         let inside = self.inside.iter().map(|p| p.1);
         let all = self.halves.iter().flatten().copied().chain(inside);
         all.map(|(rho, e)| Material {
-            name: "m".into(),
             reflectance: rho.into(),
             exitance: e.into(),
+            ..Material::grey("m", 0.0)
         })
         .collect()
     }

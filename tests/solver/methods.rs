@@ -16,7 +16,7 @@ use crate::common::{cornell_box, cube, keep_going, quads};
 
 fn material(reflectance: [f64; 3], exitance: [f64; 3]) -> Material {
     let (reflectance, exitance) = (reflectance.into(), exitance.into());
-    Material { name: "m".into(), reflectance, exitance }
+    Material { reflectance, exitance, ..Material::grey("m", 0.0) }
 }
 
 fn grey(reflectance: f64, exitance: f64) -> Material {

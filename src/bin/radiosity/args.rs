@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use lexopt::prelude::*;
-use radiosity::{Backend, Error, ErrorKind, ObjSettings, Rgb, Scene};
+use radiosity::{Backend, Error, ErrorKind, ObjSettings, Rgb, Scene, Sides};
 
 use crate::interrupt;
 
@@ -112,6 +112,10 @@ pub fn obj_option(name: &str) -> Option<ObjOption> {
             settings.sky = Some(sky(parser)?);
             Ok(())
         }),
+        "sides" => Some(|parser, settings| {
+            settings.sides = sides(parser)?;
+            Ok(())
+        }),
         _ => None,
     }
 }
@@ -129,6 +133,17 @@ fn sky(parser: &mut lexopt::Parser) -> Result<Rgb, Stop> {
     let text = parser.value()?.string()?;
     let wrong = || wrong_value("sky", &text, "a radiance r,g,b, or none");
     if text == "none" { Ok(Rgb::ZERO) } else { rgb(&text).ok_or_else(wrong) }
+}
+
+/// What surfaces do on their two sides, by its name.
+fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
+    let text = parser.value()?.string()?;
+    match text.as_str() {
+        "auto" => Ok(Sides::Auto),
+        "front" => Ok(Sides::Front),
+        "both" => Ok(Sides::Both),
+        _ => Err(wrong_value("sides", &text, "auto, front or both")),
+    }
 }
 
 /// `r,g,b`, or one number for all three.

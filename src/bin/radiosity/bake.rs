@@ -73,6 +73,8 @@ Files and devices:
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
+  --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
+                    are wound, front or both [auto]
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
@@ -224,9 +226,7 @@ impl Bake {
         self.files.check()?;
         let name = self.scene.display().to_string();
         let scene = progress::of_reading(&self.scene, || {
-            let mut scene = self.obj.load(&self.scene)?;
-            scene.check_winding();
-            Ok::<_, Error>(scene)
+            Ok::<_, Error>(self.obj.load(&self.scene)?.resolve_sides())
         })?;
         args::print_warnings(&scene);
         let (warnings, triangles) =

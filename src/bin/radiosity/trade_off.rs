@@ -53,6 +53,8 @@ given.
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
+  --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
+                    are wound, front or both [auto]
   --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu           rays on the CPU instead of hemicubes
 

@@ -40,6 +40,7 @@ last line compares the two. After Ctrl-C what was measured so far is printed.
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
   --sky r,g,b       radiance of a uniform sky, or none (as the bake had) [1 if nothing emits]
+  --sides WHICH     auto, front or both (as the bake had) [auto]
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:
@@ -136,7 +137,9 @@ impl Options {
         for file in self.csv.iter().chain(points_ply) {
             args::check_writable(file)?;
         }
-        let scene = progress::of_reading(&self.scene, || self.obj.load(&self.scene))?;
+        let scene = progress::of_reading(&self.scene, || {
+            Ok::<_, Error>(self.obj.load(&self.scene)?.resolve_sides())
+        })?;
         args::print_warnings(&scene);
         match &self.what {
             What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),

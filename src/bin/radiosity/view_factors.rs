@@ -108,8 +108,9 @@ impl Options {
                 Long("cpu") => device = Some(Device::Cpu),
                 Value(path) => scenes.push(path.into()),
                 Long(name) => match args::obj_option(name) {
-                    Some(option) => option(parser, &mut obj)?,
-                    None => return Err(arg.unexpected().into()),
+                    // Factors are of fronts, and --two-sided names the groups with two.
+                    Some(option) if name != "sides" => option(parser, &mut obj)?,
+                    _ => return Err(arg.unexpected().into()),
                 },
                 _ => return Err(arg.unexpected().into()),
             }

@@ -99,6 +99,7 @@ impl ObjFile<'_> {
         if used.contains(&(materials.len() as u32)) {
             materials.push(grey("(default)"));
         }
+        materials.iter_mut().for_each(|material| material.sides = settings.sides);
         for (name, radiance) in &settings.emit {
             let mut found = false;
             for material in materials.iter_mut().filter(|m| m.name == *name) {
@@ -153,6 +154,6 @@ impl MtlMaterial {
             note(WarningKind::MaterialStatement, "it emits nothing".into())?;
         }
         let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
-        Ok(Material { name: String::new(), reflectance, exitance })
+        Ok(Material { reflectance, exitance, ..Material::grey("", 0.0) })
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::files::{self, FileSource, MAX_BYTES};
 use crate::error::{Error, ErrorKind, quoted};
-use crate::scene::{Rgb, Scene};
+use crate::scene::{Rgb, Scene, Sides};
 
 /// How odd things in an OBJ file and its libraries are treated, and which materials emit.
 ///
@@ -31,6 +31,8 @@ pub struct ObjSettings {
     /// Radiance of a uniform sky, W/(m² sr) per channel ([`Scene::with_sky`]). `None`: 1 if nothing
     /// in the scene emits, else 0.
     pub sky: Option<Rgb>,
+    /// What surfaces do on their two sides.
+    pub sides: Sides,
 }
 
 impl ObjSettings {
@@ -93,6 +95,6 @@ impl ObjSettings {
 impl Default for ObjSettings {
     fn default() -> ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
-        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None }
+        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None, sides: Sides::Auto }
     }
 }

@@ -1,0 +1,96 @@
+//! Surfaces with two sides: a triangle for each side that reflects.
+//!
+//! ```text
+//!   as it was wound       turned                  doubled
+//!
+//!   ──────── front        ──────── back           ──────── front of t
+//!   ──────── back         ──────── front          ──────── front of its twin: the same corners
+//!                                                          the other way round
+//! ```
+//!
+//! Each of the two covers the other's back ([`Scene::is_back_covered`]), so that whatever makes
+//! rows, gathers or casts rays treats them as it treats any other triangles.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+use super::texture::MaterialTextures;
+use super::{Material, Rgb, Scene};
+
+/// What the surfaces of a material do on their two sides. It is carried out when a scene is baked
+/// or verified, or by [`Scene::resolve_sides`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Sides {
+    /// Fronts reflect and emit, backs block.
+    #[default]
+    Front,
+    /// Both sides reflect alike, each with a radiosity of its own; fronts emit.
+    Both,
+    /// Each triangle reflects on the sides that light can reach, however it is wound. It emits on
+    /// its front, or on its back if light from there gets much further.
+    Auto,
+}
+
+/// What becomes of a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Treatment {
+    /// Left out.
+    pub dropped: bool,
+    /// Its back becomes its front.
+    pub turned: bool,
+    /// The side that is not its front reflects too.
+    pub doubled: bool,
+}
+
+impl Scene {
+    /// The same scene with each of its triangles treated, and materials that have one side. Twins
+    /// come after all others, in their order. They emit nothing: where the triangle's material
+    /// does, they have another, of the same name, after all others.
+    pub(crate) fn treated(&self, treatments: &[Treatment]) -> Scene {
+        let mut scene = self.clone();
+        scene.materials.iter_mut().for_each(|material| material.sides = Sides::Front);
+        if treatments.iter().all(|treatment| *treatment == Treatment::default()) {
+            return scene;
+        }
+        let mut textures = (*self.textures).clone();
+        scene.triangles.clear();
+        scene.cut_sides.clear();
+        textures.coordinates.clear();
+        textures.relative_exitance.clear();
+        let mut dark: BTreeMap<u32, u32> = BTreeMap::new();
+        let is_kept = |&t: &usize| !treatments[t].dropped;
+        let is_doubled = |t: &usize| is_kept(t) && treatments[*t].doubled;
+        let kept = (0..treatments.len()).filter(is_kept).map(|t| (t, false));
+        let twins = (0..treatments.len()).filter(is_doubled).map(|t| (t, true));
+        for (t, is_twin) in kept.chain(twins) {
+            let mut triangle = self.triangles[t];
+            let mut coordinates = self.texture_coordinates(t);
+            let mut cut = self.cut_sides.get(t).copied();
+            if treatments[t].turned != is_twin {
+                triangle.corners.swap(1, 2);
+                coordinates.iter_mut().for_each(|corners| corners.swap(1, 2));
+                // From corners a, b, c to a, c, b: the side bc stays in the middle.
+                cut.iter_mut().for_each(|sides| sides.swap(0, 2));
+            }
+            let material = triangle.material;
+            if is_twin && self.materials[material as usize].exitance != Rgb::ZERO {
+                triangle.material = *dark.entry(material).or_insert_with(|| {
+                    let index = scene.materials.len() as u32;
+                    let without = scene.materials[material as usize].clone();
+                    scene.materials.push(Material { exitance: Rgb::ZERO, ..without });
+                    if let Some(maps) = self.textures.of_materials.get(&material).cloned() {
+                        let maps = MaterialTextures { exitance: None, ..maps };
+                        textures.of_materials.insert(index, maps);
+                    }
+                    index
+                });
+            }
+            scene.triangles.push(triangle);
+            scene.cut_sides.extend(cut);
+            textures.coordinates.extend(coordinates);
+            textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
+        }
+        Scene { textures: Arc::new(textures), covered_backs: OnceLock::new(), ..scene }
+    }
+}

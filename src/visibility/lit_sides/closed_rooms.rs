@@ -1,0 +1,57 @@
+//! Rooms: closed surfaces around all of a scene that look inwards.
+
+use rustc_hash::FxHashMap;
+
+use crate::geometry::aabb::Aabb;
+use crate::geometry::union_find::UnionFind;
+use crate::geometry::weld::Weld;
+use crate::scene::Scene;
+
+/// Per triangle of `scene`, whether it is one of a surface that is closed, wound alike so that its
+/// fronts look inwards, and as large as the scene. Light from outside has no business in there: the
+/// walls of a room without a lamp are dark, and no body in the open that is wound inside out.
+pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
+    let count = scene.triangles().len();
+    let mut weld = Weld::default();
+    let mut at_edges: FxHashMap<(u32, u32), Vec<(usize, bool)>> = FxHashMap::default();
+    for t in 0..count {
+        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            at_edges.entry((a.min(b), a.max(b))).or_default().push((t, a < b));
+        }
+    }
+    let (mut surfaces, mut is_open) = (UnionFind::new(count), vec![false; count]);
+    for triangles in at_edges.values() {
+        match triangles.as_slice() {
+            &[(t, forward), (s, also_forward)] if forward != also_forward => surfaces.join(t, s),
+            others => others.iter().for_each(|&(t, _)| is_open[t] = true),
+        }
+    }
+    let mut of_surfaces: FxHashMap<usize, Surface> = FxHashMap::default();
+    let centre = scene.bounds().centre();
+    for (t, &is_open) in is_open.iter().enumerate() {
+        let surface = of_surfaces.entry(surfaces.find(t)).or_default();
+        let [a, b, c] = scene.corners(t).map(|p| p - centre);
+        surface.volume += a.dot(b.cross(c));
+        surface.is_open |= is_open;
+        surface.triangles.push(t);
+    }
+    let mut is_room = vec![false; count];
+    for surface in of_surfaces.values().filter(|surface| !surface.is_open && surface.volume < 0.0) {
+        let corners = surface.triangles.iter().flat_map(|&t| scene.corners(t));
+        if Aabb::from_points(corners) == scene.bounds() {
+            surface.triangles.iter().for_each(|&t| is_room[t] = true);
+        }
+    }
+    is_room
+}
+
+/// Triangles that continue one another.
+#[derive(Default)]
+struct Surface {
+    triangles: Vec<usize>,
+    /// Whether it has a side that no other triangle, or more than one, or one wound otherwise has.
+    is_open: bool,
+    /// Six times the volume that it encloses, if it is closed: negative, where fronts look inwards.
+    volume: f64,
+}

@@ -1,0 +1,204 @@
+//! Walks from sides of triangles to the light.
+
+use std::cell::Cell;
+use std::f64::consts::{PI, TAU};
+
+use fastrand::Rng;
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::sheets::{Sheets, SideIndex};
+use crate::sampling::low_discrepancy::fold_to_triangle;
+use crate::sampling::surface::AreaSampler;
+use crate::scene::{Rgb, Scene, Sides};
+use crate::visibility::offset;
+use crate::visibility::ray_scene::RayScene;
+
+/// Surfaces that a walk meets at most. Through a door of a thirtieth of a room's area four in ten
+/// get out within so many. Chosen by hand.
+const MAX_BOUNCES: usize = 16;
+
+/// A lamp shines from its back if rays from there get so many times as far as from its front.
+/// Lamps right below a ceiling and bulbs wound inside out are far above; one that is made to light
+/// a ceiling, a tenth of the room below it, is not. Chosen by hand.
+const FURTHER: f64 = 16.0;
+
+/// Surfaces lie in one place up to this share of the square root of a triangle's area, as for
+/// covered backs, where they face alike by this cosine.
+const SAME_PLACE: f64 = 1e-4;
+const ALIKE: f64 = 0.999;
+
+/// What walks meet.
+pub struct Walks<'a> {
+    scene: &'a Scene,
+    /// Of each material.
+    sides: &'a [Sides],
+    rays: RayScene,
+    normals: Vec<DVec3>,
+    /// Triangles that emit.
+    lamps: Vec<usize>,
+    /// Whether they do so on their backs.
+    shining_backs: FxHashMap<usize, bool>,
+    /// Of each lamp, in units of `brightest` times area.
+    powers: AreaSampler,
+    /// Exitance of the brightest, W/m² summed over the channels.
+    brightest: f64,
+    /// Surfaces within this distance of each other are in one place, scene unit.
+    contact: f64,
+}
+
+impl<'a> Walks<'a> {
+    /// In `scene`, whose materials have these `sides`.
+    pub fn new(scene: &'a Scene, sides: &'a [Sides], sheets: &Sheets) -> Walks<'a> {
+        let count = scene.triangles().len();
+        let exitance = |&t: &usize| scene.exitance(t).element_sum();
+        let lamps: Vec<usize> = (0..count).filter(|t| exitance(t) > 0.0).collect();
+        let brightest = lamps.iter().map(exitance).fold(0.0, f64::max);
+        let power = |t: &usize| exitance(t) / brightest * scene.area(*t);
+        let mut walks = Walks {
+            scene,
+            sides,
+            rays: RayScene::of_scene(scene),
+            normals: (0..count).map(|t| scene.normal(t)).collect(),
+            shining_backs: FxHashMap::default(),
+            powers: AreaSampler::new(lamps.iter().map(power)),
+            brightest,
+            lamps,
+            contact: (offset::PATH_CONTACT * scene.bounds().diagonal())
+                .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
+        };
+        walks.shining_backs = walks.find_shining_backs(sheets);
+        walks
+    }
+
+    /// Whether there is any light.
+    pub fn has_light(&self) -> bool {
+        !self.lamps.is_empty() || self.scene.sky() != Rgb::ZERO
+    }
+
+    /// What the surface of triangle `t` does on its sides.
+    pub fn sides_of(&self, t: usize) -> Sides {
+        // Where the file has a surface for each side, each has its own.
+        if self.scene.is_back_covered(t) {
+            return Sides::Front;
+        }
+        self.sides[self.scene.triangles()[t].material as usize]
+    }
+
+    /// Of a lamp, whether it shines from its back.
+    pub fn shines_from_back(&self, t: usize) -> Option<bool> {
+        self.shining_backs.get(&t).copied()
+    }
+
+    fn find_shining_backs(&self, sheets: &Sheets) -> FxHashMap<usize, bool> {
+        let sides: Vec<SideIndex> = self.lamps.iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
+        let free = sheets.ask(&sides, |side, rng| {
+            let start = self.random_start(side, rng)?;
+            self.next(start, side, rng).map(|(at, _)| start.distance(at))
+        });
+        let shines_from_back = |&t: &usize| {
+            let [front, back] = [2 * t, 2 * t + 1].map(|side| free.of_sheet(side).mean());
+            (t, self.sides_of(t) == Sides::Auto && back > FURTHER * front)
+        };
+        self.lamps.iter().map(shines_from_back).collect()
+    }
+
+    /// About the irradiance at a place on a side, W/m² summed over the channels, that a walk from
+    /// there finds at the first light that it meets; none if it meets none.
+    pub fn walk_to_light(&self, mut at: DVec3, mut side: SideIndex, rng: &mut Rng) -> Option<f64> {
+        let mut throughput = 1.0;
+        for _ in 0..MAX_BOUNCES {
+            if let Some(irradiance) = self.irradiance_of_lamp(at, side, rng) {
+                return Some(throughput * irradiance);
+            }
+            let Some(next) = self.next(at, side, rng) else {
+                let sky = throughput * self.scene.sky_radiosity().element_sum();
+                return (sky > 0.0).then_some(sky);
+            };
+            (at, side) = next;
+            let (t, is_back) = (side / 2, side % 2 == 1);
+            if self.shines_from_back(t) == Some(is_back) {
+                return Some(throughput * self.scene.exitance(t).element_sum());
+            }
+            let is_dark = is_back && self.sides_of(t) == Sides::Front;
+            let reflectance = self.scene.material(t).reflectance.max_element();
+            if is_dark || reflectance == 0.0 {
+                return None;
+            }
+            throughput *= reflectance;
+        }
+        None
+    }
+
+    /// A place on `side`; none at a back where a front lies before it.
+    pub fn random_start(&self, side: SideIndex, rng: &mut Rng) -> Option<DVec3> {
+        let at = self.random_point(side / 2, rng);
+        let hidden = side % 2 == 1 && self.front_before(at, side).is_some();
+        (!hidden).then_some(at)
+    }
+
+    /// The triangle whose front lies in one place with a back, `side`, and looks the same way: it is
+    /// that which light meets.
+    pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
+        let (t, normal) = (side / 2, self.normal(side));
+        let reach = (SAME_PLACE * self.scene.area(t).sqrt()).max(self.contact);
+        let found = Cell::new(None);
+        self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
+            let alike = self.normals[hit.triangle].dot(normal) > ALIKE;
+            let counts = hit.front && hit.triangle != t && alike;
+            if counts {
+                found.set(Some(hit.triangle));
+            }
+            counts
+        });
+        found.get()
+    }
+
+    /// Unit normal on a side.
+    fn normal(&self, side: SideIndex) -> DVec3 {
+        let front = self.normals[side / 2];
+        if side.is_multiple_of(2) { front } else { -front }
+    }
+
+    /// Where a ray from a place on a side, dense as the cosine, ends, and on which side.
+    fn next(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<(DVec3, SideIndex)> {
+        let (normal, turn) = (self.normal(side), TAU * rng.f64());
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let square = rng.f64();
+        let across = turn.cos() * tangent + turn.sin() * bitangent;
+        let direction = square.sqrt() * across + (1.0 - square).sqrt() * normal;
+        let hit = self.rays.closest_hit(at, direction, self.contact, Some(side / 2))?;
+        Some((at + hit.distance * direction, 2 * hit.triangle + usize::from(!hit.front)))
+    }
+
+    /// Irradiance at a place on a side from a lamp, chosen by its power; none if it is not seen.
+    fn irradiance_of_lamp(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
+        if self.lamps.is_empty() {
+            return None;
+        }
+        let lamp = self.lamps[self.powers.locate(rng.f64()).0];
+        let to = self.random_point(lamp, rng) - at;
+        let (direction, distance) = to.normalize_and_length();
+        let cosine = self.normal(side).dot(direction);
+        let facing = -self.normal(2 * lamp + usize::from(self.shining_backs[&lamp])).dot(direction);
+        // Written so that NaN, of a lamp that is met, sees nothing.
+        if !(cosine > 0.0 && facing > 0.0) {
+            return None;
+        }
+        let between = self.contact..distance - self.contact;
+        let blocked = self.rays.occluded(at, direction, between, |hit| {
+            hit.triangle != side / 2 && hit.triangle != lamp
+        });
+        // The power of all lamps as seen from there, but not more than the lamp sends near by.
+        let power = self.powers.total_area() * self.brightest;
+        let far = power * cosine * facing / (PI * distance * distance);
+        (!blocked).then_some(far.min(power / self.scene.area(lamp)))
+    }
+
+    /// A point of a triangle, uniform over its area.
+    pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
+        let [a, b, c] = self.scene.corners(t);
+        let [u, v] = fold_to_triangle([rng.f64(), rng.f64()]);
+        a + u * (b - a) + v * (c - a)
+    }
+}
