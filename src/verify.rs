@@ -28,7 +28,8 @@
 //! nearer than 0.2 % of the diagonal of all that reflects; or whose mean of 1/distance to what they
 //! see is above 10 000 over that diagonal. They lie inside a solid, under what stands on them,
 //! right behind a plate or in a crack; nobody sees them, and bakes tell there what would be
-//! seen without it. The mean m is over all points.
+//! seen without it. So are points that see nothing: what the sky gives them is exact. The mean m is
+//! over all points.
 //!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
 //! has the mean |B_told − B_true|², however noisy they are.

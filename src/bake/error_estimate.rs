@@ -11,7 +11,8 @@
 //! are left out: those that see backs in more than 95 % of their hemisphere, weighted by the
 //! cosine, or in more than 40 % of it backs that nearly touch them, or on average nothing but what
 //! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
-//! what stands on them, or in a crack. A group of the scene has the same figure over its own area,
+//! what stands on them, or in a crack. Those that see nothing are left out too: what the sky gives
+//! them is exact, and would hide the error of others. A group of the scene has the same figure over its own area,
 //! with the floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
@@ -105,7 +106,8 @@ pub(super) struct Observation {
     pub next: Rgb,
     /// What the middle of the element may be off by, up to a common factor, W/m².
     pub element_residual: f64,
-    /// Whether the point is hidden by what touches its surface or encloses it: nobody sees it.
+    /// Whether the point is hidden by what touches its surface or encloses it, so that nobody sees
+    /// it, or sees nothing itself.
     pub excluded: bool,
     /// Share of the hemisphere in which nothing is seen.
     pub escaped: f64,

@@ -374,7 +374,8 @@ impl Sample {
             gathered: [self.reflected(first), self.reflected(second)],
             next: self.reflected(next),
             element_residual: estimator.element_residual[self.element],
-            excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal)),
+            excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal))
+                || [first, second, next].iter().all(|g| g.inverse_distance == 0.0),
             escaped: first.escaped,
             backface: first.backface,
             inverse_distance: first.inverse_distance,

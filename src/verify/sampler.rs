@@ -193,7 +193,8 @@ impl<'a> Sampler<'a> {
                 near.count() as f64 / HIDDEN_RAYS as f64
             };
             let inverse = hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>();
-            traced.hidden = backs(f64::INFINITY) > HIDDEN
+            traced.hidden = hits.is_empty()
+                || backs(f64::INFINITY) > HIDDEN
                 || backs(NEAR * self.diagonal) > HIDDEN_NEAR
                 || inverse / HIDDEN_RAYS as f64 * CRACK * self.diagonal > 1.0;
         }

@@ -158,3 +158,25 @@ fn a_sky_is_no_less_than_dark() {
         assert!(error.to_string().contains("sky"), "{error}");
     }
 }
+
+#[test]
+fn what_sees_nothing_but_the_sky_hides_no_error() {
+    let [west, ..] = walls([0.0; 3], [1.0; 3]);
+    let corner = [(facing_up([0.0, 1.0], [0.0, 1.0], 0.0), 0.5), (west, 0.8)];
+    // A hundred times as large, above them, looking up.
+    let roof = (facing_up([0.0, 14.0], [0.0, 14.0], 2.0), 0.5);
+    let roofed = [&corner[..], &[roof]].concat();
+    let [alone, baked] = [&corner[..], &roofed].map(|parts| bake(&under_sky(parts), 0.1));
+    // The light under the roof is another, and so is the error, but not a tenth.
+    let (told, of_all) = (alone.estimate.total, baked.estimate.total);
+    assert!(of_all > 0.5 * told && told > 1e-3, "{told} {of_all}");
+    let scene = under_sky(&roofed);
+    let mut solution = baked.light.surface.clone();
+    for (position, radiosity) in solution.positions.iter().zip(&mut solution.radiosity) {
+        *radiosity *= if position.z == 2.0 { 0.5 } else { 1.0 };
+    }
+    solution.irradiance.clear();
+    let found = verify(&scene, &solution, &Settings::default(), keep_going).unwrap();
+    assert_eq!(found.groups.iter().map(|g| g.hidden_share).collect::<Vec<_>>(), [0.0, 0.0, 1.0]);
+    assert!(found.error.unwrap().value < 0.1 && found.error_with_hidden.unwrap().value > 0.4);
+}
