@@ -155,6 +155,30 @@ fn the_inside_of_bodies_that_interpenetrate_is_dark() {
 }
 
 #[test]
+fn a_part_of_a_sheet_that_is_inside_of_a_body_is_dark() {
+    // A screen in two parts, of one group: the lower one is in a block.
+    let part = |z0: f64, z1: f64| [[0.5, 0.4, z0], [0.5, 0.6, z0], [0.5, 0.6, z1], [0.5, 0.4, z1]];
+    let solid = block([0.3, 0.3, 0.1], [0.7, 0.7, 0.6]);
+    let parts = scene(&[
+        (&room(), 0.5, 0.0),
+        (&solid, 0.5, 0.0),
+        (&[lamp(0.1)], 0.0, 1.0),
+        (&[part(0.2, 0.55), part(0.55, 0.65), part(0.65, 0.85)], 0.5, 0.0),
+    ]);
+    let triangles = parts.triangles().iter().map(|t| Triangle { group: t.group.min(13), ..*t });
+    let (groups, materials) = (parts.groups().to_vec(), parts.materials().to_vec());
+    let one = Scene::new(parts.positions().to_vec(), triangles.collect(), groups, materials);
+    let found = one.unwrap().resolve_sides();
+    // Nothing of the lowest, all of the highest; of the middle one half is outside.
+    assert_eq!(done(&found), [0, 0, 4]);
+    assert!(
+        found.triangles()[32..]
+            .iter()
+            .all(|t| t.corners.iter().all(|&k| { found.positions()[k as usize].z >= 0.55 }))
+    );
+}
+
+#[test]
 fn lamps_shine_where_their_light_gets_further() {
     // Right below the ceiling, wound up; a bulb inside out; a window whose light would leave.
     let up = facing_up([0.3, 0.7], [0.3, 0.7], 0.99);
