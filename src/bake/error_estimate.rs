@@ -12,8 +12,8 @@
 //! cosine, or in more than 40 % of it backs that nearly touch them, or on average nothing but what
 //! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
 //! what stands on them, or in a crack. Those that see nothing are left out too: what the sky gives
-//! them is exact, and would hide the error of others. A group of the scene has the same figure over its own area,
-//! with the floor of the scene.
+//! them is exact, and would hide the error of others. A group of the scene has the same figure over
+//! its own area, with the floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result

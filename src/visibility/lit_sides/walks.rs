@@ -137,8 +137,8 @@ impl<'a> Walks<'a> {
         (!hidden).then_some(at)
     }
 
-    /// The triangle whose front lies in one place with a back, `side`, and looks the same way: it is
-    /// that which light meets.
+    /// The triangle whose front lies in one place with a back, `side`, and looks the same way: it
+    /// is that which light meets.
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
         let reach = (SAME_PLACE * self.scene.area(t).sqrt()).max(self.contact);
