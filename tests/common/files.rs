@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use radiosity::{Scene, load_obj};
+use radiosity::{ObjSettings, Scene, Sides};
 
-/// `scene`, written to `folder` and loaded from there.
+/// `scene`, written to `folder` and loaded from there. Its fronts reflect: where sheets reflect on
+/// both sides, rounding at their edges decides about a ray here and there.
 pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Error> {
     let (mut obj, mut mtl) = (String::from("mtllib scene.mtl\n"), String::new());
     for (k, m) in scene.materials().iter().enumerate() {
@@ -21,10 +22,12 @@ pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Err
         let _ = write!(obj, "g {}\nusemtl m{}\n", scene.groups()[t.group as usize], t.material);
         let _ = writeln!(obj, "f {a} {b} {c}");
     }
+    let mut settings = ObjSettings::default();
+    settings.sides = Sides::Front;
     let path = folder.join("scene.obj");
     std::fs::write(folder.join("scene.mtl"), mtl).expect("a scratch file");
     std::fs::write(&path, obj).expect("a scratch file");
-    load_obj(path)
+    settings.load(path)
 }
 
 /// The radiosity of every vertex of a PLY file as the crate writes it, channel after channel.
