@@ -6,8 +6,8 @@ use std::path::Path;
 
 use radiosity::{ObjSettings, Scene, Sides};
 
-/// `scene`, written to `folder` and loaded from there. Its fronts reflect: where sheets reflect on
-/// both sides, rounding at their edges decides about a ray here and there.
+/// `scene`, written to `folder` and loaded from there. Its fronts reflect: a bake with sheets that
+/// reflect on both sides is not yet the same over all scales.
 pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Error> {
     let (mut obj, mut mtl) = (String::from("mtllib scene.mtl\n"), String::new());
     for (k, m) in scene.materials().iter().enumerate() {
