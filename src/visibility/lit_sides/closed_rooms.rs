@@ -2,9 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
+use super::sheets::triangles_at_edges;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
-use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 
 /// Per triangle of `scene`, whether it is one of a surface that is closed, wound alike so that its
@@ -12,16 +12,8 @@ use crate::scene::Scene;
 /// walls of a room without a lamp are dark, and no body in the open that is wound inside out.
 pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
     let count = scene.triangles().len();
-    let mut weld = Weld::default();
-    let mut at_edges: FxHashMap<(u32, u32), Vec<(usize, bool)>> = FxHashMap::default();
-    for t in 0..count {
-        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
-        for (a, b) in [(a, b), (b, c), (c, a)] {
-            at_edges.entry((a.min(b), a.max(b))).or_default().push((t, a < b));
-        }
-    }
     let (mut surfaces, mut is_open) = (UnionFind::new(count), vec![false; count]);
-    for triangles in at_edges.values() {
+    for triangles in triangles_at_edges(scene).values() {
         match triangles.as_slice() {
             &[(t, forward), (s, also_forward)] if forward != also_forward => surfaces.join(t, s),
             others => others.iter().for_each(|&(t, _)| is_open[t] = true),

@@ -121,16 +121,8 @@ impl Found {
 /// Per side of a triangle of `scene`, the first side of its sheet.
 fn first_sides(scene: &Scene) -> Vec<SideIndex> {
     let count = scene.triangles().len();
-    let mut weld = Weld::default();
-    let mut at_edges: FxHashMap<(u32, u32), Vec<(usize, bool)>> = FxHashMap::default();
-    for t in 0..count {
-        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
-        for (a, b) in [(a, b), (b, c), (c, a)] {
-            at_edges.entry((a.min(b), a.max(b))).or_default().push((t, a < b));
-        }
-    }
     let mut sheets = UnionFind::new(2 * count);
-    for triangles in at_edges.values() {
+    for triangles in triangles_at_edges(scene).values() {
         let &[(t, forward), (s, also_forward)] = triangles.as_slice() else { continue };
         if scene.triangles()[t].group == scene.triangles()[s].group {
             // Wound alike, one runs forward along what they share, and the other back.
@@ -140,4 +132,18 @@ fn first_sides(scene: &Scene) -> Vec<SideIndex> {
         }
     }
     (0..2 * count).map(|side| sheets.find(side)).collect()
+}
+
+/// The triangles at each edge of `scene`, by the welded positions at its ends, lower first, and
+/// whether each runs along it from the lower to the higher.
+pub fn triangles_at_edges(scene: &Scene) -> FxHashMap<(u32, u32), Vec<(usize, bool)>> {
+    let mut weld = Weld::default();
+    let mut at_edges: FxHashMap<(u32, u32), Vec<(usize, bool)>> = FxHashMap::default();
+    for t in 0..scene.triangles().len() {
+        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            at_edges.entry((a.min(b), a.max(b))).or_default().push((t, a < b));
+        }
+    }
+    at_edges
 }
