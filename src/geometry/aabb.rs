@@ -11,6 +11,9 @@
 
 use glam::{BVec3, DVec3};
 
+/// Sides that differ by no more than this share are equal: coordinates are rounded.
+const EQUAL: f64 = 1e-9;
+
 /// An axis-aligned box from its lowest to its highest coordinates, both within it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
@@ -81,10 +84,11 @@ impl Aabb {
         self.size().length()
     }
 
-    /// The axis (0 to 2) of the longest side; the last of equals.
+    /// The axis (0 to 2) of the longest side; the last of those that are equal but for rounding.
     pub fn longest_axis(&self) -> usize {
         let size = self.size();
-        (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0)
+        let long = (1.0 - EQUAL) * size.max_element();
+        (0..3).rfind(|&axis| size[axis] >= long).unwrap_or(2)
     }
 
     /// The point in the middle. Written so that finite coordinates do not overflow.
@@ -116,6 +120,8 @@ mod tests {
         assert_eq!(Aabb::EMPTY.union(bounds), bounds);
         assert_eq!((bounds.longest_axis(), bounds.longest_side()), (1, 7.0));
         assert_eq!(bounds.centre(), DVec3::new(0.0, 1.5, 1.75));
+        let cube = Aabb { low: DVec3::ZERO, high: DVec3::new(1.0 + 1e-15, 1.0 - 1e-15, 0.5) };
+        assert_eq!(cube.longest_axis(), 1, "the last of equals");
     }
 
     #[test]

@@ -208,7 +208,8 @@ impl TrianglePlane {
 
     /// Adds the segments along which the triangle with these `corners` touches or crosses this one,
     /// whose expanded box is `within`: the parts of its `outer` sides that lie within the tolerance
-    /// of the plane, and its cut with the plane.
+    /// of the plane, and its cut with the plane. What lies in the plane does not cut it, whatever
+    /// rounding makes of it.
     pub fn add_contacts(
         &self,
         corners: &[DVec3; 3],
@@ -224,6 +225,9 @@ impl TrianglePlane {
         if !Aabb::from_points(*corners).overlaps(within) {
             return;
         }
+        let [a, b, c] = *corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let is_coplanar = normal.dot(self.normal).abs() > COPLANAR_COSINE;
         let point_at_height = |k: usize, l: usize, h: f64| {
             let share = (h - height[k]) / (height[l] - height[k]);
             corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
@@ -231,7 +235,7 @@ impl TrianglePlane {
         let mut cut = vec![];
         for (k, l) in [(0, 1), (1, 2), (2, 0)] {
             let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
-            let crosses = low < 0.0 && high > 0.0;
+            let crosses = !is_coplanar && low < 0.0 && high > 0.0;
             if outer[k] && low <= tolerance && high >= -tolerance {
                 // The end at corner k of what lies within the tolerance.
                 let end = |k: usize, l: usize| {

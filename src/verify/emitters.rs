@@ -20,6 +20,13 @@ use crate::scene::Scene;
 /// Clusters there are at most: the weights of all are taken at every vertex of every path.
 const MAX_CLUSTERS: usize = 64;
 
+/// Widths that agree to this share are equal: a scene in another unit has the same clusters.
+const EQUAL: f64 = 1.0 - 1e-9;
+
+/// Triangles are sorted by where they lie in units of this share of their box. It is no fraction of
+/// small numbers, so that regular places do not lie on its steps, which rounding would move.
+const SORT_STEP: f64 = 1e-6 / std::f64::consts::SQRT_2;
+
 /// The emitting triangles of a scene.
 #[derive(Debug)]
 pub(super) struct Emitters {
@@ -119,18 +126,23 @@ fn split(scene: &Scene, all: Vec<usize>) -> Vec<Vec<usize>> {
     if all.is_empty() {
         return vec![];
     }
-    let centre = |t: usize| scene.corners(t).into_iter().sum::<DVec3>();
+    let centre = |t: usize| scene.corners(t).into_iter().sum::<DVec3>() / 3.0;
     let width = |triangles: &[usize]| match triangles.len() {
         1 => 0.0,
         _ => bounds_of(scene, triangles).longest_side(),
     };
     let mut clusters = vec![(width(&all), all)];
     while clusters.len() < MAX_CLUSTERS {
-        let widest = (0..clusters.len()).max_by(|&i, &j| clusters[i].0.total_cmp(&clusters[j].0));
-        let Some(widest) = widest.filter(|&c| clusters[c].1.len() > 1) else { break };
+        let widest = clusters.iter().map(|&(width, _)| width).fold(0.0, f64::max);
+        let Some(widest) = clusters.iter().rposition(|c| c.1.len() > 1 && c.0 >= EQUAL * widest)
+        else {
+            break;
+        };
         let (_, mut low) = clusters.swap_remove(widest);
-        let axis = bounds_of(scene, &low).longest_axis();
-        low.sort_by(|&s, &t| centre(s)[axis].total_cmp(&centre(t)[axis]).then(s.cmp(&t)));
+        let bounds = bounds_of(scene, &low);
+        let (axis, step) = (bounds.longest_axis(), SORT_STEP * bounds.longest_side());
+        let along = |t: usize| ((centre(t) - bounds.low)[axis] / step) as u64;
+        low.sort_by_key(|&t| (along(t), t));
         let high = low.split_off(low.len() / 2);
         clusters.extend([low, high].map(|half| (width(&half), half)));
     }

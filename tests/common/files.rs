@@ -4,10 +4,9 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-use radiosity::{ObjSettings, Scene, Sides};
+use radiosity::Scene;
 
-/// `scene`, written to `folder` and loaded from there. Its fronts reflect: a bake with sheets that
-/// reflect on both sides is not yet the same over all scales.
+/// `scene`, written to `folder` and loaded from there.
 pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Error> {
     let (mut obj, mut mtl) = (String::from("mtllib scene.mtl\n"), String::new());
     for (k, m) in scene.materials().iter().enumerate() {
@@ -22,12 +21,10 @@ pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Err
         let _ = write!(obj, "g {}\nusemtl m{}\n", scene.groups()[t.group as usize], t.material);
         let _ = writeln!(obj, "f {a} {b} {c}");
     }
-    let mut settings = ObjSettings::default();
-    settings.sides = Sides::Front;
     let path = folder.join("scene.obj");
     std::fs::write(folder.join("scene.mtl"), mtl).expect("a scratch file");
     std::fs::write(&path, obj).expect("a scratch file");
-    settings.load(path)
+    radiosity::load_obj(path)
 }
 
 /// The radiosity of every vertex of a PLY file as the crate writes it, channel after channel.

@@ -1,7 +1,7 @@
 //! Meshes of unequal depths: split by hand, split where surfaces touch, shot from; and the ambient
 //! term, which knows their areas. No GPU needed.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use radiosity::mesh::NodeId;
 use radiosity::{
     ErrorKind, Material, Mesh, RayRows, Rgb, Scene, Solver, StopReason, Triangle, VertexMesh,
@@ -194,6 +194,24 @@ fn contact_splits_only_where_box_stands() {
 fn shared_edges_are_no_contact() {
     let empty = Mesh::new(cube(&grey()), 0.3).unwrap();
     assert_eq!(empty.split_at_contacts(3).element_count(), empty.element_count());
+}
+
+#[test]
+fn other_side_of_a_sheet_is_no_contact() {
+    // Askew, so that the corners of each lie off the plane of the other by rounding.
+    let turn = DQuat::from_axis_angle(DVec3::new(2.0, 3.0, 6.0) / 7.0, 0.7);
+    let placed = |p: [f64; 3]| (turn * DVec3::from_array(p) / 3.0).to_array();
+    for k in 0..50 {
+        let shift = f64::from(k) * 0.1;
+        let front = FLOOR.map(|[x, y, z]| placed([x + shift, y, z]));
+        let mut back = front;
+        back.reverse();
+        // The same diagonal, the other way round.
+        back.rotate_left(1);
+        let sheet = Mesh::new(quads(&[(front, grey()), (back, grey())]), 0.2).unwrap();
+        let cut = sheet.split_at_contacts(3);
+        assert_eq!(cut.element_count(), sheet.element_count(), "shifted by {shift}");
+    }
 }
 
 #[test]

@@ -49,6 +49,29 @@ fn furnaces_have_their_closed_form() {
 }
 
 #[test]
+fn paths_are_the_same_in_another_unit() {
+    // Square lamps, whose sides and halves are equal but for rounding.
+    let found = |unit: f64| {
+        let tile = |k: u32| {
+            let at = 0.3 * f64::from(k) + 0.1;
+            (facing_down([at, at + 0.2], [0.4, 0.6], 0.7), lamp([3.0, 2.0, 1.0]))
+        };
+        let mut all = (0..4).map(tile).collect::<Vec<_>>();
+        all.push((facing_up([0.0, 2.0], [0.0, 2.0], 0.0), paint(0.6, 0.0)));
+        let scale = |(corners, material): &(Quad, Material)| {
+            (corners.map(|p| p.map(|x| x * unit)), material.clone())
+        };
+        let scene = quads(&all.iter().map(scale).collect::<Vec<_>>());
+        reflected(&scene, [0.9 * unit, 0.4 * unit, 0.0], DVec3::Z, 300).radiosity
+    };
+    let one = found(1.0);
+    for unit in [1e-9, 1e-4, 1e5, 1e9] {
+        // Rounding of coordinates, over some sums.
+        assert!(found(unit).abs_diff_eq(one, 1e-9 * one.x), "{unit}: {} {one}", found(unit));
+    }
+}
+
+#[test]
 fn lamps_of_any_size_have_their_view_factor() {
     for size in [1e-4, 0.1, 3.0, 1e4] {
         let light = facing_down([0.0, size], [0.0, size], 0.7);

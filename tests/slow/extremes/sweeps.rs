@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 use std::num::NonZeroU32;
+use std::path::Path;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
@@ -296,8 +297,13 @@ fn exitance_of_room(ask: &Ask) -> Swept {
     room(sweep, ask.exitances().into_iter().map(|e| (HERE, e)).collect(), ask)
 }
 
-/// The same room from an OBJ file to a PLY file, baked to 10 %: every vertex, with floats' 6e-8.
-fn bake(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
+/// The same room from an OBJ file to a PLY file, baked to 10 %, and what `told` reads of it.
+fn bake(
+    mut sweep: Sweep,
+    steps: Vec<(Frame, f64)>,
+    ask: &Ask,
+    told: impl Fn(&GatheredMesh, &Path) -> Vec<f64>,
+) -> Swept {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let light = |frame: Frame, e: f64, sweep: &mut Sweep| -> Result<Vec<f64>, Error> {
         let scene = files::through_obj(&scenes::room(frame, e, 0.1 * e), folder.path())?;
@@ -305,7 +311,7 @@ fn bake(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
         sweep.solved(&baked.solution);
         let ply = folder.path().join("scene.ply");
         write_ply(&ply, &baked.light.surface)?;
-        Ok(files::radiosity_of_ply(&ply).into_iter().map(|b| b / e).collect())
+        Ok(told(&baked.light, &ply).into_iter().map(|b| b / e).collect())
     };
     let known = light(HERE, 1.0, &mut sweep)?;
     for (frame, e) in steps {
@@ -316,19 +322,40 @@ fn bake(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     Ok(sweep)
 }
 
+/// Every vertex of the file, with floats' 6e-8.
+fn vertices(_: &GatheredMesh, file: &Path) -> Vec<f64> {
+    files::radiosity_of_ply(file)
+}
+
+/// The mean of every group, by area. A ray that falls to the other side of an edge may split an
+/// element more, so that there are other vertices.
+fn group_means(light: &GatheredMesh, _: &Path) -> Vec<f64> {
+    let (scene, surface) = (light.mesh.scene(), &light.surface);
+    let mut sums = vec![[0.0; 2]; scene.groups().len()];
+    for (face, &e) in surface.faces.iter().zip(&surface.elements) {
+        let triangle = light.mesh.triangle(light.mesh.element(e as usize));
+        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
+        let area = (b - a).cross(c - a).length();
+        let radiosity = face.map(|v| surface.radiosity[v as usize].x).iter().sum::<f64>() / 3.0;
+        let [sum, total] = &mut sums[scene.triangles()[triangle].group as usize];
+        (*sum, *total) = (*sum + radiosity * area, *total + area);
+    }
+    sums.into_iter().map(|[sum, area]| sum / area).collect()
+}
+
 fn scale_of_bake(ask: &Ask) -> Swept {
     let sweep = Sweep::new("scale", SCALES, "bake at scale 1", 1e-6);
-    bake(sweep, ask.scales().into_iter().map(|f| (f, 1.0)).collect(), ask)
+    bake(sweep, ask.scales().into_iter().map(|f| (f, 1.0)).collect(), ask, vertices)
 }
 
 fn shift_of_bake(ask: &Ask) -> Swept {
-    let sweep = Sweep::new("shift", SHIFTS, "bake at the origin", ONE_RAY);
-    bake(sweep, ask.shifts().into_iter().map(|f| (f, 1.0)).collect(), ask)
+    let sweep = Sweep::new("shift", SHIFTS, "bake at the origin, groups", ONE_RAY);
+    bake(sweep, ask.shifts().into_iter().map(|f| (f, 1.0)).collect(), ask, group_means)
 }
 
 fn exitance_of_bake(ask: &Ask) -> Swept {
     let sweep = Sweep::new("exitance", EXITANCES, "bake at 1 W/m²", 1e-6);
-    bake(sweep, ask.exitances().into_iter().map(|e| (HERE, e)).collect(), ask)
+    bake(sweep, ask.exitances().into_iter().map(|e| (HERE, e)).collect(), ask, vertices)
 }
 
 /// Two closed rooms, one brighter than the other, by all methods: the mean of each is its E/(1−ρ).
