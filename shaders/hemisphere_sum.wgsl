@@ -21,9 +21,9 @@ struct Tile {
     middle: vec3f,
     scale: f32,           // area of a pixel at distance 1 along the view; 0 for no light
     right: vec3f,
-    padding: u32,
+    disc: f32,            // of the sun's tile, whose red says what hides it: its radius, squared
     up: vec3f,
-    padding_2: u32,
+    padding: u32,
 }
 
 @group(0) @binding(0) var pixels: texture_2d_array<f32>;   // a layer a point
@@ -74,10 +74,16 @@ fn add_columns(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
             let at = vec2u(i % TILE, i / TILE);
             let pixel = textureLoad(pixels, corner + at, point, 0);
             let p = (vec2f(at) + 0.5) * (2.0 / f32(TILE)) - 1.0;
-            let d = tile.middle + p.x * tile.right - p.y * tile.up;
+            let off = p.x * tile.right - p.y * tile.up;
+            let d = tile.middle + off;
             // cos / (π r²) of a pixel at distance 1 along the view, which it faces.
             let r2 = dot(d, d);
-            seen += pixel.ra * (max(d.z, 0.0) * tile.scale / (PI * r2 * r2));
+            let weight = max(d.z, 0.0) * tile.scale / (PI * r2 * r2);
+            if tile.disc == 0.0 {
+                seen += pixel.ra * weight;
+            } else if dot(off, off) <= tile.disc {
+                seen += vec2f(1.0 - pixel.r, 1.0) * weight;
+            }
         }
         columns[point][8u + 2u * tile_index][lane] = seen.x;
         columns[point][9u + 2u * tile_index][lane] = seen.y;

@@ -1,25 +1,10 @@
 // Draws the radiosity of the scene's own triangles: over one face of a hemicube, or over a tile
 // that fits one light. The element that a pixel sees is found in the triangle's quadtree: in a
 // lattice of nodes at the deepest level that it is complete to, then by descent. Needs
-// shared/corner.wgsl and shared/lattice.wgsl before it.
+// shared/corner.wgsl, shared/lattice.wgsl and shared/view.wgsl before it.
 
 const INNER: u32 = 0x80000000u;
-const MAX_EXPLICIT_LIGHTS: u32 = 8u;
 const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
-
-struct RadianceView {
-    eye: vec3f,           // the point, from the middle of the scene, in units of its size
-    near: f32,            // near plane, same unit
-    right: vec3f,         // dot products with these three are clip x, y and w
-    bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
-    up: vec3f,
-    light: u32,           // the light that a tile looks for
-    forward: vec3f,
-    light_count: u32,     // how many lights have tiles of their own
-    eye_low: vec3f,       // what rounding took off the eye
-    padding: u32,
-    lights: array<u32, MAX_EXPLICIT_LIGHTS>,   // and which: their exitance is not counted here
-}
 
 struct RadianceTriangle {
     exitance: vec3f,      // per channel, in units of about the brightest
@@ -128,4 +113,10 @@ fn radiance(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 @fragment
 fn light_visibility(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     return vec4f(select(0.0, in.sought, front));
+}
+
+// That something is seen before the sun.
+@fragment
+fn sun_hidden() -> @location(0) vec4f {
+    return vec4f(1.0);
 }

@@ -15,6 +15,8 @@ mod textured;
 mod up_axis;
 mod view_score;
 
+pub use up_axis::up_axis;
+
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -50,8 +52,8 @@ pub struct RadianceImage {
     pub height: u32,
     /// `width` × `height` pixels.
     pub pixels: Vec<Rgb>,
-    /// Radiance of pixels in which there is nothing but sky, W/(m² sr) per channel.
-    pub sky: Rgb,
+    /// Of each pixel, whether there is nothing but sky in it.
+    pub sky: Vec<bool>,
 }
 
 /// Largest image side, pixels. Chosen by hand: memory for the pixels is 24 GiB there.
@@ -82,8 +84,8 @@ impl Camera {
     ) -> Result<RadianceImage, Error> {
         let rays = PrimaryRays::new(self, surface, width, height, samples)?;
         let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
-        let pixels = rays.pixels(0..width * height, &radiosity).collect();
-        Ok(RadianceImage { width, height, pixels, sky: surface.sky })
+        let (pixels, sky) = rays.pixels(0..width * height, &radiosity).unzip();
+        Ok(RadianceImage { width, height, pixels, sky })
     }
 
     /// Right, up and forward of the view, unit length.
@@ -135,7 +137,8 @@ impl Camera {
 /// What a primary ray sees first.
 enum Seen {
     Front(Hit),
-    Sky,
+    /// In this direction, unit length.
+    Sky(DVec3),
 }
 
 /// The primary rays through the pixels of an image, and the surface that they meet.
@@ -212,18 +215,27 @@ impl PrimaryRays<'_> {
         (0..pixels).step_by(band as usize).map(move |start| start..end(start))
     }
 
-    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen.
+    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen, and whether that is nothing
+    /// but sky.
     fn pixels<'b>(
         &'b self,
         range: Range<u32>,
         radiosity: &'b (impl Fn(&Hit) -> Rgb + Sync),
-    ) -> impl IndexedParallelIterator<Item = Rgb> + 'b {
+    ) -> impl IndexedParallelIterator<Item = (Rgb, bool)> + 'b {
         range.into_par_iter().map(move |k| {
-            let radiance = |seen: Seen| match seen {
-                Seen::Front(hit) => radiosity(&hit) / PI,
-                Seen::Sky => self.surface.sky,
-            };
-            self.seen(k).map(radiance).sum::<Rgb>() * self.weight
+            let (mut sum, mut is_sky) = (Rgb::ZERO, true);
+            let mut count = 0;
+            for seen in self.seen(k) {
+                count += 1;
+                sum += match seen {
+                    Seen::Front(hit) => {
+                        is_sky = false;
+                        radiosity(&hit) / PI
+                    }
+                    Seen::Sky(direction) => self.surface.sky.radiance(direction),
+                };
+            }
+            (sum * self.weight, is_sky && count == self.samples * self.samples)
         })
     }
 
@@ -244,7 +256,7 @@ impl PrimaryRays<'_> {
     fn hit(&self, direction: DVec3) -> Option<Seen> {
         match self.scene.closest_hit(self.eye, direction, 0.0, None) {
             Some(hit) => hit.front.then_some(Seen::Front(hit)),
-            None => Some(Seen::Sky),
+            None => Some(Seen::Sky(direction.normalize())),
         }
     }
 

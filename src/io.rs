@@ -21,6 +21,8 @@ mod ply;
 mod ply_reader;
 #[cfg(feature = "png")]
 mod png;
+#[cfg(all(feature = "exr", feature = "textures"))]
+mod radiance;
 mod text;
 mod textures;
 mod tone;
@@ -41,6 +43,8 @@ pub use self::png::{write_png, write_png_with_tone};
 pub use obj::{ObjSettings, load_obj, read_obj};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;
+#[cfg(all(feature = "exr", feature = "textures"))]
+pub use radiance::read_radiance;
 pub use tone::ToneCurve;
 
 /// Creates `path` and hands it to `write`; any failure names the file.

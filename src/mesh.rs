@@ -243,9 +243,7 @@ impl Mesh {
             let Node { triangle, cell: Cell { level, i, j, flipped }, .. } = *self.node(element);
             all.update(bytemuck::bytes_of(&[triangle, level, i, j, flipped.into()]));
         }
-        if self.scene.sky() != Rgb::ZERO {
-            all.update(bytemuck::bytes_of(&self.scene.sky().to_array()));
-        }
+        all.update(bytemuck::cast_slice(&self.scene.sky().key()));
         if self.scene.has_textures() {
             for e in 0..self.element_count() {
                 let pair = [self.reflectance(e), self.exitance(e)];

@@ -12,12 +12,14 @@ mod cut;
 mod rgb;
 mod scene_textures;
 mod sides;
+mod sky;
+mod sky_distribution;
+mod sky_map;
 pub mod texture;
 mod textured;
 mod warning;
 
 use std::collections::{BTreeMap, HashMap};
-use std::f64::consts::PI;
 use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DVec2, DVec3};
@@ -29,6 +31,10 @@ pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 pub use sides::Sides;
 pub(crate) use sides::Treatment;
+pub use sky::{Sky, Sun};
+pub use sky_distribution::SkyDistribution;
+#[cfg(feature = "gpu")]
+pub(crate) use sky_map::SkyMap;
 use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
 
@@ -75,7 +81,7 @@ pub struct Scene {
     coordinate_ulp: f64,
     warnings: Vec<Warning>,
     /// See [`Scene::sky`].
-    sky: Rgb,
+    sky: Sky,
     /// Textures of materials, and where they lie on triangles.
     textures: Arc<SceneTextures>,
     /// Per triangle, the sides across which its surface does not continue; empty for none.
@@ -184,7 +190,7 @@ impl Scene {
         let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let coordinate_ulp = f64::EPSILON * largest;
         let warnings = vec![];
-        let sky = Rgb::ZERO;
+        let sky = Sky::default();
         let mut scene = Scene {
             positions,
             triangles,
@@ -226,29 +232,6 @@ impl Scene {
     /// The materials.
     pub fn materials(&self) -> &[Material] {
         &self.materials
-    }
-
-    /// Radiance of the sky, W/(m² sr) per channel: the same in every direction in which there is no
-    /// surface, 0 unless set. What sees nothing else receives the irradiance π times that.
-    pub fn sky(&self) -> Rgb {
-        self.sky
-    }
-
-    /// The same scene under a uniform sky of `radiance`, W/(m² sr) per channel.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite.
-    pub fn with_sky(self, radiance: Rgb) -> Result<Scene, Error> {
-        if !(radiance * PI).is_finite() || radiance.min_element() < 0.0 {
-            let remedy = "give at least 0 in every channel, and finite";
-            return Err(bad("sky", format!("radiance {radiance}"), remedy));
-        }
-        Ok(Scene { sky: radiance, ..self })
-    }
-
-    /// Radiosity of a surface that looks like the sky, W/m².
-    pub(crate) fn sky_radiosity(&self) -> Rgb {
-        PI * self.sky
     }
 
     /// Whether any surface emits light.
@@ -359,7 +342,7 @@ impl Scene {
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
         let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
-        let scene = Scene { sky: self.sky, textures, cut_sides, ..scene };
+        let scene = Scene { sky: self.sky.clone(), textures, cut_sides, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

@@ -21,7 +21,7 @@ mod textured;
 use glam::DVec3;
 
 use crate::mesh::{Mesh, SurfaceTopology};
-use crate::scene::{Material, Rgb};
+use crate::scene::{Material, Rgb, Sky};
 use hanging_nodes::HangingNodes;
 pub(crate) use irradiance::irradiance;
 use keys::{ElementLoops, Vertices};
@@ -54,9 +54,8 @@ pub struct VertexMesh {
     pub faces: Vec<[u32; 3]>,
     /// For each face, the index of the element that it is, or is a part of.
     pub elements: Vec<u32>,
-    /// Radiance where there is no surface, W/(m² sr) per channel:
-    /// [`Scene::sky`](crate::Scene::sky).
-    pub sky: Rgb,
+    /// What is seen where there is no surface: [`Scene::sky`](crate::Scene::sky).
+    pub sky: Sky,
     /// Comments for a file's header, one line each.
     pub comments: Vec<String>,
 }
@@ -111,7 +110,7 @@ impl VertexMesh {
             radiosity: restored.collect(),
             normals,
             positions: positions.clone(),
-            sky: mesh.scene().sky(),
+            sky: mesh.scene().sky().clone(),
             ..Default::default()
         };
         let mut reflected = out.radiosity.clone();

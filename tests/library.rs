@@ -1,7 +1,7 @@
 //! Tests of the library, module for module as in `src`: `cargo test --release --test library
 //! solver` runs those of the solver.
 //!
-//! - What takes more than seconds is in `slow.rs`; the program is tested in `command_line.rs`, the
+//! - What takes more than seconds is in `slow.rs`; the program is tested in `command_line`, the
 //!   memory that reading a file takes in `import_memory.rs`, which has a process of its own.
 //! - `common` has what tests share: scenes, rows and light that are made up, closed forms, truth.
 //! - A test that needs a graphics adapter fails without one. Where RADIOSITY_NO_GPU is set it is

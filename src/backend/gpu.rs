@@ -20,6 +20,7 @@ mod render_targets;
 mod resolution;
 mod rows;
 mod shaders;
+mod sky;
 mod sources;
 mod split_float;
 #[cfg(test)]

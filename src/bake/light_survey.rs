@@ -22,7 +22,7 @@ use crate::gather::gather_points::SurfaceOffset;
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::Mesh;
 use crate::sampling::surface::{AreaSampler, SurfacePoint};
-use crate::scene::{Aabb, Material, Rgb, Scene};
+use crate::scene::{Aabb, Material, Rgb, Scene, Sky};
 
 /// Where the light of a scene falls.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,21 +72,21 @@ impl LightSurvey {
         let places = places(scene);
         // A scene with more triangles than a mesh may have elements is refused when it is cut.
         let is_too_large = scene.triangles().len() > Mesh::MAX_ELEMENTS;
-        let sky = scene.sky_radiosity().length();
-        if (lights.is_empty() && sky == 0.0) || places.is_empty() || is_too_large {
+        let has_sky = !scene.sky().is_black();
+        if (lights.is_empty() && !has_sky) || places.is_empty() || is_too_large {
             return survey;
         }
         // Direct light at each place: flux over the area that it stands for, W.
         let mut flux = vec![0.0; places.len()];
-        // Without lights one look still finds the sky.
-        for first in (0..lights.len().max(1)).step_by(3) {
-            let lights = &lights[first..lights.len().min(first + 3)];
-            let seen = look(scene, lights, &places);
-            if first == 0 {
-                for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
-                    *flux += place.area * seen.escaped * sky;
-                }
+        if has_sky {
+            let seen = look(scene, &[], scene.sky().clone(), &places);
+            for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
+                *flux += place.area * seen.irradiance.length();
             }
+        }
+        for first in (0..lights.len()).step_by(3) {
+            let lights = &lights[first..lights.len().min(first + 3)];
+            let seen = look(scene, lights, Sky::default(), &places);
             for (channel, light) in lights.iter().enumerate() {
                 let exitance = scene.materials()[light.material as usize].exitance.length();
                 let mut landing = 0.0;
@@ -163,9 +163,14 @@ fn places(scene: &Scene) -> Vec<Place> {
 }
 
 /// What each of `places` sees where each of up to three `lights` emits 1 W/m² in a channel of its
-/// own and nothing else does: the irradiances are form factors, visible shares of the hemisphere,
-/// weighted by the cosine.
-fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<IrradianceSample> {
+/// own and nothing else does but the `sky`: under a black one the irradiances are form factors,
+/// visible shares of the hemisphere, weighted by the cosine.
+fn look(
+    scene: &Scene,
+    lights: &[MaterialLight],
+    sky: Sky,
+    places: &[Place],
+) -> Vec<IrradianceSample> {
     let mut materials: Vec<Material> = scene.materials().to_vec();
     for material in &mut materials {
         material.exitance = Rgb::ZERO;
@@ -174,7 +179,7 @@ fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<Irradi
         materials[light.material as usize].exitance = channel;
     }
     let looked_at = scene.with_materials(materials).expect("as many materials, all in range");
-    let looked_at = looked_at.with_sky(Rgb::ZERO).expect("a sky of no light");
+    let looked_at = looked_at.with_sky(sky).expect("a sky of the scene");
     let mesh = Mesh::new(looked_at, f64::INFINITY).expect("no splits");
     let points: Vec<GatherPoint> = places.iter().map(|place| place.point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];

@@ -114,7 +114,7 @@ fn received(
     backend: &ResilientBackend,
 ) -> Result<ReceivedLight, Error> {
     let materials = &settings.gathered_materials;
-    if materials.is_empty() && mesh.scene().sky() == Rgb::ZERO {
+    if materials.is_empty() && mesh.scene().sky().is_black() {
         return Ok(ReceivedLight::default());
     }
     let scene = mesh.scene();

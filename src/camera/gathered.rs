@@ -65,6 +65,7 @@ impl Camera {
         let view = GatheredView::new(LitSurface { rays, light });
         let field = light.radiosity_field();
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
+        let mut sky = vec![false; pixels.len()];
         let total = pixels.len();
         let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
         for band in bands {
@@ -73,6 +74,7 @@ impl Camera {
                 view.parts(band).into_iter().partition(|p| p.reflectance != Rgb::ZERO);
             for part in others {
                 pixels[part.pixel] += part.interpolated;
+                sky[part.pixel] = part.is_whole_sky;
             }
             let mut queue = &gathering[..];
             while !queue.is_empty() {
@@ -93,7 +95,7 @@ impl Camera {
                 return Ok(None);
             }
         }
-        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
+        Ok(Some(RadianceImage { width, height, pixels, sky }))
     }
 }
 
@@ -109,6 +111,8 @@ struct PixelPart {
     reflectance: Rgb,
     /// What it adds to the pixel by the radiosity at vertices, W/(m² sr).
     interpolated: Rgb,
+    /// Whether the pixel is nothing but sky.
+    is_whole_sky: bool,
 }
 
 impl PixelPart {
@@ -148,11 +152,15 @@ impl GatheredView<'_> {
 
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
         let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
-        let mut sky_rays = 0;
+        let (mut sky_rays, mut sky) = (0, Rgb::ZERO);
         for seen in self.lit.rays.seen(pixel) {
-            let Seen::Front(hit) = seen else {
-                sky_rays += 1;
-                continue;
+            let hit = match seen {
+                Seen::Front(hit) => hit,
+                Seen::Sky(direction) => {
+                    sky_rays += 1;
+                    sky += self.lit.light.surface.sky.radiance(direction);
+                    continue;
+                }
             };
             let surface = self.smooth_surface(&hit);
             match groups.iter_mut().find(|group| group.0 == surface) {
@@ -161,8 +169,8 @@ impl GatheredView<'_> {
             }
         }
         let mut parts = vec![];
-        if sky_rays > 0 && self.lit.light.surface.sky != Rgb::ZERO {
-            parts.push(self.sky_part(pixel as usize, sky_rays));
+        if sky_rays > 0 {
+            parts.push(self.sky_part(pixel as usize, sky_rays, sky));
         }
         for (_, hits) in &groups {
             self.add_parts(pixel as usize, hits, &mut parts);
@@ -170,17 +178,19 @@ impl GatheredView<'_> {
         parts
     }
 
-    /// The rays of a pixel that see the sky, where nothing is to be gathered.
-    fn sky_part(&self, pixel: usize, rays: u32) -> PixelPart {
-        let weight = self.lit.rays.weight * f64::from(rays);
+    /// The rays of a pixel that see the sky, where nothing is to be gathered, and the sum of its
+    /// radiance there, W/(m² sr).
+    fn sky_part(&self, pixel: usize, rays: u32, sky: Rgb) -> PixelPart {
+        let PrimaryRays { weight, samples, .. } = self.lit.rays;
         PixelPart {
             pixel,
             point: GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 },
             size: 0.0,
-            weight,
+            weight: weight * f64::from(rays),
             exitance: Rgb::ZERO,
             reflectance: Rgb::ZERO,
-            interpolated: self.lit.light.surface.sky * weight,
+            interpolated: sky * weight,
+            is_whole_sky: rays == samples * samples,
         }
     }
 
@@ -213,6 +223,7 @@ impl GatheredView<'_> {
             exitance,
             reflectance,
             interpolated: sum * self.lit.rays.weight / PI,
+            is_whole_sky: false,
         });
     }
 

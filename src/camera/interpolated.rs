@@ -32,13 +32,16 @@ impl Camera {
         let count = width * height;
         let bands = rays.bands(count, RAYS_PER_BAND);
         let lit = LitSurface { rays, light };
-        let mut pixels = Vec::with_capacity(count as usize);
+        let (mut pixels, mut sky) = (Vec::with_capacity(count as usize), vec![]);
         for band in bands {
-            pixels.par_extend(lit.rays.pixels(band, &|hit| lit.radiosity(hit)));
+            let (seen, is_sky): (Vec<_>, Vec<_>) =
+                lit.rays.pixels(band, &|hit| lit.radiosity(hit)).unzip();
+            pixels.extend(seen);
+            sky.extend(is_sky);
             if progress(pixels.len(), count as usize).is_break() {
                 return Ok(None);
             }
         }
-        Ok(Some(RadianceImage { width, height, pixels, sky: light.surface.sky }))
+        Ok(Some(RadianceImage { width, height, pixels, sky }))
     }
 }

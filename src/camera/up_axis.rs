@@ -32,8 +32,10 @@ const SLICE: f64 = 0.03;
 /// By how much the evidence for +z must be the stronger one. Chosen by hand.
 const MARGIN: f64 = 0.05;
 
-/// The axis, +y or +z, that seems to point up in `scene`.
-pub(super) fn up_axis(scene: &Scene) -> DVec3 {
+/// The axis, +y or +z, that seems to point up in `scene`: by what is level and upright, by what
+/// stands wider below than above, and by which way ground, roofs and lamps face. +y without clear
+/// evidence.
+pub fn up_axis(scene: &Scene) -> DVec3 {
     if evidence(scene, DVec3::Z) > evidence(scene, DVec3::Y) + MARGIN { DVec3::Z } else { DVec3::Y }
 }
 

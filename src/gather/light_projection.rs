@@ -87,6 +87,13 @@ impl LightProjection {
         Some(LightProjection::of_box(forward, [right, up], middle, half))
     }
 
+    /// The view of a disc that is far away in unit direction `forward`, from the tangent of its
+    /// angular radius.
+    pub fn of_disc(forward: DVec3, tangent: f64) -> LightProjection {
+        let x = forward.any_orthonormal_vector();
+        LightProjection::of_box(forward, [x, x.cross(forward)], DVec2::ZERO, DVec2::splat(tangent))
+    }
+
     /// The view along unit `forward` that shows the box around `middle` in the plane at distance 1
     /// with the given axes.
     fn of_box(forward: DVec3, [x, y]: [DVec3; 2], middle: DVec2, half: DVec2) -> LightProjection {

@@ -84,6 +84,11 @@ impl Lights {
         Lights { scene, lights, of_triangle }
     }
 
+    /// The scene whose lights they are.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// The lights that are worth explicit samples from `point`, those with the largest unoccluded
     /// irradiance first, each with the unoccluded form factor from there to it.
     pub fn importance_ranked(&self, point: &GatherPoint) -> Vec<(u32, f64)> {

@@ -146,7 +146,7 @@ impl SampledMesh {
             positions: self.vertices.positions.clone(),
             normals: vec![DVec3::ZERO; count],
             radiosity: vec![Rgb::ZERO; count],
-            sky: self.mesh.scene().sky(),
+            sky: self.mesh.scene().sky().clone(),
             ..Default::default()
         };
         for (e, outline) in self.vertices.outlines.iter() {

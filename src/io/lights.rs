@@ -5,7 +5,7 @@
 //! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
 //! warning that nothing emits names these.
 
-use crate::scene::{Material, Rgb, Warning, WarningKind};
+use crate::scene::{Material, Rgb, Sky, Warning, WarningKind};
 
 /// What is part of the names that lamps are given, in lower case.
 const LIGHT_NAMES: [&str; 22] = [
@@ -32,22 +32,22 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// Radiance of the sky over a scene in which nothing emits, unless said otherwise, W/(m² sr).
 const DEFAULT_SKY: Rgb = Rgb::ONE;
 
-/// Radiance of the sky over a scene of `used` materials where `wanted` is asked for; and the
-/// warning that none of them emits, if none does and no sky was asked for.
+/// The sky over a scene of `used` materials where `wanted` is asked for; and the warning that none
+/// of them emits, if none does and no sky was asked for.
 pub(super) fn sky_and_warning<'a>(
     used: impl Iterator<Item = &'a Material> + Clone,
-    wanted: Option<Rgb>,
-) -> (Rgb, Option<Warning>) {
-    if used.clone().any(|m| m.exitance.max_element() > 0.0) {
-        return (wanted.unwrap_or(Rgb::ZERO), None);
-    }
-    let sky = wanted.unwrap_or(DEFAULT_SKY);
-    let warns = wanted.is_none() || sky == Rgb::ZERO;
-    (sky, warns.then(|| no_light(used, sky)))
+    wanted: Option<&Sky>,
+) -> (Sky, Option<Warning>) {
+    let is_dark = !used.clone().any(|m| m.exitance.max_element() > 0.0);
+    let warns = is_dark && wanted.is_none_or(Sky::is_black);
+    let default = Sky::uniform(if is_dark { DEFAULT_SKY } else { Rgb::ZERO });
+    let sky = wanted.cloned().unwrap_or(default);
+    let warning = warns.then(|| no_light(used, sky.is_black()));
+    (sky, warning)
 }
 
-/// The warning that none of `used` emits, under a `sky`.
-fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone, sky: Rgb) -> Warning {
+/// The warning that none of `used` emits, under a sky that may be black.
+fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone, is_black: bool) -> Warning {
     let names = candidates(used.clone().map(|m| m.name.as_str()));
     let example = names.first().or(Some(&"MATERIAL")).map(|name| crate::error::shortened(name));
     let example = example.unwrap_or_default().escape_debug().to_string();
@@ -56,9 +56,9 @@ fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone, sky: Rgb) -> W
     } else {
         format!("{example}=15,15,15")
     };
-    let under = match sky {
-        Rgb::ZERO => "left dark",
-        _ => "lit from outside by a sky of radiance 1",
+    let under = match is_black {
+        true => "left dark",
+        false => "lit from outside by a sky of radiance 1",
     };
     let done = match names.len() {
         0 => format!("{under}; for a lamp write `Ke` into a material, or --emit {example}"),

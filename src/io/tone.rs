@@ -43,8 +43,8 @@ impl ToneCurve {
 
     /// Fits the curve to an image; what is nothing but sky does not count.
     pub fn fit_image(image: &RadianceImage) -> ToneCurve {
-        let is_sky = |colour: &Rgb| colour.distance(image.sky) <= 1e-9 * image.sky.length();
-        let surfaces: Vec<Rgb> = image.pixels.iter().copied().filter(|c| !is_sky(c)).collect();
+        let pixels = image.pixels.iter().zip(&image.sky);
+        let surfaces: Vec<Rgb> = pixels.filter(|(_, is_sky)| !**is_sky).map(|(c, _)| *c).collect();
         ToneCurve::fit(if surfaces.is_empty() { &image.pixels } else { &surfaces })
     }
 

@@ -24,7 +24,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::emitters::{Emitters, Weights};
 use crate::progress::BatchSizer;
-use crate::scene::{Rgb, Scene};
+use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -159,11 +159,14 @@ impl<'a> PathTracer<'a> {
         loop {
             let weights = self.emitters.weights(at.position);
             reflected += throughput * self.next_event(&at, &weights, rng);
+            if let Some(sun) = self.scene.sky().sun() {
+                reflected += throughput * self.irradiance_of_sun(&at, sun, rng);
+            }
             let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
             let hit = match self.next_hit(&at, direction) {
                 Some(hit) if hit.front => hit,
                 Some(_) => return reflected,
-                None => return reflected + throughput * PI * self.scene.sky(),
+                None => return reflected + throughput * PI * self.scene.sky().radiance(direction),
             };
             let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
             let reflectance = self.scene.reflectance_at(hit.triangle, [hit.u, hit.v]);
@@ -208,6 +211,18 @@ impl<'a> PathTracer<'a> {
         }
         let density = self.emitters.density(weights, light) * distance * distance / facing;
         self.scene.exitance_at(light, place) / PI * cosine / (density + cosine / PI)
+    }
+
+    /// Irradiance at `at` from one point of the sun, W/m². No path meets the sun by itself.
+    fn irradiance_of_sun(&self, at: &SurfacePoint, sun: &Sun, rng: &mut Rng) -> Rgb {
+        let direction = sun.towards([rng.f64(), rng.f64()]);
+        let cosine = self.normals[at.triangle].dot(direction);
+        let between = self.contact..f64::INFINITY;
+        let hides = |hit: &Hit| hit.triangle != at.triangle;
+        if cosine <= 0.0 || self.rays.occluded(at.position, direction, between, hides) {
+            return Rgb::ZERO;
+        }
+        sun.irradiance * cosine
     }
 
     /// What a ray along `direction` (unit length) meets first. What lies in one place with the

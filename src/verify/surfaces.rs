@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::path_tracer::{SurfacePoint, random_point};
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Rgb, Scene};
+use crate::scene::Scene;
 
 /// The part of a group that reflects.
 pub(super) struct ReflectingGroup {
@@ -34,7 +34,7 @@ impl ReflectingGroup {
         if total == 0.0 {
             return wrong("none that is used reflects", "give one a reflectance above 0");
         }
-        if !scene.has_emitter() && scene.sky() == Rgb::ZERO {
+        if !scene.has_emitter() && scene.sky().is_black() {
             return wrong("none that is used emits", "give one an exitance above 0, or a sky");
         }
         let group = |(group, areas): (usize, Vec<(usize, f64)>)| {

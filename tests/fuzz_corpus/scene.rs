@@ -10,7 +10,7 @@
 //! An image of any kind is told by its content; what has no sign of its own is taken for a TGA.
 
 use radiosity::io::ObjSettings;
-use radiosity::{Error, ErrorKind, Mesh, RayRows, Rgb, Scene, Solver, VertexMesh};
+use radiosity::{Error, ErrorKind, Mesh, RayRows, Rgb, Scene, Sky, Solver, VertexMesh};
 use std::ops::ControlFlow;
 
 /// Parts one file from the next.
@@ -79,8 +79,9 @@ fn settings(choice: u8) -> ObjSettings {
     if choice & 8 != 0 {
         settings.emit.push(("a".into(), Rgb::new(15.0, 0.0, 1e-300)));
     }
-    settings.sky =
-        [None, None, Some(Rgb::ZERO), Some(Rgb::new(0.0, 1.0, 2.0))][usize::from(choice >> 4 & 3)];
+    settings.sky = [None, None, Some(Rgb::ZERO), Some(Rgb::new(0.0, 1.0, 2.0))]
+        [usize::from(choice >> 4 & 3)]
+    .map(Sky::uniform);
     if choice & 64 != 0 {
         settings.max_reflectance = 0.0;
     }
@@ -112,7 +113,7 @@ fn check_scene(scene: &Scene, bytes: usize) {
         assert!(reflectance.min_element() >= 0.0 && reflectance.max_element() < 1.0);
         check_textures(scene, t);
     }
-    assert!(scene.sky().is_finite());
+    assert!(scene.sky().uniform_radiance().is_some_and(Rgb::is_finite));
     for count in [scene.positions().len(), scene.triangles().len(), scene.groups().len()] {
         assert!(count <= bytes, "{count} of {bytes} bytes");
     }

@@ -6,7 +6,12 @@ use radiosity::{ErrorKind, RadianceImage, Rgb, write_exr, write_png};
 /// 4 × 3 pixels, all different, red from 0 to 11 and green even.
 fn image() -> RadianceImage {
     let pixel = |k: u32| Rgb::new(f64::from(k), 0.25, 1e-3 * f64::from(k));
-    RadianceImage { width: 4, height: 3, pixels: (0..12).map(pixel).collect(), sky: Rgb::ZERO }
+    RadianceImage {
+        width: 4,
+        height: 3,
+        pixels: (0..12).map(pixel).collect(),
+        sky: vec![false; 12],
+    }
 }
 
 #[test]
@@ -46,7 +51,7 @@ fn exr_rejects_values_beyond_floats() {
     let image = |value: f64| {
         let mut pixels = vec![Rgb::ONE; 6];
         pixels[4] = Rgb::splat(value);
-        RadianceImage { width: 3, height: 2, pixels, sky: Rgb::ZERO }
+        RadianceImage { width: 3, height: 2, pixels, sky: vec![false; 6] }
     };
     write_exr(&path, &image(1e30)).unwrap();
     for value in [1e39, f64::INFINITY, f64::NAN] {

@@ -91,7 +91,7 @@ fn ply_reads_back_bit_for_bit() {
 #[test]
 fn unwritable_path_is_named() {
     let (surface, missing) = (surface(), Path::new("no/such/folder/x"));
-    let image = RadianceImage { width: 1, height: 1, pixels: vec![Rgb::ONE], sky: Rgb::ZERO };
+    let image = RadianceImage { width: 1, height: 1, pixels: vec![Rgb::ONE], sky: vec![false] };
     for e in [
         write_ply(missing, &surface).unwrap_err(),
         write_exr(missing, &image).unwrap_err(),

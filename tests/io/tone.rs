@@ -83,6 +83,7 @@ fn black_pixels_do_not_count() {
     // Nor does the sky in a picture, however much of it there is; if there is no more, it does.
     let sky = Rgb::new(3.0, 4.0, 5.0);
     let with_sky = |pixels: Vec<Rgb>| {
+        let sky = pixels.iter().map(|&pixel| pixel == sky).collect();
         let image = RadianceImage { width: 4, height: 1, pixels, sky };
         ToneCurve::fit_image(&image)
     };

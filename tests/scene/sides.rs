@@ -48,7 +48,7 @@ fn flipped(scene: &Scene, seed: u64) -> (Scene, usize) {
     let triangles = scene.triangles().iter().map(turn).collect();
     let (groups, materials) = (scene.groups().to_vec(), scene.materials().to_vec());
     let turned = Scene::new(scene.positions().to_vec(), triangles, groups, materials).unwrap();
-    (turned.with_sky(scene.sky()).unwrap(), count)
+    (turned.with_sky(scene.sky().clone()).unwrap(), count)
 }
 
 /// How many triangles were dropped, turned and doubled, by the warnings.

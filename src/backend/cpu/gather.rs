@@ -28,7 +28,7 @@ use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::Scene;
+use crate::scene::{Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -77,7 +77,7 @@ impl RayGather {
             scene: RayScene::of_scene(mesh.scene()),
             lights: Lights::new(mesh.shared_scene()),
             rotations: CellRotation::new(&mesh.scene().bounds()),
-            samples: HemisphereSamples::progressive(min_rays),
+            samples: samples(mesh.scene(), min_rays, min_rays),
             min_rays,
             max_rays: min_rays,
             noise: f64::INFINITY,
@@ -96,7 +96,7 @@ impl RayGather {
         } else {
             self.min_rays
         };
-        let samples = HemisphereSamples::progressive(max_rays);
+        let samples = samples(self.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
@@ -110,14 +110,16 @@ impl RayGather {
             light.convex
                 || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
         });
+        let sun = sources.mesh.scene().sky().sun();
         let trace = |range| self.trace(sources, point, &lights, range);
+        let sample = |sums: &RaySums, count| self.sample(sums, (point, &lights, sun), count);
         let mut count = self.min_rays;
         let mut sums = trace(0..count / 2);
         loop {
             let second = trace(count / 2..count);
-            let [a, b] = [&sums, &second].map(|half| self.sample(half, &lights, count / 2));
+            let [a, b] = [&sums, &second].map(|half| sample(half, count / 2));
             sums.add(&second);
-            let all = self.sample(&sums, &lights, count);
+            let all = sample(&sums, count);
             let largest_share = sums.max_contribution / f64::from(count);
             let difference = a.irradiance.distance(b.irradiance).max(largest_share);
             let allowed = self.noise * all.irradiance.length().max(self.dim);
@@ -139,14 +141,15 @@ impl RayGather {
         let rotation = self.rotations.at(point.position, point.near);
         let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
         let mut sums = RaySums::default();
-        let sky = sources.mesh.scene().sky_radiosity();
+        let sky = sources.mesh.scene().sky();
         let out = &mut sums.hemisphere;
         for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
             let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
             else {
                 out.escaped += 1.0;
-                out.irradiance += sky;
-                sums.max_contribution = sums.max_contribution.max(sky.length());
+                let radiosity = PI * sky.radiance(direction);
+                out.irradiance += radiosity;
+                sums.max_contribution = sums.max_contribution.max(radiosity.length());
                 continue;
             };
             out.inverse_distance += 1.0 / hit.distance;
@@ -167,11 +170,19 @@ impl RayGather {
             self.shadow_rays(sources.mesh.scene(), point, light, range.clone(), rotation)
         };
         sums.lights = lights.iter().map(visible).collect();
+        if let Some(sun) = sky.sun() {
+            sums.sun = self.rays_to_sun(point, sun, range, rotation);
+        }
         sums
     }
 
     /// The irradiance by sums over `count` rays.
-    fn sample(&self, sums: &RaySums, lights: &[(u32, f64)], count: u32) -> IrradianceSample {
+    fn sample(
+        &self,
+        sums: &RaySums,
+        (point, lights, sun): (&GatherPoint, &[(u32, f64)], Option<&Sun>),
+        count: u32,
+    ) -> IrradianceSample {
         let (share, mut out) = (1.0 / f64::from(count), sums.hemisphere);
         out.irradiance *= share;
         out.escaped *= share;
@@ -186,7 +197,37 @@ impl RayGather {
             };
             out.direct += light.exitance * visible.seen * share;
         }
+        if let Some(sun) = sun {
+            let Visible { points, seen, all } = sums.sun;
+            out.direct += match sun.unoccluded(point.normal.dot(sun.direction)) {
+                Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
+                None => sun.irradiance * (seen / points.max(1.0)),
+            };
+        }
         out.irradiance += out.direct;
+        out
+    }
+
+    /// The cosines at `point` of points spread over the sun: of those of `range` that are seen, and
+    /// of all above the horizon.
+    fn rays_to_sun(
+        &self,
+        point: &GatherPoint,
+        sun: &Sun,
+        range: Range<u32>,
+        rotation: f64,
+    ) -> Visible {
+        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
+        let second_rotation = (rotation * SECOND_ROTATION).fract();
+        for [x, y] in range.map(sobol_02_point) {
+            let direction = sun.towards([(x + second_rotation).fract(), (y + rotation).fract()]);
+            let cosine = point.normal.dot(direction).max(0.0);
+            let reach = point.near..f64::INFINITY;
+            out.all += cosine;
+            if cosine > 0.0 && !self.scene.occluded(point.position, direction, reach, |_| true) {
+                out.seen += cosine;
+            }
+        }
         out
     }
 
@@ -234,6 +275,16 @@ impl RayGather {
     }
 }
 
+/// Directions of `max_rays` rays in `scene`, of which `min_rays` are cast at least. Under a sky
+/// that is brighter above than at its sides all places would be off alike by rays that are nearer
+/// to the normal than they should.
+fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
+    match scene.sky().uniform_radiance() {
+        Some(_) => HemisphereSamples::progressive(max_rays),
+        None => HemisphereSamples::centred(max_rays, min_rays),
+    }
+}
+
 /// Sums over rays.
 #[derive(Debug, Default)]
 struct RaySums {
@@ -241,6 +292,8 @@ struct RaySums {
     /// The largest reflected radiosity, or that of the sky, that one ray found, W/m².
     max_contribution: f64,
     lights: Vec<Visible>,
+    /// Cosines instead of form factors.
+    sun: Visible,
 }
 
 /// Sums of form factors over points on a light.
@@ -262,10 +315,17 @@ impl RaySums {
         sum.inverse_distance += term.inverse_distance;
         self.max_contribution = self.max_contribution.max(other.max_contribution);
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
-            sum.points += term.points;
-            sum.seen += term.seen;
-            sum.all += term.all;
+            sum.add(term);
         }
+        self.sun.add(&other.sun);
+    }
+}
+
+impl Visible {
+    fn add(&mut self, other: &Visible) {
+        self.points += other.points;
+        self.seen += other.seen;
+        self.all += other.all;
     }
 }
 

@@ -66,7 +66,7 @@ fn add_hemicube(image: &PointImage, n: u32, lane: u32) -> (Vec3, Vec3) {
     (radiosity, shares)
 }
 
-/// A lane's form factors of a light: of what is seen, and of all of it.
+/// A lane's form factors of a light, or of the sun: of what is seen, and of all of it.
 fn add_tile(image: &PointImage, n: u32, index: u32, tile: &Tile, lane: u32) -> Vec2 {
     let tiles_per_line = n.max(TILE) / TILE;
     let left = index % tiles_per_line * TILE;
@@ -76,9 +76,15 @@ fn add_tile(image: &PointImage, n: u32, index: u32, tile: &Tile, lane: u32) -> V
         let (x, y) = (i % TILE, i / TILE);
         let pixel = image.pixel(left + x, top + y);
         let p = (Vec2::new(x as f32, y as f32) + 0.5) * (2.0 / TILE as f32) - 1.0;
-        let d = Vec3::from(tile.middle) + p.x * Vec3::from(tile.right) - p.y * Vec3::from(tile.up);
+        let off = p.x * Vec3::from(tile.right) - p.y * Vec3::from(tile.up);
+        let d = Vec3::from(tile.middle) + off;
         let r2 = d.dot(d);
-        seen += Vec2::new(pixel.x, pixel.w) * (d.z.max(0.0) * tile.scale / (PI * r2 * r2));
+        let weight = d.z.max(0.0) * tile.scale / (PI * r2 * r2);
+        if tile.disc == 0.0 {
+            seen += Vec2::new(pixel.x, pixel.w) * weight;
+        } else if off.dot(off) <= tile.disc {
+            seen += Vec2::new(1.0 - pixel.x, 1.0) * weight;
+        }
     }
     seen
 }

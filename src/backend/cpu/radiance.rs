@@ -66,6 +66,11 @@ impl Radiance<'_> {
         });
     }
 
+    /// Draws the tile of the sun: in red that something hides it.
+    pub fn draw_sun_tile(&self, image: &mut Image<Vec4>, target: Target, triangles: u32) {
+        self.draw(image, target, 0..triangles, DepthTest::Nearest, |_, _, pixel| pixel.x = 1.0);
+    }
+
     fn draw(
         &self,
         image: &mut Image<Vec4>,

@@ -27,6 +27,8 @@ pub enum DepthTest {
     Nearest,
     /// Any front.
     AnyFront,
+    /// What is at the far end, where nothing was drawn.
+    Behind,
 }
 
 /// One triangle at one pixel centre.
@@ -89,6 +91,9 @@ impl<T: Copy> Image<T> {
                         continue;
                     }
                     self.depth[pixel] = depth;
+                }
+                if test == DepthTest::Behind && depth < self.depth[pixel] {
+                    continue;
                 }
                 let weights = (b / inverse_w).as_vec3().to_array();
                 let fragment = Fragment { weights, inverse_w: inverse_w as f32, front };

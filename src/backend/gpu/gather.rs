@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! points ─► GatherJob: 5 faces + a tile for each light seen on its own ─► radiance images
-//!                                                                              │
+//!                      + one for the sun                                       │
 //! IrradianceSample ◄─ sample(sums, job), checked ◄─ readback ◄─ hemisphere sum ┘
 //! ```
 //!
-//! What comes straight from a light is its closed form times the share of its tile that is seen;
-//! all other light is the sum of radiosity × form factor over the pixels of the hemicube.
+//! What comes straight from a light or the sun is its closed form times the share of its tile that
+//! is seen; all other light is the sum of radiosity × form factor over the pixels of the hemicube.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Instant;
 
 use glam::DVec3;
@@ -33,7 +33,7 @@ use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::Mesh;
 use crate::progress::Timings;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Rgb, Scene};
+use crate::scene::{Rgb, Scene, Sky, Sun};
 
 /// Gathers with hemicubes (Cohen and Greenberg 1985) on a graphics device, one a point.
 ///
@@ -75,6 +75,9 @@ struct GatherJob {
     views: Vec<View>,
     tiles: Vec<Tile>,
     lights: Vec<(u32, f64)>,
+    /// Its cosine, if any of it is above the horizon: its tile is the one after those of the
+    /// lights.
+    sun: Option<f64>,
 }
 
 /// Images of a batch take at most this many bytes, if more than one. Chosen by hand; no measurement
@@ -95,9 +98,12 @@ impl HemicubeGather {
         hemicube::check_resolution(resolution)?;
         let scene = mesh.scene();
         let lights = Lights::new(mesh.shared_scene());
-        let tiles = lights.lights.len().min(MAX_EXPLICIT_LIGHTS) as u32;
+        let sky = scene.sky();
+        let tiles = lights.lights.len() + usize::from(sky.sun().is_some());
+        let tiles = tiles.min(MAX_EXPLICIT_LIGHTS) as u32;
         let size = target_size(gpu.limits(), scene, resolution, tiles)?;
-        let brightest = lights.lights.iter().map(|l| l.exitance.max_element()).fold(0.0, f64::max);
+        let lamps = lights.lights.iter().map(|l| l.exitance.max_element());
+        let brightest = lamps.chain(sky.map().map(|_| PI * sky.brightest())).fold(0.0, f64::max);
         let mut gather = HemicubeGather {
             gpu: gpu.clone(),
             draw_list: DrawList::new(scene),
@@ -148,6 +154,11 @@ impl HemicubeGather {
     /// What is drawn for `point`.
     fn job(&self, scene: &Scene, point: &GatherPoint) -> GatherJob {
         let mut lights = self.lights.importance_ranked(point);
+        let sun = scene.sky().sun().map(|sun| (sun, point.normal.dot(sun.direction)));
+        let sun = sun.filter(|&(_, cosine)| cosine > -Sun::SINE);
+        if sun.is_some() {
+            lights.truncate(MAX_EXPLICIT_LIGHTS - 1);
+        }
         let mut projections = vec![];
         lights.retain(|&(light, _)| {
             let triangles = self.lights.lights[light as usize].triangles.iter();
@@ -181,14 +192,18 @@ impl HemicubeGather {
         };
         let faces = Face::all(&frame).into_iter().map(|face| view(face, NO_LIGHT));
         let of_lights = projections.iter().zip(&lights).map(|(p, light)| view(p.face, light.0));
-        let views = faces.chain(of_lights).collect();
+        let to_sun = sun.map(|(sun, _)| LightProjection::of_disc(sun.direction, Sun::tangent()));
+        let of_sun = to_sun.iter().map(|p| view(p.face, NO_LIGHT));
+        let views = faces.chain(of_lights).chain(of_sun).collect();
         let mut tiles: Vec<Tile> = projections.iter().map(|p| tile(p, &frame)).collect();
+        let disc = (Sun::tangent() * Sun::tangent()) as f32;
+        tiles.extend(to_sun.map(|p| Tile { disc, ..tile(&p, &frame) }));
         tiles.resize(self.size.tiles as usize, Tile::default());
-        GatherJob { views, tiles, lights }
+        GatherJob { views, tiles, lights, sun: sun.map(|(_, cosine)| cosine) }
     }
 
-    /// What the sums over a point's pixels say, under a sky of this radiosity, W/m².
-    fn sample(&self, sums: &Sums, job: &GatherJob, sky: Rgb) -> IrradianceSample {
+    /// What the sums over a point's pixels say, under this sky.
+    fn sample(&self, sums: &Sums, job: &GatherJob, sky: &Sky) -> IrradianceSample {
         let mut direct = Rgb::ZERO;
         for (&(light, factor), &[seen, alone]) in job.lights.iter().zip(&sums.lights) {
             let (light, seen) = (&self.lights.lights[light as usize], f64::from(seen));
@@ -199,10 +214,19 @@ impl HemicubeGather {
                     seen
                 };
         }
+        if let (Some(sun), Some(cosine)) = (sky.sun(), job.sun) {
+            let [seen, all] = sums.lights[job.lights.len()].map(f64::from);
+            direct += match sun.unoccluded(cosine) {
+                Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
+                None => sun.irradiance * (seen / (Sun::SINE * Sun::SINE)),
+            };
+        }
         let [r, g, b] = sums.radiosity.map(f64::from);
         let escaped = f64::from(sums.open);
+        // Other skies are in the pixels.
+        let uniform = PI * sky.uniform_radiance().unwrap_or(Rgb::ZERO);
         IrradianceSample {
-            irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct + sky * escaped,
+            irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct + uniform * escaped,
             direct,
             escaped,
             backface: sums.back.into(),
@@ -220,7 +244,7 @@ impl HemicubeGather {
         let jobs: Vec<GatherJob> = points.par_iter().map(|p| self.job(light.scene, p)).collect();
         let views: Vec<&[View]> = jobs.iter().map(|job| &job.views[..]).collect();
         let tiles: Vec<Tile> = jobs.iter().flat_map(|job| &job.tiles).copied().collect();
-        let sky = light.scene.sky_radiosity();
+        let sky = light.scene.sky();
         let gpu = &self.gpu;
         let Batches { radiance, sum, readback, .. } = batches;
         let mut timings = self.timings;
@@ -348,7 +372,7 @@ fn target_size(
     Ok(TargetSize { batch, ..of(resolution) })
 }
 
-/// Where the pixels of a light's tile look, in the frame of the point.
+/// Where the pixels of a light's or of the sun's tile look, in the frame of the point.
 fn tile(fit: &LightProjection, frame: &Frame) -> Tile {
     let Frame { tangent, bitangent, normal } = *frame;
     let local =
@@ -359,9 +383,9 @@ fn tile(fit: &LightProjection, frame: &Frame) -> Tile {
         middle: local(fit.middle),
         scale: (area / f64::from(TILE * TILE)) as f32,
         right: local(fit.right),
-        padding: 0,
+        disc: 0.0,
         up: local(fit.up),
-        padding_2: 0,
+        padding: 0,
     }
 }
 

@@ -6,6 +6,7 @@
 //! | `item_buffer.wgsl` | [`Corner`] ×3, [`TriangleCells`], [`FaceView`] | u32 a pixel |
 //! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
 //! | `radiance.wgsl` | [`Corner`], [`RadianceTriangle`], [`RadianceView`], [`Lattice`] | f32 ×4 |
+//! | `sky.wgsl` | [`RadianceView`], [`SkyAxes`] | f32 ×4 |
 //! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`], [`Summation`] | [`Sums`] a point |
 //!
 //! Members that a shader does not read pad the struct to WGSL's alignment.
@@ -100,15 +101,27 @@ pub struct Summation {
     pub tiles: u32,
 }
 
-/// Where the pixels of a light's tile look.
+/// Where the pixels of a light's or of the sun's tile look.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Tile {
     pub middle: [f32; 3],
     pub scale: f32,
     pub right: [f32; 3],
-    pub padding: u32,
+    pub disc: f32,
     pub up: [f32; 3],
+    pub padding: u32,
+}
+
+/// The axes of a sky's pieces, and how many of these lie along the edge of a square.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct SkyAxes {
+    pub x: [f32; 3],
+    pub side: u32,
+    pub y: [f32; 3],
+    pub padding: u32,
+    pub z: [f32; 3],
     pub padding_2: u32,
 }
 
@@ -153,7 +166,7 @@ mod tests {
     use std::mem::offset_of;
 
     use super::super::shaders::{
-        HEMISPHERE_SUM_WGSL, ITEM_BUFFER_WGSL, RADIANCE_WGSL, REDUCE_WGSL,
+        HEMISPHERE_SUM_WGSL, ITEM_BUFFER_WGSL, RADIANCE_WGSL, REDUCE_WGSL, SKY_WGSL,
     };
     use super::*;
 
@@ -226,6 +239,12 @@ mod tests {
             rust_layout!(Reduction { resolution, slots, stride })
         );
         let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
+        let sky = parsed(SKY_WGSL);
+        assert_eq!(
+            wgsl_layout(&sky, "SkyAxes"),
+            rust_layout!(SkyAxes { x, side, y, padding, z, padding_2 })
+        );
+        assert_eq!(wgsl_layout(&sky, "RadianceView"), wgsl_layout(&radiance, "RadianceView"));
         assert_eq!(
             wgsl_layout(&radiance, "RadianceView"),
             rust_layout!(RadianceView {
@@ -259,7 +278,7 @@ mod tests {
         );
         assert_eq!(
             wgsl_layout(&gather, "Tile"),
-            rust_layout!(Tile { middle, scale, right, padding, up, padding_2 })
+            rust_layout!(Tile { middle, scale, right, disc, up, padding })
         );
     }
 

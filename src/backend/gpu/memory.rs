@@ -121,6 +121,29 @@ impl Memory {
         }))
     }
 
+    /// A texture of these texels, line by line, for shaders to read: width and height.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Memory`] when that is more than is left.
+    pub fn texels(
+        &self,
+        label: &str,
+        texels: &[[f32; 4]],
+        [width, height]: [u32; 2],
+    ) -> Result<wgpu::TextureView, Error> {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let texture = self.texture(label, [width, height, 1], format, usage)?;
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * width),
+            rows_per_image: None,
+        };
+        let bytes = bytemuck::cast_slice(texels);
+        self.queue.write_texture(texture.as_image_copy(), bytes, layout, texture.size());
+        Ok(texture.create_view(&Default::default()))
+    }
+
     fn take(&self, label: &str, bytes: u64) -> Result<(), Error> {
         if let Err(taken) = self.budget.take(bytes) {
             let limit = self.budget.limit;

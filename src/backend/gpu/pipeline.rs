@@ -7,6 +7,8 @@ pub enum DepthMode {
     Nearest,
     /// Whether there is any front, hidden or not.
     AnyFront,
+    /// What is at the far end, where nothing was drawn.
+    Behind,
 }
 
 /// The module of a WGSL source.
@@ -52,6 +54,7 @@ impl Draw<'_> {
         let (compare, cull_mode) = match self.depth_mode {
             DepthMode::Nearest => (wgpu::CompareFunction::Greater, None),
             DepthMode::AnyFront => (wgpu::CompareFunction::Always, Some(wgpu::Face::Back)),
+            DepthMode::Behind => (wgpu::CompareFunction::GreaterEqual, None),
         };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fragment),

@@ -6,8 +6,10 @@
 //! │ hemicube     │ 3N lines, as the item buffer: radiosity in rgb, ±1/depth in alpha
 //! ├────┬────┬────┤
 //! │ 0  │ 1  │ …  │ tiles of TILE × TILE pixels, one a light: red where it is seen, alpha where it
-//! └────┴────┴────┘ would be if nothing hid it
+//! └────┴────┴────┘ would be if nothing hid it; in that of the sun red where something hides it
 //! ```
+//!
+//! A sky that is not uniform is drawn behind the hemicube, with an alpha of 0 as where nothing is.
 //!
 //! The twin on the CPU is `backend/cpu/radiance.rs`.
 
@@ -18,10 +20,11 @@ use super::memory::Memory;
 use super::pipeline::{self, DepthMode};
 use super::render_targets::RenderTargets;
 use super::shaders::RADIANCE_WGSL;
+use super::sky::Sky;
 use super::sources::SourceBuffers;
 use super::split_float::SplitFloat;
 use crate::error::Error;
-use crate::gather::lights::Lights;
+use crate::gather::lights::{Lights, NO_LIGHT};
 use crate::hemicube::Face;
 use crate::scene::Scene;
 
@@ -29,10 +32,14 @@ use crate::scene::Scene;
 #[derive(Debug)]
 pub struct Radiance {
     layout: wgpu::BindGroupLayout,
-    /// The faces of hemicubes, the scene in a tile, a light alone in a tile.
+    /// The faces of hemicubes, the scene in the tile of a light, and the light alone in it.
     faces: wgpu::RenderPipeline,
     seen: wgpu::RenderPipeline,
     alone: wgpu::RenderPipeline,
+    /// What hides the sun in its tile, if there is one.
+    sun: Option<wgpu::RenderPipeline>,
+    /// What lies behind the faces, if that differs by direction.
+    sky: Option<Sky>,
     corners: wgpu::Buffer,
     triangles: wgpu::Buffer,
     views: wgpu::Buffer,
@@ -54,7 +61,7 @@ pub struct View {
 pub struct TargetSize {
     /// Pixels along an edge of the hemicube's top face, N.
     pub resolution: u32,
-    /// Tiles of lights below the hemicube.
+    /// Tiles of lights and of the sun below the hemicube.
     pub tiles: u32,
     /// Images.
     pub batch: u32,
@@ -128,7 +135,12 @@ impl Radiance {
             let layout = Some(&pipelines);
             pipeline::Draw { module: &module, layout, fragment, target, depth_mode }.create(device)
         };
+        let unit = drawn.radiance_unit;
+        let sky = drawn.scene.sky();
+        let sun = |_| pipeline("sun_hidden", wgpu::ColorWrites::RED, DepthMode::Nearest);
         Ok(Radiance {
+            sun: sky.sun().map(sun),
+            sky: sky.map().map(|map| Sky::new(memory, map, &views, format, unit)).transpose()?,
             faces: pipeline("radiance", wgpu::ColorWrites::ALL, DepthMode::Nearest),
             seen: pipeline("light_visibility", wgpu::ColorWrites::RED, DepthMode::Nearest),
             alone: pipeline("light_visibility", wgpu::ColorWrites::ALPHA, DepthMode::AnyFront),
@@ -172,21 +184,33 @@ impl Radiance {
         for (layer, views) in points.iter().enumerate() {
             let mut pass = self.targets.pass(encoder, layer, points.len(), queries);
             pass.set_bind_group(0, bindings, &[]);
-            for (k, view) in views.iter().enumerate() {
-                if k < 5 {
-                    self.draw_face(&mut pass, k, view, index);
-                } else {
-                    self.draw_tile(&mut pass, k as u32 - 5, view, index);
-                }
-                index += 1;
+            let (faces, tiles) = views.split_at(5);
+            for (face, view) in faces.iter().enumerate() {
+                self.draw_face(&mut pass, face, view, index + face as u32);
             }
+            if let Some(sky) = &self.sky {
+                sky.begin(&mut pass);
+                for face in 0..5 {
+                    self.set_viewport(&mut pass, face);
+                    Sky::draw(&mut pass, index + face as u32);
+                }
+                pass.set_bind_group(0, bindings, &[]);
+            }
+            for (tile, view) in (0..).zip(tiles) {
+                self.draw_tile(&mut pass, tile, view, index + 5 + tile);
+            }
+            index += views.len() as u32;
         }
     }
 
-    fn draw_face(&self, pass: &mut wgpu::RenderPass, face: usize, view: &View, index: u32) {
+    fn set_viewport(&self, pass: &mut wgpu::RenderPass, face: usize) {
         let lines = Face::rows(face, self.resolution);
         let (y, height) = (lines.start as f32, lines.len() as f32);
         pass.set_viewport(0.0, y, self.resolution as f32, height, 0.0, 1.0);
+    }
+
+    fn draw_face(&self, pass: &mut wgpu::RenderPass, face: usize, view: &View, index: u32) {
+        self.set_viewport(pass, face);
         if face == 0 {
             pass.set_pipeline(&self.faces);
         }
@@ -197,9 +221,13 @@ impl Radiance {
         let [x, y] = tile_corner(self.resolution, tile);
         let size = TILE as f32;
         pass.set_viewport(x as f32, y as f32, size, size, 0.0, 1.0);
-        pass.set_pipeline(&self.alone);
-        draw_runs(pass, &self.lights[view.view.light as usize..][..1], index);
-        pass.set_pipeline(&self.seen);
+        if let (NO_LIGHT, Some(sun)) = (view.view.light, &self.sun) {
+            pass.set_pipeline(sun);
+        } else {
+            pass.set_pipeline(&self.alone);
+            draw_runs(pass, &self.lights[view.view.light as usize..][..1], index);
+            pass.set_pipeline(&self.seen);
+        }
         draw_runs(pass, &view.runs, index);
     }
 }

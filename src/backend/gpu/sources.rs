@@ -45,21 +45,11 @@ impl SourceBuffers {
         let (lattices, nodes) = quadtrees(mesh);
         let texels = element_texels(sources, radiance_unit);
         let lines = corners.len().div_ceil(ELEMENTS_A_LINE as usize);
-        let size = [ELEMENTS_A_LINE, 3 * lines as u32, 1];
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let format = wgpu::TextureFormat::Rgba32Float;
-        let elements = memory.texture("elements", size, format, usage)?;
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(16 * ELEMENTS_A_LINE),
-            rows_per_image: None,
-        };
-        let texels = bytemuck::cast_slice(&texels);
-        memory.queue.write_texture(elements.as_image_copy(), texels, layout, elements.size());
+        let elements = memory.texels("elements", &texels, [ELEMENTS_A_LINE, 3 * lines as u32])?;
         Ok(SourceBuffers {
             lattices: memory.storage("lattices", bytemuck::cast_slice(&lattices))?,
             nodes: memory.storage("nodes", bytemuck::cast_slice(&nodes))?,
-            elements: elements.create_view(&Default::default()),
+            elements,
         })
     }
 }

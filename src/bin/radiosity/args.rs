@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use lexopt::prelude::*;
-use radiosity::{Backend, Error, ErrorKind, ObjSettings, Rgb, Scene, Sides};
+use radiosity::{Backend, Error, ErrorKind, Rgb, Scene};
 
 use crate::interrupt;
 
@@ -90,64 +90,8 @@ pub fn end() -> Result<(), Stop> {
     if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(()) }
 }
 
-/// What an option of the command line does to how OBJ files are read.
-pub type ObjOption = fn(&mut lexopt::Parser, &mut ObjSettings) -> Result<(), Stop>;
-
-/// The option of how OBJ files are read that is called `name`.
-pub fn obj_option(name: &str) -> Option<ObjOption> {
-    match name {
-        "strict" => Some(|_, settings| {
-            settings.strict = true;
-            Ok(())
-        }),
-        "max-reflectance" => Some(|parser, settings| {
-            settings.max_reflectance = value(parser, "max-reflectance", "a number below 1")?;
-            Ok(())
-        }),
-        "emit" => Some(|parser, settings| {
-            settings.emit.push(emission(parser)?);
-            Ok(())
-        }),
-        "sky" => Some(|parser, settings| {
-            settings.sky = Some(sky(parser)?);
-            Ok(())
-        }),
-        "sides" => Some(|parser, settings| {
-            settings.sides = sides(parser)?;
-            Ok(())
-        }),
-        _ => None,
-    }
-}
-
-/// `MATERIAL=r,g,b`, or one number for all three.
-fn emission(parser: &mut lexopt::Parser) -> Result<(String, Rgb), Stop> {
-    let text = parser.value()?.string()?;
-    let wrong = || wrong_value("emit", &text, "MATERIAL=r,g,b");
-    let (name, radiance) = text.rsplit_once('=').ok_or_else(wrong)?;
-    Ok((name.into(), rgb(radiance).ok_or_else(wrong)?))
-}
-
-/// `r,g,b`, one number for all three, or `none`.
-fn sky(parser: &mut lexopt::Parser) -> Result<Rgb, Stop> {
-    let text = parser.value()?.string()?;
-    let wrong = || wrong_value("sky", &text, "a radiance r,g,b, or none");
-    if text == "none" { Ok(Rgb::ZERO) } else { rgb(&text).ok_or_else(wrong) }
-}
-
-/// What surfaces do on their two sides, by its name.
-fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
-    let text = parser.value()?.string()?;
-    match text.as_str() {
-        "auto" => Ok(Sides::Auto),
-        "front" => Ok(Sides::Front),
-        "both" => Ok(Sides::Both),
-        _ => Err(wrong_value("sides", &text, "auto, front or both")),
-    }
-}
-
 /// `r,g,b`, or one number for all three.
-fn rgb(text: &str) -> Option<Rgb> {
+pub fn rgb(text: &str) -> Option<Rgb> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     match numbers.as_deref() {
         Ok(&[grey]) => Some(Rgb::splat(grey)),

@@ -9,13 +9,12 @@ use std::time::Instant;
 
 use files::Files;
 use lexopt::prelude::*;
-use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Error, ObjSettings, Rgb, Scene, Solver,
-};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, Solver};
 use settings::{Adjustment, Setting};
 
 use crate::args::{self, Device, Stop};
 use crate::report::Report;
+use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
 
 pub const USAGE: &str = "\
@@ -73,6 +72,14 @@ Files and devices:
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
+  --sky WHICH       a sky above the horizon: overcast; cie1 to cie15, those of the CIE; or
+                    perez:CLEARNESS,BRIGHTNESS; or a picture around the scene, FILE.exr or .hdr
+  --zenith r,g,b    radiance of that sky straight up, or what a picture is multiplied with [1]
+  --sun x,y,z=E     a sun in this direction: E, or r,g,b, is the irradiance of what faces it, W/m²
+  --sun-at LATITUDE,LONGITUDE,TIME=E  the same by place (degrees north and east) and time, as
+                    2026-06-21T12:00:00+02:00
+  --up x,y,z        away from the ground, for skies [+y or +z, whichever seems to be]
+  --north x,y,z     where north is, for --sun-at [-z; +y where +z is up]
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
                     are wound, front or both [auto]
   --state FILE      write the state of the solve there now and then, and go on from it if it is
@@ -110,7 +117,7 @@ const BLACK: (&str, &str) =
 /// What is asked of a bake.
 pub struct Bake {
     pub scene: PathBuf,
-    obj: ObjSettings,
+    reading: SceneOptions,
     pub target: Target,
     /// Settings made by hand, in their order.
     adjustments: Vec<Adjustment>,
@@ -152,7 +159,7 @@ impl Bake {
         let (mut gather, mut state) = (None, false);
         let mut bake = Bake {
             scene: PathBuf::new(),
-            obj: ObjSettings::default(),
+            reading: SceneOptions::default(),
             target: Target::Settings(Gather::None),
             adjustments: vec![],
             files: Files::new(),
@@ -186,9 +193,9 @@ impl Bake {
                     let name = name.to_string();
                     if let Some(setting) = Setting::named(&name) {
                         bake.adjustments.push(setting.adjustment(parser)?);
-                    } else if let Some(option) = args::obj_option(&name) {
-                        option(parser, &mut bake.obj)?;
-                    } else if !bake.files.option(&name, parser)? {
+                    } else if !bake.reading.option(&name, parser)?
+                        && !bake.files.option(&name, parser)?
+                    {
                         return Err(Long(&name).unexpected().into());
                     }
                 }
@@ -226,7 +233,7 @@ impl Bake {
         self.files.check()?;
         let name = self.scene.display().to_string();
         let scene = progress::of_reading(&self.scene, || {
-            Ok::<_, Error>(self.obj.load(&self.scene)?.resolve_sides())
+            Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
         args::print_warnings(&scene);
         let (warnings, triangles) =
@@ -249,14 +256,16 @@ impl Bake {
             let (found, remedy) = if is_black { BLACK } else { DARK };
             eprintln!("warning: {found}: {remedy}");
         }
-        if self.obj.sky.is_none() {
+        let sky = self.reading.sky.words(baked.mesh.scene());
+        if self.reading.sky.is_default() {
             // White things would not be seen before the sky that was chosen to light them.
-            baked.light.surface.sky = Rgb::ZERO;
+            baked.light.surface.sky = Sky::default();
         }
         let writing = Instant::now();
         let picture = self.files.write(&baked, &device)?;
         let report = Report {
             scene: name,
+            sky,
             adapter: device.adapter(),
             target: self.target,
             triangles,

@@ -24,6 +24,8 @@ mod bake;
 mod interrupt;
 mod progress;
 mod report;
+mod scene_options;
+mod sky;
 mod trade_off;
 mod verify;
 mod view_factors;

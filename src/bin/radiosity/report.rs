@@ -14,6 +14,8 @@ use crate::bake::{Target, settings};
 pub struct Report {
     /// The scene, as the user named it.
     pub scene: String,
+    /// The options that give its sky, where that is more than a radiance.
+    pub sky: Option<String>,
     /// Name, type and driver of what made the rows.
     pub adapter: AdapterInfo,
     /// What was asked for.
@@ -58,7 +60,13 @@ impl Report {
             },
             "settings": settings::report(&baked.settings),
             "triangles": self.triangles,
-            "sky": baked.mesh.scene().sky().to_array(),
+            "sky": match &self.sky {
+                Some(words) => json!(words),
+                None => {
+                    let radiance = baked.mesh.scene().sky().uniform_radiance();
+                    json!(radiance.unwrap_or(Rgb::ZERO).to_array())
+                }
+            },
             "shot_elements": baked.mesh.element_count(),
             "elements": baked.light.mesh.element_count(),
             "vertices": baked.light.surface.positions.len(),

@@ -25,13 +25,12 @@ use std::time::Instant;
 use grid::{Grid, Run, Target};
 use lexopt::prelude::*;
 use measure::Measured;
-use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, ObjSettings, Scene,
-};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene};
 use reference::Reference;
 use surface_points::SurfacePoints;
 
 use crate::args::{self, Device, Stop};
+use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
 
 pub const USAGE: &str = "\
@@ -52,7 +51,8 @@ given.
   --strict        refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
-  --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
+  --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits];
+                    for other skies and a sun see `radiosity bake --help`
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
                     are wound, front or both [auto]
   --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
@@ -67,7 +67,7 @@ shares of the radiosity.";
 /// What is asked of the command.
 struct Options {
     scene: PathBuf,
-    obj: ObjSettings,
+    reading: SceneOptions,
     /// A file of points with their true radiosity.
     truth: Option<PathBuf>,
     /// Path of the output without its ending.
@@ -112,7 +112,7 @@ impl Options {
     fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
         let (mut scenes, mut truth, mut out) = (vec![], None, None);
         let (mut quick, mut device) = (false, Device::Gpu(None));
-        let mut obj = ObjSettings::default();
+        let mut reading = SceneOptions::default();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
@@ -122,10 +122,12 @@ impl Options {
                 Long("adapter") => device = Device::named(parser)?,
                 Long("cpu") => device = Device::Cpu,
                 Value(path) => scenes.push(path.into()),
-                Long(name) => match args::obj_option(name) {
-                    Some(option) => option(parser, &mut obj)?,
-                    None => return Err(arg.unexpected().into()),
-                },
+                Long(name) => {
+                    let name = name.to_string();
+                    if !reading.option(&name, parser)? {
+                        return Err(Long(&name).unexpected().into());
+                    }
+                }
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -135,13 +137,13 @@ impl Options {
             stem.push("_trade_off");
             stem.into()
         });
-        Ok(Options { scene, obj, truth, out, quick, device })
+        Ok(Options { scene, reading, truth, out, quick, device })
     }
 
     fn run(&self) -> Result<Results, Error> {
         args::check_writable(&self.out)?;
         let truth = self.read_truth()?;
-        let scene = progress::of_reading(&self.scene, || self.obj.load(&self.scene))?;
+        let scene = progress::of_reading(&self.scene, || self.reading.load(&self.scene))?;
         let scene = Arc::new(scene);
         args::print_warnings(&scene);
         let device = self.device.open()?;

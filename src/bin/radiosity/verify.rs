@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 
 use lexopt::prelude::*;
 use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
-use radiosity::{Error, ErrorKind, ObjSettings, Rgb, Scene, read_ply};
+use radiosity::{Error, ErrorKind, Rgb, Scene, read_ply};
 use serde_json::Value as Json;
 
 use crate::args::{self, Stop};
+use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
 use points::Points;
 use verdict::verdict;
@@ -39,7 +40,8 @@ last line compares the two. After Ctrl-C what was measured so far is printed.
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
-  --sky r,g,b       radiance of a uniform sky, or none (as the bake had) [1 if nothing emits]
+  --sky r,g,b       radiance of a uniform sky, or none; another sky and a sun are given by the
+                    options that the bake had, those of `radiosity bake --help`
   --sides WHICH     auto, front or both (as the bake had) [auto]
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
@@ -59,7 +61,7 @@ const DEFAULT_PATHS: usize = 65536;
 /// What is asked of the command.
 struct Options {
     scene: PathBuf,
-    obj: ObjSettings,
+    reading: SceneOptions,
     settings: Settings,
     csv: Option<PathBuf>,
     what: What,
@@ -82,7 +84,7 @@ impl Options {
         let (mut files, mut csv, mut points_ply) = (vec![], None, None);
         let (mut points, mut paths) = (None, None);
         let (mut only_solution, mut settings) = (false, Settings::default());
-        let mut obj = ObjSettings::default();
+        let mut reading = SceneOptions::default();
         while let Some(arg) = parser.next()? {
             only_solution |=
                 matches!(arg, Long("precision" | "time" | "places" | "hidden" | "points-ply"));
@@ -105,10 +107,12 @@ impl Options {
                     paths = Some(args::value::<NonZeroUsize>(parser, "paths", expected)?);
                 }
                 Value(path) => files.push(PathBuf::from(path)),
-                Long(name) => match args::obj_option(name) {
-                    Some(option) => option(parser, &mut obj)?,
-                    None => return Err(arg.unexpected().into()),
-                },
+                Long(name) => {
+                    let name = name.to_string();
+                    if !reading.option(&name, parser)? {
+                        return Err(Long(&name).unexpected().into());
+                    }
+                }
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -126,7 +130,7 @@ impl Options {
             }
             None => What::Solution { ply: files.remove(1), points_ply },
         };
-        Ok(Options { scene: args::only_scene(files)?, obj, settings, csv, what })
+        Ok(Options { scene: args::only_scene(files)?, reading, settings, csv, what })
     }
 
     fn run(&self) -> Result<(), Error> {
@@ -138,7 +142,7 @@ impl Options {
             args::check_writable(file)?;
         }
         let scene = progress::of_reading(&self.scene, || {
-            Ok::<_, Error>(self.obj.load(&self.scene)?.resolve_sides())
+            Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
         args::print_warnings(&scene);
         match &self.what {
@@ -155,7 +159,7 @@ impl Options {
     fn verify(&self, scene: &Scene, ply: &Path, points_ply: Option<&Path>) -> Result<(), Error> {
         let start = Instant::now();
         let told = Told::beside(ply);
-        told.check_sky(scene, ply)?;
+        told.check_sky(scene, self.reading.sky.words(scene), ply)?;
         let solution = progress::of_reading(ply, || read_ply(ply))?;
         interrupt::catch();
         let found = progress::of_count("points", |report| {
@@ -243,15 +247,26 @@ impl Told {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] with the sky that it was baked under.
-    fn check_sky(&self, scene: &Scene, ply: &Path) -> Result<(), Error> {
-        let Some(channels) = self.0["sky"].as_array() else { return Ok(()) };
-        let [r, g, b] = [0, 1, 2].map(|k| channels.get(k).and_then(Json::as_f64).unwrap_or(0.0));
-        // Digits of a file may be rounded once more.
-        if Rgb::new(r, g, b).abs_diff_eq(scene.sky(), 1e-12 * scene.sky().max_element()) {
+    fn check_sky(&self, scene: &Scene, own: Option<String>, ply: &Path) -> Result<(), Error> {
+        let (same, told) = match &self.0["sky"] {
+            Json::String(words) => (own.as_ref() == Some(words), words.clone()),
+            Json::Array(channels) => {
+                let [r, g, b] =
+                    [0, 1, 2].map(|k| channels.get(k).and_then(Json::as_f64).unwrap_or(0.0));
+                let uniform = scene.sky().uniform_radiance().filter(|_| own.is_none());
+                // Digits of a file may be rounded once more.
+                let same = uniform.is_some_and(|radiance| {
+                    Rgb::new(r, g, b).abs_diff_eq(radiance, 1e-12 * radiance.max_element())
+                });
+                (same, format!("{r},{g},{b}"))
+            }
+            _ => return Ok(()),
+        };
+        if same {
             return Ok(());
         }
-        let found = format!("baked under a sky of radiance {r},{g},{b}");
-        let remedy = format!("verify it under the same: --sky {r},{g},{b}");
+        let found = format!("baked under a sky of {told}");
+        let remedy = format!("verify it under the same: --sky {told}");
         Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
     }
 

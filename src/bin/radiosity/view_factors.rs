@@ -11,10 +11,11 @@ use lexopt::prelude::*;
 use radiosity::backend::AdapterInfo;
 use radiosity::scene::WarningKind;
 use radiosity::view_factor::Estimate;
-use radiosity::{BakeSettings, Error, ErrorKind, Mesh, ObjSettings, Scene, ViewFactors, Warning};
+use radiosity::{BakeSettings, Error, ErrorKind, Mesh, Scene, ViewFactors, Warning};
 
 use crate::args::{self, Device, Stop};
 use crate::progress;
+use crate::scene_options::SceneOptions;
 
 pub const USAGE: &str = "\
 usage: radiosity view-factors SCENE.obj… [--error E] [--two-sided NAME]… [--enforce]
@@ -53,7 +54,7 @@ const DEFAULT_HEMICUBE: u32 = 128;
 /// What is asked of the command.
 struct Options {
     scenes: Vec<PathBuf>,
-    obj: ObjSettings,
+    reading: SceneOptions,
     /// The folder for files, or none for that of each scene.
     out: Option<PathBuf>,
     formats: Vec<Format>,
@@ -86,7 +87,7 @@ impl Options {
         let (mut error, mut two_sided) = (None, vec![]);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let mut device = None;
-        let mut obj = ObjSettings::default();
+        let mut reading = SceneOptions::default();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
@@ -107,11 +108,13 @@ impl Options {
                 Long("adapter") => device = Some(Device::named(parser)?),
                 Long("cpu") => device = Some(Device::Cpu),
                 Value(path) => scenes.push(path.into()),
-                Long(name) => match args::obj_option(name) {
+                Long(name) => {
+                    let name = name.to_string();
                     // Factors are of fronts, and --two-sided names the groups with two.
-                    Some(option) if name != "sides" => option(parser, &mut obj)?,
-                    _ => return Err(arg.unexpected().into()),
-                },
+                    if name == "sides" || !reading.option(&name, parser)? {
+                        return Err(Long(&name).unexpected().into());
+                    }
+                }
                 _ => return Err(arg.unexpected().into()),
             }
         }
@@ -134,7 +137,7 @@ impl Options {
             }
             Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided }
         };
-        Ok(Options { scenes, obj, out, formats, enforce, method })
+        Ok(Options { scenes, reading, out, formats, enforce, method })
     }
 
     fn run(&self, path: &Path) -> Result<(), Error> {
@@ -145,7 +148,7 @@ impl Options {
         for format in &self.formats {
             args::check_writable(&format.path(&stem))?;
         }
-        let scene = progress::of_reading(path, || self.obj.load(path))?;
+        let scene = progress::of_reading(path, || self.reading.load(path))?;
         let of_light = |w: &&Warning| w.kind == WarningKind::NoLight;
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::files::{self, FileSource, MAX_BYTES};
 use crate::error::{Error, ErrorKind, quoted};
-use crate::scene::{Rgb, Scene, Sides};
+use crate::scene::{Rgb, Scene, Sides, Sky};
 
 /// How odd things in an OBJ file and its libraries are treated, and which materials emit.
 ///
@@ -28,9 +28,9 @@ pub struct ObjSettings {
     pub max_reflectance: f64,
     /// Materials by name, and the radiance that they emit per channel, whatever the file says.
     pub emit: Vec<(String, Rgb)>,
-    /// Radiance of a uniform sky, W/(m² sr) per channel ([`Scene::with_sky`]). `None`: 1 if nothing
-    /// in the scene emits, else 0.
-    pub sky: Option<Rgb>,
+    /// The light from outside ([`Scene::with_sky`]). `None`: a uniform sky of radiance
+    /// 1 W/(m² sr) if nothing in the scene emits, else a black one.
+    pub sky: Option<Sky>,
     /// What surfaces do on their two sides.
     pub sides: Sides,
 }

@@ -10,9 +10,9 @@ use rustc_hash::FxHashMap;
 use super::sheets::{Sheets, SideIndex};
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
-use crate::scene::{Rgb, Scene, Sides};
+use crate::scene::{Scene, Sides};
 use crate::visibility::offset;
-use crate::visibility::ray_scene::RayScene;
+use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Surfaces that a walk meets at most. Through a door of a thirtieth of a room's area four in ten
 /// get out within so many. Chosen by hand.
@@ -73,7 +73,7 @@ impl<'a> Walks<'a> {
 
     /// Whether there is any light.
     pub fn has_light(&self) -> bool {
-        !self.lamps.is_empty() || self.scene.sky() != Rgb::ZERO
+        !self.lamps.is_empty() || !self.scene.sky().is_black()
     }
 
     /// What the surface of triangle `t` does on its sides.
@@ -94,7 +94,8 @@ impl<'a> Walks<'a> {
         let sides: Vec<SideIndex> = self.lamps.iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
         let free = sheets.ask(&sides, |side, rng| {
             let start = self.random_start(side, rng)?;
-            self.next(start, side, rng).map(|(at, _)| start.distance(at))
+            let direction = self.random_direction(side, rng);
+            self.next(start, side, direction).map(|(at, _)| start.distance(at))
         });
         let shines_from_back = |&t: &usize| {
             let [front, back] = [2 * t, 2 * t + 1].map(|side| free.of_sheet(side).mean());
@@ -108,11 +109,13 @@ impl<'a> Walks<'a> {
     pub fn walk_to_light(&self, mut at: DVec3, mut side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let mut throughput = 1.0;
         for _ in 0..MAX_BOUNCES {
-            if let Some(irradiance) = self.irradiance_of_lamp(at, side, rng) {
+            let of_lamp = self.irradiance_of_lamp(at, side, rng);
+            if let Some(irradiance) = of_lamp.or_else(|| self.irradiance_of_sun(at, side, rng)) {
                 return Some(throughput * irradiance);
             }
-            let Some(next) = self.next(at, side, rng) else {
-                let sky = throughput * self.scene.sky_radiosity().element_sum();
+            let direction = self.random_direction(side, rng);
+            let Some(next) = self.next(at, side, direction) else {
+                let sky = throughput * PI * self.scene.sky().radiance(direction).element_sum();
                 return (sky > 0.0).then_some(sky);
             };
             (at, side) = next;
@@ -160,15 +163,30 @@ impl<'a> Walks<'a> {
         if side.is_multiple_of(2) { front } else { -front }
     }
 
-    /// Where a ray from a place on a side, dense as the cosine, ends, and on which side.
-    fn next(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<(DVec3, SideIndex)> {
+    /// A direction from a side, dense as the cosine.
+    fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
         let (normal, turn) = (self.normal(side), TAU * rng.f64());
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let square = rng.f64();
         let across = turn.cos() * tangent + turn.sin() * bitangent;
-        let direction = square.sqrt() * across + (1.0 - square).sqrt() * normal;
+        square.sqrt() * across + (1.0 - square).sqrt() * normal
+    }
+
+    /// Where a ray from a place on a side ends, and on which side.
+    fn next(&self, at: DVec3, side: SideIndex, direction: DVec3) -> Option<(DVec3, SideIndex)> {
         let hit = self.rays.closest_hit(at, direction, self.contact, Some(side / 2))?;
         Some((at + hit.distance * direction, 2 * hit.triangle + usize::from(!hit.front)))
+    }
+
+    /// Irradiance at a place on a side from the sun; none if it is not seen.
+    fn irradiance_of_sun(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
+        let sun = self.scene.sky().sun()?;
+        let direction = sun.towards([rng.f64(), rng.f64()]);
+        let cosine = self.normal(side).dot(direction);
+        let hides = |hit: &Hit| hit.triangle != side / 2;
+        let is_seen =
+            cosine > 0.0 && !self.rays.occluded(at, direction, self.contact..f64::INFINITY, hides);
+        is_seen.then(|| sun.irradiance.element_sum() * cosine)
     }
 
     /// Irradiance at a place on a side from a lamp, chosen by its power; none if it is not seen.

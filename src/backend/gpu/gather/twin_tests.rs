@@ -6,13 +6,16 @@ use super::*;
 use crate::backend::cpu::hemisphere_sum::{Columns, PointImage, WORDS, add_columns, add_up};
 use crate::backend::cpu::radiance;
 use crate::backend::cpu::rasterizer::{Image, Viewport};
+use crate::backend::cpu::sky;
 use crate::backend::gpu::hemisphere_sum::weights;
 use crate::backend::gpu::layout::{LANES, Summation};
+use crate::backend::gpu::sky::{axes, texels};
 use crate::backend::gpu::sources::{element_texels, quadtrees};
 use crate::backend::gpu::test_support::{
     gpu, offsets, picture, read_buffer, read_texture, scene, shade, textured_scene,
 };
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
+use crate::scene::SkyDistribution;
 
 /// Where view `k` of a point is drawn: a face of the hemicube, or a tile below it.
 fn viewport(k: usize, n: u32) -> Viewport {
@@ -95,6 +98,17 @@ fn textured_radiance_equals_its_twin() {
     compare(&mesh);
 }
 
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn sky_and_sun_equal_their_twins() {
+    let mesh = scene();
+    let distribution = SkyDistribution::cie(12).unwrap();
+    let (up, sun) = (DVec3::new(0.1, 0.3, 1.0), DVec3::new(0.2, 0.1, 1.0));
+    let sky = crate::scene::Sky::new(distribution, Rgb::new(1.0, 2.0, 3.0), up, sun).unwrap();
+    let sky = sky.with_sun(Sun { direction: sun, irradiance: Rgb::ONE }).unwrap();
+    compare(&mesh.with_scene(mesh.scene().clone().with_sky(sky).unwrap()).unwrap());
+}
+
 /// What two points in `mesh` gather, pass by pass, on the device and by the twins.
 fn compare(mesh: &Mesh) {
     let gpu = gpu();
@@ -128,6 +142,9 @@ fn compare(mesh: &Mesh) {
             nodes: &nodes,
             elements: &element_texels(&sources, gather.radiance_unit),
         };
+        let pieces = mesh.scene().sky().map().map(|map| texels(map, gather.radiance_unit));
+        let sky = mesh.scene().sky().map().zip(pieces.as_deref());
+        let sky = sky.map(|(map, pieces)| sky::Sky { axes: axes(map), pieces });
         let in_scene = gather.draw_list.order.len() as u32;
         let columns: Vec<f32> = read_buffer(&gpu, &sum.columns);
         let sums: Vec<f32> = read_buffer(&gpu, &sum.sums);
@@ -135,6 +152,7 @@ fn compare(mesh: &Mesh) {
             let what = format!("{n} pixels, point {k}");
             let job = gather.job(mesh.scene(), p);
             assert_eq!(job.lights.len(), 2, "both lights have tiles");
+            assert_eq!(job.sun.is_some(), sky.is_some());
             let twins: Vec<Vec<_>> = offsets()
                 .into_iter()
                 .map(|offset| {
@@ -144,6 +162,9 @@ fn compare(mesh: &Mesh) {
                         let target = radiance::Target { view: &view.view, viewport, offset };
                         if index < 5 {
                             twin.draw_face(&mut image, target, in_scene);
+                            sky.iter().for_each(|sky| sky.draw_face(&mut image, target));
+                        } else if view.view.light == NO_LIGHT {
+                            twin.draw_sun_tile(&mut image, target, in_scene);
                         } else {
                             let light = of_lights[view.view.light as usize].clone();
                             twin.draw_tile(&mut image, target, light, in_scene);

@@ -1,6 +1,8 @@
 //! The program: what its commands write, and how they refuse wrong usage and bad scenes.
 #![cfg(feature = "cli")]
 
+mod sky;
+
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
@@ -389,44 +391,6 @@ fn room(walls: usize) -> String {
         text += &format!("f {face}\n");
     }
     text
-}
-
-#[test]
-fn a_sky_lights_what_has_no_lamp() {
-    let folder = tempfile::tempdir().unwrap();
-    let radiosity = |name: &str, more: &[&str]| {
-        let scene = write(folder.path(), name, &room(if name == "open.obj" { 5 } else { 6 }));
-        let scene = scene.display().to_string();
-        let mut args = vec![scene.as_str(), "--error", "0.1", "--cpu", "--write", "json,ply"];
-        args.extend(more);
-        let out = run("bake", &args);
-        let said = String::from_utf8_lossy(&out.stderr).into_owned();
-        assert!(out.status.success(), "{said}");
-        let stem = Path::new(&scene).with_extension("");
-        let ply = radiosity::io::read_ply(stem.with_extension("ply")).unwrap();
-        let json = std::fs::read(stem.with_extension("json")).unwrap();
-        let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
-        let brightest = ply.radiosity.iter().map(|b| b.x).fold(0.0, f64::max);
-        (brightest, json["sky"][0].as_f64().unwrap(), said)
-    };
-    let (one, sky, said) = radiosity("open.obj", &[]);
-    assert!(one > 0.1 && sky == 1.0 && said.contains("sky of radiance 1"), "{one} {sky} {said}");
-    let (two, sky, said) = radiosity("open.obj", &["--sky", "2"]);
-    // The same rays: twice as much, in the files' six digits.
-    assert!((two / one - 2.0).abs() < 1e-5 && sky == 2.0 && !said.contains("sky"), "{two} {said}");
-    let place = |name: &str| folder.path().join(name).display().to_string();
-    let (scene, ply) = (place("open.obj"), place("open.ply"));
-    let other_sky = run("verify", &[&scene, &ply]);
-    let said = String::from_utf8_lossy(&other_sky.stderr);
-    assert!(!other_sky.status.success() && said.contains("--sky 2,2,2"), "{said}");
-    let same_sky = run("verify", &[&scene, &ply, "--sky", "2", "--precision", "0.5"]);
-    assert!(same_sky.status.success(), "{}", String::from_utf8_lossy(&same_sky.stderr));
-    let (none, _, said) = radiosity("open.obj", &["--sky", "none"]);
-    assert!(none == 0.0 && said.contains("left dark") && said.contains("--emit"), "{said}");
-    let (closed, _, said) = radiosity("closed.obj", &[]);
-    assert!(closed == 0.0 && said.contains("no light") && said.contains("--emit"), "{said}");
-    refused(&[cornell(), "--sky", "blue"], &["--sky", "none"]);
-    refused(&[cornell(), "--sky", "1,2,-3"], &["sky", "0"]);
 }
 
 /// What the solution emits has to be what the scene emits: forgotten lamps are found.

@@ -1,0 +1,61 @@
+//! How the commands read a scene, and what lights it from outside.
+
+use std::path::Path;
+
+use lexopt::prelude::*;
+use radiosity::{Error, ObjSettings, Rgb, Scene, Sides};
+
+use crate::args::{Stop, rgb, value, wrong_value};
+use crate::sky::SkyOptions;
+
+/// What is said of how a scene is to be read.
+#[derive(Clone, Debug, Default)]
+pub struct SceneOptions {
+    obj: ObjSettings,
+    pub sky: SkyOptions,
+}
+
+impl SceneOptions {
+    /// Takes option `name` with its value, if it is one of these.
+    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
+        match name {
+            "strict" => self.obj.strict = true,
+            "max-reflectance" => {
+                self.obj.max_reflectance = value(parser, "max-reflectance", "a number below 1")?;
+            }
+            "emit" => self.obj.emit.push(emission(parser)?),
+            "sides" => self.obj.sides = sides(parser)?,
+            _ => return self.sky.option(name, parser),
+        }
+        Ok(true)
+    }
+
+    /// The scene of an OBJ file, under the sky that was asked for.
+    ///
+    /// # Errors
+    /// Those of [`ObjSettings::load`] and [`SkyOptions::over`].
+    pub fn load(&self, path: &Path) -> Result<Scene, Error> {
+        let mut obj = self.obj.clone();
+        obj.sky = self.sky.while_reading();
+        self.sky.over(obj.load(path)?)
+    }
+}
+
+/// `MATERIAL=r,g,b`, or one number for all three.
+fn emission(parser: &mut lexopt::Parser) -> Result<(String, Rgb), Stop> {
+    let text = parser.value()?.string()?;
+    let wrong = || wrong_value("emit", &text, "MATERIAL=r,g,b");
+    let (name, radiance) = text.rsplit_once('=').ok_or_else(wrong)?;
+    Ok((name.into(), rgb(radiance).ok_or_else(wrong)?))
+}
+
+/// What surfaces do on their two sides, by its name.
+fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
+    let text = parser.value()?.string()?;
+    match text.as_str() {
+        "auto" => Ok(Sides::Auto),
+        "front" => Ok(Sides::Front),
+        "both" => Ok(Sides::Both),
+        _ => Err(wrong_value("sides", &text, "auto, front or both")),
+    }
+}

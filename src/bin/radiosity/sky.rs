@@ -1,0 +1,251 @@
+//! The light from outside, as the command line names it.
+
+use std::f64::consts::FRAC_PI_2;
+use std::path::{Path, PathBuf};
+
+use lexopt::prelude::*;
+use radiosity::camera::up_axis;
+use radiosity::glam::{DQuat, DVec3};
+use radiosity::io::read_radiance;
+use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, SkyDistribution, Sun};
+use solar_positioning::{Location, SolarPositions, delta_t};
+
+use crate::args::{self, Stop, wrong_value};
+
+/// What `--sky` takes.
+const SKIES: &str =
+    "a radiance r,g,b, none, overcast, cie1 to cie15, perez:CLEARNESS,BRIGHTNESS, or a picture";
+
+/// What is said of the light from outside.
+#[derive(Clone, Debug, Default)]
+pub struct SkyOptions {
+    kind: Kind,
+    zenith: Option<Rgb>,
+    up: Option<DVec3>,
+    north: Option<DVec3>,
+    sun: Option<(SunPlace, Rgb)>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq)]
+enum Kind {
+    /// Nothing was said.
+    #[default]
+    Default,
+    Uniform(Rgb),
+    Overcast,
+    Cie(u32),
+    /// Clearness and brightness.
+    Perez(f64, f64),
+    Picture(PathBuf),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum SunPlace {
+    Towards(DVec3),
+    /// Degrees north and east, and the time (RFC 3339).
+    At([f64; 2], String),
+}
+
+impl SkyOptions {
+    /// Takes the value of option `name`, if it is one of these.
+    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
+        match name {
+            "sky" => self.kind = Kind::parse(&parser.value()?.string()?)?,
+            "zenith" => {
+                let text = parser.value()?.string()?;
+                let wrong = || wrong_value("zenith", &text, "a radiance r,g,b");
+                self.zenith = Some(args::rgb(&text).ok_or_else(wrong)?);
+            }
+            "up" => self.up = Some(direction(parser, "up")?),
+            "north" => self.north = Some(direction(parser, "north")?),
+            "sun" => {
+                let text = parser.value()?.string()?;
+                self.sun = Some(sun_towards(&text).ok_or_else(|| {
+                    wrong_value("sun", &text, "x,y,z=IRRADIANCE: towards it, and W/m² facing it")
+                })?);
+            }
+            "sun-at" => {
+                let text = parser.value()?.string()?;
+                self.sun = Some(sun_at(&text).ok_or_else(|| {
+                    let example = "LATITUDE,LONGITUDE,TIME=IRRADIANCE, as in \
+                                   48.1,11.6,2026-06-21T12:00:00+02:00=800";
+                    wrong_value("sun-at", &text, example)
+                })?);
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
+    pub fn is_default(&self) -> bool {
+        self.kind == Kind::Default && self.sun.is_none()
+    }
+
+    /// A sky to read the scene with, before its up axis is known: black only if this one is.
+    pub fn while_reading(&self) -> Option<Sky> {
+        match self.kind {
+            _ if self.is_default() => None,
+            Kind::Uniform(radiance) if self.sun.is_none() => Some(radiance.into()),
+            _ => Some(Rgb::ONE.into()),
+        }
+    }
+
+    /// `scene` under this sky, and the sky in words that give it again.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for numbers that mean no sky, a time that is none, or a sun below the
+    /// horizon; those of reading a picture.
+    pub fn over(&self, scene: Scene) -> Result<Scene, Error> {
+        if self.is_default() || (matches!(self.kind, Kind::Uniform(_)) && self.sun.is_none()) {
+            return Ok(scene);
+        }
+        let up = self.up.unwrap_or_else(|| up_axis(&scene));
+        let sun = self.sun(up)?;
+        let towards_sun = sun.map_or(up, |sun| sun.direction);
+        let zenith = self.zenith.unwrap_or(Rgb::ONE);
+        let spread = |distribution: Option<SkyDistribution>| {
+            let wrong = || bad("sky", format!("{:?}", self.kind), SKIES);
+            Sky::new(distribution.ok_or_else(wrong)?, zenith, up, towards_sun)
+        };
+        let sky = match &self.kind {
+            Kind::Default => Sky::default(),
+            Kind::Uniform(radiance) => (*radiance).into(),
+            Kind::Overcast => spread(Some(SkyDistribution::OVERCAST))?,
+            Kind::Cie(number) => spread(SkyDistribution::cie(*number))?,
+            Kind::Perez(clearness, brightness) => {
+                let angle = up.normalize().angle_between(towards_sun);
+                spread(SkyDistribution::perez(*clearness, *brightness, angle))?
+            }
+            Kind::Picture(path) => {
+                let (width, mut pixels) = read_radiance(path)?;
+                pixels.iter_mut().for_each(|pixel| *pixel *= zenith);
+                Sky::picture(width, &pixels, up)?
+            }
+        };
+        scene.with_sky(match sun {
+            Some(sun) => sky.with_sun(sun)?,
+            None => sky,
+        })
+    }
+
+    fn sun(&self, up: DVec3) -> Result<Option<Sun>, Error> {
+        let Some((place, irradiance)) = self.sun.clone() else { return Ok(None) };
+        let direction = match place {
+            SunPlace::Towards(direction) => direction,
+            SunPlace::At(place, time) => self.direction_at(place, &time, up)?,
+        };
+        let unit = direction.try_normalize();
+        let unit = unit.ok_or_else(|| bad("sun", direction.to_string(), "give a direction"))?;
+        Ok(Some(Sun { direction: unit, irradiance }))
+    }
+
+    /// Towards the sun at a place and time, without refraction.
+    fn direction_at(
+        &self,
+        [latitude, longitude]: [f64; 2],
+        time: &str,
+        up: DVec3,
+    ) -> Result<DVec3, Error> {
+        let wrong = |found: String| {
+            bad("sun-at", found, "give degrees north and east, and a time with its offset from UTC")
+        };
+        let when = chrono::DateTime::parse_from_rfc3339(time);
+        let when = when.map_err(|e| wrong(format!("time {time}: {e}")))?;
+        let sun = delta_t::estimate_from_date_like(&when).and_then(|delta| {
+            let location = Location { latitude, longitude };
+            SolarPositions::new().at(&when, location, 0.0, delta, None)
+        });
+        let sun = sun.map_err(|e| wrong(e.to_string()))?;
+        let (elevation, azimuth) =
+            (FRAC_PI_2 - sun.zenith_angle().to_radians(), sun.azimuth().to_radians());
+        if elevation <= 0.0 {
+            let found = format!("the sun {:.1}° below the horizon", -elevation.to_degrees());
+            return Err(bad("sun-at", found, "give a time at which it is day"));
+        }
+        let up = up.normalize();
+        // Where −z is north for +y up.
+        let default = DQuat::from_rotation_arc(DVec3::Y, up) * DVec3::NEG_Z;
+        let north = self.north.unwrap_or(default).reject_from_normalized(up).try_normalize();
+        let north = north.ok_or_else(|| bad("north", "it along up".into(), "give another"))?;
+        let level = azimuth.cos() * north + azimuth.sin() * north.cross(up);
+        Ok(elevation.cos() * level + elevation.sin() * up)
+    }
+
+    /// The same in words that give it again; none where a radiance says all.
+    pub fn words(&self, scene: &Scene) -> Option<String> {
+        if scene.sky().uniform_radiance().is_some() && scene.sky().sun().is_none() {
+            return None;
+        }
+        let list = |v: DVec3| v.to_array().map(|x| x.to_string()).join(",");
+        let mut words = vec![match &self.kind {
+            Kind::Default => "none".into(),
+            Kind::Uniform(radiance) => list(*radiance),
+            Kind::Overcast => "overcast".into(),
+            Kind::Cie(number) => format!("cie{number}"),
+            Kind::Perez(clearness, brightness) => format!("perez:{clearness},{brightness}"),
+            Kind::Picture(path) => path.display().to_string(),
+        }];
+        if !matches!(self.kind, Kind::Default | Kind::Uniform(_)) {
+            words.push(format!("--zenith {}", list(self.zenith.unwrap_or(Rgb::ONE))));
+            words.push(format!("--up {}", list(self.up.unwrap_or_else(|| up_axis(scene)))));
+        }
+        if let Some(Sun { direction, irradiance }) = scene.sky().sun() {
+            words.push(format!("--sun {}={}", list(*direction), list(*irradiance)));
+        }
+        Some(words.join(" "))
+    }
+}
+
+impl Kind {
+    fn parse(text: &str) -> Result<Kind, Stop> {
+        let wrong = || wrong_value("sky", text, SKIES);
+        if let Some(radiance) = args::rgb(text) {
+            return Ok(Kind::Uniform(radiance));
+        }
+        if let Some(number) = text.strip_prefix("cie") {
+            let number = number.parse().ok().filter(|&n| SkyDistribution::cie(n).is_some());
+            return number.map(Kind::Cie).ok_or_else(wrong);
+        }
+        if let Some(numbers) = text.strip_prefix("perez:") {
+            let numbers = numbers.split_once(',').ok_or_else(wrong)?;
+            let number = |text: &str| text.trim().parse().map_err(|_| wrong());
+            return Ok(Kind::Perez(number(numbers.0)?, number(numbers.1)?));
+        }
+        match text {
+            "none" => Ok(Kind::Uniform(Rgb::ZERO)),
+            "overcast" => Ok(Kind::Overcast),
+            _ if Path::new(text).extension().is_some() => Ok(Kind::Picture(text.into())),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+fn bad(option: &str, found: String, remedy: &str) -> Error {
+    Error::new(ErrorKind::Setting, format!("--{option}"), found, remedy)
+}
+
+/// `x,y,z`, not zero.
+fn direction(parser: &mut lexopt::Parser, option: &str) -> Result<DVec3, Stop> {
+    let numbers = args::numbers::<f64, 3>(parser, option, "a direction x,y,z")?;
+    let direction = DVec3::from_array(numbers);
+    let expected = "a direction x,y,z that is not zero";
+    let wrong = || wrong_value(option, &format!("{direction}"), expected);
+    direction.try_normalize().ok_or_else(wrong)
+}
+
+/// `x,y,z=IRRADIANCE`.
+fn sun_towards(text: &str) -> Option<(SunPlace, Rgb)> {
+    let (direction, irradiance) = text.split_once('=')?;
+    let numbers: Result<Vec<f64>, _> = direction.split(',').map(|n| n.trim().parse()).collect();
+    let direction = DVec3::from_array(numbers.ok()?.try_into().ok()?);
+    Some((SunPlace::Towards(direction), args::rgb(irradiance)?))
+}
+
+/// `LATITUDE,LONGITUDE,TIME=IRRADIANCE`.
+fn sun_at(text: &str) -> Option<(SunPlace, Rgb)> {
+    let (at, irradiance) = text.split_once('=')?;
+    let [latitude, longitude, time] = at.split(',').collect::<Vec<_>>().try_into().ok()?;
+    let place = [latitude.trim().parse().ok()?, longitude.trim().parse().ok()?];
+    Some((SunPlace::At(place, time.trim().into()), args::rgb(irradiance)?))
+}
