@@ -295,7 +295,10 @@ fn parts(
     // Light that was not shot is a part of what one more pass would change.
     let truncation = (truncation(&means, bias, conditions) - unshot).max(0.0);
     let total = (interpolation + gaps + truncation + unshot).sqrt();
-    let scatter = means.standard_error(|d| d.interpolation.length_squared());
+    let scatter = means.standard_error(|d| {
+        let change = conditions.gather_passes.map_or(DVec3::ZERO, |_| d.next - bias);
+        d.interpolation.length_squared() + change.length_squared()
+    });
     ErrorEstimate {
         total,
         uncertainty: if total > 0.0 { scatter / (2.0 * total) } else { 0.0 },

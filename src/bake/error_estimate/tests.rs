@@ -271,3 +271,13 @@ fn by_light_a_dark_plane_changes_nothing() {
     assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
     assert!((alone.by_light.total / expected - 1.0).abs() < 1e-9, "{:?}", alone.by_light);
 }
+
+#[test]
+fn a_change_at_one_point_is_as_uncertain_as_it_is_large() {
+    // One of a thousand would change by all of itself: the square of the error is 1/1000, and so is
+    // its standard error; that of the error is half of it, relative.
+    let one = |k: usize| Observation { next: Rgb::splat(1.0 + f64::from(k == 7)), ..exact() };
+    let found = estimate_of(one);
+    assert!(found.truncation > 0.99 * found.total && found.mesh == 0.0, "{found:?}");
+    assert!((found.uncertainty / found.total - 0.5).abs() < 0.01, "{found:?}");
+}
