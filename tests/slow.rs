@@ -18,6 +18,7 @@ mod slow {
     #[cfg(feature = "cli")]
     mod kill_and_resume;
     mod many_triangles;
+    mod open_scenes;
     mod properties;
     mod row_memory;
     mod small_change;

@@ -146,8 +146,8 @@ impl SkyDistribution {
         graded.iter().all(|x| x.is_finite()).then_some(SkyDistribution(Kind::Graded(graded)))
     }
 
-    /// Radiance relative to the zenith by the cosines from it and from the sun, which is at the
-    /// cosine `sun` from the zenith: 0 or more, 0 below the horizon.
+    /// Radiance relative to the zenith by the cosines from it, above 0, and from the sun, which is at
+    /// the cosine `sun` from the zenith: 0 or more.
     pub(super) fn relative_to_zenith(self, sun: f64) -> impl Fn(f64, f64) -> f64 {
         let absolute = move |up: f64, from_sun: f64| match self.0 {
             Kind::Traditional => 1.0 + 2.0 * up,
@@ -161,7 +161,7 @@ impl SkyDistribution {
         let zenith = absolute(1.0, sun);
         move |up, from_sun| {
             let relative = absolute(up, from_sun) / zenith;
-            if up > 0.0 && relative.is_finite() { relative.max(0.0) } else { 0.0 }
+            if relative.is_finite() { relative.max(0.0) } else { 0.0 }
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DVec3};
 use radiosity::solver::Method;
-use radiosity::{ErrorKind, Mesh, RayRows, Scene, Solver};
+use radiosity::{ErrorKind, Mesh, RayRows, Rgb, Scene, Sky, SkyDistribution, Solver, Sun};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};
@@ -36,6 +36,33 @@ fn changed_solve_saves_its_old_rows() {
             solve.run(&mut rays(&moved), keep_going).unwrap();
         }
         assert_same_bits(&again.into_solution().unwrap(), &solve.into_solution().unwrap());
+    }
+}
+
+#[test]
+fn a_state_is_of_one_sky() {
+    let mesh = cornell_box(300.0);
+    let under = |sky: Sky| mesh.with_scene(mesh.scene().clone().with_sky(sky).unwrap()).unwrap();
+    let overcast =
+        |zenith| Sky::new(SkyDistribution::OVERCAST, zenith, DVec3::Y, DVec3::Y).unwrap();
+    let sun = |direction| Sun { direction, irradiance: Rgb::ONE };
+    let skies = [
+        Sky::default(),
+        Sky::uniform(Rgb::ONE),
+        overcast(Rgb::ONE),
+        overcast(Rgb::new(1.0, 1.0, 1.1)),
+        overcast(Rgb::ONE).with_sun(sun(DVec3::Y)).unwrap(),
+        overcast(Rgb::ONE).with_sun(sun(DVec3::X)).unwrap(),
+    ];
+    let solver = Solver::new(Method::Jacobi);
+    for (k, sky) in skies.iter().enumerate() {
+        let mesh = under(sky.clone());
+        let state = solver.begin(&mesh).unwrap().to_bytes();
+        for (l, other) in skies.iter().enumerate() {
+            let other = under(other.clone());
+            let taken = solver.resume_bytes(&other, &rays(&other), &state);
+            assert_eq!(taken.is_ok(), k == l, "saved under {k}, resumed under {l}");
+        }
     }
 }
 
