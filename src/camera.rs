@@ -215,8 +215,8 @@ impl PrimaryRays<'_> {
         (0..pixels).step_by(band as usize).map(move |start| start..end(start))
     }
 
-    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen, and whether that is nothing
-    /// but sky.
+    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen, and whether that is sky
+    /// alone.
     fn pixels<'b>(
         &'b self,
         range: Range<u32>,

@@ -146,8 +146,8 @@ impl SkyDistribution {
         graded.iter().all(|x| x.is_finite()).then_some(SkyDistribution(Kind::Graded(graded)))
     }
 
-    /// Radiance relative to the zenith by the cosines from it, above 0, and from the sun, which is at
-    /// the cosine `sun` from the zenith: 0 or more.
+    /// Radiance relative to the zenith, 0 or more, by the cosines from it, above 0, and from the
+    /// sun, which is at the cosine `sun` from the zenith.
     pub(super) fn relative_to_zenith(self, sun: f64) -> impl Fn(f64, f64) -> f64 {
         let absolute = move |up: f64, from_sun: f64| match self.0 {
             Kind::Traditional => 1.0 + 2.0 * up,

@@ -21,7 +21,7 @@ pub struct Sky {
 }
 
 impl Sky {
-    /// Behind faces of `views` on targets of `format`, with light in units of `radiance_unit`, W/m².
+    /// Behind faces of `views` on targets of `format`, with light in units of `radiance_unit` W/m².
     pub fn new(
         memory: &Memory,
         map: &SkyMap,
