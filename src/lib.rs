@@ -32,7 +32,7 @@
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let mut obj = ObjSettings::default();
 //! obj.emit.push(("bulb".into(), Rgb::splat(15.0))); // radiance of a material
-//! obj.sky = Some(Rgb::ONE);
+//! obj.sky = Some(Rgb::ONE.into());
 //! let (scene, go) = (obj.load("scene.obj")?, |_: &_| ControlFlow::Continue(()));
 //! let light = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, go)?.light;
 //! let image = Camera::framing(&light, 1.5).image(&light.surface, 768, 512, 4)?;
