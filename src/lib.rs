@@ -131,7 +131,9 @@ pub use io::write_png;
 pub use io::{ObjSettings, load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
-pub use scene::{Material, Rgb, Scene, Sides, Sky, SkyDistribution, Sun, Triangle, Warning};
+pub use scene::{
+    Material, Rgb, Scene, Sides, Sky, SkyDistribution, Specular, Sun, Triangle, Warning,
+};
 pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;
 pub use view_factor::ViewFactors;

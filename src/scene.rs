@@ -15,6 +15,7 @@ mod sides;
 mod sky;
 mod sky_distribution;
 mod sky_map;
+mod specular;
 pub mod texture;
 mod textured;
 mod warning;
@@ -35,6 +36,7 @@ pub use sky::{Sky, Sun};
 pub use sky_distribution::SkyDistribution;
 #[cfg(feature = "gpu")]
 pub(crate) use sky_map::SkyMap;
+pub use specular::Specular;
 use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
 
@@ -51,6 +53,9 @@ pub struct Material {
     pub exitance: Rgb,
     /// Which sides do: fronts, unless set. Backs of others only block light.
     pub sides: Sides,
+    /// What pictures show of it beside that: a mirror or glass. Light is spread as if it were not
+    /// there.
+    pub specular: Option<Specular>,
 }
 
 /// A face of the scene: counter-clockwise corners seen from its front.
@@ -114,7 +119,8 @@ impl Scene {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
-    /// is not finite, an index out of range, or when no triangle with area is left.
+    /// is not finite, a mirror or glass that returns more light than it gets, an index out of
+    /// range, or when no triangle with area is left.
     pub fn new(
         positions: Vec<DVec3>,
         triangles: Vec<Triangle>,
@@ -362,7 +368,8 @@ impl Material {
     /// A surface that reflects `reflectance` in every channel and emits nothing.
     pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
         let (reflectance, exitance) = (Rgb::splat(reflectance), Rgb::ZERO);
-        Material { name: name.into(), reflectance, exitance, sides: Sides::Front }
+        let (name, sides) = (name.into(), Sides::Front);
+        Material { name, reflectance, exitance, sides, specular: None }
     }
 
     /// Whether any light is reflected, in any channel.
@@ -370,7 +377,7 @@ impl Material {
         self.reflectance != Rgb::ZERO
     }
 
-    /// Reflectance in [0, 1), exitance finite and not negative.
+    /// Reflectance in [0, 1), exitance finite and not negative, no more light than there is.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let place = || format!("material {}", quoted(&[&self.name]));
         for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
@@ -391,7 +398,8 @@ impl Material {
                 ));
             }
         }
-        Ok(())
+        let fault = self.specular.and_then(|specular| specular.fault(self.reflectance));
+        fault.map_or(Ok(()), |(found, remedy)| Err(bad(place(), found, remedy)))
     }
 }
 
@@ -437,6 +445,38 @@ mod tests {
             let e = one(RIGHT, Material::grey("chalk", rho)).unwrap_err();
             assert_eq!(e.kind(), ErrorKind::Scene);
             assert!(e.to_string().contains("chalk"), "{e}");
+        }
+    }
+
+    #[test]
+    fn specular_materials_return_no_more_than_they_get() {
+        let with = |specular| {
+            let material = Material { specular: Some(specular), ..Material::grey("plate", 0.25) };
+            one(RIGHT, material)
+        };
+        let glass = |refractive_index, transmittance| {
+            let transmittance = Rgb::new(0.5, transmittance, 0.5);
+            with(Specular::Glass { refractive_index, transmittance })
+        };
+        let mirror = |reflectance| with(Specular::Mirror { reflectance: Rgb::splat(reflectance) });
+        let polished =
+            |reflectance| with(Specular::Polished { reflectance: Rgb::splat(reflectance) });
+        for good in [mirror(0.0), mirror(0.75), polished(0.75), glass(1.0, 0.0), glass(5.0, 0.75)] {
+            assert!(good.unwrap().material(0).specular.is_some());
+        }
+        for (bad, parts) in [
+            (mirror(0.76), ["specular reflectance 0.76 and reflectance 0.25", "their sum"]),
+            (polished(-0.1), ["specular reflectance -0.1", "from 0 to 1"]),
+            (polished(f64::NAN), ["specular reflectance NaN", "from 0 to 1"]),
+            (glass(0.9, 0.5), ["a refractive index of 0.9", "from 1 to 5"]),
+            (glass(f64::NAN, 0.5), ["a refractive index of NaN", "from 1 to 5"]),
+            (glass(1.5, 1.1), ["transmittance 1.1 in channel g", "from 0 to 1"]),
+        ] {
+            let e = bad.unwrap_err();
+            assert_eq!(e.kind(), ErrorKind::Scene);
+            for part in ["material 'plate'", parts[0], parts[1]] {
+                assert!(e.to_string().contains(part), "{e}");
+            }
         }
     }
 
