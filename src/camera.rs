@@ -2,7 +2,8 @@
 //!
 //! ```text
 //!   pixel ── n × n primary rays ── nearest face ── radiosity interpolated from its vertices
-//!                                                └─ or gathered there: camera/gathered.rs
+//!                                    │           └─ or gathered there: camera/gathered.rs
+//!                                    └─ at mirrors and glass on to others: camera/second_pass.rs
 //! ```
 //!
 //! Rays lie on a grid sheared by one sub-pixel per row and column (n-rooks), so that an edge along
@@ -10,7 +11,10 @@
 
 mod framing;
 mod gathered;
+mod glass_bodies;
 mod interpolated;
+mod optics;
+mod second_pass;
 mod textured;
 mod up_axis;
 mod view_score;
@@ -71,7 +75,8 @@ impl Camera {
     /// `samples` primary rays on an n-rooks grid: no two in one row or column.
     ///
     /// Radiance is the interpolated radiosity over π. Backs of faces are black, and rays that meet
-    /// nothing see the sky, [`VertexMesh::sky`].
+    /// nothing see the sky, [`VertexMesh::sky`]. A mesh of vertices knows no mirrors and no glass:
+    /// [`Camera::interpolated_image`] shows these.
     ///
     /// # Errors
     /// Those of [`Camera::check`].
@@ -134,7 +139,7 @@ impl Camera {
     }
 }
 
-/// What a primary ray sees first.
+/// What a ray sees first.
 enum Seen {
     Front(Hit),
     /// In this direction, unit length.
@@ -241,14 +246,19 @@ impl PrimaryRays<'_> {
 
     /// What the rays of pixel `k` see. The other rays hit backs.
     fn seen(&self, k: u32) -> impl Iterator<Item = Seen> {
+        self.directions(k).filter_map(|direction| self.hit(direction))
+    }
+
+    /// Directions of the rays of pixel `k`, of any length.
+    fn directions(&self, k: u32) -> impl Iterator<Item = DVec3> {
         let n = self.samples;
         // Middle of row or column k of an n × n grid within a sub-pixel.
         let middle = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
-        (0..n * n).filter_map(move |s| {
+        (0..n * n).map(move |s| {
             let (i, j) = (s % n, s / n);
             let x = f64::from(k % self.width * n + i) + middle(j);
             let y = f64::from(k / self.width * n + j) + middle(n - 1 - i);
-            self.hit(self.corner + self.right * x + self.down * y)
+            self.corner + self.right * x + self.down * y
         })
     }
 

@@ -16,7 +16,8 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::textured::LitSurface;
+use super::second_pass::{SecondPass, Sighting};
+use super::textured::{LitSurface, Sight};
 use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
@@ -46,7 +47,8 @@ impl Camera {
     /// Rays of one pixel that meet the same smooth surface share one gather in their middle, unless
     /// the radiosity at the vertices shows an edge of a shadow between them. So most pixels gather
     /// once, while edges are as clean as the rays are dense. Surfaces that reflect nothing do not
-    /// gather. `progress` is called with the number of pixels done and of all pixels, several times
+    /// gather. Mirrors and glass show what is seen in and through them, as in
+    /// [`Camera::interpolated_image`]. `progress` is called with the number of pixels done and of all pixels, several times
     /// a second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
@@ -105,8 +107,8 @@ struct PixelPart {
     point: GatherPoint,
     /// Square root of the element's area, scene unit.
     size: f64,
-    /// Share of the pixel's rays, in (0, 1].
-    weight: f64,
+    /// Share of the pixel's rays per channel, in [0, 1].
+    weight: Rgb,
     exitance: Rgb,
     reflectance: Rgb,
     /// What it adds to the pixel by the radiosity at vertices, W/(m² sr).
@@ -125,9 +127,30 @@ impl PixelPart {
     }
 }
 
+/// A hit on a front, as a part of what a ray sees.
+struct SeenHit {
+    hit: Hit,
+    /// What of its radiance comes to the camera, per channel, in [0, 1].
+    weight: Rgb,
+    sight: Sight,
+}
+
+/// What the rays of a pixel see of the sky.
+#[derive(Default)]
+struct SkySeen {
+    /// Rays that meet nothing on their way there.
+    direct_rays: u32,
+    /// Sum over all rays, W/(m² sr).
+    radiance: Rgb,
+}
+
+/// Hits with the same history on the same smooth surface. The history is 0 where it was met first.
+type Group = ((u64, u32), Vec<SeenHit>);
+
 /// A solution as the camera's rays meet it.
 struct GatheredView<'a> {
     lit: LitSurface<'a>,
+    second_pass: Option<SecondPass>,
     offset: SurfaceOffset,
     /// Per triangle of the scene, the smooth surface that it is a part of.
     surfaces: Vec<u32>,
@@ -139,6 +162,7 @@ impl GatheredView<'_> {
         GatheredView {
             offset: SurfaceOffset::new(scene),
             surfaces: SurfaceTopology::new(scene).surfaces(),
+            second_pass: SecondPass::new(&lit),
             lit,
         }
     }
@@ -151,67 +175,70 @@ impl GatheredView<'_> {
     }
 
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {
-        let mut groups: Vec<(u32, Vec<Hit>)> = vec![];
-        let (mut sky_rays, mut sky) = (0, Rgb::ZERO);
-        for seen in self.lit.rays.seen(pixel) {
+        let mut groups: Vec<Group> = vec![];
+        let mut sky = SkySeen::default();
+        let second_pass = self.second_pass.as_ref();
+        SecondPass::sightings(second_pass, &self.lit, pixel, |sighting| {
+            let Sighting { seen, weight, sight, history } = sighting;
             let hit = match seen {
                 Seen::Front(hit) => hit,
                 Seen::Sky(direction) => {
-                    sky_rays += 1;
-                    sky += self.lit.light.surface.sky.radiance(direction);
-                    continue;
+                    sky.direct_rays += u32::from(history == 0);
+                    sky.radiance += weight * self.lit.light.surface.sky.radiance(direction);
+                    return;
                 }
             };
-            let surface = self.smooth_surface(&hit);
-            match groups.iter_mut().find(|group| group.0 == surface) {
+            let key = (history, self.smooth_surface(&hit));
+            let hit = SeenHit { hit, weight, sight };
+            match groups.iter_mut().find(|group| group.0 == key) {
                 Some((_, hits)) => hits.push(hit),
-                None => groups.push((surface, vec![hit])),
+                None => groups.push((key, vec![hit])),
             }
-        }
+        });
         let mut parts = vec![];
-        if sky_rays > 0 {
-            parts.push(self.sky_part(pixel as usize, sky_rays, sky));
+        if sky.direct_rays > 0 || sky.radiance != Rgb::ZERO {
+            parts.push(self.sky_part(pixel as usize, sky));
         }
-        for (_, hits) in &groups {
-            self.add_parts(pixel as usize, hits, &mut parts);
+        for ((history, _), hits) in &groups {
+            self.add_parts(pixel as usize, *history, hits, &mut parts);
         }
         parts
     }
 
-    /// The rays of a pixel that see the sky, where nothing is to be gathered, and the sum of its
-    /// radiance there, W/(m² sr).
-    fn sky_part(&self, pixel: usize, rays: u32, sky: Rgb) -> PixelPart {
+    /// The rays of a pixel that see the sky, where nothing is to be gathered.
+    fn sky_part(&self, pixel: usize, sky: SkySeen) -> PixelPart {
         let PrimaryRays { weight, samples, .. } = self.lit.rays;
         PixelPart {
             pixel,
             point: GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 },
             size: 0.0,
-            weight: weight * f64::from(rays),
+            weight: Rgb::ZERO,
             exitance: Rgb::ZERO,
             reflectance: Rgb::ZERO,
-            interpolated: sky * weight,
-            is_whole_sky: rays == samples * samples,
+            interpolated: sky.radiance * weight,
+            is_whole_sky: sky.direct_rays == samples * samples,
         }
     }
 
     /// Adds the hits on one smooth surface: as one part, or as several where the radiosity varies.
-    fn add_parts(&self, pixel: usize, hits: &[Hit], parts: &mut Vec<PixelPart>) {
-        let radiosity = || hits.iter().map(|hit| self.lit.untextured_radiosity(hit));
+    fn add_parts(&self, pixel: usize, history: u64, hits: &[SeenHit], parts: &mut Vec<PixelPart>) {
+        let radiosity = || hits.iter().map(|seen| self.lit.untextured_radiosity(&seen.hit));
         let sum: Rgb = radiosity().sum();
         let low = radiosity().fold(Rgb::INFINITY, Rgb::min);
         let spread = (radiosity().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
         if hits.len() > 1 && spread.length() > EDGE_CONTRAST * sum.length() {
             // Hits are in order of sub-pixel rows: the upper and the lower half.
             let (upper, lower) = hits.split_at(hits.len() / 2);
-            self.add_parts(pixel, upper, parts);
-            self.add_parts(pixel, lower, parts);
+            self.add_parts(pixel, history, upper, parts);
+            self.add_parts(pixel, history, lower, parts);
             return;
         }
-        let hit = self.middle_hit(hits);
+        let hit = self.middle_hit(hits, history == 0);
         let (surface, mesh) = (&self.lit.light.surface, &self.lit.light.mesh);
         let node = mesh.element(self.lit.element(&hit));
         let size = mesh.area(node).sqrt();
-        let (reflectance, exitance, sum) = self.seen_of(hits, sum);
+        let (reflectance, exitance, sum) = self.seen_of(hits);
+        let weight: Rgb = hits.iter().map(|seen| seen.weight).sum();
         let normal =
             self.lit.rays.interpolate(&hit, &surface.normals).normalize_or(mesh.normal(node));
         let position = self.lit.rays.interpolate(&hit, &surface.positions);
@@ -219,7 +246,7 @@ impl GatheredView<'_> {
             pixel,
             point: self.offset.gather_point(position, normal, size),
             size,
-            weight: self.lit.rays.weight * hits.len() as f64,
+            weight: self.lit.rays.weight * weight,
             exitance,
             reflectance,
             interpolated: sum * self.lit.rays.weight / PI,
@@ -228,39 +255,45 @@ impl GatheredView<'_> {
     }
 
     /// Mean reflectance and exitance of what was hit, and the sum of the radiosity that the
-    /// vertices give it, which is `even` without a texture, W/m².
-    fn seen_of(&self, hits: &[Hit], even: Rgb) -> (Rgb, Rgb, Rgb) {
-        let t = self.lit.triangle(&hits[0]);
-        if self.lit.light.mesh.scene().textures(t).is_none() {
-            let material = self.lit.light.mesh.scene().material(t);
-            return (material.reflectance, material.exitance, even);
+    /// vertices give it, W/m²: each by its weight.
+    fn seen_of(&self, hits: &[SeenHit]) -> (Rgb, Rgb, Rgb) {
+        let interpolated =
+            |seen: &SeenHit| seen.weight * self.lit.radiosity(&seen.hit, &seen.sight);
+        let interpolated = hits.iter().map(interpolated).sum();
+        let t = self.lit.triangle(&hits[0].hit);
+        if self.lit.scene().textures(t).is_none() {
+            let material = self.lit.scene().material(t);
+            return (material.reflectance, material.exitance, interpolated);
         }
-        let (mut reflectance, mut exitance) = (Rgb::ZERO, Rgb::ZERO);
-        for hit in hits {
-            let [reflects, emits] = self.lit.reflectance_and_exitance(hit);
-            (reflectance, exitance) = (reflectance + reflects, exitance + emits);
+        let (mut reflectance, mut exitance, mut sum) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
+        for SeenHit { hit, weight, sight } in hits {
+            let [reflects, emits] = self.lit.reflectance_and_exitance(hit, sight);
+            reflectance += weight * reflects;
+            exitance += weight * emits;
+            sum += weight;
         }
-        let count = hits.len() as f64;
-        let interpolated = hits.iter().map(|hit| self.lit.radiosity(hit)).sum();
-        (reflectance / count, exitance / count, interpolated)
+        // What weighs nothing in a channel is 0 / that, and stays 0.
+        let sum = sum.max(Rgb::splat(f64::MIN_POSITIVE));
+        (reflectance / sum, exitance / sum, interpolated)
     }
 
     /// The hit of the ray through the mean position of `hits`, if it is on their surface, or else
-    /// the one of them that is nearest to it. Light that is linear over the surface has its mean
-    /// there.
-    fn middle_hit(&self, hits: &[Hit]) -> Hit {
+    /// the one of them that is nearest to it, as of those that are not `direct`. Light that is
+    /// linear over the surface has its mean there.
+    fn middle_hit(&self, hits: &[SeenHit], direct: bool) -> Hit {
         let position =
             |hit: &Hit| self.lit.rays.interpolate(hit, &self.lit.light.surface.positions);
-        let mean = hits.iter().map(position).sum::<DVec3>() / hits.len() as f64;
-        let surface = self.smooth_surface(&hits[0]);
-        if let Some(Seen::Front(hit)) = self.lit.rays.hit(mean - self.lit.rays.eye)
+        let mean = hits.iter().map(|seen| position(&seen.hit)).sum::<DVec3>() / hits.len() as f64;
+        let surface = self.smooth_surface(&hits[0].hit);
+        if direct
+            && let Some(Seen::Front(hit)) = self.lit.rays.hit(mean - self.lit.rays.eye)
             && self.smooth_surface(&hit) == surface
         {
             return hit;
         }
         let distance = |hit: &Hit| position(hit).distance_squared(mean);
-        let mut nearest = (distance(&hits[0]), hits[0]);
-        for hit in &hits[1..] {
+        let mut nearest = (distance(&hits[0].hit), hits[0].hit);
+        for SeenHit { hit, .. } in &hits[1..] {
             let candidate = (distance(hit), *hit);
             if candidate.0 < nearest.0 {
                 nearest = candidate;

@@ -1,13 +1,16 @@
-//! Images of a solution by the light between its vertices, with its textures.
+//! Images of a solution by the light between its vertices, with its textures and its mirrors.
 
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::second_pass::{SecondPass, Sighting};
 use super::textured::LitSurface;
-use super::{Camera, PrimaryRays, RadianceImage};
+use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
+use crate::scene::Rgb;
 
 /// Primary rays between two reports of progress: a tenth of a second on two cores.
 const RAYS_PER_BAND: u32 = 1 << 18;
@@ -15,7 +18,11 @@ const RAYS_PER_BAND: u32 = 1 << 18;
 impl Camera {
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
     /// meets a textured material, the irradiance between the vertices is reflected by the texture
-    /// at that point. `progress` is called with the number of pixels done and of all pixels,
+    /// at that point. Mirrors and glass ([`crate::Specular`]) show what is seen in and through
+    /// them: a ray goes on, and splits at glass, until it meets what is diffuse or the sky. Parts
+    /// that together weigh less than 1/1024 of the ray are not looked at, nor what lies behind 512
+    /// boundaries, as between two mirrors that face each other: they count as the mean of the
+    /// others. `progress` is called with the number of pixels done and of all pixels,
     /// several times a second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
@@ -32,10 +39,11 @@ impl Camera {
         let count = width * height;
         let bands = rays.bands(count, RAYS_PER_BAND);
         let lit = LitSurface { rays, light };
+        let second_pass = SecondPass::new(&lit);
         let (mut pixels, mut sky) = (Vec::with_capacity(count as usize), vec![]);
         for band in bands {
-            let (seen, is_sky): (Vec<_>, Vec<_>) =
-                lit.rays.pixels(band, &|hit| lit.radiosity(hit)).unzip();
+            let seen = |k| radiance(&lit, second_pass.as_ref(), k);
+            let (seen, is_sky): (Vec<_>, Vec<_>) = band.into_par_iter().map(seen).unzip();
             pixels.extend(seen);
             sky.extend(is_sky);
             if progress(pixels.len(), count as usize).is_break() {
@@ -44,4 +52,20 @@ impl Camera {
         }
         Ok(Some(RadianceImage { width, height, pixels, sky }))
     }
+}
+
+/// Radiance of pixel `k`, W/(m² sr), and whether that is sky alone, seen directly.
+fn radiance(lit: &LitSurface, second_pass: Option<&SecondPass>, k: u32) -> (Rgb, bool) {
+    let (mut sum, mut sky_rays) = (Rgb::ZERO, 0);
+    SecondPass::sightings(second_pass, lit, k, |Sighting { seen, weight, sight, history }| {
+        sum += weight
+            * match seen {
+                Seen::Front(hit) => lit.radiosity(&hit, &sight) / PI,
+                Seen::Sky(direction) => {
+                    sky_rays += u32::from(history == 0);
+                    lit.light.surface.sky.radiance(direction)
+                }
+            };
+    });
+    (sum * lit.rays.weight, sky_rays == lit.rays.samples * lit.rays.samples)
 }

@@ -17,26 +17,40 @@ pub(super) struct LitSurface<'a> {
     pub light: &'a GatheredMesh,
 }
 
+/// From where a hit is seen, and along which axis: through mirrors, where their images are.
+#[derive(Clone, Copy)]
+pub(super) struct Sight {
+    /// Scene unit.
+    pub eye: DVec3,
+    /// Its product with a way from the eye is the depth along the view's axis.
+    pub forward: DVec3,
+}
+
 impl LitSurface<'_> {
+    /// That of the camera itself.
+    pub fn direct_sight(&self) -> Sight {
+        Sight { eye: self.rays.eye, forward: self.rays.forward }
+    }
+
     /// Reflectance per channel and exitance, W/m², at a hit.
-    pub fn reflectance_and_exitance(&self, hit: &Hit) -> [Rgb; 2] {
-        let (scene, t) = (self.light.mesh.scene(), self.triangle(hit));
+    pub fn reflectance_and_exitance(&self, hit: &Hit, sight: &Sight) -> [Rgb; 2] {
+        let (scene, t) = (self.scene(), self.triangle(hit));
         if scene.textures(t).is_none() {
             let material = scene.material(t);
             return [material.reflectance, material.exitance];
         }
         let position = self.rays.interpolate(hit, &self.light.surface.positions);
-        let (place, share) = (scene.barycentric(t, position), self.share(scene, t, position));
+        let (place, share) = (scene.barycentric(t, position), self.share(t, position, sight));
         [scene.reflectance_around(t, place, share), scene.exitance_around(t, place, share)]
     }
 
     /// Radiosity at a hit, W/m²: by the light at the vertices and the texture at the hit.
-    pub fn radiosity(&self, hit: &Hit) -> Rgb {
+    pub fn radiosity(&self, hit: &Hit, sight: &Sight) -> Rgb {
         let surface = &self.light.surface;
         if self.light.mesh.scene().textures(self.triangle(hit)).is_none() {
             return self.rays.interpolate(hit, &surface.radiosity);
         }
-        let [reflectance, exitance] = self.reflectance_and_exitance(hit);
+        let [reflectance, exitance] = self.reflectance_and_exitance(hit, sight);
         exitance + reflectance * self.rays.interpolate(hit, &surface.irradiance)
     }
 
@@ -61,15 +75,20 @@ impl LitSurface<'_> {
         mesh.triangle(mesh.element(self.element(hit)))
     }
 
+    /// The scene that is seen.
+    pub fn scene(&self) -> &Scene {
+        self.light.mesh.scene()
+    }
+
     /// The share of triangle `t` that lies between a ray to `position` on it and its neighbours.
-    fn share(&self, scene: &Scene, t: usize, position: DVec3) -> f64 {
-        let to = position - self.rays.eye;
-        let depth = to.dot(self.rays.forward);
-        let normal = scene.normal(t);
+    fn share(&self, t: usize, position: DVec3, sight: &Sight) -> f64 {
+        let to = position - sight.eye;
+        let depth = to.dot(sight.forward);
+        let (scene, normal) = (self.scene(), self.scene().normal(t));
         // A cross-section of the rays' pyramid there, and how much of the surface it covers.
         let section = (self.rays.right.cross(self.rays.down).length() * depth * depth).abs();
         let facing = (normal.dot(to) / to.length()).abs();
-        let across = (self.rays.forward.dot(to) / to.length()).abs();
+        let across = (sight.forward.dot(to) / to.length()).abs();
         (section * across / facing / scene.area(t)).min(1.0)
     }
 }

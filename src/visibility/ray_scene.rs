@@ -105,6 +105,18 @@ impl RayScene {
         start: f64,
         ignored: Option<usize>,
     ) -> Option<Hit> {
+        self.closest_hit_of(from, direction, start, ignored, |_| true)
+    }
+
+    /// The same of those hits that `counts`.
+    pub fn closest_hit_of(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        start: f64,
+        ignored: Option<usize>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let (ray, reach) = self.ray(from, direction);
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
@@ -114,7 +126,8 @@ impl RayScene {
             }
             // Rounded up, so that an equal is still looked at.
             let end = best.map_or(f64::INFINITY, |b| b.distance * (1.0 + 4.0 * f64::EPSILON));
-            let Some(hit) = self.intersect(triangle, from, direction, start..end) else {
+            let hit = self.intersect(triangle, from, direction, start..end);
+            let Some(hit) = hit.filter(|hit| counts(hit)) else {
                 return f32::INFINITY;
             };
             // Between equals the lower index wins, whatever the order of the visit.

@@ -1,2 +1,3 @@
 mod gathered;
 mod image;
+mod second_pass;

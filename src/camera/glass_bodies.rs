@@ -1,0 +1,284 @@
+//! Which triangles of glass enclose a body, and which are panes.
+//!
+//! ```text
+//!     ┌──────────┐  body: each side of its triangles     ─────────  pane: a sheet with an end;
+//!     │  glass   │  is shared by one other of them                  light goes straight on
+//!     │  ┌────┐  │
+//!     │  │ air│  │  cavity: a body in a body, wound the other way round
+//!     │  └────┘  │
+//!     └──────────┘  Another body in it, wound alike, is of its own glass.
+//! ```
+//!
+//! What is outside follows from the shape, not from how triangles are wound: files have bodies
+//! inside out. How a body is wound counts only beside that of one around it.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use crate::geometry::aabb::Aabb;
+use crate::geometry::union_find::UnionFind;
+use crate::geometry::weld::Weld;
+use crate::scene::{Scene, Specular};
+
+/// What encloses less than this share of its area to the power of 3/2 is flat: a sheet that a file
+/// has twice. A ball has 0.094, what is 10⁻⁶ as thick as it is wide some 10⁻⁷.
+const FLAT: f64 = 1e-9;
+
+/// What a triangle of glass is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum GlassFace {
+    /// A part of a sheet.
+    Pane,
+    /// A part of the boundary of a body.
+    Boundary {
+        /// Which one.
+        body: u32,
+        /// Whether its front looks out of the glass.
+        front_is_outside: bool,
+    },
+}
+
+/// A medium around a point: a body, and its refractive index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Medium {
+    pub body: u32,
+    pub refractive_index: f64,
+}
+
+/// The glass of a scene.
+pub(super) struct GlassBodies {
+    /// Per triangle of the scene; none for what is not glass.
+    pub faces: Vec<Option<GlassFace>>,
+    shells: Vec<Shell>,
+}
+
+/// A closed surface.
+struct Shell {
+    material: u32,
+    /// Corners counter-clockwise seen from outside, scene unit.
+    triangles: Vec<[DVec3; 3]>,
+    bounds: Aabb,
+    /// Scene unit cubed, above 0.
+    volume: f64,
+    /// Area of the triangles whose fronts look out of it, less that of the others.
+    outward_area: f64,
+    /// The body that it bounds.
+    body: u32,
+    /// Whether the glass is around it.
+    is_cavity: bool,
+}
+
+/// A triangle of glass by its corners' numbers, the first of those with the same corners.
+#[derive(Clone, Copy)]
+struct Face {
+    triangle: usize,
+    corners: [u32; 3],
+}
+
+impl GlassBodies {
+    pub fn new(scene: &Scene) -> GlassBodies {
+        let glass = |&t: &usize| scene.material(t).specular.is_some_and(|s| s.is_glass());
+        let mut weld = Weld::default();
+        let (mut unique, mut numbers) = (vec![], FxHashMap::default());
+        // Per triangle of glass: itself, and the first with its corners and material.
+        let mut all = vec![];
+        for t in (0..scene.triangles().len()).filter(glass) {
+            let corners = scene.corners(t).map(|p| weld.number(p));
+            let mut key = corners;
+            key.sort_unstable();
+            let number =
+                *numbers.entry((scene.triangles()[t].material, key)).or_insert_with(|| {
+                    unique.push(Face { triangle: t, corners });
+                    unique.len() - 1
+                });
+            all.push((t, corners, number));
+        }
+        let found = shells(scene, &unique);
+        let mut bodies = GlassBodies { faces: vec![None; scene.triangles().len()], shells: vec![] };
+        let of_faces: Vec<Option<(u32, bool)>> = {
+            let mut of_faces = vec![None; unique.len()];
+            for (members, outward) in found {
+                let shell = Shell::new(scene, &unique, &members, &outward);
+                let Some((shell, flipped)) = shell else { continue };
+                for (&k, outward) in members.iter().zip(outward) {
+                    of_faces[k] = Some((bodies.shells.len() as u32, outward != flipped));
+                }
+                bodies.shells.push(shell);
+            }
+            of_faces
+        };
+        bodies.nest();
+        for (t, corners, number) in all {
+            let face = of_faces[number].map(|(shell, outward)| {
+                let Shell { body, is_cavity, .. } = bodies.shells[shell as usize];
+                let alike = same_way_round(corners, unique[number].corners);
+                GlassFace::Boundary { body, front_is_outside: (outward == alike) != is_cavity }
+            });
+            bodies.faces[t] = Some(face.unwrap_or(GlassFace::Pane));
+        }
+        bodies
+    }
+
+    /// The bodies around `point`, the innermost last.
+    pub fn around(&self, scene: &Scene, point: DVec3) -> Vec<Medium> {
+        let mut around: Vec<&Shell> = self.shells.iter().filter(|s| s.encloses(point)).collect();
+        around.sort_by(|a, b| b.volume.total_cmp(&a.volume));
+        let mut media: Vec<Medium> = vec![];
+        for shell in around {
+            if shell.is_cavity {
+                media.retain(|medium| medium.body != shell.body);
+            } else if let Some(Specular::Glass { refractive_index, .. }) =
+                scene.materials()[shell.material as usize].specular
+            {
+                media.push(Medium { body: shell.body, refractive_index });
+            }
+        }
+        media
+    }
+
+    /// Finds the cavities, and gives bodies their numbers: those of the shells around them.
+    fn nest(&mut self) {
+        let shells = &self.shells;
+        let place = |s: &Shell| s.triangles[0][0];
+        let around = |k: usize| -> Vec<usize> {
+            let encloses = |&j: &usize| {
+                j != k
+                    && shells[j].material == shells[k].material
+                    && shells[j].volume > shells[k].volume
+                    && shells[j].encloses(place(&shells[k]))
+            };
+            (0..shells.len()).filter(encloses).collect()
+        };
+        let around: Vec<Vec<usize>> = (0..shells.len()).map(around).collect();
+        let by_volume = |a: &usize, b: &usize| shells[*a].volume.total_cmp(&shells[*b].volume);
+        let faces_out = |k: usize| shells[k].outward_area > 0.0;
+        let is_cavity = |k: usize| {
+            let outermost = around[k].iter().copied().max_by(by_volume);
+            outermost.is_some_and(|outermost| faces_out(outermost) != faces_out(k))
+        };
+        let is_cavity: Vec<bool> = (0..shells.len()).map(is_cavity).collect();
+        let host = |k: usize| {
+            let solid = around[k].iter().copied().filter(|&j| !is_cavity[j]);
+            solid.min_by(by_volume).filter(|_| is_cavity[k]).unwrap_or(k)
+        };
+        let hosts: Vec<usize> = (0..shells.len()).map(host).collect();
+        for (k, shell) in self.shells.iter_mut().enumerate() {
+            (shell.body, shell.is_cavity) = (hosts[k] as u32, is_cavity[k]);
+        }
+    }
+}
+
+impl Shell {
+    /// That of these faces, of which some are wound one way and the others, which are not
+    /// `alike`, the other. Also whether those that are alike look into it. None if it is flat.
+    fn new(
+        scene: &Scene,
+        faces: &[Face],
+        members: &[usize],
+        alike: &[bool],
+    ) -> Option<(Shell, bool)> {
+        let corners = |(&k, &alike): (&usize, &bool)| {
+            let [a, b, c] = scene.corners(faces[k].triangle);
+            if alike { [a, b, c] } else { [a, c, b] }
+        };
+        let mut triangles: Vec<[DVec3; 3]> = members.iter().zip(alike).map(corners).collect();
+        let origin = triangles[0][0];
+        let cone = |[a, b, c]: &[DVec3; 3]| (a - origin).cross(b - origin).dot(c - origin) / 6.0;
+        let volume: f64 = triangles.iter().map(cone).sum();
+        let areas = || members.iter().map(|&k| scene.area(faces[k].triangle));
+        let area: f64 = areas().sum();
+        // Written so that NaN is flat.
+        if !(volume.abs() > FLAT * area.powf(1.5)) {
+            return None;
+        }
+        let flipped = volume < 0.0;
+        if flipped {
+            triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        }
+        let signed = areas().zip(alike).map(|(a, &alike)| if alike != flipped { a } else { -a });
+        let shell = Shell {
+            material: scene.triangles()[faces[members[0]].triangle].material,
+            bounds: Aabb::from_points(triangles.iter().flatten().copied()),
+            triangles,
+            volume: volume.abs(),
+            outward_area: signed.sum(),
+            body: 0,
+            is_cavity: false,
+        };
+        Some((shell, flipped))
+    }
+
+    /// Whether `point` is inside: by the solid angle that it is enclosed in.
+    fn encloses(&self, point: DVec3) -> bool {
+        let Aabb { low, high } = self.bounds;
+        let is_near = point.cmpge(low).all() && point.cmple(high).all();
+        is_near && self.triangles.iter().map(|t| solid_angle(*t, point)).sum::<f64>() > TAU
+    }
+}
+
+/// The closed surfaces of `faces`: which belong to each, and which of these are wound alike.
+fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
+    let edges = |k: usize| {
+        let ([a, b, c], material) =
+            (faces[k].corners, scene.triangles()[faces[k].triangle].material);
+        [(a, b), (b, c), (c, a)].map(|(a, b)| ((material, a.min(b), a.max(b)), a < b))
+    };
+    let mut sharing: FxHashMap<(u32, u32, u32), Vec<usize>> = FxHashMap::default();
+    for k in 0..faces.len() {
+        edges(k).into_iter().for_each(|(edge, _)| sharing.entry(edge).or_default().push(k));
+    }
+    let mut sets = UnionFind::new(faces.len());
+    for pair in sharing.values() {
+        // Where more meet, those of one body are joined elsewhere.
+        if let [a, b] = pair[..] {
+            sets.join(a, b);
+        }
+    }
+    let sets: Vec<usize> = (0..faces.len()).map(|k| sets.find(k)).collect();
+    let neighbour = |k: usize, edge| {
+        let mut others = sharing[&edge].iter().filter(|&&j| j != k && sets[j] == sets[k]);
+        others.next().filter(|_| others.next().is_none()).copied()
+    };
+    let mut members: Vec<Vec<usize>> = vec![vec![]; faces.len()];
+    (0..faces.len()).for_each(|k| members[sets[k]].push(k));
+    let mut alike: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut closed = vec![];
+    'sets: for members in members.into_iter().filter(|members| !members.is_empty()) {
+        alike[members[0]] = Some(true);
+        let mut queue = vec![members[0]];
+        while let Some(k) = queue.pop() {
+            for (edge, forward) in edges(k) {
+                let Some(other) = neighbour(k, edge) else { continue 'sets };
+                // Wound alike, they run along their side in opposite directions.
+                let runs_forward = edges(other).iter().any(|&e| e == (edge, true));
+                let wanted = alike[k].map(|alike| alike == (forward != runs_forward));
+                match alike[other] {
+                    None => queue.push(other),
+                    // A band with one side encloses nothing.
+                    known if known != wanted => continue 'sets,
+                    _ => {}
+                }
+                alike[other] = wanted;
+            }
+        }
+        let of_members = members.iter().map(|&k| alike[k]).collect::<Option<Vec<bool>>>();
+        closed.extend(of_members.map(|alike| (members, alike)));
+    }
+    closed
+}
+
+/// Whether the same three corners are in the same order, wherever it begins.
+fn same_way_round(a: [u32; 3], b: [u32; 3]) -> bool {
+    (0..3).any(|k| [0, 1, 2].map(|i| a[(i + k) % 3]) == b)
+}
+
+/// Solid angle that a triangle takes up from `point`, above 0 where its back is seen (van Oosterom
+/// and Strackee 1983, equation 8).
+fn solid_angle(corners: [DVec3; 3], point: DVec3) -> f64 {
+    let [a, b, c] = corners.map(|corner| corner - point);
+    let [x, y, z] = [a.length(), b.length(), c.length()];
+    let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
+    2.0 * a.dot(b.cross(c)).atan2(below)
+}

@@ -1,0 +1,311 @@
+//! The second pass: rays of the camera go on at mirrors and glass until they meet what is diffuse.
+//!
+//! ```text
+//!   eye ──► mirror ──► one ray                       weight × reflectance
+//!       ──► glass  ──► one reflected, one refracted  weight × R,  weight × (1 − R) τ
+//!       ──► pane   ──► one reflected, one straight   the sums over both of its faces
+//!
+//!   at each of them, and in the end, a diffuse part: weight × its share × B/π
+//! ```
+//!
+//! These are the paths from the light by diffuse reflections to a diffuse surface, and from there
+//! by specular ones to the eye: L D* S* E (Heckbert 1990; Wallace, Cohen and Greenberg 1987). What
+//! mirrors and glass send onto diffuse surfaces, such as caustics, is not among them.
+//!
+//! Both branches are followed, the heaviest first, until all that wait weigh less than
+//! [`LEFT_OUT`] together. These count as the mean of what the ray saw: off by at most that share of
+//! the brightest radiance that there is. More is left out of rays only that are caught, between
+//! mirrors or at the rim of a ball of triangles, where all angles are close to the critical one.
+
+use glam::DVec3;
+
+use super::Seen;
+use super::glass_bodies::{GlassBodies, GlassFace, Medium};
+use super::optics::{fresnel, pane, refracted, schlick};
+use super::textured::{LitSurface, Sight};
+use crate::mesh::SurfaceTopology;
+use crate::sampling::hash::split_mix64;
+use crate::scene::{Rgb, Specular};
+use crate::visibility::offset;
+use crate::visibility::ray_scene::Hit;
+
+/// What is not looked at weighs less than this, in the channel where it weighs most. Chosen by
+/// hand: below a step of 8 bits for what is as bright as white.
+const LEFT_OUT: f64 = 1.0 / 1024.0;
+
+/// Boundaries that a ray and its branches meet, at most. Chosen by hand: between two mirrors that
+/// reflect 0.98 a ray is down to [`LEFT_OUT`] after 343.
+const MAX_BOUNDARIES: usize = 512;
+
+/// What is seen along a ray of the camera or a branch of it.
+pub(super) struct Sighting {
+    pub seen: Seen,
+    /// What of its radiance comes to the camera, per channel, in [0, 1].
+    pub weight: Rgb,
+    pub sight: Sight,
+    /// The same for rays that took the same way over mirrors and glass, and 0 for none.
+    pub history: u64,
+}
+
+/// The mirrors and the glass of a scene.
+pub(super) struct SecondPass {
+    glass: GlassBodies,
+    /// Bodies that the camera is in, the innermost last.
+    media: Vec<Medium>,
+    /// Per triangle of the scene, the smooth surface that it is a part of.
+    surfaces: Vec<u32>,
+    /// Surfaces within this distance of each other are in one place, scene unit.
+    contact: f64,
+}
+
+/// A ray that goes on.
+struct Branch {
+    from: DVec3,
+    /// Unit length.
+    direction: DVec3,
+    /// Way from the camera, scene unit.
+    length: f64,
+    weight: Rgb,
+    /// Bodies that it is in, the innermost last.
+    media: Vec<Medium>,
+    history: u64,
+}
+
+/// Where a branch meets a mirror or glass.
+struct Boundary {
+    triangle: usize,
+    position: DVec3,
+    /// Unit normals on the side that is met, of the triangle and of the smooth surface.
+    plane: DVec3,
+    normal: DVec3,
+    front: bool,
+    /// Of the angle to the normal.
+    cosine: f64,
+}
+
+impl SecondPass {
+    /// None for a scene without mirrors and glass.
+    pub fn new(lit: &LitSurface) -> Option<SecondPass> {
+        let scene = lit.scene();
+        if scene.materials().iter().all(|material| material.specular.is_none()) {
+            return None;
+        }
+        let glass = GlassBodies::new(scene);
+        let contact = (offset::PATH_CONTACT * scene.bounds().diagonal())
+            .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp());
+        Some(SecondPass {
+            media: glass.around(scene, lit.rays.eye),
+            glass,
+            surfaces: SurfaceTopology::new(scene).surfaces(),
+            contact,
+        })
+    }
+
+    /// Hands over all that the rays of pixel `k` see, with a second pass where there is one.
+    pub fn sightings(
+        second_pass: Option<&SecondPass>,
+        lit: &LitSurface,
+        k: u32,
+        mut found: impl FnMut(Sighting),
+    ) {
+        let (sight, weight, history) = (lit.direct_sight(), Rgb::ONE, 0);
+        for direction in lit.rays.directions(k) {
+            if let Some(second_pass) = second_pass {
+                second_pass.follow(lit, direction.normalize(), &mut found);
+            } else if let Some(seen) = lit.rays.hit(direction) {
+                found(Sighting { seen, weight, sight, history });
+            }
+        }
+    }
+
+    /// Follows a ray from the camera along `direction`, of unit length.
+    fn follow(&self, lit: &LitSurface, direction: DVec3, found: &mut impl FnMut(Sighting)) {
+        let axial = direction.dot(lit.rays.forward);
+        let mut pending = vec![Branch {
+            from: lit.rays.eye,
+            direction,
+            length: 0.0,
+            weight: Rgb::ONE,
+            media: self.media.clone(),
+            history: 0,
+        }];
+        let (mut all, mut seen_weight) = (vec![], Rgb::ZERO);
+        let heaviness = |branch: &Branch| branch.weight.max_element();
+        for _ in 0..=MAX_BOUNDARIES {
+            if pending.iter().map(heaviness).sum::<f64>() <= LEFT_OUT {
+                break;
+            }
+            // The first of equals.
+            let heavier = |best: usize, k: usize| {
+                if heaviness(&pending[k]) > heaviness(&pending[best]) { k } else { best }
+            };
+            let heaviest = (0..pending.len()).fold(0, heavier);
+            let branch = pending.swap_remove(heaviest);
+            let hit = self.next_hit(lit, &branch);
+            let sight = match &hit {
+                Some(hit) if branch.history != 0 => {
+                    let way = (branch.length + hit.distance) * branch.direction;
+                    let at = branch.from + hit.distance * branch.direction;
+                    Sight { eye: at - way, forward: axial * branch.direction }
+                }
+                _ => lit.direct_sight(),
+            };
+            let (weight, history) = (branch.weight, branch.history);
+            let Some(hit) = hit else {
+                seen_weight += weight;
+                all.push(Sighting { seen: Seen::Sky(branch.direction), weight, sight, history });
+                continue;
+            };
+            let material = lit.scene().material(lit.triangle(&hit));
+            let Some(specular) = material.specular else {
+                // A back is black, and seen.
+                seen_weight += weight;
+                if hit.front {
+                    all.push(Sighting { seen: Seen::Front(hit), weight, sight, history });
+                }
+                continue;
+            };
+            let boundary = self.boundary(lit, &branch, &hit);
+            let diffuse = self.branch_out(&branch, &boundary, &hit, specular, &mut pending);
+            let shines = material.reflects() || material.exitance != Rgb::ZERO;
+            if hit.front && shines && diffuse != Rgb::ZERO {
+                let weight = weight * diffuse;
+                seen_weight += weight;
+                all.push(Sighting { seen: Seen::Front(hit), weight, sight, history });
+            }
+        }
+        let left_out: Rgb = pending.iter().map(|branch| branch.weight).sum();
+        // Where nothing is seen, nothing is known of the rest.
+        let rise = left_out / seen_weight.max(Rgb::splat(f64::MIN_POSITIVE));
+        let rise = Rgb::select(seen_weight.cmpgt(Rgb::ZERO), rise, Rgb::ZERO);
+        for sighting in all {
+            found(Sighting { weight: sighting.weight * (Rgb::ONE + rise), ..sighting });
+        }
+    }
+
+    /// What `branch` meets next. Mirrors and glass in one place with where it starts are passed,
+    /// fronts of others there are met; so is a front in one place with glass: it lies against it.
+    fn next_hit(&self, lit: &LitSurface, branch: &Branch) -> Option<Hit> {
+        let Branch { from, direction, history, .. } = *branch;
+        let specular = |hit: &Hit| lit.scene().material(lit.triangle(hit)).specular;
+        let rays = &lit.rays.scene;
+        let hit = if history == 0 {
+            rays.closest_hit(from, direction, 0.0, None)?
+        } else {
+            let counts =
+                |hit: &Hit| hit.distance > self.contact || hit.front && specular(hit).is_none();
+            rays.closest_hit_of(from, direction, -self.contact, None, counts)?
+        };
+        if !specular(&hit).is_some_and(|specular| specular.is_glass()) {
+            return Some(hit);
+        }
+        let start = hit.distance - self.contact;
+        let against = rays.closest_hit_of(from, direction, start, None, |other| {
+            other.front && other.distance < hit.distance + self.contact && specular(other).is_none()
+        });
+        Some(against.unwrap_or(hit))
+    }
+
+    fn boundary(&self, lit: &LitSurface, branch: &Branch, hit: &Hit) -> Boundary {
+        let triangle = lit.triangle(hit);
+        let side = if hit.front { 1.0 } else { -1.0 };
+        let plane = side * lit.scene().normal(triangle);
+        let smooth = lit.rays.interpolate(hit, &lit.light.surface.normals);
+        let smooth = side * smooth.normalize_or_zero();
+        // At the rim of a smooth body its normal may look away.
+        let normal = if smooth.dot(branch.direction) < 0.0 { smooth } else { plane };
+        Boundary {
+            triangle,
+            position: branch.from + hit.distance * branch.direction,
+            plane,
+            normal,
+            front: hit.front,
+            cosine: (-normal.dot(branch.direction)).clamp(0.0, 1.0),
+        }
+    }
+
+    /// Adds the branches that go on from a boundary, and tells what the diffuse part counts there.
+    fn branch_out(
+        &self,
+        branch: &Branch,
+        boundary: &Boundary,
+        hit: &Hit,
+        specular: Specular,
+        pending: &mut Vec<Branch>,
+    ) -> Rgb {
+        let mut add = |direction: DVec3, share: Rgb, media: Vec<Medium>, kind: u64| {
+            if share != Rgb::ZERO && branch.weight * share != Rgb::ZERO {
+                let surface = u64::from(self.surfaces[boundary.triangle]);
+                pending.push(Branch {
+                    from: boundary.position,
+                    direction,
+                    length: branch.length + hit.distance,
+                    weight: branch.weight * share,
+                    media,
+                    history: split_mix64(branch.history ^ (2 * surface + kind)).max(1),
+                });
+            }
+        };
+        let mut reflect = |share| add(boundary.mirrored(branch), share, branch.media.clone(), 0);
+        match specular {
+            Specular::Mirror { reflectance } => {
+                if boundary.front {
+                    reflect(reflectance);
+                }
+                Rgb::ONE
+            }
+            Specular::Polished { reflectance } => {
+                let rise = schlick(boundary.cosine);
+                if boundary.front {
+                    reflect(reflectance + (Rgb::ONE - reflectance) * rise);
+                }
+                Rgb::splat(1.0 - rise)
+            }
+            Specular::Glass { refractive_index, transmittance } => {
+                let index_of = |media: &[Medium]| media.last().map_or(1.0, |m| m.refractive_index);
+                let (ratio, share, media) = match self.glass.faces[boundary.triangle] {
+                    Some(GlassFace::Boundary { body, front_is_outside }) => {
+                        let mut media = branch.media.clone();
+                        if boundary.front == front_is_outside {
+                            media.push(Medium { body, refractive_index });
+                            (refractive_index / index_of(&branch.media), transmittance, media)
+                        } else {
+                            let innermost = media.iter().rposition(|m| m.body == body);
+                            innermost.map(|k| media.remove(k));
+                            (index_of(&media) / refractive_index, Rgb::ONE, media)
+                        }
+                    }
+                    _ => {
+                        let ratio = refractive_index / index_of(&branch.media);
+                        let face = fresnel(boundary.cosine, ratio);
+                        let [reflected, through] = pane(face, transmittance);
+                        reflect(reflected);
+                        add(branch.direction, through, branch.media.clone(), 1);
+                        return Rgb::splat(1.0 - face);
+                    }
+                };
+                let reflected = fresnel(boundary.cosine, ratio);
+                reflect(Rgb::splat(reflected));
+                let through = boundary.refracted(branch, ratio);
+                add(through, (1.0 - reflected) * share, media, 1);
+                Rgb::splat(1.0 - reflected)
+            }
+        }
+    }
+}
+
+impl Boundary {
+    /// The direction of `branch` reflected, to the side that it comes from.
+    fn mirrored(&self, branch: &Branch) -> DVec3 {
+        let smooth = branch.direction.reflect(self.normal);
+        if smooth.dot(self.plane) > 0.0 { smooth } else { branch.direction.reflect(self.plane) }
+    }
+
+    /// The direction of `branch` refracted, to the other side.
+    fn refracted(&self, branch: &Branch, ratio: f64) -> DVec3 {
+        let by = |normal| refracted(branch.direction, normal, ratio);
+        let behind = |direction: &DVec3| direction.dot(self.plane) < 0.0;
+        let direction = by(self.normal).filter(behind).or_else(|| by(self.plane));
+        direction.unwrap_or(branch.direction)
+    }
+}
