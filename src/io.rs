@@ -23,6 +23,7 @@ mod ply_reader;
 mod png;
 #[cfg(all(feature = "exr", feature = "textures"))]
 mod radiance;
+mod specular;
 mod text;
 mod textures;
 mod tone;
@@ -45,6 +46,7 @@ pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;
 #[cfg(all(feature = "exr", feature = "textures"))]
 pub use radiance::read_radiance;
+pub use specular::SpecularSurfaces;
 pub use tone::ToneCurve;
 
 /// Creates `path` and hands it to `write`; any failure names the file.

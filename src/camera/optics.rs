@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn reflectance_at_known_angles() {
-        for n in [1.1, 1.33, 1.5, 2.42, 1.0 / 1.5, 1.0] {
+        for n in [1.1_f64, 1.33, 1.5, 2.42, 1.0 / 1.5, 1.0] {
             let normal = ((n - 1.0) / (n + 1.0)).powi(2);
             assert!((fresnel(1.0, n) - normal).abs() < 1e-16, "{n}");
             assert!((fresnel(0.0, n) - f64::from(n != 1.0)).abs() < 1e-15, "{n}");

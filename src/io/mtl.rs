@@ -6,7 +6,8 @@
 //! | `Kd` | diffuse reflectance ρ per channel, linear |
 //! | `Ke` | emitted radiance L per channel: exitance π L |
 //! | `Ka` | radiance, if above 1 and no material has a `Ke`: see [`super::lights`] |
-//! | `d`, `Tr`, `map_d` | transparency: not modelled, warned about |
+//! | `illum`, `Ks`, `Ni`, `Tf`, `d`, `Tr` | mirrors and glass: see [`super::specular`] |
+//! | `d`, `Tr`, `map_d` of others | transparency: not modelled, warned about |
 //! | `map_Kd`, `map_Ke` | textures, multiplied by `Kd` and `Ke`: see [`super::textures`] |
 //!
 //! All others do not change diffuse light, and are skipped. tobj reads the materials, one at a time
@@ -18,9 +19,10 @@ use std::io::{self, Write as _};
 
 use super::files::{self, FileSource, MAX_BYTES};
 use super::obj::repairs::Repairs;
+use super::specular::{SpecularStatements, SpecularSurfaces};
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Rgb, Warning, WarningKind};
+use crate::scene::{Rgb, Specular, Warning, WarningKind};
 
 /// Words of a `mtllib` line that are tried as one name with spaces. Chosen by hand.
 const MAX_WORDS: usize = 8;
@@ -47,6 +49,8 @@ pub(super) struct MtlMaterial {
     pub ambient: Option<Rgb>,
     /// `map_Kd` and `map_Ke`, with their options.
     pub textures: [Option<Box<str>>; 2],
+    /// `illum` and what belongs to it.
+    pub specular: Option<Specular>,
     transparent: bool,
     /// Its `newmtl` line, and the file by index.
     line: u32,
@@ -181,16 +185,20 @@ impl Library {
         }
     }
 
-    /// Warns of what `used` materials have that is not modelled.
-    pub fn warn(&mut self, used: &HashSet<u32>, repairs: &mut Repairs) {
-        let names = |odd: fn(&MtlMaterial) -> bool| {
+    /// Warns of what `used` materials have that is not modelled, or not everywhere.
+    pub fn warn(&self, used: &HashSet<u32>, surfaces: SpecularSurfaces, repairs: &mut Repairs) {
+        let names = |odd: &dyn Fn(&MtlMaterial) -> bool| {
             let all = self.materials.iter().enumerate();
             let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
             odd.map(|(_, m)| m.name.as_str()).collect::<Vec<_>>()
         };
         let redefined: Vec<&str> = self.redefined.iter().map(String::as_str).collect();
+        let is_specular = |m: &MtlMaterial| m.specular.is_some();
+        let shown = surfaces != SpecularSurfaces::Ignore;
+        let is_opaque = |m: &MtlMaterial| m.transparent && !(shown && is_specular(m));
         let lists = [
-            (WarningKind::Transparency, names(|m| m.transparent), "not modelled: they are opaque"),
+            (WarningKind::Transparency, names(&is_opaque), "not modelled: they are opaque"),
+            (WarningKind::Specular, names(&is_specular), surfaces.treatment()),
             (
                 WarningKind::RedefinedMaterial,
                 redefined,
@@ -243,17 +251,27 @@ fn escaped_words(text: &str) -> Vec<String> {
 impl MtlMaterial {
     fn new(mut material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
         let emitted = material.unknown_param.remove("map_Ke");
-        let has = |key: &str| material.unknown_param.contains_key(key);
+        let text = |key: &str| material.unknown_param.get(key).map(String::as_str);
         let rgb = |colour: Option<[f64; 3]>| colour.map(Rgb::from_array);
+        // Files disagree about which end of `Tr` is opaque.
+        let between = text("transparent").and_then(|t| t.parse().ok());
+        let statements = SpecularStatements {
+            model: material.illumination_model.unwrap_or(0),
+            specular: rgb(material.specular),
+            filter: text("Tf").and_then(colour),
+            refractive_index: material.optical_density,
+            dissolve: material.dissolve,
+            transparency: between,
+        };
         MtlMaterial {
+            specular: statements.surface(),
             reflectance: rgb(material.diffuse),
             radiance: rgb(material.emissive),
             ambient: rgb(material.ambient),
             textures: [material.diffuse_texture, emitted]
                 .map(|name| name.map(String::into_boxed_str)),
-            // Files disagree about which end of `Tr` is opaque.
             transparent: material.dissolve.is_some_and(|d| d < 1.0)
-                || has("transparent")
+                || between.is_some()
                 || material.dissolve_texture.is_some(),
             name: material.name,
             line,
@@ -271,7 +289,8 @@ struct Block {
 }
 
 /// Statements that are handed on, as they are written here. Files differ in capitals.
-const STATEMENTS: [&str; 9] = ["newmtl", "Kd", "Ke", "Ka", "d", "Tr", "map_Kd", "map_Ke", "map_d"];
+const STATEMENTS: [&str; 13] =
+    ["newmtl", "Kd", "Ke", "Ka", "Ks", "Tf", "Ni", "d", "Tr", "illum", "map_Kd", "map_Ke", "map_d"];
 
 impl Block {
     fn line(&mut self, line: &Line, repairs: &mut Repairs) -> Result<(), Error> {
@@ -287,14 +306,20 @@ impl Block {
             }
             "newmtl" => None,
             _ if self.line == 0 => None,
-            "Kd" | "Ke" | "Ka" => colour(rest).map(|c| format!("{:e} {:e} {:e}", c.x, c.y, c.z)),
-            "d" | "Tr" => words(rest).last().and_then(finite).map(|x| format!("{x:e}")),
+            "Kd" | "Ke" | "Ka" | "Ks" | "Tf" => {
+                colour(rest).map(|c| format!("{:e} {:e} {:e}", c.x, c.y, c.z))
+            }
+            "d" | "Tr" | "Ni" => words(rest).last().and_then(finite).map(|x| format!("{x:e}")),
+            "illum" => {
+                let model = words(rest).next().and_then(finite);
+                model.filter(|x| (0.0..256.0).contains(x)).map(|x| format!("{}", x as u8))
+            }
             _ => Some(rest.to_string()).filter(|name| !name.is_empty()),
         };
         match handed_on {
             Some(transparency) if *known == "Tr" => {
                 if transparency.parse().is_ok_and(|t: f64| 0.0 < t && t < 1.0) {
-                    self.statements.extend_from_slice(b"transparent\n");
+                    drop(writeln!(self.statements, "transparent {transparency}"));
                 }
             }
             // A vector takes whatever is written.

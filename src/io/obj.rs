@@ -43,7 +43,9 @@ use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 /// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
 /// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
-/// [`crate::Material::DEFAULT_REFLECTANCE`].
+/// [`crate::Material::DEFAULT_REFLECTANCE`]. `illum` 3 to 7 and 9 make mirrors and glass
+/// ([`crate::Specular`]), which pictures show; light is spread as if they were their diffuse part
+/// alone ([`ObjSettings::specular`]).
 ///
 /// What is merely odd is repaired, and said in [`Scene::warnings`]: libraries under other names or
 /// missing, materials that no library defines (grey), reflectances of 1 or more
@@ -169,7 +171,7 @@ impl<'a> ObjFile<'a> {
         let models = std::mem::take(&mut self.models);
         let mut geometry = self.geometry(models, &named)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
-        self.library.warn(&used, &mut self.repairs);
+        self.library.warn(&used, settings.specular, &mut self.repairs);
         let mut materials = self.materials(&used, settings)?;
         let textures = self.textures(&used, &mut materials, settings)?;
         if textures.is_empty() {

@@ -54,6 +54,8 @@ pub enum WarningKind {
     TextureOptions,
     /// Transparency, which is not modelled.
     Transparency,
+    /// A mirror or glass, which pictures show and light does not meet as such.
+    Specular,
     /// `Ka` above 1, taken for radiance.
     AmbientAsRadiance,
     /// No face emits light.
@@ -171,6 +173,7 @@ impl WarningKind {
                 "textures with options that are not used",
             ),
             Transparency => ("material with transparency", "materials with transparency"),
+            Specular => ("material of mirror or glass", "materials of mirror or glass"),
             AmbientAsRadiance => ("material with `Ka` above 1", "materials with `Ka` above 1"),
             NoLight => ("no light in the scene", "scenes without light"),
             Polygon => ("polygon that crosses itself", "polygons that cross themselves"),

@@ -120,6 +120,11 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     let lit = LitSides::new(scene, &light, &all);
     let is_room = closed_rooms(scene);
     let treatment = |t: usize| {
+        let is_glass = scene.material(t).specular.is_some_and(|specular| specular.is_glass());
+        if is_glass && !scene.material(t).reflects() {
+            // Both of its sides count anyway, and it encloses a body as it is.
+            return Treatment::default();
+        }
         let [is_front_lit, is_back_lit] = [2 * t, 2 * t + 1].map(|side| lit.is_lit[side]);
         let turned = match (walks.sides_of(t), walks.shines_from_back(t)) {
             (Sides::Auto, Some(shines_from_back)) => shines_from_back,
@@ -134,10 +139,11 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
             Sides::Auto => is_other_lit && lit.is_bright(other) && !is_room[t],
         };
         let is_dark = walks.sides_of(t) == Sides::Auto && !is_front_lit && !is_back_lit;
+        let reflects = scene.material(t).reflects() || scene.material(t).specular.is_some();
         Treatment {
-            dropped: is_dark && walks.has_light() && is_in_the_way(scene, &walks, t),
+            dropped: is_dark && !is_glass && walks.has_light() && is_in_the_way(scene, &walks, t),
             turned,
-            doubled: doubled && scene.material(t).reflects(),
+            doubled: doubled && reflects,
         }
     };
     (0..count).map(treatment).collect()

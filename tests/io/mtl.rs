@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use radiosity::ErrorKind;
+use radiosity::io::SpecularSurfaces;
 use radiosity::scene::WarningKind;
+use radiosity::{ErrorKind, ObjSettings, Rgb, Specular};
 
 use super::obj_texts::{
     CHALK, SQUARE, load, load_strictly, obj, oddities, refused, repaired, warned, with_library,
@@ -85,7 +86,10 @@ fn unusable_statements_are_passed_over() {
     let text = room();
     let bad = ["Kd nan 0 0", "Kd 0 inf 0", "Kd 0.5 0.5", "Kd", "Kd red", "Kd 0.1 0.1 0.1 0.1"];
     let bad = bad.into_iter().chain(["Kd spectral a.rfl 1", "Kd xyz 0.1 0.1 0.1", "Ke 0 1e999 0"]);
-    for line in bad.chain(["Ka x", "d nan", "d", "Tr 1e400", "map_Kd", "newmtl"]) {
+    for line in bad.chain([
+        "Ka x", "Ks 0 0", "Tf", "Ni inf", "illum", "illum -1", "illum x", "d nan", "d", "Tr 1e400",
+        "map_Kd", "newmtl",
+    ]) {
         let library = format!("newmtl chalk\nKd 0.3\n{line}\n");
         let files = chalk_files(&text, &library);
         let part = "1 unusable statement of a material, at ";
@@ -119,6 +123,70 @@ fn warns_of_unmodelled_material_properties() {
     // Nobody uses it, so nobody needs to know.
     let scene = with_library(&format!("{CHALK}newmtl glass\nd 0\n")).unwrap();
     assert_eq!(oddities(&scene), [], "{:?}", scene.warnings());
+}
+
+#[test]
+fn mirrors_and_glass_are_read_and_said() {
+    let shown = "1 material of mirror or glass: pictures show it";
+    for (text, specular, reflectance) in [
+        (
+            "Kd 0.1 0.4 0.9\nKs 0.5 0.7 1.5\nNs 10\nillum 3",
+            Specular::Mirror { reflectance: Rgb::new(0.5, 0.7, 1.0) },
+            // The rest of one is room for the diffuse part.
+            [0.1, 1.0 - 0.7, 0.0],
+        ),
+        ("ILLUM 5\nks 0.25", Specular::Polished { reflectance: Rgb::splat(0.25) }, [0.0; 3]),
+        (
+            "Kd 0.3\nillum 7\nNi 1.4\nTf 0.5 0.9 1",
+            Specular::Glass { refractive_index: 1.4, transmittance: Rgb::new(0.5, 0.9, 1.0) },
+            [0.3, 1.0 - 0.9, 0.0],
+        ),
+        (
+            "Kd 0.3\nillum 4\nd -halo 0.75",
+            Specular::Glass { refractive_index: 1.5, transmittance: Rgb::splat(0.25) },
+            [0.3; 3],
+        ),
+        (
+            "Kd 0.3\nillum 9\nTr 0.25",
+            Specular::Glass { refractive_index: 1.5, transmittance: Rgb::splat(0.25) },
+            [0.3; 3],
+        ),
+    ] {
+        let scene = with_library(&format!("newmtl chalk\n{text}\n")).unwrap();
+        assert_eq!(scene.material(0).specular, Some(specular), "{text}");
+        assert_eq!(scene.material(0).reflectance.to_array(), reflectance, "{text}");
+        // Nothing else is said of it, and nobody refuses it.
+        assert_eq!(oddities(&scene).len(), 1, "{:?}", scene.warnings());
+        warned(&scene, shown);
+        let text = format!("newmtl chalk\n{text}\n");
+        assert!(load_strictly(&chalk_files(&room(), &text)).is_ok());
+    }
+    // Written by default: as if it were not there.
+    let plain = format!("{CHALK}illum 4\nTf 1.00 1.00 1.00\nNi 1.00\nKs 0.5 0.5 0.5\n");
+    let scene = with_library(&plain).unwrap();
+    assert_eq!((scene.material(0).specular, oddities(&scene)), (None, vec![]));
+    assert_eq!(scene.material(0).reflectance.to_array(), [0.8, 0.7, 0.6]);
+}
+
+#[test]
+fn mirrors_and_glass_may_be_black_or_ignored() {
+    let (text, library) = (room(), "newmtl chalk\nKd 0.3\nKe 1\nillum 9\nd 0.5\n");
+    let files = chalk_files(&text, library);
+    let with = |specular| {
+        let mut settings = ObjSettings::default();
+        settings.specular = specular;
+        settings.read("room.obj", files[0].1, &files[1..]).unwrap()
+    };
+    let black = with(SpecularSurfaces::Black);
+    assert!(black.material(0).specular.is_some());
+    assert_eq!(black.material(0).reflectance, Rgb::ZERO);
+    assert_eq!(black.material(0).exitance, Rgb::splat(PI));
+    warned(&black, "it is black");
+    let ignored = with(SpecularSurfaces::Ignore);
+    assert_eq!(ignored.material(0).specular, None);
+    assert_eq!(ignored.material(0).reflectance, Rgb::splat(0.3));
+    warned(&ignored, "ignored: it is diffuse");
+    warned(&ignored, "transparency");
 }
 
 #[test]

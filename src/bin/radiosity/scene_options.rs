@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use lexopt::prelude::*;
+use radiosity::io::SpecularSurfaces;
 use radiosity::{Error, ObjSettings, Rgb, Scene, Sides};
 
 use crate::args::{Stop, rgb, value, wrong_value};
@@ -25,6 +26,7 @@ impl SceneOptions {
             }
             "emit" => self.obj.emit.push(emission(parser)?),
             "sides" => self.obj.sides = sides(parser)?,
+            "specular" => self.obj.specular = specular(parser)?,
             _ => return self.sky.option(name, parser),
         }
         Ok(true)
@@ -57,5 +59,16 @@ fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
         "front" => Ok(Sides::Front),
         "both" => Ok(Sides::Both),
         _ => Err(wrong_value("sides", &text, "auto, front or both")),
+    }
+}
+
+/// What mirrors and glass count as where light is spread, by its name.
+fn specular(parser: &mut lexopt::Parser) -> Result<SpecularSurfaces, Stop> {
+    let text = parser.value()?.string()?;
+    match text.as_str() {
+        "diffuse" => Ok(SpecularSurfaces::Diffuse),
+        "black" => Ok(SpecularSurfaces::Black),
+        "ignore" => Ok(SpecularSurfaces::Ignore),
+        _ => Err(wrong_value("specular", &text, "diffuse, black or ignore")),
     }
 }

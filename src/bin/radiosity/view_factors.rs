@@ -111,7 +111,7 @@ impl Options {
                 Long(name) => {
                     let name = name.to_string();
                     // Factors are of fronts, and --two-sided names the groups with two.
-                    if name == "sides" || !reading.option(&name, parser)? {
+                    if matches!(&*name, "sides" | "specular") || !reading.option(&name, parser)? {
                         return Err(Long(&name).unexpected().into());
                     }
                 }

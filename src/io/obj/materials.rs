@@ -5,12 +5,13 @@ use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::PI;
 
 use super::super::mtl::MtlMaterial;
+use super::super::specular::SpecularSurfaces;
 use super::super::textures::{TextureStatement, Textures, Unread};
 use super::statements::UNKNOWN_MATERIAL;
 use super::{ObjFile, ObjSettings};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::texture::{MaterialTextures, TextureMap};
-use crate::scene::{Material, Rgb, WarningKind};
+use crate::scene::{Material, Rgb, Specular, WarningKind};
 
 impl ObjFile<'_> {
     /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
@@ -29,6 +30,9 @@ impl ObjFile<'_> {
             let emitted = settings.emit.iter().any(|(name, _)| *name == material.name);
             for (k, statement) in mtl.textures.iter().enumerate() {
                 let Some(statement) = statement else { continue };
+                if k == 0 && mtl.is_black(settings) {
+                    continue;
+                }
                 let statement = TextureStatement::parse(statement);
                 let name = statement.name.as_str();
                 if statement.more {
@@ -45,15 +49,16 @@ impl ObjFile<'_> {
                     }
                 };
                 let written = if k == 0 { mtl.reflectance } else { mtl.radiance };
+                let most = settings.max_reflectance.min(mtl.diffuse_room(settings));
                 let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
-                    None if k == 0 => Rgb::splat(settings.max_reflectance),
+                    None if k == 0 => Rgb::splat(most),
                     None => Rgb::ONE,
                     Some(_) if k == 0 => material.reflectance,
                     Some(radiance) => radiance,
                 };
                 let TextureStatement { scale, offset, clamped, .. } = statement;
                 let (factor, ceiling) = match k {
-                    0 => (factor, settings.max_reflectance),
+                    0 => (factor, most),
                     _ => (PI * factor.max(Rgb::ZERO), f64::MAX),
                 };
                 let mean = factor * texture.whole_mean();
@@ -118,6 +123,21 @@ impl ObjFile<'_> {
 }
 
 impl MtlMaterial {
+    /// The mirror or glass that it is, if that counts.
+    fn specular(&self, settings: &ObjSettings) -> Option<Specular> {
+        self.specular.filter(|_| settings.specular != SpecularSurfaces::Ignore)
+    }
+
+    /// Whether light is spread as if it reflected nothing.
+    fn is_black(&self, settings: &ObjSettings) -> bool {
+        self.specular.is_some() && settings.specular == SpecularSurfaces::Black
+    }
+
+    /// What a mirror or glass leaves of one for diffuse reflectance, in every channel.
+    fn diffuse_room(&self, settings: &ObjSettings) -> f64 {
+        self.specular(settings).map_or(1.0, |specular| 1.0 - specular.share().max_element())
+    }
+
     /// As a material of a scene, as yet without its name; `note` is told of every repair.
     fn complete(
         &self,
@@ -134,9 +154,12 @@ impl MtlMaterial {
             note(WarningKind::AmbientAsRadiance, "taken for the radiance that they emit".into())?;
         }
         let mut reflectance = self.reflectance.unwrap_or(Rgb::ZERO);
-        if self.reflectance.is_none() && radiance == Rgb::ZERO {
+        let specular = self.specular(settings);
+        let textured = self.textures.iter().any(Option::is_some);
+        let is_plain = specular.is_none() || textured;
+        if self.reflectance.is_none() && radiance == Rgb::ZERO && is_plain {
             reflectance = Rgb::splat(Material::DEFAULT_REFLECTANCE);
-            if self.textures.iter().all(Option::is_none) {
+            if !textured {
                 note(WarningKind::MaterialWithoutColour, UNKNOWN_MATERIAL.into())?;
             }
         }
@@ -154,6 +177,12 @@ impl MtlMaterial {
             note(WarningKind::MaterialStatement, "it emits nothing".into())?;
         }
         let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
-        Ok(Material { reflectance, exitance, ..Material::grey("", 0.0) })
+        if let Some(specular) = specular {
+            reflectance = reflectance.min(Rgb::ONE - specular.share());
+        }
+        if self.is_black(settings) {
+            reflectance = Rgb::ZERO;
+        }
+        Ok(Material { reflectance, exitance, specular, ..Material::grey("", 0.0) })
     }
 }

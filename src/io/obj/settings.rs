@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::super::files::{self, FileSource, MAX_BYTES};
+use super::super::specular::SpecularSurfaces;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Rgb, Scene, Sides, Sky};
 
@@ -33,6 +34,8 @@ pub struct ObjSettings {
     pub sky: Option<Sky>,
     /// What surfaces do on their two sides.
     pub sides: Sides,
+    /// What the light that is spread takes mirrors and glass for.
+    pub specular: SpecularSurfaces,
 }
 
 impl ObjSettings {
@@ -95,6 +98,7 @@ impl ObjSettings {
 impl Default for ObjSettings {
     fn default() -> ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
-        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None, sides: Sides::Auto }
+        let (sides, specular) = (Sides::Auto, SpecularSurfaces::Diffuse);
+        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None, sides, specular }
     }
 }

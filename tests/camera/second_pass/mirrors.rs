@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::{Camera, Material, Rgb, Specular};
+use radiosity::{Camera, Material, Rgb, Sky, Specular};
 
 use super::{LEFT_OUT, directions, draw, lit, lit_walls, mirror, scene};
 use crate::common::scenes::{Quad, block, grey};
@@ -92,7 +92,7 @@ fn diffuse_part_of_a_mirror_is_seen_with_its_reflection() {
     ] {
         let plate = Material { specular: Some(specular), ..Material::grey("plate", 0.5) };
         let mut light = lit(scene(&[(glass_of_mirror(), plate)]), |_, _| Rgb::ONE);
-        light.surface.sky = Rgb::splat(2.0);
+        light.surface.sky = Sky::uniform(Rgb::splat(2.0));
         let image = draw(&CAMERA, &light, 1);
         for (pixel, direction) in image.pixels.iter().zip(directions(&CAMERA)) {
             let rise = if cosine_matters { (1.0 + direction.x).powi(5) } else { 0.0 };

@@ -1,0 +1,192 @@
+//! Which materials of MTL files are mirrors and glass.
+//!
+//! `illum` names a model (Wavefront, "Advanced Visualizer" 3.0, appendix B1, "Illumination models").
+//! Many programs write it without meaning it, and values that belong to it by default:
+//!
+//! | `illum` | counts as | if |
+//! |---|---|---|
+//! | 3 | mirror of reflectance `Ks` | `Ks` is above 0 |
+//! | 5 | polished: `Ks` at normal incidence, more from the side | `Ks` is above 0 |
+//! | 4, 9 | glass that lets 1 − `d` through; without a `d` below 1, 1 − `Tf` | that is above 0 |
+//! | 6, 7 | glass that lets (1 − `d`) `Tf` through; without a `d` below 1, `Tf` | see below |
+//! | others, none | what it is without: diffuse | |
+//!
+//! - Where there is no `d` below 1, a `Tr` between 0 and 1 counts as 1 − `d`. Files disagree about
+//!   which end of `Tr` is opaque, so that 0 and 1 say nothing.
+//! - 4 without `d` is what Maya writes for all that it has, with a `Tf` of 1 for what is opaque and
+//!   of 0 for what is clear.
+//! - In 6 and 7 a `Tf` of 0 or of 1 in all channels says nothing, and counts as 1. Where `d` says
+//!   nothing either, the material is glass only if there is no `d` and `Ni` is above 1.
+//! - `Ni` is the refractive index if it is above 1 and at most 5; else that of window glass, 1.5.
+//! - Channels of `Ks` and `Tf` count as 0 below 0 and as 1 above 1. `Ns` does not count: what
+//!   is a mirror is a perfect one.
+//!
+//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each channel
+//! both together reflect no more than they get. Without a `Kd` there is none.
+
+use crate::scene::{Rgb, Specular};
+
+/// What the light that is spread takes mirrors and glass for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SpecularSurfaces {
+    /// For their diffuse part. Pictures show it with mirrors and glass.
+    #[default]
+    Diffuse,
+    /// For black. Pictures show mirrors and glass without a diffuse part.
+    Black,
+    /// `illum` does not count: all is diffuse, also in pictures.
+    Ignore,
+}
+
+impl SpecularSurfaces {
+    /// What is done about mirrors and glass, for a warning.
+    pub fn treatment(self) -> &'static str {
+        match self {
+            SpecularSurfaces::Diffuse => {
+                "pictures show it; for the light that is spread only its diffuse part counts"
+            }
+            SpecularSurfaces::Black => "pictures show it; for the light that is spread it is black",
+            SpecularSurfaces::Ignore => "ignored: it is diffuse",
+        }
+    }
+}
+
+/// What a material says of these, as it is written; nothing where it cannot be read.
+pub(super) struct SpecularStatements {
+    /// `illum`.
+    pub model: u8,
+    /// `Ks`.
+    pub specular: Option<Rgb>,
+    /// `Tf`.
+    pub filter: Option<Rgb>,
+    /// `Ni`.
+    pub refractive_index: Option<f64>,
+    /// `d`.
+    pub dissolve: Option<f64>,
+    /// `Tr`, if it is between 0 and 1.
+    pub transparency: Option<f64>,
+}
+
+/// Refractive index of window glass.
+const WINDOW_GLASS: f64 = 1.5;
+
+impl SpecularStatements {
+    /// The mirror or glass that they describe.
+    pub fn surface(&self) -> Option<Specular> {
+        let share = |colour: Rgb| colour.clamp(Rgb::ZERO, Rgb::ONE);
+        let reflectance = share(self.specular.unwrap_or(Rgb::ZERO));
+        let transmittance = match self.model {
+            3 if reflectance != Rgb::ZERO => return Some(Specular::Mirror { reflectance }),
+            5 if reflectance != Rgb::ZERO => return Some(Specular::Polished { reflectance }),
+            4 | 9 => self.clearness().or(self.filter.map(|filter| Rgb::ONE - share(filter)))?,
+            6 | 7 => {
+                let filter = self.filter.map(share);
+                let filter = filter.filter(|&tf| tf != Rgb::ZERO && tf != Rgb::ONE);
+                let refracts = self.refractive_index.is_some_and(|n| n > 1.0);
+                let by_index = refracts && self.dissolve.is_none();
+                match (self.clearness(), filter) {
+                    (Some(clear), filter) => clear * filter.unwrap_or(Rgb::ONE),
+                    (None, Some(filter)) => filter,
+                    (None, None) if by_index => Rgb::ONE,
+                    (None, None) => return None,
+                }
+            }
+            _ => return None,
+        };
+        let known = |&n: &f64| n > 1.0 && n <= Specular::MAX_REFRACTIVE_INDEX;
+        let index = self.refractive_index.filter(known);
+        let refractive_index = index.unwrap_or(WINDOW_GLASS);
+        (transmittance != Rgb::ZERO).then_some(Specular::Glass { refractive_index, transmittance })
+    }
+
+    /// How much `d` or `Tr` lets through, if either says that anything passes.
+    fn clearness(&self) -> Option<Rgb> {
+        let by_dissolve = self.dissolve.filter(|&d| d < 1.0).map(|d| 1.0 - d.max(0.0));
+        by_dissolve.or(self.transparency).map(Rgb::splat)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Option<Specular> {
+        let mut statements = SpecularStatements {
+            model: 0,
+            specular: None,
+            filter: None,
+            refractive_index: None,
+            dissolve: None,
+            transparency: None,
+        };
+        for statement in text.split(", ") {
+            let words: Vec<&str> = statement.split(' ').collect();
+            let number = |k: usize| words[k].parse::<f64>().unwrap();
+            let colour = || match words.len() {
+                2 => Rgb::splat(number(1)),
+                _ => Rgb::new(number(1), number(2), number(3)),
+            };
+            match words[0] {
+                "illum" => statements.model = words[1].parse().unwrap(),
+                "Ks" => statements.specular = Some(colour()),
+                "Tf" => statements.filter = Some(colour()),
+                "Ni" => statements.refractive_index = Some(number(1)),
+                "d" => statements.dissolve = Some(number(1)),
+                "Tr" => statements.transparency = Some(number(1)),
+                other => panic!("{other}"),
+            }
+        }
+        statements.surface()
+    }
+
+    #[test]
+    fn models_make_mirrors_and_glass() {
+        let mirror = |r| Some(Specular::Mirror { reflectance: r });
+        let polished = |r| Some(Specular::Polished { reflectance: r });
+        let tinted =
+            |n, transmittance| Some(Specular::Glass { refractive_index: n, transmittance });
+        let glass = |n, t| tinted(n, Rgb::splat(t));
+        for (text, want) in [
+            // Those of the format's own description.
+            ("illum 3, Ks 0 1 0", mirror(Rgb::Y)),
+            ("illum 4, Ks 0.9, d 0.1", glass(1.5, 0.9)),
+            ("illum 5, Ks 0.618 0.876 0.143", polished(Rgb::new(0.618, 0.876, 0.143))),
+            ("illum 6, Tf 1, Ni 1.2", glass(1.2, 1.0)),
+            ("illum 7, Ks 0.6 0.9 0.1, Tf 1, Ni 1.2", glass(1.2, 1.0)),
+            // A ball in a Cornell box, and others.
+            ("illum 7, Ks 0.3, Tf 0.1, Ni 2.5", glass(2.5, 0.1)),
+            ("illum 7, Ks 0.3, Ni 1.33", glass(1.33, 1.0)),
+            ("illum 9, Ks 1, Ni 1.45, d 0.5", glass(1.45, 0.5)),
+            ("illum 9, Ks 1, d 0.1", glass(1.5, 0.9)),
+            ("illum 6, d 0.5, Tf 1 0.5 0.5", tinted(1.5, Rgb::new(0.5, 0.25, 0.25))),
+            ("illum 4, d 0", glass(1.5, 1.0)),
+            ("illum 4, Tr 0.75", glass(1.5, 0.75)),
+            // What Maya writes: opaque, clear, half.
+            ("illum 4, Tf 1, Ni 1, Ks 0.5", None),
+            ("illum 4, Tf 0, Ni 1.8, Ks 1", glass(1.8, 1.0)),
+            ("illum 4, Tf 0.5, Ni 1", glass(1.5, 0.5)),
+            // Written without being meant.
+            ("illum 4, Ks 0", None),
+            ("illum 4, d 1, Ni 1", None),
+            ("illum 4, Ni 42, Tf 1", None),
+            ("illum 7, Ks 1", None),
+            ("illum 7, Ks 1, Ni 1, d 1", None),
+            ("illum 7, Ni 1.5, d 1, Tf 1", None),
+            ("illum 6, Ni 1.5, d 1, Tf 0", None),
+            ("illum 9, Ni 1.5", None),
+            ("illum 3", None),
+            ("illum 5, Ks -1", None),
+            ("illum 2, Ks 1, Ni 1.5, d 0.5", None),
+            ("illum 8, Ks 1", None),
+            ("illum 10, Ks 1, d 0", None),
+            ("d 0.1, Ni 1.5", None),
+            // Out of range.
+            ("illum 3, Ks 2 0.5 -1", mirror(Rgb::new(1.0, 0.5, 0.0))),
+            ("illum 4, d -3, Ni 0", glass(1.5, 1.0)),
+            ("illum 7, Tf 2 0.5 -1, Ni 42", tinted(1.5, Rgb::new(1.0, 0.5, 0.0))),
+        ] {
+            assert_eq!(parse(text), want, "{text}");
+        }
+    }
+}
