@@ -23,6 +23,7 @@ pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
 mod surplus;
+pub(crate) mod two_sided;
 
 use glam::DVec3;
 
@@ -129,7 +130,7 @@ impl RadiosityField<'_> {
         let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
         for (e, corners) in self.corners.iter().enumerate() {
             let node = self.mesh.element(e);
-            if self.mesh.material(node).reflects() {
+            if self.mesh.material(node).scatters() {
                 let mean = corners.iter().map(|&v| self.reflected[v as usize]).sum::<Rgb>() / 3.0;
                 flux += mean.length() * self.mesh.area(node);
                 area += self.mesh.area(node);

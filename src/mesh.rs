@@ -24,6 +24,7 @@ mod quadtree;
 pub(crate) mod sizing;
 mod textured;
 mod topology;
+mod transmission;
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -40,6 +41,7 @@ pub(crate) use contact_cuts::cut_at_contacts;
 pub(crate) use quadtree::Cell;
 pub(crate) use sizing::ElementSizing;
 pub(crate) use topology::{Side, SurfaceTopology};
+pub(crate) use transmission::{Passage, Transmission};
 
 /// A node of a quadtree: an index that is valid for the [`Mesh`] it came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -238,6 +240,9 @@ impl Mesh {
             let ([a, b, c], material) = (self.scene.corners(t), self.scene.material(t));
             let triples = [a, b, c, material.reflectance, material.exitance];
             all.update(bytemuck::bytes_of(&triples.map(|v| v.to_array())));
+            if material.is_translucent() {
+                all.update(bytemuck::bytes_of(&material.transmittance.to_array()));
+            }
         }
         for &element in &self.elements {
             let Node { triangle, cell: Cell { level, i, j, flipped }, .. } = *self.node(element);
@@ -322,18 +327,18 @@ impl Mesh {
         self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
     }
 
-    /// Area of all elements that reflect, length unit squared.
-    pub(crate) fn reflecting_area(&self) -> f64 {
-        let elements = self.elements.iter().filter(|&&node| self.material(node).reflects());
+    /// Area of all elements that scatter light, length unit squared.
+    pub(crate) fn scattering_area(&self) -> f64 {
+        let elements = self.elements.iter().filter(|&&node| self.material(node).scatters());
         elements.map(|&node| self.area(node)).sum()
     }
 
-    /// Mean reflectance by area of the elements that reflect, per channel; 0 where none does. What
-    /// reflects nothing is left out, since a black sky around a scene makes the scene no darker.
-    pub(crate) fn mean_reflectance(&self) -> Rgb {
-        let reflecting = |(e, &node): (usize, &NodeId)| self.reflectance(e) * self.area(node);
-        let area = self.reflecting_area().max(f64::MIN_POSITIVE);
-        self.elements.iter().enumerate().map(reflecting).sum::<Rgb>() / area
+    /// Mean albedo by area of the elements that scatter light, per channel; 0 where none does. What
+    /// is black is left out, since a black sky around a scene makes the scene no darker.
+    pub(crate) fn mean_albedo(&self) -> Rgb {
+        let scattering = |(e, &node): (usize, &NodeId)| self.albedo(e) * self.area(node);
+        let area = self.scattering_area().max(f64::MIN_POSITIVE);
+        self.elements.iter().enumerate().map(scattering).sum::<Rgb>() / area
     }
 
     /// Unit normal of `node`, on its front.

@@ -27,6 +27,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+use covered_backs::CoveredBacks;
 pub(crate) use cut::Piece;
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
@@ -51,6 +52,10 @@ pub struct Material {
     /// Exitance E per channel, W/m²: π times the emitted radiance. Of a texture the mean over all
     /// triangles of the material; [`Scene::exitance_at`] has it in detail.
     pub exitance: Rgb,
+    /// Diffuse transmittance τ per channel: of the light that arrives on either side, the share
+    /// that leaves diffusely from the other. ρ + τ < 1. What is translucent reflects on both sides,
+    /// whatever `sides` says. With a texture, τ follows it as ρ does, and this is its mean.
+    pub transmittance: Rgb,
     /// Which sides do: fronts, unless set. Backs of others only block light.
     pub sides: Sides,
     /// What pictures show of it beside that: a mirror or glass. Light is spread as if it were not
@@ -92,7 +97,7 @@ pub struct Scene {
     /// Per triangle, the sides across which its surface does not continue; empty for none.
     cut_sides: Vec<[bool; 3]>,
     /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
-    covered_backs: OnceLock<Vec<bool>>,
+    covered_backs: OnceLock<CoveredBacks>,
 }
 
 impl Scene {
@@ -118,7 +123,8 @@ impl Scene {
     /// when its square underflows.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for a reflectance outside [0, 1), a negative exitance, a number that
+    /// [`ErrorKind::Scene`] for a reflectance, alone or with a transmittance, outside [0, 1), a
+    /// negative exitance, a number that
     /// is not finite, a mirror or glass that returns more light than it gets, an index out of
     /// range, or when no triangle with area is left.
     pub fn new(
@@ -278,8 +284,19 @@ impl Scene {
     /// Whether all of the back of triangle `t` lies where others have their fronts: nothing meets
     /// it, and what comes from that side meets those.
     pub(crate) fn is_back_covered(&self, t: usize) -> bool {
-        let covered = self.covered_backs.get_or_init(|| covered_backs::covered_backs(self));
-        covered.get(t).is_some_and(|&covered| covered)
+        self.covered_backs().is_covered(t)
+    }
+
+    /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back: what passes
+    /// through it leaves from them. None of others.
+    pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {
+        let is_translucent = |t: usize| self.material(t).is_translucent();
+        let covers = if is_translucent(t) { self.covered_backs().covers(t) } else { &[] };
+        covers.iter().map(|&s| s as usize).filter(move |&s| is_translucent(s))
+    }
+
+    fn covered_backs(&self) -> &CoveredBacks {
+        self.covered_backs.get_or_init(|| CoveredBacks::new(self))
     }
 
     /// The axis-aligned box around all triangles.
@@ -289,7 +306,7 @@ impl Scene {
 
     /// The axis-aligned box around all triangles that reflect; around all, if none does.
     pub(crate) fn reflecting_bounds(&self) -> Aabb {
-        let reflecting = (0..self.triangles.len()).filter(|&t| self.material(t).reflects());
+        let reflecting = (0..self.triangles.len()).filter(|&t| self.material(t).scatters());
         let mut corners = reflecting.flat_map(|t| self.corners(t)).peekable();
         if corners.peek().is_some() { Aabb::from_points(corners) } else { self.bounds() }
     }
@@ -369,15 +386,28 @@ impl Material {
     pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
         let (reflectance, exitance) = (Rgb::splat(reflectance), Rgb::ZERO);
         let (name, sides) = (name.into(), Sides::Front);
-        Material { name, reflectance, exitance, sides, specular: None }
+        let transmittance = Rgb::ZERO;
+        Material { name, reflectance, transmittance, exitance, sides, specular: None }
     }
 
-    /// Whether any light is reflected, in any channel.
-    pub(crate) fn reflects(&self) -> bool {
-        self.reflectance != Rgb::ZERO
+    /// Whether any light that arrives leaves again diffusely, on either side, in any channel.
+    pub(crate) fn scatters(&self) -> bool {
+        self.albedo() != Rgb::ZERO
     }
 
-    /// Reflectance in [0, 1), exitance finite and not negative, no more light than there is.
+    /// Whether any light that arrives leaves diffusely from the other side.
+    pub(crate) fn is_translucent(&self) -> bool {
+        self.transmittance != Rgb::ZERO
+    }
+
+    /// The share of the light that arrives which leaves again diffusely, on either side: ρ + τ per
+    /// channel.
+    pub(crate) fn albedo(&self) -> Rgb {
+        self.reflectance + self.transmittance
+    }
+
+    /// Reflectance and transmittance in [0, 1) together, exitance finite and not negative, no more
+    /// light than there is.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let place = || format!("material {}", quoted(&[&self.name]));
         for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
@@ -386,6 +416,17 @@ impl Material {
                     place(),
                     format!("reflectance {rho} in channel {channel}"),
                     "must be at least 0 and below 1: a surface cannot return all light or more",
+                ));
+            }
+        }
+        let both = self.transmittance.to_array().into_iter().zip(self.albedo().to_array());
+        for (channel, (tau, albedo)) in ["r", "g", "b"].iter().zip(both) {
+            if !(tau >= 0.0 && albedo < 1.0) {
+                let rho = albedo - tau;
+                return Err(bad(
+                    place(),
+                    format!("transmittance {tau} beside reflectance {rho} in channel {channel}"),
+                    "must be at least 0, and both together below 1",
                 ));
             }
         }
@@ -398,7 +439,7 @@ impl Material {
                 ));
             }
         }
-        let fault = self.specular.and_then(|specular| specular.fault(self.reflectance));
+        let fault = self.specular.and_then(|specular| specular.fault(self.albedo()));
         fault.map_or(Ok(()), |(found, remedy)| Err(bad(place(), found, remedy)))
     }
 }

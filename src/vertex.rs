@@ -21,7 +21,7 @@ mod textured;
 use glam::DVec3;
 
 use crate::mesh::{Mesh, SurfaceTopology};
-use crate::scene::{Material, Rgb, Sky};
+use crate::scene::{Rgb, Sky};
 use hanging_nodes::HangingNodes;
 pub(crate) use irradiance::irradiance;
 use keys::{ElementLoops, Vertices};
@@ -44,8 +44,9 @@ pub struct VertexMesh {
     /// reflects the mean of the elements around it, weighted by area.
     pub radiosity: Vec<Rgb>,
     /// Irradiance at the vertices, W/m² per channel, linear: what a program with the textures
-    /// multiplies with their reflectance. A channel in which the material reflects nothing is not
-    /// gathered, and 0 here. Empty where it is not known.
+    /// multiplies with their reflectance. On a translucent surface it is the mean of the irradiances
+    /// on both sides, by the shares of them that leave: to be multiplied with ρ + τ. A channel in
+    /// which the material is black is not gathered, and 0 here. Empty where it is not known.
     pub irradiance: Vec<Rgb>,
     /// Standard error of the radiosity at each vertex and over the faces around it, W/m²: a length
     /// over the channels. Empty where it was not estimated.
@@ -123,9 +124,9 @@ impl VertexMesh {
         out.reflect(mesh, outlines, &reflected);
         let hanging_nodes = HangingNodes::new(mesh, &topology, &vertices);
         out.add_elements(mesh, &hanging_nodes, |_, e| {
-            let Material { reflectance, exitance, .. } = mesh.material(mesh.element(e));
-            let reflected = (element_radiosity[e] - exitance).max(Rgb::ZERO);
-            [with_textures[e], irradiance(reflected, *reflectance)]
+            let material = mesh.material(mesh.element(e));
+            let reflected = (element_radiosity[e] - material.exitance).max(Rgb::ZERO);
+            [with_textures[e], irradiance(reflected, material.albedo())]
         });
         (out, vertices.corners, reflected)
     }
@@ -183,7 +184,7 @@ impl VertexMesh {
             out.normals.extend([mesh.normal(node); 3]);
             out.radiosity.extend([radiosity; 3]);
             let reflected = (radiosity - mesh.exitance(e)).max(Rgb::ZERO);
-            out.irradiance.extend([irradiance(reflected, mesh.reflectance(e)); 3]);
+            out.irradiance.extend([irradiance(reflected, mesh.albedo(e)); 3]);
             out.faces.push([first, first + 1, first + 2]);
             out.elements.push(e as u32);
         }
@@ -251,7 +252,7 @@ mod tests {
     use std::collections::HashMap;
 
     use super::*;
-    use crate::scene::{Scene, Triangle};
+    use crate::scene::{Material, Scene, Triangle};
 
     /// Triangles over shared positions; one group and one material each as given.
     fn mesh(positions: &[[f64; 3]], faces: &[([u32; 3], u32, u32)], size: f64) -> Mesh {

@@ -136,8 +136,8 @@ pub(super) struct Conditions<'a> {
     pub strata: &'a [Stratum],
     /// Radiosity below which errors are relative to this instead, W/m².
     pub radiosity_floor: f64,
-    /// Mean reflectance over the area that reflects, of the channel in which it is highest.
-    pub mean_reflectance: f64,
+    /// Mean albedo over the area that scatters light, of the channel in which it is highest.
+    pub mean_albedo: f64,
     /// Times that all vertices have gathered; none if the light is that of the elements.
     pub gather_passes: Option<u32>,
     /// See [`ErrorEstimate::unshot_bound`].
@@ -392,13 +392,13 @@ fn change(deviation: &Deviation, conditions: &Conditions) -> DVec3 {
 
 /// Squared error of stopping after some passes, where one more would change `bias` in the mean.
 fn truncation(means: &Means, bias: DVec3, conditions: &Conditions) -> f64 {
-    let reflectance = conditions.mean_reflectance;
-    let series = bias.length() / (1.0 - reflectance);
+    let albedo = conditions.mean_albedo;
+    let series = bias.length() / (1.0 - albedo);
     if conditions.gather_passes.is_some() {
         // Both gathers cast the same rays, so that their difference has little noise.
         means.of(|d| (change(d, conditions) - bias).length_squared()) + series * series
     } else {
-        (series * reflectance).powi(2)
+        (series * albedo).powi(2)
     }
 }
 
@@ -408,7 +408,7 @@ fn passed_share(observations: &[Observation], conditions: &Conditions) -> f64 {
     let escaped = observations.iter().map(|o| o.escaped).sum::<f64>();
     let escaped = escaped / observations.len().max(1) as f64;
     match conditions.gather_passes {
-        Some(passes) => (conditions.mean_reflectance * (1.0 - escaped)).powi(passes as i32),
+        Some(passes) => (conditions.mean_albedo * (1.0 - escaped)).powi(passes as i32),
         None => 1.0,
     }
 }

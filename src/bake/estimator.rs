@@ -20,7 +20,8 @@ use crate::bake::strata::{SampleCounts, SampledFace, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
-use crate::gather::{Gather, GatherPoint, IrradianceSample};
+use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
+use crate::gather::{Gather, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::rotation::CellRotation;
@@ -90,8 +91,8 @@ struct Sample {
     /// Share of the stratum's area that it stands for.
     weight: f64,
     element: usize,
-    reflectance: Rgb,
-    point: GatherPoint,
+    albedo: Rgb,
+    point: TwoSidedPoint,
     /// Step to the centroid of the face, scene unit.
     inward: DVec3,
     /// Reflected radiosity that the vertices interpolate to, W/m².
@@ -130,7 +131,7 @@ impl ErrorEstimator<'_> {
         let conditions = Conditions {
             strata: &strata,
             radiosity_floor,
-            mean_reflectance: self.light.mesh.mean_reflectance().max_element(),
+            mean_albedo: self.light.mesh.mean_albedo().max_element(),
             gather_passes: self.lit_by.map(|_| self.gather_passes),
             unshot_bound,
         };
@@ -146,11 +147,11 @@ impl ErrorEstimator<'_> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
         let floor = self.radiosity_floor();
         let (strata, samples) = self.samples(counts, floor);
-        let points: Vec<GatherPoint> = samples.iter().map(|s| s.point).collect();
-        let jittered: Vec<GatherPoint> = samples.iter().map(Sample::jittered).collect();
+        let points: Vec<TwoSidedPoint> = samples.iter().map(|s| s.point).collect();
+        let jittered: Vec<TwoSidedPoint> = samples.iter().map(Sample::jittered).collect();
         let sources = self.sources().radiosity_field();
-        let first = gatherer.gather(&sources, &points)?;
-        let second = gatherer.gather(&sources, &jittered)?;
+        let first = gather_two_sided(gatherer, &sources, &points)?;
+        let second = gather_two_sided(gatherer, &sources, &jittered)?;
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mut sums = [(0.0, 0.0); 2];
         for (sample, (first, second)) in samples.iter().zip(first.iter().zip(&second)) {
@@ -193,13 +194,13 @@ impl ErrorEstimator<'_> {
         let mut batches = BatchSizer::new(FIRST_BATCH);
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
-                let points: Vec<GatherPoint> = batch.iter().map(|&k| samples[k].point).collect();
-                let jittered: Vec<GatherPoint> =
+                let points: Vec<TwoSidedPoint> = batch.iter().map(|&k| samples[k].point).collect();
+                let jittered: Vec<TwoSidedPoint> =
                     batch.iter().map(|&k| samples[k].jittered()).collect();
-                let first = gatherer.gather(&sources, &points)?;
-                let second = gatherer.gather(&sources, &jittered)?;
+                let first = gather_two_sided(gatherer, &sources, &points)?;
+                let second = gather_two_sided(gatherer, &sources, &jittered)?;
                 let next = match self.lit_by {
-                    Some(_) => gatherer.gather(&self.light.radiosity_field(), &points)?,
+                    Some(_) => gather_two_sided(gatherer, &self.light.radiosity_field(), &points)?,
                     None => first.clone(),
                 };
                 for (i, &k) in batch.iter().enumerate() {
@@ -241,7 +242,7 @@ impl ErrorEstimator<'_> {
             let interpolated = |values: &[Rgb]| mix(face.map(|v| values[v as usize]));
             // Of the light, whatever textures are.
             let reflected = if mesh.scene().has_textures() {
-                material.reflectance * interpolated(&surface.irradiance)
+                material.albedo() * interpolated(&surface.irradiance)
             } else {
                 interpolated(&surface.radiosity) - material.exitance
             };
@@ -249,8 +250,8 @@ impl ErrorEstimator<'_> {
                 stratum,
                 weight,
                 element,
-                reflectance: material.reflectance,
-                point,
+                albedo: material.albedo(),
+                point: TwoSidedPoint::new(point, material),
                 inward: corners(face).iter().sum::<DVec3>() / 3.0 - position,
                 interpolated: reflected,
                 size,
@@ -260,7 +261,7 @@ impl ErrorEstimator<'_> {
         let faces = (0..surface.faces.len()).filter_map(|face| {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
-            if !mesh.material(node).reflects() {
+            if !mesh.material(node).scatters() {
                 return None;
             }
             let corners = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
@@ -305,23 +306,23 @@ impl ErrorEstimator<'_> {
         let groups = mesh.scene().groups().len().max(1);
         let (mut squares, mut areas) = (vec![0.0; groups], vec![0.0; groups]);
         let mut flux = Rgb::ZERO;
-        let mut max_reflectance = Rgb::ZERO;
+        let mut max_albedo = Rgb::ZERO;
         for e in 0..mesh.element_count() {
             let node = mesh.element(e);
             let material = mesh.material(node);
-            if !material.reflects() {
+            if !material.scatters() {
                 continue;
             }
             let corners = sources.corners[e].iter().map(|&v| sources.reflected[v as usize]);
             let reflected = corners.sum::<Rgb>() / 3.0;
             let (element_area, group) = (mesh.area(node), mesh.group(node) as usize);
-            let ambient = material.reflectance * ambient_irradiance;
+            let ambient = material.albedo() * ambient_irradiance;
             let scale = (reflected + ambient).length().max(floor);
             squares[group] += (ambient.length() / scale).powi(2) * element_area;
             areas[group] += element_area;
             let reflected = reflected * mesh.relative_reflectance(e);
             flux += (reflected + mesh.exitance(e)) * element_area;
-            max_reflectance = max_reflectance.max(mesh.reflectance(e));
+            max_albedo = max_albedo.max(mesh.albedo(e));
         }
         let mean = |squares: f64, area: f64| if area > 0.0 { squares / area } else { 0.0 };
         let whole = mean(squares.iter().sum(), areas.iter().sum());
@@ -329,8 +330,8 @@ impl ErrorEstimator<'_> {
             let group = stratum.group.map(|g| g as usize);
             stratum.ambient = group.map_or(whole, |g| mean(squares[g], areas[g]));
         }
-        // Every bounce returns the largest reflectance of what is left, at most.
-        let bound = self.ledger.unshot * max_reflectance / (Rgb::ONE - max_reflectance) / flux;
+        // Every bounce returns the largest albedo of what is left, at most.
+        let bound = self.ledger.unshot * max_albedo / (Rgb::ONE - max_albedo) / flux;
         if flux == Rgb::ZERO { 0.0 } else { bound.max_element() }
     }
 
@@ -362,7 +363,7 @@ impl ErrorEstimator<'_> {
 impl Sample {
     /// Reflected radiosity of the point by what was gathered there, W/m².
     fn reflected(&self, gathered: &IrradianceSample) -> Rgb {
-        self.reflectance * gathered.irradiance
+        self.albedo * gathered.irradiance
     }
 
     fn observation(&self, estimator: &ErrorEstimator, gathers: &SampleGathers) -> Observation {
@@ -384,11 +385,9 @@ impl Sample {
     }
 
     /// A point a hair beside.
-    fn jittered(&self) -> GatherPoint {
-        let point = self.point;
+    fn jittered(&self) -> TwoSidedPoint {
         let step = JITTER * self.size * (0.5 + self.rotation);
-        let step = self.inward.normalize_or_zero() * step.min(self.inward.length());
-        GatherPoint { position: point.position + step, ..point }
+        self.point.moved_by(self.inward.normalize_or_zero() * step.min(self.inward.length()))
     }
 }
 

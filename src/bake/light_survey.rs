@@ -146,7 +146,7 @@ fn strongest_lights(scene: &Scene) -> Vec<MaterialLight> {
 /// surfaces get some beside large ones.
 fn places(scene: &Scene) -> Vec<Place> {
     let triangles: Vec<usize> =
-        (0..scene.triangles().len()).filter(|&t| scene.material(t).reflects()).collect();
+        (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters()).collect();
     let area: f64 = triangles.iter().map(|&t| scene.area(t)).sum();
     let density = |t: usize| 0.5 * scene.area(t) / area + 0.5 / triangles.len() as f64;
     let sampler = AreaSampler::new(triangles.iter().map(|&t| density(t)));

@@ -36,11 +36,11 @@ pub(super) fn resolved_light(mesh: &Mesh, radiosity: &[Rgb], size: f64) -> Vec<R
         for e in elements() {
             let area = mesh.area(mesh.element(e));
             flux += (radiosity[e] - mesh.exitance(e)) * area;
-            unit_flux += mesh.reflectance(e) * area;
+            unit_flux += mesh.albedo(e) * area;
         }
         let irradiance = irradiance(flux, unit_flux);
         for e in elements() {
-            resolved[e] = mesh.exitance(e) + mesh.reflectance(e) * irradiance;
+            resolved[e] = mesh.exitance(e) + mesh.albedo(e) * irradiance;
         }
     }
     resolved

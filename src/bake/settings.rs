@@ -110,7 +110,7 @@ impl SolveSettings {
     pub(super) fn sizing(&self, scene: &Scene, size: f64) -> ElementSizing {
         let is_idle = |(m, material): &(u32, &Material)| {
             let shoots = material.exitance != Rgb::ZERO && !self.gathered_materials.contains(m);
-            !material.reflects() && !shoots
+            !material.scatters() && !shoots
         };
         let idle = (0..).zip(scene.materials()).filter(is_idle);
         let unsplit_materials = idle.map(|(m, _)| m).collect();

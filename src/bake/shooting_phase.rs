@@ -126,7 +126,7 @@ fn received(
     let above = SurfaceOffset::new(mesh.scene());
     let elements = 0..mesh.element_count();
     let reflecting: Vec<usize> =
-        elements.filter(|&e| mesh.material(mesh.element(e)).reflects()).collect();
+        elements.filter(|&e| mesh.material(mesh.element(e)).scatters()).collect();
     let point = |&e: &usize| {
         let node = mesh.element(e);
         above.gather_point(mesh.centroid(node), mesh.normal(node), mesh.area(node).sqrt())

@@ -249,9 +249,9 @@ impl Framing<'_> {
 /// Vertices of what reflects, or of all where nothing does.
 fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
     let triangles = 0..scene.triangles().len();
-    let any = triangles.clone().any(|t| scene.material(t).reflects());
+    let any = triangles.clone().any(|t| scene.material(t).scatters());
     let mut used = vec![false; scene.positions().len()];
-    for t in triangles.filter(|&t| !any || scene.material(t).reflects()) {
+    for t in triangles.filter(|&t| !any || scene.material(t).scatters()) {
         for corner in scene.triangles()[t].corners {
             used[corner as usize] = true;
         }

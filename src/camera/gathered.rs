@@ -22,6 +22,7 @@ use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::{SurfaceOffset, is_buried};
+use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::SurfaceTopology;
 use crate::progress::BatchSizer;
@@ -73,7 +74,7 @@ impl Camera {
         for band in bands {
             let end = band.end;
             let (gathering, others): (Vec<PixelPart>, Vec<PixelPart>) =
-                view.parts(band).into_iter().partition(|p| p.reflectance != Rgb::ZERO);
+                view.parts(band).into_iter().partition(|p| p.albedo != Rgb::ZERO);
             for part in others {
                 pixels[part.pixel] += part.interpolated;
                 sky[part.pixel] = part.is_whole_sky;
@@ -81,8 +82,8 @@ impl Camera {
             let mut queue = &gathering[..];
             while !queue.is_empty() {
                 let done = batch_sizer.next(&mut queue, |batch| {
-                    let points: Vec<GatherPoint> = batch.iter().map(|part| part.point).collect();
-                    let gathered = gatherer.gather(&field, &points)?;
+                    let points: Vec<TwoSidedPoint> = batch.iter().map(|part| part.point).collect();
+                    let gathered = gather_two_sided(gatherer, &field, &points)?;
                     for (part, sample) in batch.iter().zip(&gathered) {
                         pixels[part.pixel] += part.radiance(sample);
                     }
@@ -104,13 +105,13 @@ impl Camera {
 /// A group of a pixel's rays that meet one smooth surface and share a gather.
 struct PixelPart {
     pixel: usize,
-    point: GatherPoint,
+    point: TwoSidedPoint,
     /// Square root of the element's area, scene unit.
     size: f64,
     /// Share of the pixel's rays per channel, in [0, 1].
     weight: Rgb,
     exitance: Rgb,
-    reflectance: Rgb,
+    albedo: Rgb,
     /// What it adds to the pixel by the radiosity at vertices, W/(m² sr).
     interpolated: Rgb,
     /// Whether the pixel is nothing but sky.
@@ -123,7 +124,7 @@ impl PixelPart {
         if is_buried(sample, self.size) {
             return self.interpolated;
         }
-        (self.exitance + self.reflectance * sample.irradiance) * self.weight / PI
+        (self.exitance + self.albedo * sample.irradiance) * self.weight / PI
     }
 }
 
@@ -208,13 +209,14 @@ impl GatheredView<'_> {
     /// The rays of a pixel that see the sky, where nothing is to be gathered.
     fn sky_part(&self, pixel: usize, sky: SkySeen) -> PixelPart {
         let PrimaryRays { weight, samples, .. } = self.lit.rays;
+        let nowhere = GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 };
         PixelPart {
             pixel,
-            point: GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 },
+            point: TwoSidedPoint::one_sided(nowhere),
             size: 0.0,
             weight: Rgb::ZERO,
             exitance: Rgb::ZERO,
-            reflectance: Rgb::ZERO,
+            albedo: Rgb::ZERO,
             interpolated: sky.radiance * weight,
             is_whole_sky: sky.direct_rays == samples * samples,
         }
@@ -237,24 +239,25 @@ impl GatheredView<'_> {
         let (surface, mesh) = (&self.lit.light.surface, &self.lit.light.mesh);
         let node = mesh.element(self.lit.element(&hit));
         let size = mesh.area(node).sqrt();
-        let (reflectance, exitance, sum) = self.seen_of(hits);
+        let (albedo, exitance, sum) = self.seen_of(hits);
         let weight: Rgb = hits.iter().map(|seen| seen.weight).sum();
         let normal =
             self.lit.rays.interpolate(&hit, &surface.normals).normalize_or(mesh.normal(node));
         let position = self.lit.rays.interpolate(&hit, &surface.positions);
+        let point = self.offset.gather_point(position, normal, size);
         parts.push(PixelPart {
             pixel,
-            point: self.offset.gather_point(position, normal, size),
+            point: TwoSidedPoint::new(point, mesh.material(node)),
             size,
             weight: self.lit.rays.weight * weight,
             exitance,
-            reflectance,
+            albedo,
             interpolated: sum * self.lit.rays.weight / PI,
             is_whole_sky: false,
         });
     }
 
-    /// Mean reflectance and exitance of what was hit, and the sum of the radiosity that the
+    /// Mean albedo and exitance of what was hit, and the sum of the radiosity that the
     /// vertices give it, W/m²: each by its weight.
     fn seen_of(&self, hits: &[SeenHit]) -> (Rgb, Rgb, Rgb) {
         let interpolated =
@@ -263,18 +266,18 @@ impl GatheredView<'_> {
         let t = self.lit.triangle(&hits[0].hit);
         if self.lit.scene().textures(t).is_none() {
             let material = self.lit.scene().material(t);
-            return (material.reflectance, material.exitance, interpolated);
+            return (material.albedo(), material.exitance, interpolated);
         }
-        let (mut reflectance, mut exitance, mut sum) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
+        let (mut albedo, mut exitance, mut sum) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
         for SeenHit { hit, weight, sight } in hits {
-            let [reflects, emits] = self.lit.reflectance_and_exitance(hit, sight);
-            reflectance += weight * reflects;
+            let [scatters, emits] = self.lit.albedo_and_exitance(hit, sight);
+            albedo += weight * scatters;
             exitance += weight * emits;
             sum += weight;
         }
         // What weighs nothing in a channel is 0 / that, and stays 0.
         let sum = sum.max(Rgb::splat(f64::MIN_POSITIVE));
-        (reflectance / sum, exitance / sum, interpolated)
+        (albedo / sum, exitance / sum, interpolated)
     }
 
     /// The hit of the ray through the mean position of `hits`, if it is on their surface, or else

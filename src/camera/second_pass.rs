@@ -167,7 +167,7 @@ impl SecondPass {
             };
             let boundary = self.boundary(lit, &branch, &hit);
             let diffuse = self.branch_out(&branch, &boundary, &hit, specular, &mut pending);
-            let shines = material.reflects() || material.exitance != Rgb::ZERO;
+            let shines = material.scatters() || material.exitance != Rgb::ZERO;
             if hit.front && shines && diffuse != Rgb::ZERO {
                 let weight = weight * diffuse;
                 seen_weight += weight;

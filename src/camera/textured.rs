@@ -32,16 +32,16 @@ impl LitSurface<'_> {
         Sight { eye: self.rays.eye, forward: self.rays.forward }
     }
 
-    /// Reflectance per channel and exitance, W/m², at a hit.
-    pub fn reflectance_and_exitance(&self, hit: &Hit, sight: &Sight) -> [Rgb; 2] {
+    /// Albedo per channel and exitance, W/m², at a hit.
+    pub fn albedo_and_exitance(&self, hit: &Hit, sight: &Sight) -> [Rgb; 2] {
         let (scene, t) = (self.scene(), self.triangle(hit));
         if scene.textures(t).is_none() {
             let material = scene.material(t);
-            return [material.reflectance, material.exitance];
+            return [material.albedo(), material.exitance];
         }
         let position = self.rays.interpolate(hit, &self.light.surface.positions);
         let (place, share) = (scene.barycentric(t, position), self.share(t, position, sight));
-        [scene.reflectance_around(t, place, share), scene.exitance_around(t, place, share)]
+        [scene.albedo_around(t, place, share), scene.exitance_around(t, place, share)]
     }
 
     /// Radiosity at a hit, W/m²: by the light at the vertices and the texture at the hit.
@@ -50,8 +50,8 @@ impl LitSurface<'_> {
         if self.light.mesh.scene().textures(self.triangle(hit)).is_none() {
             return self.rays.interpolate(hit, &surface.radiosity);
         }
-        let [reflectance, exitance] = self.reflectance_and_exitance(hit, sight);
-        exitance + reflectance * self.rays.interpolate(hit, &surface.irradiance)
+        let [albedo, exitance] = self.albedo_and_exitance(hit, sight);
+        exitance + albedo * self.rays.interpolate(hit, &surface.irradiance)
     }
 
     /// Radiosity at a hit as if no material were textured, W/m²: it shows the light.
@@ -61,7 +61,7 @@ impl LitSurface<'_> {
         if scene.textures(t).is_none() {
             return self.rays.interpolate(hit, &surface.radiosity);
         }
-        scene.material(t).reflectance * self.rays.interpolate(hit, &surface.irradiance)
+        scene.material(t).albedo() * self.rays.interpolate(hit, &surface.irradiance)
     }
 
     /// The element of the mesh that was hit.

@@ -48,7 +48,7 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
         let exitance = scene.material(t).exitance.element_sum();
         emitted += size * exitance;
         downward -= size * exitance * cosine;
-        if !scene.material(t).reflects() {
+        if !scene.material(t).scatters() {
             continue;
         }
         area += size;
@@ -73,7 +73,7 @@ fn footing(scene: &Scene, axis: DVec3) -> f64 {
     let bounds = scene.reflecting_bounds();
     let (low, height) = (bounds.low.dot(axis), bounds.size().dot(axis));
     let (mut lowest, mut highest) = (Aabb::EMPTY, Aabb::EMPTY);
-    let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).reflects());
+    let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters());
     for corner in reflecting.flat_map(|t| scene.corners(t)) {
         let level = corner.dot(axis) - low;
         if level <= SLICE * height {

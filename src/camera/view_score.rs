@@ -88,10 +88,10 @@ impl ViewScorer<'_> {
     fn add_parts(&mut self, light: &GatheredMesh) {
         let (surface, mesh) = (&light.surface, &light.mesh);
         let any_reflects =
-            (0..self.scene.triangles().len()).any(|t| self.scene.material(t).reflects());
+            (0..self.scene.triangles().len()).any(|t| self.scene.material(t).scatters());
         for (face, &element) in surface.faces.iter().zip(&surface.elements) {
             let t = mesh.triangle(mesh.element(element as usize));
-            if any_reflects && !self.scene.material(t).reflects() {
+            if any_reflects && !self.scene.material(t).scatters() {
                 continue;
             }
             let [a, b, c] = face.map(|v| surface.positions[v as usize]);

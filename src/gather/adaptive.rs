@@ -296,7 +296,7 @@ impl<'a> AdaptiveGather<'a> {
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
         let source = self.source.radiosity_field();
         let previous = previous.map(GatheredMesh::radiosity_field);
-        let gathers = |&v: &u32| points.reflectance(v) != Rgb::ZERO;
+        let gathers = |&v: &u32| points.albedo(v) != Rgb::ZERO;
         let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
         let total = pending.len();
         let mut gathered = 0;

@@ -1,7 +1,8 @@
 //! A batch of vertices that gather at once, and what follows for their values.
 
 use super::gather_points::VertexGatherPoints;
-use super::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+use super::two_sided::{TwoSidedPoint, gather_two_sided};
+use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
 
@@ -25,14 +26,14 @@ pub(super) struct VertexValues<'s> {
 /// Gathers one point for each of `vertices`.
 pub(super) fn gather_batch<'v>(
     vertices: &'v [u32],
-    places: Vec<GatherPoint>,
+    places: Vec<TwoSidedPoint>,
     source: &RadiosityField,
     previous: Option<&RadiosityField>,
     gatherer: &mut dyn Gather,
 ) -> Result<Batch<'v>, Error> {
-    let samples = gatherer.gather(source, &places)?;
+    let samples = gather_two_sided(gatherer, source, &places)?;
     let previous = match previous {
-        Some(previous) => Some(gatherer.gather(previous, &places)?),
+        Some(previous) => Some(gather_two_sided(gatherer, previous, &places)?),
         None => None,
     };
     Ok(Batch { vertices, samples, previous })
@@ -57,14 +58,14 @@ impl Batch<'_> {
             }
             let reflected = &mut values.reflected[v as usize];
             match &self.previous {
-                // ρ (E − E_previous) added; never below zero.
+                // (ρ + τ) (E − E_previous) added; never below zero.
                 Some(previous) => {
                     let difference = sample.irradiance - previous[k].irradiance;
-                    *reflected = (*reflected + points.reflectance(v) * difference).max(Rgb::ZERO);
+                    *reflected = (*reflected + points.albedo(v) * difference).max(Rgb::ZERO);
                 }
-                // ρ E, which is darkness at a buried vertex.
+                // (ρ + τ) E, which is darkness at a buried vertex.
                 None => {
-                    *reflected = points.reflectance(v) * sample.irradiance;
+                    *reflected = points.albedo(v) * sample.irradiance;
                     values.buried[v as usize] = is_buried;
                     values.inverse_distance[v as usize] = sample.inverse_distance;
                 }

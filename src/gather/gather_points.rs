@@ -12,10 +12,11 @@
 
 use glam::DVec3;
 
+use super::two_sided::TwoSidedPoint;
 use super::{GatherPoint, IrradianceSample};
 use crate::geometry::incidence::Incidence;
 use crate::mesh::Mesh;
-use crate::scene::{Rgb, Scene};
+use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::keys::Vertices;
 use crate::visibility::{buried, offset};
 
@@ -73,20 +74,25 @@ impl<'a> VertexGatherPoints<'a> {
         self.around.at(v)
     }
 
-    /// Reflectance of the surface that vertex `v` is on.
-    pub fn reflectance(&self, v: u32) -> Rgb {
-        self.mesh.material(self.mesh.element(self.around(v)[0] as usize)).reflectance
+    /// Albedo of the surface that vertex `v` is on.
+    pub fn albedo(&self, v: u32) -> Rgb {
+        self.material(v).albedo()
+    }
+
+    fn material(&self, v: u32) -> &Material {
+        self.mesh.material(self.mesh.element(self.around(v)[0] as usize))
     }
 
     /// The gather point of vertex `v` at its `attempt`: in another element around it each time.
-    pub fn point(&self, v: u32, attempt: usize) -> GatherPoint {
+    pub fn point(&self, v: u32, attempt: usize) -> TwoSidedPoint {
         let around = self.around(v);
         let step = around.len().div_ceil(MAX_ATTEMPTS);
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
         let position = self.vertices.positions[v as usize];
         let inset = (self.mesh.centroid(element) - position) * CORNER_INSET;
         let size = self.sizes[v as usize];
-        self.offset.gather_point(position + inset, self.normals[v as usize], size)
+        let point = self.offset.gather_point(position + inset, self.normals[v as usize], size);
+        TwoSidedPoint::new(point, self.material(v))
     }
 
     /// Whether vertex `v` has another gather point after that of `attempt`.

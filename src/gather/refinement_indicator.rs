@@ -73,7 +73,7 @@ impl ErrorScale {
     /// For a gather of `field` on `mesh`, whose light is mostly in `region`.
     pub fn new(mesh: &Mesh, field: &RadiosityField, region: Option<Aabb>) -> ErrorScale {
         let reflecting =
-            (0..mesh.element_count()).filter(|&e| mesh.material(mesh.element(e)).reflects());
+            (0..mesh.element_count()).filter(|&e| mesh.material(mesh.element(e)).scatters());
         let edge = |e| {
             let corners = mesh.corners(mesh.element(e));
             longest_edge(corners) / size_growth(region.as_ref(), &corners)

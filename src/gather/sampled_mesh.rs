@@ -62,7 +62,7 @@ impl SampledMesh {
     /// reflected.
     pub fn is_splittable(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
-        self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.material(node).reflects()
+        self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.material(node).scatters()
     }
 
     /// Mean of 1/distance to what is seen from those corners of element `e` that reflect less than

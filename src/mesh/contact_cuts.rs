@@ -94,7 +94,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
         let material = scene.material(t);
         // Glass that is cut here and not there would enclose no body.
         let is_glass = material.specular.is_some_and(|specular| specular.is_glass());
-        if longest_edge(corners) <= finest || !material.reflects() || is_glass {
+        if longest_edge(corners) <= finest || !material.scatters() || is_glass {
             return Cuts::default();
         }
         let plane = TrianglePlane::new(scene, t, tolerance);

@@ -30,6 +30,23 @@ impl Mesh {
         Rgb::select(of_material.cmpgt(Rgb::ZERO), reflectance / of_material, Rgb::ONE)
     }
 
+    /// The share of what element `e` receives that leaves again diffusely, on either side: ρ + τ per
+    /// channel. The transmittance τ of a textured material follows its reflectance.
+    pub(crate) fn albedo(&self, e: usize) -> Rgb {
+        self.reflectance(e) + self.transmittance(e)
+    }
+
+    /// The share of what element `e` receives that leaves diffusely from the other side, if it has
+    /// one.
+    pub(crate) fn transmittance(&self, e: usize) -> Rgb {
+        let of_material = self.material(self.element(e)).transmittance;
+        if of_material == Rgb::ZERO {
+            of_material
+        } else {
+            of_material * self.relative_reflectance(e)
+        }
+    }
+
     /// Reflectance of every element; of none where no material has a texture of it.
     fn textured_reflectances(&self) -> &[Rgb] {
         self.textured_reflectances.get_or_init(|| {

@@ -12,7 +12,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::{Scene, longest_edge};
 use crate::geometry::incidence::Incidence;
@@ -31,19 +31,60 @@ const OPEN_SHARE: f64 = 1e-6;
 /// triangle: thousands that meet in a point would each look at all of them. Chosen by hand.
 const MAX_TRIANGLES: usize = 256;
 
-/// For each triangle of `scene`, whether all of its back is covered by the fronts of others that
-/// share corners with it, or with others that do; empty where none is.
-pub(super) fn covered_backs(scene: &Scene) -> Vec<bool> {
-    let count = scene.triangles().len();
-    let mut weld = Weld::default();
-    let corners: Vec<[u32; 3]> =
-        (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
-    let meeting = Incidence::new(weld.positions.len(), || {
-        corners.iter().map(<[u32; 3]>::as_slice).enumerate()
-    });
-    let surfaces = Surfaces { scene, corners, meeting };
-    let covered: Vec<bool> = (0..count).into_par_iter().map(|t| surfaces.is_covered(t)).collect();
-    if covered.contains(&true) { covered } else { vec![] }
+/// The backs that are covered, and by what.
+#[derive(Clone, Debug, Default)]
+pub(super) struct CoveredBacks {
+    /// Per triangle, whether all of its back is covered by the fronts of others that share corners
+    /// with it, or with others that do; empty where none is.
+    is_covered: Vec<bool>,
+    /// Which ones those are, of each that is covered.
+    covers: FxHashMap<u32, Vec<u32>>,
+}
+
+impl CoveredBacks {
+    /// Those of `scene`.
+    pub fn new(scene: &Scene) -> CoveredBacks {
+        let count = scene.triangles().len();
+        let mut weld = Weld::default();
+        let corners: Vec<[u32; 3]> =
+            (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
+        let meeting = Incidence::new(weld.positions.len(), || {
+            corners.iter().map(<[u32; 3]>::as_slice).enumerate()
+        });
+        let surfaces = Surfaces { scene, corners, meeting };
+        let covers: Vec<Option<Vec<u32>>> =
+            (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
+        let is_covered: Vec<bool> = covers.iter().map(Option::is_some).collect();
+        if !is_covered.contains(&true) {
+            return CoveredBacks::default();
+        }
+        let covers = (0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect();
+        CoveredBacks { is_covered, covers }
+    }
+
+    /// Whether the back of triangle `t` is covered.
+    pub fn is_covered(&self, t: usize) -> bool {
+        self.is_covered.get(t).is_some_and(|&covered| covered)
+    }
+
+    /// Triangles whose fronts cover it.
+    pub fn covers(&self, t: usize) -> &[u32] {
+        self.covers.get(&(t as u32)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The same where triangle t is cut into the pieces from `firsts[t]` to `firsts[t + 1]`. These
+    /// are covered as it is: what covers it may be cut elsewhere.
+    pub fn cut(&self, firsts: &[u32]) -> CoveredBacks {
+        let pieces = |t: u32| firsts[t as usize]..firsts[t as usize + 1];
+        let covered = (0..).zip(&self.is_covered).filter(|(_, is_covered)| **is_covered);
+        let mut is_covered = vec![false; firsts.last().map_or(0, |&count| count as usize)];
+        covered.flat_map(|(t, _)| pieces(t)).for_each(|piece| is_covered[piece as usize] = true);
+        let of_pieces = |(&t, covers): (&u32, &Vec<u32>)| {
+            let covers: Vec<u32> = covers.iter().flat_map(|&s| pieces(s)).collect();
+            pieces(t).map(move |piece| (piece, covers.clone())).collect::<Vec<_>>()
+        };
+        CoveredBacks { is_covered, covers: self.covers.iter().flat_map(of_pieces).collect() }
+    }
 }
 
 /// Triangles by the positions of their corners.
@@ -61,12 +102,14 @@ impl Surfaces<'_> {
         if meeting.len() > MAX_TRIANGLES { &[] } else { meeting }
     }
 
-    /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards.
-    fn is_covered(&self, t: usize) -> bool {
+    /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards: which
+    /// they are, if nothing is left.
+    fn covers(&self, t: usize) -> Option<Vec<u32>> {
         let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
         let still_open = OPEN_SHARE * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
         let mut known: FxHashSet<u32> = FxHashSet::default();
+        let mut covers = vec![];
         let mut queue: Vec<u32> = self.corners[t].to_vec();
         let mut k = 0;
         while k < queue.len() && known.len() < MAX_TRIANGLES {
@@ -80,14 +123,15 @@ impl Surfaces<'_> {
                     let further = self.corners[s as usize];
                     queue.extend(further.iter().filter(|v| !self.corners[t].contains(v)));
                     open = left;
+                    covers.push(s);
                 }
             }
             if open.iter().map(|part| polygon_area(part)).sum::<f64>() <= still_open {
-                return true;
+                return Some(covers);
             }
             k += 1;
         }
-        false
+        None
     }
 
     /// Triangle `s` in the plane of a triangle with these `corners` and unit `normal`, if it lies

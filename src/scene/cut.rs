@@ -31,8 +31,7 @@ impl Scene {
         textures.coordinates.clear();
         textures.relative_exitance.clear();
         scene.cut_sides.clear();
-        // A piece is covered as its triangle is: what covers it may be cut elsewhere.
-        let mut covered = vec![];
+        let mut firsts = vec![0];
         for (t, pieces) in pieces.into_iter().enumerate() {
             for piece in pieces {
                 let first = scene.positions.len() as u32;
@@ -40,16 +39,16 @@ impl Scene {
                 let corners = [first, first + 1, first + 2];
                 scene.triangles.push(Triangle { corners, ..self.triangles[t] });
                 scene.cut_sides.push(piece.cut);
-                covered.push(self.is_back_covered(t));
                 if let Some([a, b, c]) = self.texture_coordinates(t) {
                     let place = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
                     textures.coordinates.push(piece.weights.map(place));
                 }
                 textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
             }
+            firsts.push(scene.triangles.len() as u32);
         }
         scene.textures = Arc::new(textures);
-        scene.covered_backs = OnceLock::from(covered);
+        scene.covered_backs = OnceLock::from(self.covered_backs().cut(&firsts));
         scene
     }
 

@@ -58,6 +58,19 @@ impl Scene {
         self.filtered(t, map, self.material(t).reflectance, (barycentric, share))
     }
 
+    /// The share of the light that arrives around a point which leaves again diffusely, on either
+    /// side, per channel: that of a textured material follows its reflectance.
+    pub(crate) fn albedo_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
+        let (material, reflectance) =
+            (self.material(t), self.reflectance_around(t, barycentric, share));
+        if !material.is_translucent() {
+            return reflectance;
+        }
+        let has_mean = material.reflectance.cmpgt(Rgb::ZERO);
+        let relative = Rgb::select(has_mean, reflectance / material.reflectance, Rgb::ONE);
+        reflectance + material.transmittance * relative
+    }
+
     /// Exitance per channel, W/m², of a point of triangle `t`, where its second and third corner
     /// have these weights: what the texture has there, if there is one.
     pub fn exitance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
@@ -130,8 +143,13 @@ impl Scene {
         for (&m, maps) in &mut textures.of_materials {
             let material = &mut self.materials[m as usize];
             if let Some(map) = &mut maps.reflectance {
+                let told = map.mean;
                 map.mean = reflectances.get(&m).copied().unwrap_or(map.whole_mean());
                 material.reflectance = map.mean;
+                if material.is_translucent() {
+                    let has_mean = told.cmpgt(Rgb::ZERO);
+                    material.transmittance *= Rgb::select(has_mean, map.mean / told, Rgb::ZERO);
+                }
             }
             if let Some(map) = &mut maps.exitance {
                 map.mean = exitances.get(&m).copied().unwrap_or(map.whole_mean());

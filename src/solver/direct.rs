@@ -1,7 +1,7 @@
 //! Gaussian elimination on the dense matrix: for small scenes, and as a reference for the other
 //! methods.
 //!
-//! The matrix is 1 − M, with M_ji = ρ_j F_ij. Its columns are diagonally dominant, since no element
+//! The matrix is 1 − M, with M_ji = ρ_j F_ij, and what comes through from behind. Its columns are diagonally dominant, since no element
 //! sends out more than its light. So elimination needs no pivoting, and no entry grows to more than
 //! twice the largest (Higham 2002, Theorem 9.9). Each entry is a channel triple: one elimination
 //! solves all three. It goes by panels: the rows of a panel are eliminated one by one, then all
@@ -84,7 +84,12 @@ impl LinearSystem {
             matrix[i * stride + count] = flux.unshot[i];
             for entry in &row.entries {
                 let j = entry.element as usize;
-                matrix[j * stride + i] -= flux.reflectance[j] * Row::form_factor(entry.share);
+                let form_factor = Row::form_factor(entry.share);
+                matrix[j * stride + i] -= flux.reflectance[j] * form_factor;
+                for passage in flux.behind(j) {
+                    let k = passage.behind as usize;
+                    matrix[k * stride + i] -= passage.passed * form_factor;
+                }
             }
         }
         LinearSystem { count, matrix }

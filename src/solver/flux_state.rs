@@ -17,12 +17,14 @@ use serde::{Deserialize, Serialize};
 use super::ledger::{Ledger, largest_share};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
-use crate::mesh::{Mesh, NodeId};
+use crate::mesh::{Mesh, NodeId, Passage, Transmission};
 use crate::scene::Rgb;
 
 /// Flux of the elements, W per channel.
 #[derive(Clone)]
 pub(super) struct Flux {
+    /// The shares of what elements receive that others, behind them, send on.
+    transmission: Transmission,
     /// Emitted by all, or received of it where that is known beforehand.
     total: Rgb,
     /// Emitted by each.
@@ -54,25 +56,29 @@ impl Flux {
         let emitted: Vec<Rgb> =
             elements.clone().enumerate().map(|(e, n)| mesh.exitance(e) * mesh.area(n)).collect();
         let reflectance: Vec<Rgb> = (0..emitted.len()).map(|e| mesh.reflectance(e)).collect();
+        let transmission = Transmission::new(mesh);
         let mut unshot = emitted.clone();
         let mut incident = vec![Rgb::ZERO; emitted.len()];
         for (e, node) in elements.enumerate().filter(|_| !received.irradiance.is_empty()) {
             if received.is_of(mesh, node) {
                 unshot[e] = Rgb::ZERO;
             }
-            if reflectance[e] != Rgb::ZERO {
+            if reflectance[e] + transmission.passed(e) != Rgb::ZERO {
                 incident[e] = received.irradiance[e] * mesh.area(node);
                 unshot[e] += reflectance[e] * incident[e];
             }
         }
-        let lost = |e: usize| (Rgb::ONE - reflectance[e]) * incident[e];
+        for (e, unshot) in unshot.iter_mut().enumerate().filter(|_| !transmission.is_none()) {
+            *unshot += transmission.transmitted(e, &incident);
+        }
+        let lost = |e: usize| (Rgb::ONE - reflectance[e] - transmission.passed(e)) * incident[e];
         let total: Rgb = unshot.iter().sum::<Rgb>() + (0..unshot.len()).map(lost).sum::<Rgb>();
         if !total.is_finite() {
             let remedy = "scale exitances down: sums of flux must stay finite in 64-bit floats";
             let found = format!("{total} W");
             return Err(Error::new(ErrorKind::Scene, "emitted flux", found, remedy));
         }
-        Ok(Flux { total, emitted, reflectance, incident, unshot })
+        Ok(Flux { transmission, total, emitted, reflectance, incident, unshot })
     }
 
     /// Emitted by all elements.
@@ -80,9 +86,30 @@ impl Flux {
         self.total
     }
 
-    /// Emitted or reflected by element `e`, shot or not.
+    /// Emitted, reflected or let through by element `e`, shot or not.
     pub fn leaving(&self, e: usize) -> Rgb {
-        self.emitted[e] + self.reflectance[e] * self.incident[e]
+        self.emitted[e] + self.scattered(e, &self.incident)
+    }
+
+    /// What leaves element `e` of the flux that is `incident` on each: what it reflects of its own,
+    /// and what comes through from behind.
+    pub fn scattered(&self, e: usize, incident: &[Rgb]) -> Rgb {
+        self.reflectance[e] * incident[e] + self.transmitted(e, incident)
+    }
+
+    /// The part of it that comes through from behind.
+    pub fn transmitted(&self, e: usize, incident: &[Rgb]) -> Rgb {
+        self.transmission.transmitted(e, incident)
+    }
+
+    /// The share of what element `e` receives that leaves again, from it or from those behind it.
+    pub fn albedo(&self, e: usize) -> Rgb {
+        self.reflectance[e] + self.transmission.passed(e)
+    }
+
+    /// The elements behind element `e`, if it is translucent.
+    pub fn behind(&self, e: usize) -> &[Passage] {
+        self.transmission.behind(e)
     }
 
     /// What is unshot or overshot in `elements`, as a share of the emitted: the worst channel.
@@ -120,8 +147,8 @@ impl ReceivedLight {
 /// What became of flux that was sent, W per channel.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Transfer {
-    /// By the fronts of elements.
-    pub reflected: Rgb,
+    /// By the fronts of elements, or let through by these.
+    pub scattered: Rgb,
     /// By the fronts of elements.
     pub absorbed: Rgb,
     /// Met no surface.
@@ -133,7 +160,7 @@ pub(super) struct Transfer {
 impl Transfer {
     /// Adds `scale` times `other`.
     pub fn add(&mut self, scale: Rgb, other: Transfer) {
-        self.reflected += scale * other.reflected;
+        self.scattered += scale * other.scattered;
         self.absorbed += scale * other.absorbed;
         self.escaped += scale * other.escaped;
         self.backface += scale * other.backface;
@@ -141,26 +168,26 @@ impl Transfer {
 }
 
 /// Sends `flux` along `row`; `receive` is called with each element and the flux that it receives,
-/// of which it reflects the share `reflectance` gives.
+/// of which the share `albedo` leaves again.
 pub(super) fn send(
     flux: Rgb,
     row: &Row,
-    reflectance: impl Fn(usize) -> Rgb,
+    albedo: impl Fn(usize) -> Rgb,
     mut receive: impl FnMut(usize, Rgb),
 ) -> Transfer {
     let per_share = flux / f64::from(Row::TOTAL);
     let mut absorbed = Rgb::ZERO;
-    let mut reflected = Rgb::ZERO;
+    let mut scattered = Rgb::ZERO;
     for entry in &row.entries {
         let e = entry.element as usize;
         let incident = per_share * f64::from(entry.share);
-        let passed = incident * reflectance(e);
+        let scattered_here = incident * albedo(e);
         receive(e, incident);
-        reflected += passed;
-        absorbed += incident - passed;
+        scattered += scattered_here;
+        absorbed += incident - scattered_here;
     }
     Transfer {
-        reflected,
+        scattered,
         absorbed,
         escaped: per_share * f64::from(row.escaped),
         backface: per_share * f64::from(row.backface),
@@ -194,18 +221,18 @@ impl<'m> FluxState<'m> {
 
     /// Sends `flux`, which is no longer unshot anywhere, along `row`.
     pub fn distribute(&mut self, flux: Rgb, row: &Row) {
-        let Flux { reflectance, incident, unshot, .. } = &mut self.flux;
-        let transfer = send(
-            flux,
-            row,
-            |e| reflectance[e],
-            |e, received| {
-                incident[e] += received;
-                unshot[e] += reflectance[e] * received;
-            },
-        );
+        let Flux { transmission, reflectance, incident, unshot, .. } = &mut self.flux;
+        let receive = |e: usize, received: Rgb| {
+            incident[e] += received;
+            unshot[e] += reflectance[e] * received;
+            for passage in transmission.behind(e) {
+                unshot[passage.behind as usize] += passage.passed * received;
+            }
+        };
+        let albedo = |e: usize| reflectance[e] + transmission.passed(e);
+        let transfer = send(flux, row, albedo, receive);
         self.record_losses(transfer);
-        self.ledger.unshot += transfer.reflected - flux;
+        self.ledger.unshot += transfer.scattered - flux;
     }
 
     /// Enters what is lost of flux that was sent into the ledger.
@@ -256,11 +283,11 @@ mod tests {
         let irradiance = vec![Rgb::new(1.0, 2.0, 3.0); mesh.element_count()];
         let received = ReceivedLight { irradiance, materials: vec![light as u32] };
         let state = FluxState::new(&mesh, &received).unwrap();
-        let area = mesh.reflecting_area();
+        let area = mesh.scattering_area();
         let close = |a: Rgb, b: Rgb| (a - b).abs().max_element() < 1e-9 * b.max_element();
         // All that the lamp sends to surfaces that reflect, of which the rest is unshot.
         assert!(close(state.ledger.emitted, area * Rgb::new(1.0, 2.0, 3.0)), "{:?}", state.ledger);
-        let reflected = mesh.mean_reflectance() * area * Rgb::new(1.0, 2.0, 3.0);
+        let reflected = mesh.mean_albedo() * area * Rgb::new(1.0, 2.0, 3.0);
         assert!(close(state.ledger.unshot, reflected), "{:?} {reflected}", state.ledger);
         assert!(state.ledger.imbalance() < 1e-12);
         // What leaves is all of it, emission included.

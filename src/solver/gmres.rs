@@ -19,7 +19,7 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::flux_state::{FluxState, Transfer, send};
+use super::flux_state::{Flux, FluxState, Transfer, send};
 use super::ledger::largest_share;
 use super::row_cache::RowCache;
 use super::step::StepContext;
@@ -82,7 +82,7 @@ impl Gmres {
                 return Ok(Some(StopReason::Cancelled));
             };
             if is_complete && let Some(product) = self.product.take() {
-                cycle.extend(product, &step.state.flux.reflectance);
+                cycle.extend(product, &step.state.flux);
                 step.counters.steps += 1;
             }
             return Ok(None);
@@ -190,11 +190,11 @@ impl Cycle {
         let unshot_share = self.unshot_bound(step.state);
         for (e, row) in rows {
             let Product { incident, transfer, element } = &mut *product;
-            let reflectance = &step.state.flux.reflectance;
+            let flux = &step.state.flux;
             let sent = send(
                 vector[e],
                 &row,
-                |receiver| reflectance[receiver],
+                |receiver| flux.albedo(receiver),
                 |receiver, received| incident[receiver] += received,
             );
             transfer.add(Rgb::ONE, sent);
@@ -209,11 +209,11 @@ impl Cycle {
 
     /// Takes in the product with the newest basis vector, and adds to the basis the direction that
     /// is new in it.
-    fn extend(&mut self, product: Product, reflectance: &[Rgb]) {
+    fn extend(&mut self, product: Product, flux: &Flux) {
         let Product { incident, transfer, .. } = product;
         let k = self.products();
-        let reflected = incident.iter().zip(reflectance).map(|(&h, &rho)| rho * h);
-        let mut new: Vec<Rgb> = self.basis[k].iter().zip(reflected).map(|(&v, m)| v - m).collect();
+        let scattered = (0..incident.len()).map(|e| flux.scattered(e, &incident));
+        let mut new: Vec<Rgb> = self.basis[k].iter().zip(scattered).map(|(&v, m)| v - m).collect();
         // Modified Gram–Schmidt, enough for GMRES (Paige, Rozložník and Strakoš 2006).
         let mut column = vec![];
         for v in &self.basis {

@@ -219,10 +219,11 @@ impl<'m> FluxState<'m> {
         for scaled in [&mut ledger.absorbed, &mut ledger.escaped, &mut ledger.backface_loss] {
             *scaled *= kept;
         }
+        flux.incident.iter_mut().for_each(|incident| *incident *= kept);
         for e in 0..new.emitted.len() {
-            flux.incident[e] *= kept;
             flux.unshot[e] = flux.unshot[e] * kept + (new.emitted[e] - flux.emitted[e] * kept);
-            let brighter = (new.reflectance[e] - flux.reflectance[e]) * flux.incident[e];
+            let brighter = (new.reflectance[e] - flux.reflectance[e]) * flux.incident[e]
+                + (new.transmitted(e, &flux.incident) - flux.transmitted(e, &flux.incident));
             flux.unshot[e] += brighter;
             ledger.absorbed -= brighter;
         }

@@ -48,20 +48,20 @@ impl Ledger {
     /// fell evenly on all surfaces that reflect, again and again: the ambient term of Cohen, Chen,
     /// Wallace and Greenberg (1988). For early pictures, or to correct for what was not shot; it
     /// knows nothing of where that would have gone. Returns the ambient radiosity, W/m² per unit of
-    /// reflectance.
+    /// albedo.
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
         let ambient = self.ambient(mesh);
         for (e, b) in radiosity.iter_mut().enumerate() {
-            *b += mesh.reflectance(e) * ambient;
+            *b += mesh.albedo(e) * ambient;
         }
         ambient
     }
 
-    /// Radiosity, W/m² per unit of reflectance, that the unshot light would bring if it fell
+    /// Radiosity, W/m² per unit of albedo, that the unshot light would bring if it fell
     /// evenly.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
-        let absorptance = (Rgb::ONE - mesh.mean_reflectance()).max(Rgb::splat(f64::EPSILON));
-        let area = mesh.reflecting_area().max(f64::MIN_POSITIVE);
+        let absorptance = (Rgb::ONE - mesh.mean_albedo()).max(Rgb::splat(f64::EPSILON));
+        let area = mesh.scattering_area().max(f64::MIN_POSITIVE);
         (self.unshot - self.overshot) / area / absorptance
     }
 

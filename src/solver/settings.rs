@@ -83,7 +83,7 @@ impl Solver {
     /// 3. else shooting.
     pub fn for_mesh(mesh: &Mesh) -> Solver {
         let [shooting, _, _, _, gmres, direct] = Method::ALL.map(Solver::new);
-        let reflectance = mesh.mean_reflectance().max_element();
+        let reflectance = mesh.mean_albedo().max_element();
         let count = mesh.element_count();
         let all_fit = count.saturating_mul(count).saturating_mul(8) <= gmres.row_memory;
         let bright = if all_fit {

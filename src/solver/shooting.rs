@@ -156,7 +156,7 @@ struct TakenFlux {
 
 impl FluxState<'_> {
     /// Takes the unshot flux of `elements`, and beyond it what `ambient_overshoot` (W/m² per unit
-    /// of reflectance) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
+    /// of albedo) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
     fn take(&mut self, elements: &[Range<usize>], ambient_overshoot: Rgb) -> TakenFlux {
         let mut flux = Rgb::ZERO;
         let mut overshot = Rgb::ZERO;
@@ -167,7 +167,7 @@ impl FluxState<'_> {
             if ambient_overshoot != Rgb::ZERO {
                 let area = self.mesh.area(self.mesh.element(e));
                 let limit = MAX_OVERSHOOT * unshot.max(Rgb::ZERO);
-                let over = (self.flux.reflectance[e] * area * ambient_overshoot).min(limit);
+                let over = (self.flux.albedo(e) * area * ambient_overshoot).min(limit);
                 self.flux.unshot[e] -= over;
                 flux += over;
                 overshot += over;

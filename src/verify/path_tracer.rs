@@ -24,7 +24,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::emitters::{Emitters, Weights};
 use crate::progress::BatchSizer;
-use crate::scene::{Rgb, Scene, Sun};
+use crate::scene::{Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -154,7 +154,8 @@ impl<'a> PathTracer<'a> {
     /// Reflected radiosity at `point` as one path finds it, W/m².
     fn path(&self, point: &SurfacePoint, rng: &mut Rng) -> Rgb {
         let mut at = *point;
-        let mut throughput = self.scene.material(at.triangle).reflectance;
+        let Material { reflectance, transmittance, .. } = *self.scene.material(at.triangle);
+        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
         let mut reflected = Rgb::ZERO;
         loop {
             let weights = self.emitters.weights(at.position);
@@ -177,16 +178,40 @@ impl<'a> PathTracer<'a> {
                 let balance = cosine / PI / (cosine / PI + light);
                 reflected += throughput * exitance * balance;
             }
-            let survival = reflectance.max_element().min(MAX_SURVIVAL);
+            let albedo = self.scene.albedo_around(hit.triangle, [hit.u, hit.v], 0.0);
+            let survival = albedo.max_element().min(MAX_SURVIVAL);
             if rng.f64() >= survival {
                 return reflected;
             }
-            throughput *= reflectance / survival;
             at = SurfacePoint {
                 triangle: hit.triangle,
                 position: at.position + hit.distance * direction,
             };
+            throughput *=
+                self.scatter(&mut at, [reflectance, albedo - reflectance], rng) / survival;
         }
+    }
+
+    /// Chooses the side that a path goes on from: that of `at`, or the one behind it, to which it
+    /// is moved. What of the light on that side leaves, over the probability of the choice.
+    fn scatter(
+        &self,
+        at: &mut SurfacePoint,
+        [reflectance, transmittance]: [Rgb; 2],
+        rng: &mut Rng,
+    ) -> Rgb {
+        let through = transmittance.element_sum();
+        if through == 0.0 {
+            return reflectance;
+        }
+        let through = through / (through + reflectance.element_sum());
+        if rng.f64() >= through {
+            return reflectance / (1.0 - through);
+        }
+        // Without one nothing leaves.
+        let Some(behind) = self.scene.other_side(at.triangle).next() else { return Rgb::ZERO };
+        at.triangle = behind;
+        transmittance / through
     }
 
     /// Irradiance at `at` from one point of an emitter, W/m², with the share that the balance
@@ -253,7 +278,8 @@ pub(super) fn nearest_surface(
     let reach = LOOKUP_REACH * diagonal;
     let nearest: Cell<Option<Hit>> = Cell::new(None);
     let key = |hit: Hit| ((hit.distance - reach).abs(), hit.triangle);
-    rays.occluded(position - reach * normal, normal, 0.0..2.0 * reach, |hit| {
+    // From before it: what lies in one place with another, back to back, is met on its front only.
+    rays.occluded(position + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
         let alike = normals[hit.triangle].dot(normal) > ALIKE;
         if alike && nearest.get().is_none_or(|best| key(*hit) < key(best)) {
             nearest.set(Some(*hit));

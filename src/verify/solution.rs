@@ -141,15 +141,15 @@ impl<'a> SolutionLookup<'a> {
     /// What the solution emits at places of triangle `t` of `scene`, W/m², and how exactly that is
     /// known.
     fn emitted(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, f64)> {
-        let (corners, normal, reflectance) =
-            (scene.corners(t), scene.normal(t), scene.material(t).reflectance);
+        let (corners, normal, albedo) =
+            (scene.corners(t), scene.normal(t), scene.material(t).albedo());
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
             let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
             let radiosity = self.interpolated(&hit, &self.solution.radiosity);
             let irradiance = self.interpolated(&hit, &self.solution.irradiance);
-            let reflected = reflectance * irradiance;
+            let reflected = albedo * irradiance;
             let noise = EMISSION_NOISE * radiosity.max_element().max(reflected.max_element());
             Some((radiosity - reflected, noise))
         })
@@ -168,7 +168,7 @@ impl<'a> SolutionLookup<'a> {
         let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
         let material = scene.material(point.triangle);
         Some(match scene.textures(point.triangle) {
-            Some(_) => material.reflectance * self.interpolated(&hit, &self.solution.irradiance),
+            Some(_) => material.albedo() * self.interpolated(&hit, &self.solution.irradiance),
             None => self.interpolated(&hit, &self.solution.radiosity) - material.exitance,
         })
     }

@@ -22,7 +22,7 @@ impl ReflectingGroup {
     pub fn all(scene: &Scene) -> Result<Vec<ReflectingGroup>, Error> {
         let mut areas: Vec<Vec<(usize, f64)>> = vec![vec![]; scene.groups().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
-            if scene.material(t).reflects() {
+            if scene.material(t).scatters() {
                 let list = &mut areas[triangle.group as usize];
                 let before = list.last().map_or(0.0, |&(_, sum)| sum);
                 list.push((t, before + scene.area(t)));

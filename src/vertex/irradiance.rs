@@ -14,8 +14,8 @@ pub(super) fn untextured(mesh: &Mesh, radiosity: &[Rgb]) -> Option<Vec<Rgb>> {
     mesh.scene().has_textures().then(|| (0..radiosity.len()).map(element).collect())
 }
 
-/// Irradiance that is `reflected` by a surface of this `reflectance`, W/m²: 0, for unknown, where
-/// that is 0.
-pub(crate) fn irradiance(reflected: Rgb, reflectance: Rgb) -> Rgb {
-    Rgb::select(reflectance.cmpgt(Rgb::ZERO), reflected / reflectance, Rgb::ZERO)
+/// Irradiance of which `reflected` leaves a surface of this `albedo` again, W/m²: 0, for unknown,
+/// where that is 0.
+pub(crate) fn irradiance(reflected: Rgb, albedo: Rgb) -> Rgb {
+    Rgb::select(albedo.cmpgt(Rgb::ZERO), reflected / albedo, Rgb::ZERO)
 }

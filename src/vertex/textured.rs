@@ -23,9 +23,9 @@ impl VertexMesh {
     pub(crate) fn reflect(&mut self, mesh: &Mesh, outlines: &ElementLoops, reflected: &[Rgb]) {
         self.irradiance = vec![Rgb::ZERO; reflected.len()];
         for (e, outline) in outlines.iter() {
-            let reflectance = mesh.material(mesh.element(e)).reflectance;
+            let albedo = mesh.material(mesh.element(e)).albedo();
             for v in outline.iter().map(|&v| v as usize) {
-                self.irradiance[v] = irradiance(reflected[v], reflectance);
+                self.irradiance[v] = irradiance(reflected[v], albedo);
             }
         }
         if !mesh.scene().has_textures() {

@@ -57,7 +57,7 @@ const OPEN_SHARE: f64 = 1e-6;
 impl Scene {
     /// The same scene with [`Sides`] carried out: triangles of [`Sides::Auto`] turned so that light
     /// reaches their fronts, and a second triangle, with the corners the other way round, wherever
-    /// both sides reflect. All materials have one side then. Triangles come in their order, second
+    /// both sides reflect, or let light through. All materials have one side then. Triangles come in their order, second
     /// ones after all others; lamps that reflect on both sides add a material that does not emit.
     ///
     /// Which sides light reaches is found by walks from places on each, the same for the same
@@ -68,7 +68,7 @@ impl Scene {
     /// dropped, turned and doubled.
     #[must_use]
     pub fn resolve_sides(&self) -> Scene {
-        if self.materials().iter().all(|material| material.sides == Sides::Front) {
+        if is_resolved(self) {
             return self.clone();
         }
         let repeated = repeated_triangles(self);
@@ -103,8 +103,14 @@ impl Scene {
 
 /// [`Scene::resolve_sides`], where there is anything to do.
 pub(crate) fn resolved(scene: Arc<Scene>) -> Arc<Scene> {
-    let is_resolved = scene.materials().iter().all(|material| material.sides == Sides::Front);
-    if is_resolved { scene } else { Arc::new(scene.resolve_sides()) }
+    if is_resolved(&scene) { scene } else { Arc::new(scene.resolve_sides()) }
+}
+
+/// Whether all materials have one side, and translucent triangles another behind them.
+fn is_resolved(scene: &Scene) -> bool {
+    let is_missing = |t: usize| scene.material(t).is_translucent() && !scene.is_back_covered(t);
+    scene.materials().iter().all(|material| material.sides == Sides::Front)
+        && !(0..scene.triangles().len()).any(is_missing)
 }
 
 /// What becomes of each triangle of `scene`, whose materials have these `sides`.
@@ -121,10 +127,11 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     let is_room = closed_rooms(scene);
     let treatment = |t: usize| {
         let is_glass = scene.material(t).specular.is_some_and(|specular| specular.is_glass());
-        if is_glass && !scene.material(t).reflects() {
+        if is_glass && !scene.material(t).scatters() {
             // Both of its sides count anyway, and it encloses a body as it is.
             return Treatment::default();
         }
+        let is_translucent = scene.material(t).is_translucent();
         let [is_front_lit, is_back_lit] = [2 * t, 2 * t + 1].map(|side| lit.is_lit[side]);
         let turned = match (walks.sides_of(t), walks.shines_from_back(t)) {
             (Sides::Auto, Some(shines_from_back)) => shines_from_back,
@@ -134,12 +141,13 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
         let (is_other_lit, other) =
             if turned { (is_front_lit, 2 * t) } else { (is_back_lit, 2 * t + 1) };
         let doubled = match walks.sides_of(t) {
+            _ if is_translucent => !scene.is_back_covered(t),
             Sides::Front => false,
             Sides::Both => true,
             Sides::Auto => is_other_lit && lit.is_bright(other) && !is_room[t],
         };
         let is_dark = walks.sides_of(t) == Sides::Auto && !is_front_lit && !is_back_lit;
-        let reflects = scene.material(t).reflects() || scene.material(t).specular.is_some();
+        let reflects = scene.material(t).scatters() || scene.material(t).specular.is_some();
         Treatment {
             dropped: is_dark && !is_glass && walks.has_light() && is_in_the_way(scene, &walks, t),
             turned,
@@ -166,7 +174,7 @@ impl<'a> LitSides<'a> {
             let (own, share) = (light.of(side), light.of_sheet(side).share());
             let objects = own.hits == 0.0 && (1.0 - share).powf(own.places) < OBJECTION;
             is_lit[side] = share >= LIT_SHARE && !objects;
-            if is_lit[side] && scene.material(side / 2).reflects() {
+            if is_lit[side] && scene.material(side / 2).scatters() {
                 flux += own.mean() * scene.area(side / 2);
                 lit_area += scene.area(side / 2);
             }

@@ -5,3 +5,4 @@ mod sky;
 mod sky_models;
 mod surroundings;
 mod target;
+mod translucent;

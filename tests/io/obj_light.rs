@@ -1,11 +1,13 @@
-//! Which materials emit: `Ke`, `Ka` above 1, and what the caller says.
+//! Which materials emit: `Ke`, `Ka` above 1, and what the caller says; and what he says lets light
+//! through.
 
 use std::f64::consts::PI;
 
 use radiosity::scene::WarningKind;
-use radiosity::{Error, ErrorKind, ObjSettings, Rgb, Scene};
+use radiosity::{Error, ErrorKind, Material, ObjSettings, Rgb, Scene};
 
 use super::obj_texts::{SQUARE, refused, warned};
+use crate::common::textured::tga;
 
 /// A wall and a lamp, with this library.
 fn room(library: &str, settings: &ObjSettings) -> Result<Scene, Error> {
@@ -105,4 +107,61 @@ fn without_light_names_candidates() {
         let warning = scene.warnings().iter().find(|w| w.kind == WarningKind::NoLight).unwrap();
         assert_eq!(warning.names.len(), usize::from(is_light), "{name}");
     }
+}
+
+fn transmitting(transmit: &[(&str, [f64; 3])]) -> ObjSettings {
+    let mut settings = ObjSettings::default();
+    settings.transmit = transmit.iter().map(|&(name, tau)| (name.into(), tau.into())).collect();
+    settings
+}
+
+#[test]
+fn caller_says_what_lets_light_through() {
+    let library = "newmtl wall\nKd 0.5 0.6 0.2\nnewmtl Ceiling Lamp\nKd 0.5\nKe 7 7 7\n";
+    let scene = room(library, &transmitting(&[("wall", [0.2, 0.6, 0.3])])).unwrap();
+    // What it reflects, it lets through instead, as far as that goes.
+    assert_eq!(scene.material(0).transmittance, Rgb::new(0.2, 0.6, 0.3));
+    assert!(scene.material(0).reflectance.abs_diff_eq(Rgb::new(0.3, 0.0, 0.0), 1e-15));
+    assert_eq!(scene.material(1).transmittance, Rgb::ZERO);
+    // The last one counts.
+    let twice = transmitting(&[("wall", [0.4; 3]), ("wall", [0.0, 0.1, 0.0])]);
+    let scene = room(library, &twice).unwrap();
+    assert_eq!(scene.material(0).transmittance, Rgb::new(0.0, 0.1, 0.0));
+    assert!(scene.material(0).reflectance.abs_diff_eq(Rgb::new(0.5, 0.5, 0.4), 1e-15));
+    // No more than may be reflected.
+    let scene = room(library, &transmitting(&[("wall", [0.999; 3])])).unwrap();
+    assert_eq!(scene.material(0).transmittance, Rgb::splat(0.98));
+    let refusal = room(library, &transmitting(&[("walls", [0.1; 3])]));
+    refused(refusal, ErrorKind::Scene, "room.obj", &["'walls'", "light through", "'Ceiling Lamp'"]);
+    for bad in [-0.1, 1.0, f64::NAN] {
+        let refusal = room(library, &transmitting(&[("wall", [0.0, bad, 0.0])]));
+        refused(refusal, ErrorKind::Setting, "transmit 'wall'", &["at least 0 and below 1"]);
+    }
+}
+
+#[test]
+fn what_a_texture_reflects_is_let_through_in_its_colours() {
+    // A quarter of the area is black, the rest (1, 0.5, 0) by `Kd`.
+    let image = tga(2, &[[0; 3], [255; 3], [255; 3], [255; 3]]);
+    let text = format!("mtllib a.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl leaf\n")
+        + "f 1/1 2/2 3/3 4/4\n";
+    let library: &[u8] = b"newmtl leaf\nKd 0.8 0.4 0.1\nmap_Kd a.tga\n";
+    let read = |tau: [f64; 3]| {
+        let files: [(&str, &[u8]); 2] = [("a.mtl", library), ("a.tga", &image)];
+        transmitting(&[("leaf", tau)]).read("leaf.obj", text.as_bytes(), &files).unwrap()
+    };
+    let scene = read([0.3, 0.15, 0.0]);
+    let Material { reflectance, transmittance, .. } = scene.material(0);
+    let (white, black) = ([0.5, 0.25], [0.25, 0.5]);
+    // Both together are what the texture reflects without it, everywhere.
+    assert!((*reflectance + *transmittance).abs_diff_eq(Rgb::new(0.6, 0.3, 0.075), 1e-9));
+    assert!(transmittance.abs_diff_eq(Rgb::new(0.3, 0.15, 0.0), 1e-9), "{transmittance}");
+    assert!(scene.reflectance_at(0, white).abs_diff_eq(Rgb::new(0.4, 0.2, 0.1), 1e-9));
+    assert_eq!(scene.reflectance_at(1, black), Rgb::ZERO);
+    // More than it reflects takes the place of `Kd`, and of that nearly all may go through.
+    let scene = read([0.9; 3]);
+    let Material { reflectance, transmittance, .. } = scene.material(0);
+    let all = Rgb::splat(0.75 * 0.9);
+    assert!(transmittance.abs_diff_eq(0.99 * all, 1e-9), "{transmittance}");
+    assert!(reflectance.abs_diff_eq(0.01 * all, 1e-9), "{reflectance}");
 }

@@ -4,3 +4,4 @@ mod methods;
 mod odd_geometry;
 mod patch_cut;
 pub mod shooting;
+mod translucent;

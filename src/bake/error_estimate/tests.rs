@@ -10,7 +10,7 @@ const STRATUM: Stratum = Stratum { group: Some(0), area: 3.0, ambient: 0.0 };
 const CONDITIONS: Conditions = Conditions {
     strata: &[STRATUM],
     radiosity_floor: 0.05,
-    mean_reflectance: 0.5,
+    mean_albedo: 0.5,
     gather_passes: Some(1),
     unshot_bound: 0.0,
 };

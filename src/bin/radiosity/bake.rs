@@ -71,6 +71,8 @@ Files and devices:
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
+  --transmit MATERIAL=r,g,b  this material is translucent: of the light on either side, this share
+                    leaves diffusely from the other, instead of being reflected; may be repeated
   --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits]
   --sky WHICH       a sky above the horizon: overcast; cie1 to cie15, those of the CIE; or
                     perez:CLEARNESS,BRIGHTNESS; or a picture around the scene, FILE.exr or .hdr

@@ -24,7 +24,8 @@ impl SceneOptions {
             "max-reflectance" => {
                 self.obj.max_reflectance = value(parser, "max-reflectance", "a number below 1")?;
             }
-            "emit" => self.obj.emit.push(emission(parser)?),
+            "emit" => self.obj.emit.push(of_material(parser, "emit")?),
+            "transmit" => self.obj.transmit.push(of_material(parser, "transmit")?),
             "sides" => self.obj.sides = sides(parser)?,
             "specular" => self.obj.specular = specular(parser)?,
             _ => return self.sky.option(name, parser),
@@ -44,11 +45,11 @@ impl SceneOptions {
 }
 
 /// `MATERIAL=r,g,b`, or one number for all three.
-fn emission(parser: &mut lexopt::Parser) -> Result<(String, Rgb), Stop> {
+fn of_material(parser: &mut lexopt::Parser, option: &str) -> Result<(String, Rgb), Stop> {
     let text = parser.value()?.string()?;
-    let wrong = || wrong_value("emit", &text, "MATERIAL=r,g,b");
-    let (name, radiance) = text.rsplit_once('=').ok_or_else(wrong)?;
-    Ok((name.into(), rgb(radiance).ok_or_else(wrong)?))
+    let wrong = || wrong_value(option, &text, "MATERIAL=r,g,b");
+    let (name, colour) = text.rsplit_once('=').ok_or_else(wrong)?;
+    Ok((name.into(), rgb(colour).ok_or_else(wrong)?))
 }
 
 /// What surfaces do on their two sides, by its name.

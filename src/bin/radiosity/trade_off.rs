@@ -51,6 +51,8 @@ given.
   --strict        refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
+  --transmit MATERIAL=r,g,b  this material is translucent: this share of the light on either side
+                    leaves diffusely from the other; may be repeated
   --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits];
                     for other skies and a sun see `radiosity bake --help`
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they

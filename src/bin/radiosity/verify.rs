@@ -40,6 +40,7 @@ last line compares the two. After Ctrl-C what was measured so far is printed.
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
+  --transmit MATERIAL=r,g,b  this material lets this share through (as the bake had)
   --sky r,g,b       radiance of a uniform sky, or none; another sky and a sun are given by the
                     options that the bake had, those of `radiosity bake --help`
   --sides WHICH     auto, front or both (as the bake had) [auto]

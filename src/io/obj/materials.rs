@@ -13,6 +13,10 @@ use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::texture::{MaterialTextures, TextureMap};
 use crate::scene::{Material, Rgb, Specular, WarningKind};
 
+/// Of what a texture would reflect, the largest part that its material lets through instead: the
+/// rest tells where.
+const MAX_TRANSMITTED: f64 = 0.99;
+
 impl ObjFile<'_> {
     /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
     /// if no used one has any that can be read.
@@ -53,7 +57,7 @@ impl ObjFile<'_> {
                 let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
                     None if k == 0 => Rgb::splat(most),
                     None => Rgb::ONE,
-                    Some(_) if k == 0 => material.reflectance,
+                    Some(_) if k == 0 => material.albedo(),
                     Some(radiance) => radiance,
                 };
                 let TextureStatement { scale, offset, clamped, .. } = statement;
@@ -61,6 +65,15 @@ impl ObjFile<'_> {
                     0 => (factor, most),
                     _ => (PI * factor.max(Rgb::ZERO), f64::MAX),
                 };
+                let mut factor = factor;
+                if k == 0 && material.is_translucent() {
+                    // A part of what the texture would reflect.
+                    let all = factor * texture.whole_mean();
+                    let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
+                    let share = share.min(Rgb::splat(MAX_TRANSMITTED));
+                    material.transmittance = share * all;
+                    factor *= Rgb::ONE - share;
+                }
                 let mean = factor * texture.whole_mean();
                 let map = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
                 if k == 0 {
@@ -106,19 +119,40 @@ impl ObjFile<'_> {
         }
         materials.iter_mut().for_each(|material| material.sides = settings.sides);
         for (name, radiance) in &settings.emit {
-            let mut found = false;
-            for material in materials.iter_mut().filter(|m| m.name == *name) {
-                (material.exitance, found) = (PI * *radiance, true);
-            }
-            if !found {
-                let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-                let place = self.path.display().to_string();
-                let found = format!("no material {} that could emit", quoted(&[name]));
-                let remedy = format!("its materials are {}", quoted(&names));
-                return Err(Error::new(ErrorKind::Scene, place, found, remedy));
-            }
+            self.named(&mut materials, name, "that could emit", |material| {
+                material.exitance = PI * *radiance;
+            })?;
+        }
+        for (name, transmittance) in &settings.transmit {
+            self.named(&mut materials, name, "that could let light through", |material| {
+                let all = material.albedo();
+                material.transmittance = transmittance.min(Rgb::splat(settings.max_reflectance));
+                material.reflectance = (all - material.transmittance).max(Rgb::ZERO);
+            })?;
         }
         Ok(materials)
+    }
+
+    /// Does something to the material of this `name`.
+    fn named(
+        &self,
+        materials: &mut [Material],
+        name: &str,
+        what: &str,
+        change: impl Fn(&mut Material),
+    ) -> Result<(), Error> {
+        let mut found = false;
+        for material in materials.iter_mut().filter(|m| m.name == *name) {
+            change(material);
+            found = true;
+        }
+        if found {
+            return Ok(());
+        }
+        let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+        let found = format!("no material {} {what}", quoted(&[name]));
+        let remedy = format!("its materials are {}", quoted(&names));
+        Err(Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy))
     }
 }
 

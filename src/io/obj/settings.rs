@@ -29,6 +29,11 @@ pub struct ObjSettings {
     pub max_reflectance: f64,
     /// Materials by name, and the radiance that they emit per channel, whatever the file says.
     pub emit: Vec<(String, Rgb)>,
+    /// Materials by name that let light through diffusely, and the share of the light that arrives
+    /// on either side which leaves from the other, per channel: their transmittance. It is taken
+    /// from what they reflect, with texture and all, as far as that goes; a texture keeps at least a
+    /// hundredth, which tells where light goes through.
+    pub transmit: Vec<(String, Rgb)>,
     /// The light from outside ([`Scene::with_sky`]). `None`: a uniform sky of radiance
     /// 1 W/(m² sr) if nothing in the scene emits, else a black one.
     pub sky: Option<Sky>,
@@ -46,9 +51,10 @@ impl ObjSettings {
     /// Loads a Wavefront OBJ file and the MTL files that it names: see [`crate::load_obj`].
     ///
     /// # Errors
-    /// Those of [`crate::load_obj`]; [`ErrorKind::Setting`] for a ceiling outside [0, 1) or a
-    /// radiance that is negative or not finite; [`ErrorKind::Scene`] for a material to emit that
-    /// the scene does not have, and with [`ObjSettings::strict`] for what would be repaired.
+    /// Those of [`crate::load_obj`]; [`ErrorKind::Setting`] for a ceiling outside [0, 1), a
+    /// radiance that is negative or not finite or a transmittance outside [0, 1);
+    /// [`ErrorKind::Scene`] for a material to emit or to let light through that the scene does not
+    /// have, and with [`ObjSettings::strict`] for what would be repaired.
     pub fn load(&self, path: impl AsRef<Path>) -> Result<Scene, Error> {
         let path = path.as_ref();
         self.check()?;
@@ -91,6 +97,14 @@ impl ObjSettings {
             let remedy = "must be finite and at least 0 in each channel";
             return Err(Error::new(ErrorKind::Setting, place, found, remedy));
         }
+        let in_range = |tau: &Rgb| tau.cmpge(Rgb::ZERO).all() && tau.cmplt(Rgb::ONE).all();
+        if let Some((name, tau)) = self.transmit.iter().find(|(_, tau)| !in_range(tau)) {
+            let place = format!("transmit {}", quoted(&[name]));
+            let [r, g, b] = tau.to_array();
+            let found = format!("transmittance {r:e}, {g:e}, {b:e}");
+            let remedy = "must be at least 0 and below 1 in each channel";
+            return Err(Error::new(ErrorKind::Setting, place, found, remedy));
+        }
         Ok(())
     }
 }
@@ -99,6 +113,7 @@ impl Default for ObjSettings {
     fn default() -> ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
         let (sides, specular) = (Sides::Auto, SpecularSurfaces::Diffuse);
-        ObjSettings { strict: false, max_reflectance, emit: vec![], sky: None, sides, specular }
+        let (emit, transmit) = (vec![], vec![]);
+        ObjSettings { strict: false, max_reflectance, emit, transmit, sky: None, sides, specular }
     }
 }

@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use crate::geometry::weld::Weld;
 use crate::scene::{Scene, Sides};
 
-/// Per triangle, whether it is one of [`Sides::Auto`] with the same three positions, material,
+/// Per triangle, whether it is translucent or one of [`Sides::Auto`], with the same three positions, material,
 /// group and texture coordinates as one before it.
 pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
     let mut weld = Weld::default();
@@ -22,7 +22,9 @@ pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
         };
         let same_texture =
             || scene.corners(t).into_iter().all(|p| same(place(t, p), place(first, p)));
-        scene.material(t).sides == Sides::Auto && first != t && same_texture()
+        let material = scene.material(t);
+        let is_concerned = material.sides == Sides::Auto || material.is_translucent();
+        is_concerned && first != t && same_texture()
     };
     (0..scene.triangles().len()).map(&mut is_repeated).collect()
 }

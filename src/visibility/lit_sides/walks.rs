@@ -123,12 +123,18 @@ impl<'a> Walks<'a> {
             if self.shines_from_back(t) == Some(is_back) {
                 return Some(throughput * self.scene.exitance(t).element_sum());
             }
+            let material = self.scene.material(t);
             let is_dark = is_back && self.sides_of(t) == Sides::Front;
-            let reflectance = self.scene.material(t).reflectance.max_element();
-            if is_dark || reflectance == 0.0 {
+            if is_dark && !material.is_translucent() || !material.scatters() {
                 return None;
             }
-            throughput *= reflectance;
+            throughput *= material.albedo().max_element();
+            if material.is_translucent() {
+                let through = material.transmittance.element_sum();
+                if rng.f64() * material.albedo().element_sum() < through {
+                    side ^= 1;
+                }
+            }
         }
         None
     }

@@ -1,0 +1,73 @@
+//! What arrives on the two sides of a translucent surface, as one irradiance.
+//!
+//! B − E = ρ E_front + τ E_back = (ρ + τ) E, with E the mean of both irradiances by the shares that
+//! leave of each. So whatever follows has one irradiance and one albedo, as on any other surface.
+
+use glam::DVec3;
+
+use super::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+use crate::error::Error;
+use crate::scene::{Material, Rgb};
+use crate::visibility::offset;
+
+/// A gather point, and how much counts what arrives on the other side of its surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TwoSidedPoint {
+    pub point: GatherPoint,
+    /// τ / (ρ + τ) per channel, in [0, 1].
+    behind: Rgb,
+}
+
+impl TwoSidedPoint {
+    /// `point` on a surface of `material`.
+    pub fn new(point: GatherPoint, material: &Material) -> TwoSidedPoint {
+        let albedo = material.albedo();
+        let share = material.transmittance / albedo;
+        TwoSidedPoint { point, behind: Rgb::select(albedo.cmpgt(Rgb::ZERO), share, Rgb::ZERO) }
+    }
+
+    /// `point`, on a surface whose other side does not count.
+    pub fn one_sided(point: GatherPoint) -> TwoSidedPoint {
+        TwoSidedPoint { point, behind: Rgb::ZERO }
+    }
+
+    /// The same a `step` further on.
+    pub fn moved_by(self, step: DVec3) -> TwoSidedPoint {
+        let point = GatherPoint { position: self.point.position + step, ..self.point };
+        TwoSidedPoint { point, ..self }
+    }
+
+    /// The point on the other side of the surface, as far below it as this is above.
+    fn other_side(&self) -> GatherPoint {
+        let GatherPoint { position, normal, near } = self.point;
+        let height = near / offset::NEAR_OF_LIFT;
+        GatherPoint { position: position - 2.0 * height * normal, normal: -normal, near }
+    }
+}
+
+/// What `gatherer` finds at `points`, with the irradiance and direct light of both sides where the
+/// other counts. All else is of the points' own side.
+///
+/// # Errors
+/// Those of [`Gather::gather`].
+pub(crate) fn gather_two_sided(
+    gatherer: &mut dyn Gather,
+    field: &RadiosityField,
+    points: &[TwoSidedPoint],
+) -> Result<Vec<IrradianceSample>, Error> {
+    let fronts: Vec<GatherPoint> = points.iter().map(|p| p.point).collect();
+    let mut samples = gatherer.gather(field, &fronts)?;
+    let is_two_sided = |k: &usize| points[*k].behind != Rgb::ZERO;
+    let two_sided: Vec<usize> = (0..points.len()).filter(is_two_sided).collect();
+    if two_sided.is_empty() {
+        return Ok(samples);
+    }
+    let backs: Vec<GatherPoint> = two_sided.iter().map(|&k| points[k].other_side()).collect();
+    let behind = gatherer.gather(field, &backs)?;
+    for (&k, back) in two_sided.iter().zip(&behind) {
+        let (sample, share) = (&mut samples[k], points[k].behind);
+        sample.irradiance += share * (back.irradiance - sample.irradiance);
+        sample.direct += share * (back.direct - sample.direct);
+    }
+    Ok(samples)
+}
