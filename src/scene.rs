@@ -8,6 +8,7 @@
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
 mod covered_backs;
+mod covers;
 mod cut;
 mod rgb;
 mod scene_textures;
@@ -27,7 +28,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
-use covered_backs::CoveredBacks;
+use covers::Covers;
 pub(crate) use cut::Piece;
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
@@ -97,7 +98,7 @@ pub struct Scene {
     /// Per triangle, the sides across which its surface does not continue; empty for none.
     cut_sides: Vec<[bool; 3]>,
     /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
-    covered_backs: OnceLock<CoveredBacks>,
+    covered_backs: OnceLock<Covers>,
 }
 
 impl Scene {
@@ -295,8 +296,8 @@ impl Scene {
         covers.iter().map(|&s| s as usize).filter(move |&s| is_translucent(s))
     }
 
-    fn covered_backs(&self) -> &CoveredBacks {
-        self.covered_backs.get_or_init(|| CoveredBacks::new(self))
+    fn covered_backs(&self) -> &Covers {
+        self.covered_backs.get_or_init(|| covered_backs::covered_backs(self))
     }
 
     /// The axis-aligned box around all triangles.

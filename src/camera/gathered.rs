@@ -49,8 +49,8 @@ impl Camera {
     /// the radiosity at the vertices shows an edge of a shadow between them. So most pixels gather
     /// once, while edges are as clean as the rays are dense. Surfaces that reflect nothing do not
     /// gather. Mirrors and glass show what is seen in and through them, as in
-    /// [`Camera::interpolated_image`]. `progress` is called with the number of pixels done and of all pixels, several times
-    /// a second. It may stop the work; the result is `None` then.
+    /// [`Camera::interpolated_image`]. `progress` is called with the number of pixels done and of
+    /// all pixels, several times a second. It may stop the work; the result is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`] and of `gatherer`.

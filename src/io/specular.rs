@@ -1,6 +1,7 @@
 //! Which materials of MTL files are mirrors and glass.
 //!
-//! `illum` names a model (Wavefront, "Advanced Visualizer" 3.0, appendix B1, "Illumination models").
+//! `illum` names a model (Wavefront, "Advanced Visualizer" 3.0, appendix B1, "Illumination
+//! models").
 //! Many programs write it without meaning it, and values that belong to it by default:
 //!
 //! | `illum` | counts as | if |
@@ -21,8 +22,8 @@
 //! - Channels of `Ks` and `Tf` count as 0 below 0 and as 1 above 1. `Ns` does not count: what
 //!   is a mirror is a perfect one.
 //!
-//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each channel
-//! both together reflect no more than they get. Without a `Kd` there is none.
+//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each
+//! channel both together reflect no more than they get. Without a `Kd` there is none.
 
 use crate::scene::{Rgb, Specular};
 

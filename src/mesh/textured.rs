@@ -30,8 +30,8 @@ impl Mesh {
         Rgb::select(of_material.cmpgt(Rgb::ZERO), reflectance / of_material, Rgb::ONE)
     }
 
-    /// The share of what element `e` receives that leaves again diffusely, on either side: ρ + τ per
-    /// channel. The transmittance τ of a textured material follows its reflectance.
+    /// The share of what element `e` receives that leaves again diffusely, on either side: ρ + τ
+    /// per channel. The transmittance τ of a textured material follows its reflectance.
     pub(crate) fn albedo(&self, e: usize) -> Rgb {
         self.reflectance(e) + self.transmittance(e)
     }

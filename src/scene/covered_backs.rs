@@ -12,8 +12,9 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 
+use super::covers::Covers;
 use super::{Scene, longest_edge};
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
@@ -31,60 +32,24 @@ const OPEN_SHARE: f64 = 1e-6;
 /// triangle: thousands that meet in a point would each look at all of them. Chosen by hand.
 const MAX_TRIANGLES: usize = 256;
 
-/// The backs that are covered, and by what.
-#[derive(Clone, Debug, Default)]
-pub(super) struct CoveredBacks {
-    /// Per triangle, whether all of its back is covered by the fronts of others that share corners
-    /// with it, or with others that do; empty where none is.
-    is_covered: Vec<bool>,
-    /// Which ones those are, of each that is covered.
-    covers: FxHashMap<u32, Vec<u32>>,
-}
-
-impl CoveredBacks {
-    /// Those of `scene`.
-    pub fn new(scene: &Scene) -> CoveredBacks {
-        let count = scene.triangles().len();
-        let mut weld = Weld::default();
-        let corners: Vec<[u32; 3]> =
-            (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
-        let meeting = Incidence::new(weld.positions.len(), || {
-            corners.iter().map(<[u32; 3]>::as_slice).enumerate()
-        });
-        let surfaces = Surfaces { scene, corners, meeting };
-        let covers: Vec<Option<Vec<u32>>> =
-            (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
-        let is_covered: Vec<bool> = covers.iter().map(Option::is_some).collect();
-        if !is_covered.contains(&true) {
-            return CoveredBacks::default();
-        }
-        let covers = (0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect();
-        CoveredBacks { is_covered, covers }
+/// Which backs of `scene` are covered.
+pub(super) fn covered_backs(scene: &Scene) -> Covers {
+    let count = scene.triangles().len();
+    let mut weld = Weld::default();
+    let corners: Vec<[u32; 3]> =
+        (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
+    let meeting = Incidence::new(weld.positions.len(), || {
+        corners.iter().map(<[u32; 3]>::as_slice).enumerate()
+    });
+    let surfaces = Surfaces { scene, corners, meeting };
+    let covers: Vec<Option<Vec<u32>>> =
+        (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
+    let is_covered: Vec<bool> = covers.iter().map(Option::is_some).collect();
+    if !is_covered.contains(&true) {
+        return Covers::default();
     }
-
-    /// Whether the back of triangle `t` is covered.
-    pub fn is_covered(&self, t: usize) -> bool {
-        self.is_covered.get(t).is_some_and(|&covered| covered)
-    }
-
-    /// Triangles whose fronts cover it.
-    pub fn covers(&self, t: usize) -> &[u32] {
-        self.covers.get(&(t as u32)).map_or(&[], Vec::as_slice)
-    }
-
-    /// The same where triangle t is cut into the pieces from `firsts[t]` to `firsts[t + 1]`. These
-    /// are covered as it is: what covers it may be cut elsewhere.
-    pub fn cut(&self, firsts: &[u32]) -> CoveredBacks {
-        let pieces = |t: u32| firsts[t as usize]..firsts[t as usize + 1];
-        let covered = (0..).zip(&self.is_covered).filter(|(_, is_covered)| **is_covered);
-        let mut is_covered = vec![false; firsts.last().map_or(0, |&count| count as usize)];
-        covered.flat_map(|(t, _)| pieces(t)).for_each(|piece| is_covered[piece as usize] = true);
-        let of_pieces = |(&t, covers): (&u32, &Vec<u32>)| {
-            let covers: Vec<u32> = covers.iter().flat_map(|&s| pieces(s)).collect();
-            pieces(t).map(move |piece| (piece, covers.clone())).collect::<Vec<_>>()
-        };
-        CoveredBacks { is_covered, covers: self.covers.iter().flat_map(of_pieces).collect() }
-    }
+    let covers = (0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect();
+    Covers { is_covered, covers }
 }
 
 /// Triangles by the positions of their corners.

@@ -57,8 +57,9 @@ const OPEN_SHARE: f64 = 1e-6;
 impl Scene {
     /// The same scene with [`Sides`] carried out: triangles of [`Sides::Auto`] turned so that light
     /// reaches their fronts, and a second triangle, with the corners the other way round, wherever
-    /// both sides reflect, or let light through. All materials have one side then. Triangles come in their order, second
-    /// ones after all others; lamps that reflect on both sides add a material that does not emit.
+    /// both sides reflect, or let light through. All materials have one side then. Triangles come
+    /// in their order, second ones after all others; lamps that reflect on both sides add a
+    /// material that does not emit.
     ///
     /// Which sides light reaches is found by walks from places on each, the same for the same
     /// scene: at least four a side, of up to 16 bounces. A triangle that none reaches stays as it

@@ -31,8 +31,8 @@ pub struct ObjSettings {
     pub emit: Vec<(String, Rgb)>,
     /// Materials by name that let light through diffusely, and the share of the light that arrives
     /// on either side which leaves from the other, per channel: their transmittance. It is taken
-    /// from what they reflect, with texture and all, as far as that goes; a texture keeps at least a
-    /// hundredth, which tells where light goes through.
+    /// from what they reflect, with texture and all, as far as that goes; a texture keeps a
+    /// hundredth at least, which tells where light goes through.
     pub transmit: Vec<(String, Rgb)>,
     /// The light from outside ([`Scene::with_sky`]). `None`: a uniform sky of radiance
     /// 1 W/(m² sr) if nothing in the scene emits, else a black one.
