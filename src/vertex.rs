@@ -45,8 +45,9 @@ pub struct VertexMesh {
     pub radiosity: Vec<Rgb>,
     /// Irradiance at the vertices, W/m² per channel, linear: what a program with the textures
     /// multiplies with their reflectance. On a translucent surface it is the mean of the
-    /// irradiances on both sides, by the shares of them that leave: to be multiplied with ρ + τ. A channel in
-    /// which the material is black is not gathered, and 0 here. Empty where it is not known.
+    /// irradiances on both sides, by the shares of them that leave: to be multiplied with ρ + τ.
+    /// A channel in which the material is black is not gathered, and 0 here. Empty where it is not
+    /// known.
     pub irradiance: Vec<Rgb>,
     /// Standard error of the radiosity at each vertex and over the faces around it, W/m²: a length
     /// over the channels. Empty where it was not estimated.

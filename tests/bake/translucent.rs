@@ -82,7 +82,7 @@ fn a_sheet_under_a_sky_glows_on_both_sides() {
         let even = scene.clone().with_sky(zenith).unwrap();
         check(&even, [(RHO + TAU) * PI * zenith; 2], 1e-6);
         // Above only: 7π/9 L_z, of which the lower side sees what comes through. A bake for 2 %
-        // has n ≥ 256 rays, in rings whose middles are off by 1/n of the sky's change, 2/3, or less.
+        // has n ≥ 256 rays, in rings whose middles are off by 1/n of the sky's change or less: 2/3.
         let above = scene.with_sky(overcast.clone()).unwrap();
         check(&above, [RHO, TAU].map(|share| share * 7.0 * PI / 9.0 * zenith), 2.0 / 3.0 / 256.0);
     }

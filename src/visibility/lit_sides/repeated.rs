@@ -6,8 +6,8 @@ use rustc_hash::FxHashMap;
 use crate::geometry::weld::Weld;
 use crate::scene::{Scene, Sides};
 
-/// Per triangle, whether it is translucent or one of [`Sides::Auto`], with the same three positions,
-/// material, group and texture coordinates as one before it.
+/// Per triangle, whether it is translucent or one of [`Sides::Auto`], with the same three
+/// positions, material, group and texture coordinates as one before it.
 pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
     let mut weld = Weld::default();
     let mut known: FxHashMap<([u32; 3], u32, u32), usize> = FxHashMap::default();
