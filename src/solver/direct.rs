@@ -5,8 +5,8 @@
 //! diagonally dominant, since no element sends out more than its light. So elimination needs no
 //! pivoting, and no entry grows to more than twice the largest (Higham 2002, Theorem 9.9). Each
 //! entry is a channel triple: one elimination solves all three. It goes by panels: the rows of a
-//! panel are eliminated one by one, then all rows below in parallel. What the solution sends is then
-//! distributed along the rows, so that its rounding shows in the ledger.
+//! panel are eliminated one by one, then all rows below in parallel. What the solution sends is
+//! then distributed along the rows, so that its rounding shows in the ledger.
 
 use std::sync::Arc;
 
