@@ -33,6 +33,7 @@ impl Scene {
         scene.cut_sides.clear();
         // A piece is covered as its triangle is: what covers it may be cut elsewhere.
         let mut covered = vec![];
+        let mut cut_from = vec![];
         for (t, pieces) in pieces.into_iter().enumerate() {
             for piece in pieces {
                 let first = scene.positions.len() as u32;
@@ -41,6 +42,7 @@ impl Scene {
                 scene.triangles.push(Triangle { corners, ..self.triangles[t] });
                 scene.cut_sides.push(piece.cut);
                 covered.push(self.is_back_covered(t));
+                cut_from.push(t);
                 if let Some([a, b, c]) = self.texture_coordinates(t) {
                     let place = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
                     textures.coordinates.push(piece.weights.map(place));
@@ -50,6 +52,8 @@ impl Scene {
         }
         scene.textures = Arc::new(textures);
         scene.covered_backs = OnceLock::from(covered);
+        let panes = self.clear_panes().map(|panes| panes.of_pieces(cut_from.into_iter()));
+        scene.clear_panes = OnceLock::from(panes);
         scene
     }
 

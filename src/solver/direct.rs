@@ -82,9 +82,11 @@ impl LinearSystem {
         for (i, row) in rows.iter().enumerate() {
             matrix[i * stride + i] = Rgb::ONE;
             matrix[i * stride + count] = flux.unshot[i];
-            for entry in &row.entries {
+            for (k, entry) in row.entries.iter().enumerate() {
                 let j = entry.element as usize;
-                matrix[j * stride + i] -= flux.reflectance[j] * Row::form_factor(entry.share);
+                let factor = Row::form_factor(entry.share);
+                let passed = row.passed.get(k).map_or(Rgb::ONE, |&p| Row::transmittance(p));
+                matrix[j * stride + i] -= flux.reflectance[j] * factor * passed;
             }
         }
         LinearSystem { count, matrix }

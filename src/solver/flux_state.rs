@@ -128,6 +128,8 @@ pub(super) struct Transfer {
     pub escaped: Rgb,
     /// Met the back of a surface and was lost there.
     pub backface: Rgb,
+    /// Lost in clear panes on the way.
+    pub panes: Rgb,
 }
 
 impl Transfer {
@@ -137,6 +139,7 @@ impl Transfer {
         self.absorbed += scale * other.absorbed;
         self.escaped += scale * other.escaped;
         self.backface += scale * other.backface;
+        self.panes += scale * other.panes;
     }
 }
 
@@ -146,25 +149,44 @@ pub(super) fn send(
     flux: Rgb,
     row: &Row,
     reflectance: impl Fn(usize) -> Rgb,
+    receive: impl FnMut(usize, Rgb),
+) -> Transfer {
+    match row.passed.as_slice() {
+        [] => send_through(flux, row, |_| Rgb::ONE, reflectance, receive),
+        passed => send_through(flux, row, |k| Row::transmittance(passed[k]), reflectance, receive),
+    }
+}
+
+/// The same through panes that let the share `transmittance` pass of each entry, by its number;
+/// then of what escapes, and of what meets backs.
+fn send_through(
+    flux: Rgb,
+    row: &Row,
+    transmittance: impl Fn(usize) -> Rgb,
+    reflectance: impl Fn(usize) -> Rgb,
     mut receive: impl FnMut(usize, Rgb),
 ) -> Transfer {
     let per_share = flux / f64::from(Row::TOTAL);
     let mut absorbed = Rgb::ZERO;
     let mut reflected = Rgb::ZERO;
-    for entry in &row.entries {
+    let mut panes = Rgb::ZERO;
+    let mut through = |k: usize, share: u32| {
+        let sent = per_share * f64::from(share);
+        let arrived = sent * transmittance(k);
+        panes += sent - arrived;
+        arrived
+    };
+    for (k, entry) in row.entries.iter().enumerate() {
         let e = entry.element as usize;
-        let incident = per_share * f64::from(entry.share);
+        let incident = through(k, entry.share);
         let passed = incident * reflectance(e);
         receive(e, incident);
         reflected += passed;
         absorbed += incident - passed;
     }
-    Transfer {
-        reflected,
-        absorbed,
-        escaped: per_share * f64::from(row.escaped),
-        backface: per_share * f64::from(row.backface),
-    }
+    let escaped = through(row.entries.len(), row.escaped);
+    let backface = through(row.entries.len() + 1, row.backface);
+    Transfer { reflected, absorbed, escaped, backface, panes }
 }
 
 /// Flux of all elements, and the ledger of it.
@@ -213,6 +235,7 @@ impl<'m> FluxState<'m> {
         self.ledger.absorbed += transfer.absorbed;
         self.ledger.escaped += transfer.escaped;
         self.ledger.backface_loss += transfer.backface;
+        self.ledger.pane_loss += transfer.panes;
     }
 
     /// Sums what is unshot anew, so that rounding does not add up, and verifies that emitted and
