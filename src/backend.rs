@@ -26,6 +26,7 @@ pub use rows::BackendRows;
 use crate::error::Error;
 use crate::gather::Gather;
 use crate::mesh::Mesh;
+use crate::scene::Scene;
 use cpu::{RayGather, RayRows};
 #[cfg(feature = "gpu")]
 use gpu::{Gpu, HemicubeGather, HemicubeRows};
@@ -62,7 +63,8 @@ impl Backend {
     }
 
     /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
-    /// the top face, or from `rotations`·`resolution`² rays.
+    /// the top face, or from `rotations`·`resolution`² rays. Rays on the CPU in a scene with clear
+    /// panes, which hemicubes do not see.
     ///
     /// # Errors
     /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new) and [`RayRows::new`].
@@ -74,11 +76,11 @@ impl Backend {
     ) -> Result<BackendRows, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) => {
+            Backend::Gpu(gpu) if !mesh.scene().has_clear_panes() => {
                 let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?;
                 Ok(hemicubes.with_rotations(rotations).into())
             }
-            Backend::Cpu => {
+            _ => {
                 crate::hemicube::check_resolution(resolution)?;
                 let rays = (resolution * resolution).saturating_mul(rotations.get());
                 Ok(RayRows::new(mesh, rays)?.into())
@@ -96,8 +98,20 @@ impl Backend {
         }
     }
 
+    /// Why rays on the CPU take the place of a device in `scene`, if they do: hemicubes do not see
+    /// clear panes.
+    pub(crate) fn blind_to_panes(&self, scene: &Scene) -> Option<Error> {
+        #[cfg(not(feature = "gpu"))]
+        let _ = scene;
+        match self {
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(_) => gpu::check_no_panes(scene).err(),
+            Backend::Cpu => None,
+        }
+    }
+
     /// A gatherer over the scene of `mesh` with about `rays` samples a point: hemicubes on graphics
-    /// hardware, rays on the CPU otherwise.
+    /// hardware, rays on the CPU otherwise and in scenes with clear panes.
     ///
     /// # Errors
     /// Those of [`HemicubeGather::new`](crate::backend::gpu::HemicubeGather::new) and
@@ -117,7 +131,7 @@ impl Backend {
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if self.gathers_by_hemicubes() => {
+            Backend::Gpu(gpu) if self.gathers_by_hemicubes() && !mesh.scene().has_clear_panes() => {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
                 Ok(Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?))

@@ -11,7 +11,6 @@
 
 mod framing;
 mod gathered;
-mod glass_bodies;
 mod interpolated;
 mod optics;
 mod second_pass;

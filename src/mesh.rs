@@ -255,6 +255,12 @@ impl Mesh {
                 all.update(bytemuck::bytes_of(&pair.map(|v| v.to_array())));
             }
         }
+        if let Some(panes) = self.scene.clear_panes() {
+            for t in 0..self.scene.triangles().len() {
+                let share = panes.transmittance(t).unwrap_or(-Rgb::ONE);
+                all.update(bytemuck::bytes_of(&share.to_array()));
+            }
+        }
         self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
         all.digest()
     }

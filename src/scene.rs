@@ -7,9 +7,11 @@
 //! A scene is immutable: changed materials or moved groups make another scene
 //! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
 
+mod clear_panes;
 mod covered_backs;
 mod covers;
 mod cut;
+mod glass_bodies;
 mod rgb;
 mod scene_textures;
 mod sides;
@@ -28,8 +30,10 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
+pub(crate) use glass_bodies::{GlassBodies, GlassFace, Medium};
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 pub use sides::Sides;
@@ -59,8 +63,8 @@ pub struct Material {
     pub transmittance: Rgb,
     /// Which sides do: fronts, unless set. Backs of others only block light.
     pub sides: Sides,
-    /// What pictures show of it beside that: a mirror or glass. Light is spread as if it were not
-    /// there.
+    /// A mirror or glass, beside that: pictures show it. The light that is spread passes glass that
+    /// reflects nothing diffusely, weakened by its transmittance; else it is as if it were not there.
     pub specular: Option<Specular>,
 }
 
@@ -99,6 +103,8 @@ pub struct Scene {
     cut_sides: Vec<[bool; 3]>,
     /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
     covered_backs: OnceLock<Covers>,
+    /// See [`Scene::clear_panes`]; looked for when they are first asked for.
+    clear_panes: OnceLock<Option<ClearPanes>>,
 }
 
 impl Scene {
@@ -216,6 +222,7 @@ impl Scene {
             textures: Arc::default(),
             cut_sides: vec![],
             covered_backs: OnceLock::new(),
+            clear_panes: OnceLock::new(),
         };
         if !textures.is_empty() {
             scene.lay_textures(texture_coordinates, textures);
@@ -300,6 +307,21 @@ impl Scene {
         self.covered_backs.get_or_init(|| covered_backs::covered_backs(self))
     }
 
+    /// The panes that light passes; none in a scene without.
+    pub(crate) fn clear_panes(&self) -> Option<&ClearPanes> {
+        self.clear_panes.get_or_init(|| ClearPanes::new(self)).as_ref()
+    }
+
+    /// Whether there are panes that light passes.
+    pub(crate) fn has_clear_panes(&self) -> bool {
+        self.clear_panes().is_some()
+    }
+
+    /// Whether light passes triangle `t` straight on: nothing meets it.
+    pub(crate) fn is_clear(&self, t: usize) -> bool {
+        self.clear_panes().is_some_and(|panes| panes.transmittance(t).is_some())
+    }
+
     /// The axis-aligned box around all triangles.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points((0..self.triangles.len()).flat_map(|t| self.corners(t)))
@@ -335,7 +357,13 @@ impl Scene {
             return Err(bad("materials", found, "give one for each that the scene has"));
         }
         materials.iter().try_for_each(Material::check)?;
-        Ok(Scene { materials, ..self.clone() })
+        let mut scene = Scene { materials, ..self.clone() };
+        let mut both = scene.materials.iter().zip(&self.materials);
+        if both.any(|(new, old)| new.clear_transmittance() != old.clear_transmittance()) {
+            // What covers what, too, depends on which are clear.
+            (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
+        }
+        Ok(scene)
     }
 
     /// The same scene with all triangles of `group` transformed by `transform`. Vertices that they

@@ -46,7 +46,8 @@ impl<'a> ResilientBackend<'a> {
         let _ = self.failure.set(error);
     }
 
-    /// A source of rows as `settings` ask for: on the CPU if `mesh` is too large for the device.
+    /// A source of rows as `settings` ask for: on the CPU if `mesh` is too large for the device, or
+    /// has clear panes.
     /// What else keeps the device from starting is an error, since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
@@ -60,6 +61,9 @@ impl<'a> ResilientBackend<'a> {
                 None => rows,
             })
         };
+        if let Some(e) = self.backend.blind_to_panes(mesh.scene()) {
+            self.record(e);
+        }
         let first = match rows(self.backend) {
             Err(e) if e.kind() == ErrorKind::Memory => {
                 self.record(e);

@@ -173,6 +173,10 @@ fn look(
 ) -> Vec<IrradianceSample> {
     let mut materials: Vec<Material> = scene.materials().to_vec();
     for material in &mut materials {
+        if material.clear_transmittance().is_none() {
+            // It blocks light also where it does not emit.
+            material.specular = None;
+        }
         material.exitance = Rgb::ZERO;
     }
     for (light, channel) in lights.iter().zip([Rgb::X, Rgb::Y, Rgb::Z]) {

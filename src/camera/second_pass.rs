@@ -20,12 +20,11 @@
 use glam::DVec3;
 
 use super::Seen;
-use super::glass_bodies::{GlassBodies, GlassFace, Medium};
 use super::optics::{fresnel, pane, refracted, schlick};
 use super::textured::{LitSurface, Sight};
 use crate::mesh::SurfaceTopology;
 use crate::sampling::hash::split_mix64;
-use crate::scene::{Rgb, Specular};
+use crate::scene::{GlassBodies, GlassFace, Medium, Rgb, Specular};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 

@@ -9,9 +9,12 @@
 //! So a row neither loses nor makes light, its sum does not depend on the order, and a solve along
 //! it conserves energy whatever the errors of the single shares are.
 
+use std::collections::BTreeMap;
+
 use crate::error::{Error, ErrorKind};
 use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
+use crate::scene::Rgb;
 
 /// Where light that leaves one patch goes: the row F_i· of the form-factor matrix, sparse.
 ///
@@ -25,6 +28,10 @@ pub struct Row {
     pub escaped: u32,
     /// Share that meets the back of a surface and is lost there.
     pub backface: u32,
+    /// What clear panes on the way let through of each entry, then of `escaped` and of `backface`,
+    /// per channel in units of 1/[`Row::TOTAL`]: the mean over the entry's light. The shares
+    /// themselves are those without panes. Empty where no light goes through a pane.
+    pub passed: Vec<[u32; 3]>,
 }
 
 /// One nonzero of a [`Row`].
@@ -55,9 +62,21 @@ impl Row {
         entries + u64::from(self.escaped) + u64::from(self.backface)
     }
 
+    /// The share per channel, in [0, 1], that `passed` stands for.
+    pub(crate) fn transmittance(passed: [u32; 3]) -> Rgb {
+        Rgb::from_array(passed.map(Row::form_factor))
+    }
+
+    /// What stands for the share `transmittance` per channel, in [0, 1].
+    pub(crate) fn passed(transmittance: Rgb) -> [u32; 3] {
+        // Above 1 by rounding at most, and then it is 1.
+        transmittance.to_array().map(|share| (share * f64::from(Row::TOTAL)).round() as u32)
+    }
+
     /// Bytes that keeping this row takes.
     pub fn bytes(&self) -> usize {
-        size_of::<Row>() + self.entries.len() * size_of::<Entry>()
+        let passed = self.passed.len() * size_of::<[u32; 3]>();
+        size_of::<Row>() + self.entries.len() * size_of::<Entry>() + passed
     }
 
     /// Sets the shares of the entries, then `escaped` and `backface`, to these form factors, which
@@ -77,6 +96,9 @@ impl Row {
         if let Some(share) = largest {
             *share += shares.remainder(Row::TOTAL);
         }
+        let mut shares = self.entries.iter().map(|e| e.share);
+        // The last two are not of entries.
+        self.passed.retain(|_| shares.next() != Some(0));
         self.entries.retain(|e| e.share > 0);
     }
 
@@ -84,6 +106,9 @@ impl Row {
     /// every share of it is off by less than one unit. The mean of no rows is an empty row.
     pub(crate) fn mean(rows: &[&Row]) -> Row {
         let count = rows.len().max(1) as u64;
+        if rows.iter().any(|row| !row.passed.is_empty()) {
+            return Row::mean_through_panes(rows);
+        }
         let mut entries: Vec<Entry> = rows.iter().flat_map(|r| r.entries.iter().copied()).collect();
         // The rows are in order already: a stable sort merges them.
         entries.sort_by_key(|e| e.element);
@@ -100,7 +125,33 @@ impl Row {
         };
         let entries = runs.map(mean).filter(|e| e.share > 0).collect();
         let escaped = mean_of(&mut rows.iter().map(|r| r.escaped));
-        Row { entries, escaped, backface: mean_of(&mut rows.iter().map(|r| r.backface)) }
+        let backface = mean_of(&mut rows.iter().map(|r| r.backface));
+        Row { entries, escaped, backface, passed: vec![] }
+    }
+
+    /// The mean of rows some of which go through panes: what passes is the mean by shares.
+    fn mean_through_panes(rows: &[&Row]) -> Row {
+        // By element; what escapes and what meets backs come last, as in `passed`.
+        let (escaped, backface) = (u64::from(u32::MAX) + 1, u64::from(u32::MAX) + 2);
+        let mut sums: BTreeMap<u64, (f64, Rgb)> = BTreeMap::new();
+        for row in rows {
+            let entries = row.entries.iter().map(|e| (u64::from(e.element), e.share));
+            let all = entries.chain([(escaped, row.escaped), (backface, row.backface)]);
+            for (k, (slot, share)) in all.enumerate() {
+                let passed = row.passed.get(k).map_or(Rgb::ONE, |&p| Row::transmittance(p));
+                let sum = sums.entry(slot).or_default();
+                sum.0 += f64::from(share);
+                sum.1 += f64::from(share) * passed;
+            }
+        }
+        let bare: Vec<Row> = rows.iter().map(|&r| Row { passed: vec![], ..r.clone() }).collect();
+        let mean = Row::mean(&bare.iter().collect::<Vec<_>>());
+        let slots = mean.entries.iter().map(|e| u64::from(e.element)).chain([escaped, backface]);
+        let passed = slots.map(|slot| match sums.get(&slot) {
+            Some(&(share, passed)) if share > 0.0 => Row::passed(passed / share),
+            _ => [Row::TOTAL; 3],
+        });
+        Row { passed: passed.collect(), ..mean }
     }
 
     /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
@@ -118,6 +169,11 @@ impl Row {
         }
         if self.entries.windows(2).any(|w| w[0].element >= w[1].element) {
             return broken("elements out of order".into(), "they must ascend, each once");
+        }
+        if !self.passed.is_empty() && self.passed.len() != self.entries.len() + 2 {
+            let found =
+                format!("{} shares pass of {} entries", self.passed.len(), self.entries.len());
+            return broken(found, "give one an entry, then one of what is open and one of backs");
         }
         match self.entries.last() {
             Some(last) if last.element as usize >= mesh.element_count() => broken(
@@ -137,7 +193,7 @@ mod tests {
     fn mean_of_rows_is_exact() {
         let row = |entries: &[(u32, u32)], open: u32| {
             let entries = entries.iter().map(|&(element, share)| Entry { element, share });
-            let row = Row { entries: entries.collect(), escaped: open, backface: 0 };
+            let row = Row { entries: entries.collect(), escaped: open, ..Row::default() };
             Row { backface: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
         };
         // Remainders of 1, 2 and 3 in four, an entry that is in one row only, one that is lost.

@@ -23,7 +23,9 @@
 //!   is a mirror is a perfect one.
 //!
 //! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each
-//! channel both together reflect no more than they get. Without a `Kd` there is none.
+//! channel both together reflect no more than they get. Without a `Kd` there is none. Glass that
+//! light passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the colour
+//! of a preview more often than a haze.
 
 use crate::scene::{Rgb, Specular};
 
@@ -31,8 +33,11 @@ use crate::scene::{Rgb, Specular};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum SpecularSurfaces {
-    /// For their diffuse part. Pictures show it with mirrors and glass.
+    /// Mirrors for their diffuse part; glass for clear panes, which light passes straight on,
+    /// weakened by the transmittance: its diffuse part does not count. Pictures show both.
     #[default]
+    Clear,
+    /// For their diffuse part: glass blocks light. Pictures show it with mirrors and glass.
     Diffuse,
     /// For black. Pictures show mirrors and glass without a diffuse part.
     Black,
@@ -44,6 +49,9 @@ impl SpecularSurfaces {
     /// What is done about mirrors and glass, for a warning.
     pub fn treatment(self) -> &'static str {
         match self {
+            SpecularSurfaces::Clear => {
+                "pictures show it; light passes glass, and of mirrors only the diffuse part counts"
+            }
             SpecularSurfaces::Diffuse => {
                 "pictures show it; for the light that is spread only its diffuse part counts"
             }

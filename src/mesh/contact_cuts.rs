@@ -104,6 +104,10 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
         others.sort_unstable();
         let mut segments = vec![];
         for s in others {
+            // No shadow begins there.
+            if scene.is_clear(s) {
+                continue;
+            }
             let mut sides = outer[s];
             if is_near(s) {
                 // Of what lies on the triangle, its outline.

@@ -70,6 +70,10 @@ impl Surfaces<'_> {
     /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards: which
     /// they are, if nothing is left.
     fn covers(&self, t: usize) -> Option<Vec<u32>> {
+        // Light passes it from either side.
+        if self.scene.is_clear(t) {
+            return None;
+        }
         let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
         let still_open = OPEN_SHARE * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
@@ -102,7 +106,7 @@ impl Surfaces<'_> {
     /// Triangle `s` in the plane of a triangle with these `corners` and unit `normal`, if it lies
     /// there and faces the other way.
     fn cover(&self, corners: [DVec3; 3], normal: DVec3, s: usize) -> Option<[DVec3; 3]> {
-        if normal.dot(self.scene.normal(s)) >= 0.0 {
+        if normal.dot(self.scene.normal(s)) >= 0.0 || self.scene.is_clear(s) {
             return None;
         }
         let of_s = self.scene.corners(s);

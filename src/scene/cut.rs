@@ -49,6 +49,7 @@ impl Scene {
         }
         scene.textures = Arc::new(textures);
         scene.covered_backs = OnceLock::from(self.covered_backs().cut(&firsts));
+        scene.clear_panes = OnceLock::from(self.clear_panes().map(|panes| panes.cut(&firsts)));
         scene
     }
 

@@ -91,6 +91,7 @@ impl Scene {
             textures.coordinates.extend(coordinates);
             textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
         }
-        Scene { textures: Arc::new(textures), covered_backs: OnceLock::new(), ..scene }
+        (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
+        Scene { textures: Arc::new(textures), ..scene }
     }
 }

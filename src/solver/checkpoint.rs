@@ -26,7 +26,7 @@ use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
 
 /// Begins every file; the last byte is the version.
-const MAGIC: &[u8; 8] = b"radiosi\x01";
+const MAGIC: &[u8; 8] = b"radiosi\x02";
 
 /// Bytes of the checksum at the end of every file.
 const CHECKSUM_BYTES: usize = 8;

@@ -82,13 +82,14 @@ impl LinearSystem {
         for (i, row) in rows.iter().enumerate() {
             matrix[i * stride + i] = Rgb::ONE;
             matrix[i * stride + count] = flux.unshot[i];
-            for entry in &row.entries {
+            for (k, entry) in row.entries.iter().enumerate() {
                 let j = entry.element as usize;
-                let form_factor = Row::form_factor(entry.share);
-                matrix[j * stride + i] -= flux.reflectance[j] * form_factor;
+                let passed = row.passed.get(k).map_or(Rgb::ONE, |&p| Row::transmittance(p));
+                let arrives = Row::form_factor(entry.share) * passed;
+                matrix[j * stride + i] -= flux.reflectance[j] * arrives;
                 for passage in flux.behind(j) {
-                    let k = passage.behind as usize;
-                    matrix[k * stride + i] -= passage.passed * form_factor;
+                    let behind = passage.behind as usize;
+                    matrix[behind * stride + i] -= passage.passed * arrives;
                 }
             }
         }

@@ -155,6 +155,8 @@ pub(super) struct Transfer {
     pub escaped: Rgb,
     /// Met the back of a surface and was lost there.
     pub backface: Rgb,
+    /// Lost in clear panes on the way.
+    pub panes: Rgb,
 }
 
 impl Transfer {
@@ -164,6 +166,7 @@ impl Transfer {
         self.absorbed += scale * other.absorbed;
         self.escaped += scale * other.escaped;
         self.backface += scale * other.backface;
+        self.panes += scale * other.panes;
     }
 }
 
@@ -173,24 +176,48 @@ pub(super) fn send(
     flux: Rgb,
     row: &Row,
     albedo: impl Fn(usize) -> Rgb,
+    receive: impl FnMut(usize, Rgb),
+) -> Transfer {
+    if row.passed.is_empty() {
+        return send_through(flux, row, |_, sent| sent, albedo, receive);
+    }
+    let mut panes = Rgb::ZERO;
+    let weaken = |k: usize, sent: Rgb| {
+        let arrives = sent * Row::transmittance(row.passed[k]);
+        panes += sent - arrives;
+        arrives
+    };
+    let transfer = send_through(flux, row, weaken, albedo, receive);
+    Transfer { panes, ..transfer }
+}
+
+/// The same through panes, which `weaken` the flux that is sent to each entry, by its number; then
+/// what escapes, and what meets backs.
+fn send_through(
+    flux: Rgb,
+    row: &Row,
+    mut weaken: impl FnMut(usize, Rgb) -> Rgb,
+    albedo: impl Fn(usize) -> Rgb,
     mut receive: impl FnMut(usize, Rgb),
 ) -> Transfer {
     let per_share = flux / f64::from(Row::TOTAL);
     let mut absorbed = Rgb::ZERO;
     let mut scattered = Rgb::ZERO;
-    for entry in &row.entries {
+    for (k, entry) in row.entries.iter().enumerate() {
         let e = entry.element as usize;
-        let incident = per_share * f64::from(entry.share);
+        let incident = weaken(k, per_share * f64::from(entry.share));
         let scattered_here = incident * albedo(e);
         receive(e, incident);
         scattered += scattered_here;
         absorbed += incident - scattered_here;
     }
+    let count = row.entries.len();
     Transfer {
         scattered,
         absorbed,
-        escaped: per_share * f64::from(row.escaped),
-        backface: per_share * f64::from(row.backface),
+        escaped: weaken(count, per_share * f64::from(row.escaped)),
+        backface: weaken(count + 1, per_share * f64::from(row.backface)),
+        panes: Rgb::ZERO,
     }
 }
 
@@ -240,6 +267,7 @@ impl<'m> FluxState<'m> {
         self.ledger.absorbed += transfer.absorbed;
         self.ledger.escaped += transfer.escaped;
         self.ledger.backface_loss += transfer.backface;
+        self.ledger.pane_loss += transfer.panes;
     }
 
     /// Sums what is unshot anew, so that rounding does not add up, and verifies that emitted and

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::flux_state::{Flux, FluxState};
 use super::geometry_delta::GeometryDelta;
-use super::ledger::largest_share;
+use super::ledger::{Ledger, largest_share};
 use super::method_state::MethodState;
 use super::staleness::{MAX_BOUND_OVER_UNSHOT, MAX_STALE_FRACTION};
 use super::{Progress, SolveSession};
@@ -216,7 +216,8 @@ impl<'m> FluxState<'m> {
     fn adopt_mesh(&mut self, mesh: &'m Mesh, new: Flux) -> Rgb {
         let FluxState { flux, ledger, .. } = self;
         let kept = weighted_median_ratio(&flux.emitted, &new.emitted);
-        for scaled in [&mut ledger.absorbed, &mut ledger.escaped, &mut ledger.backface_loss] {
+        let Ledger { absorbed, escaped, backface_loss, pane_loss, .. } = ledger;
+        for scaled in [absorbed, escaped, backface_loss, pane_loss] {
             *scaled *= kept;
         }
         flux.incident.iter_mut().for_each(|incident| *incident *= kept);

@@ -1,7 +1,7 @@
 //! The energy balance of a solve: where all emitted light has gone.
 //!
-//! emitted = absorbed + escaped + lost at back faces + unshot − overshot, per channel and at any
-//! time, up to rounding.
+//! emitted = absorbed + escaped + lost at back faces + lost in panes + unshot − overshot, per
+//! channel and at any time, up to rounding.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,8 @@ pub struct Ledger {
     pub escaped: Rgb,
     /// Met the back of a surface and was lost there.
     pub backface_loss: Rgb,
+    /// Lost in clear panes on the way to where the rest went.
+    pub pane_loss: Rgb,
     /// Received or emitted, not yet passed on.
     pub unshot: Rgb,
     /// Passed on before it was received: 0 but for methods that send more than they have (shooting
@@ -33,14 +35,15 @@ impl Ledger {
         self.absorbed += weight * other.absorbed;
         self.escaped += weight * other.escaped;
         self.backface_loss += weight * other.backface_loss;
+        self.pane_loss += weight * other.pane_loss;
         self.unshot += weight * other.unshot;
         self.overshot += weight * other.overshot;
     }
 
     /// Emitted minus all else, relative to emitted: the worst channel. 0 when nothing is emitted.
     pub fn imbalance(&self) -> f64 {
-        let accounted =
-            self.absorbed + self.escaped + self.backface_loss + self.unshot - self.overshot;
+        let lost = self.absorbed + self.escaped + self.backface_loss + self.pane_loss;
+        let accounted = lost + self.unshot - self.overshot;
         largest_share((self.emitted - accounted).abs(), self.emitted)
     }
 

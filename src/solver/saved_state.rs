@@ -55,6 +55,7 @@ struct SavedRow {
     entries: Vec<(u32, u32)>,
     escaped: u32,
     backface: u32,
+    passed: Vec<[u32; 3]>,
 }
 
 /// A [`MethodState`] as it is saved.
@@ -132,8 +133,8 @@ fn restore_flux(state: &mut FluxState, incident: Vec<Rgb>, unshot: Vec<Rgb>) -> 
 
 /// Whether it closes is checked when all else is restored.
 fn restore_ledger(state: &mut FluxState, ledger: Ledger) -> Result<(), Error> {
-    let Ledger { emitted, absorbed, escaped, backface_loss, unshot, overshot } = ledger;
-    let parts = [absorbed, escaped, backface_loss, unshot, overshot];
+    let Ledger { emitted, absorbed, escaped, backface_loss, pane_loss, unshot, overshot } = ledger;
+    let parts = [absorbed, escaped, backface_loss, pane_loss, unshot, overshot];
     if emitted != state.ledger.emitted || !parts.iter().all(|w| w.is_finite()) {
         let remedy = format!("must be of {} W", state.ledger.emitted);
         return Err(refuse("ledger", format!("{ledger:?}"), &remedy));
@@ -182,16 +183,17 @@ fn check_counters(counters: Counters, rows_made: u64) -> Result<(), Error> {
 impl SavedRow {
     fn of(row: &Row) -> SavedRow {
         let entries = row.entries.iter().map(|e| (e.element, e.share)).collect();
-        SavedRow { entries, escaped: row.escaped, backface: row.backface }
+        let Row { escaped, backface, .. } = *row;
+        SavedRow { entries, escaped, backface, passed: row.passed.clone() }
     }
 }
 
 impl From<SavedRow> for Row {
     /// Not checked yet.
     fn from(saved: SavedRow) -> Row {
-        let SavedRow { entries, escaped, backface } = saved;
+        let SavedRow { entries, escaped, backface, passed } = saved;
         let entries = entries.into_iter().map(|(element, share)| Entry { element, share });
-        Row { entries: entries.collect(), escaped, backface }
+        Row { entries: entries.collect(), escaped, backface, passed }
     }
 }
 
@@ -305,7 +307,8 @@ mod tests {
     fn restore_rejects_row_with_wrong_total() {
         let [shooting, ..] = Method::ALL.map(Solver::new);
         expect_refusal(shooting, "rows", |s| {
-            let row = SavedRow { entries: vec![(0, 7)], escaped: 0, backface: 0 };
+            let entries = vec![(0, 7)];
+            let row = SavedRow { entries, escaped: 0, backface: 0, passed: vec![] };
             s.rows.push((s.histories[0].0, row));
         });
     }

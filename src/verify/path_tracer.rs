@@ -167,8 +167,13 @@ impl<'a> PathTracer<'a> {
             let hit = match self.next_hit(&at, direction) {
                 Some(hit) if hit.front => hit,
                 Some(_) => return reflected,
-                None => return reflected + throughput * PI * self.scene.sky().radiance(direction),
+                None => {
+                    let passed = self.passed(&at, direction, f64::INFINITY);
+                    let sky = self.scene.sky().radiance(direction);
+                    return reflected + throughput * passed * PI * sky;
+                }
             };
+            throughput *= self.passed(&at, direction, hit.distance);
             let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
             let reflectance = self.scene.reflectance_at(hit.triangle, [hit.u, hit.v]);
             if exitance != Rgb::ZERO {
@@ -235,7 +240,8 @@ impl<'a> PathTracer<'a> {
             return Rgb::ZERO;
         }
         let density = self.emitters.density(weights, light) * distance * distance / facing;
-        self.scene.exitance_at(light, place) / PI * cosine / (density + cosine / PI)
+        let passed = self.passed(at, direction, distance);
+        passed * self.scene.exitance_at(light, place) / PI * cosine / (density + cosine / PI)
     }
 
     /// Irradiance at `at` from one point of the sun, W/m². No path meets the sun by itself.
@@ -247,7 +253,13 @@ impl<'a> PathTracer<'a> {
         if cosine <= 0.0 || self.rays.occluded(at.position, direction, between, hides) {
             return Rgb::ZERO;
         }
-        sun.irradiance * cosine
+        self.passed(at, direction, f64::INFINITY) * sun.irradiance * cosine
+    }
+
+    /// The share per channel that clear panes let through from `at` along `direction` (unit length)
+    /// to a surface at that distance.
+    fn passed(&self, at: &SurfacePoint, direction: DVec3, distance: f64) -> Rgb {
+        self.rays.transmittance(at.position, direction, self.contact..distance - self.contact)
     }
 
     /// What a ray along `direction` (unit length) meets first. What lies in one place with the

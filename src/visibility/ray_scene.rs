@@ -6,7 +6,8 @@
 //!           boxes grown by a margin)
 //! ```
 //!
-//! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met.
+//! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
+//! clear panes ([`Scene::is_clear`]): [`RayScene::transmittance`] tells what they let through.
 //!
 //! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
 //! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
@@ -20,8 +21,9 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 
 use crate::geometry::aabb::Aabb;
-use crate::scene::Scene;
+use crate::scene::{Rgb, Scene};
 
+use super::panes::Panes;
 use super::wide_bvh::hierarchy;
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
@@ -34,6 +36,8 @@ pub(crate) struct RayScene {
     origin: DVec3,
     /// From the scene's unit to the hierarchy's.
     scale: f64,
+    /// None in a scene without clear panes.
+    panes: Option<Box<Panes>>,
 }
 
 /// Where a ray first met a triangle.
@@ -59,27 +63,39 @@ const BOX_MARGIN: f32 = 1e-6 * HIERARCHY_SCENE_SIZE as f32;
 
 /// Barycentric weights down to minus this count as inside, which closes the seam between
 /// neighbours: far above the rounding of the test (some 1e-15), far below anything visible.
-const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
+pub(super) const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
 
 impl RayScene {
     /// For triangles by their corners.
     pub fn new(corners: impl Iterator<Item = [DVec3; 3]>) -> RayScene {
         let corners: Vec<[DVec3; 3]> = corners.collect();
+        let all = (0..corners.len() as u32).collect();
+        RayScene::of_some(corners, all)
+    }
+
+    /// For those of the triangles whose numbers are `met`; nothing meets the others.
+    fn of_some(mut corners: Vec<[DVec3; 3]>, mut met: Vec<u32>) -> RayScene {
         let bounds = Aabb::from_points(corners.iter().flatten().copied());
         let origin = bounds.centre();
         let scale = HIERARCHY_SCENE_SIZE / bounds.longest_side().max(f64::MIN_POSITIVE);
         let local = |p: DVec3| Vec3A::from(((p - origin) * scale).as_vec3());
-        let boxes: Vec<Aabb32> = corners
+        if met.is_empty() {
+            // A hierarchy has something in it; this has no area, and nothing meets it.
+            met.push(corners.len() as u32);
+            corners.push([origin; 3]);
+        }
+        let boxes: Vec<Aabb32> = met
             .iter()
-            .map(|c| {
-                let [a, b, c] = c.map(local);
+            .map(|&t| {
+                let [a, b, c] = corners[t as usize].map(local);
                 let margin = Vec3A::splat(BOX_MARGIN);
                 Aabb32 { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
             })
             .collect();
-        let bvh = hierarchy(&boxes);
+        let mut bvh = hierarchy(&boxes);
+        bvh.primitive_indices.iter_mut().for_each(|k| *k = met[*k as usize]);
         let triangles = corners.into_iter().map(TrianglePlane::new).collect();
-        RayScene { bvh, triangles, origin, scale }
+        RayScene { bvh, triangles, origin, scale, panes: None }
     }
 
     /// The same, where nothing meets the backs of triangles that are `covered`.
@@ -90,10 +106,28 @@ impl RayScene {
         self
     }
 
-    /// For the triangles of `scene`, by their numbers.
+    /// For the triangles of `scene` that block light, by their numbers, and its clear panes.
     pub fn of_scene(scene: &Scene) -> RayScene {
-        RayScene::new((0..scene.triangles().len()).map(|t| scene.corners(t)))
-            .with_covered_backs(|t| scene.is_back_covered(t))
+        let count = scene.triangles().len();
+        let met = (0..count as u32).filter(|&t| !scene.is_clear(t as usize)).collect();
+        let rays = RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met);
+        let panes = Panes::of_scene(scene).map(Box::new);
+        RayScene { panes, ..rays }.with_covered_backs(|t| scene.is_back_covered(t))
+    }
+
+    /// Whether there are clear panes.
+    pub fn has_panes(&self) -> bool {
+        self.panes.is_some()
+    }
+
+    /// The share of light per channel along `direction` (any length) from `from` that passes the
+    /// clear panes within `reach` in units of it; all of it where there are none.
+    #[inline]
+    pub fn transmittance(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
+        match &self.panes {
+            None => Rgb::ONE,
+            Some(panes) => panes.transmittance(from, direction, reach),
+        }
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and

@@ -28,7 +28,7 @@ use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Scene, Sun};
+use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -147,7 +147,9 @@ impl RayGather {
             let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
             else {
                 out.escaped += 1.0;
-                let radiosity = PI * sky.radiance(direction);
+                let reach = point.near..f64::INFINITY;
+                let passed = self.scene.transmittance(point.position, direction, reach);
+                let radiosity = PI * sky.radiance(direction) * passed;
                 out.irradiance += radiosity;
                 sums.max_contribution = sums.max_contribution.max(radiosity.length());
                 continue;
@@ -157,12 +159,14 @@ impl RayGather {
                 out.backface += 1.0;
                 continue;
             }
-            let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v);
+            let reach = point.near..hit.distance;
+            let passed = self.scene.transmittance(point.position, direction, reach);
+            let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v) * passed;
             out.irradiance += reflected;
             sums.max_contribution = sums.max_contribution.max(reflected.length());
             let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !has_shadow_rays(light) {
-                out.irradiance += self.lights.lights[light as usize].exitance;
+                out.irradiance += self.lights.lights[light as usize].exitance * passed;
             }
         }
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
@@ -224,8 +228,9 @@ impl RayGather {
             let cosine = point.normal.dot(direction).max(0.0);
             let reach = point.near..f64::INFINITY;
             out.all += cosine;
-            if cosine > 0.0 && !self.scene.occluded(point.position, direction, reach, |_| true) {
-                out.seen += cosine;
+            let (from, any) = (point.position, |_: &Hit| true);
+            if cosine > 0.0 && !self.scene.occluded(from, direction, reach.clone(), any) {
+                out.seen += cosine * self.scene.transmittance(from, direction, reach);
             }
         }
         out
@@ -267,9 +272,10 @@ impl RayGather {
             // What is met first may be another part of the light, which is as good.
             let near = point.near / r2.sqrt();
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
-            let blocked =
-                self.scene.occluded(point.position, to, near..1.0 - offset::SEGMENT_END, other);
-            out.seen += if blocked { 0.0 } else { factor };
+            let reach = near..1.0 - offset::SEGMENT_END;
+            if !self.scene.occluded(point.position, to, reach.clone(), other) {
+                out.seen += factor * self.scene.transmittance(point.position, to, reach);
+            }
         }
         out
     }
@@ -300,8 +306,8 @@ struct RaySums {
 #[derive(Debug, Default)]
 struct Visible {
     points: f64,
-    /// To those that are visible.
-    seen: f64,
+    /// To those that are visible; per channel, what panes let through.
+    seen: Rgb,
     /// To all that are above the horizon and face the point.
     all: f64,
 }

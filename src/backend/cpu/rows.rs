@@ -5,7 +5,9 @@
 //!       ─► what each meets: an element, a back, nothing ─► sorted, counted ─► row of shares
 //! ```
 
+use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
@@ -13,8 +15,9 @@ use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
 use crate::sampling::hash::low_bias32;
 use crate::sampling::hemisphere::HemisphereSamples;
+use crate::scene::Rgb;
 use crate::visibility::offset;
-use crate::visibility::ray_scene::RayScene;
+use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid.
 ///
@@ -55,34 +58,77 @@ impl RayRows {
         RayRows { full_share, ..self }
     }
 
-    fn row(&self, mesh: &Mesh, patch: NodeId, samples: &HemisphereSamples, count: u32) -> Row {
+    fn row(&self, mesh: &Mesh, patch: NodeId, samples: &HemisphereSamples) -> Row {
         let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
         let start = offset::RAY_START * mesh.area(patch).sqrt();
         let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
-        let meets = |direction| match self.rays.closest_hit(eye, direction, start, Some(own)) {
-            None => OPEN,
-            Some(hit) if !hit.front => BACK,
-            Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v).0 as u32,
-        };
+        let meets = |direction| item(mesh, self.rays.closest_hit(eye, direction, start, Some(own)));
         let directions = samples.directions(mesh.normal(patch), rotation);
+        if self.rays.has_panes() {
+            return self.row_through_panes(mesh, patch, directions, start);
+        }
         let mut hits: Vec<u32> = directions.map(meets).collect();
         hits.sort_unstable();
-        // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
-        let share_of_first =
-            |k: usize| (k as u64 * u64::from(Row::TOTAL) / u64::from(count)) as u32;
-        let mut row = Row::default();
-        let (mut shares, mut counted) = (Apportion::default(), 0);
-        for run in hits.chunk_by(|a, b| a == b) {
-            counted += run.len();
-            let share = shares.part_up_to(share_of_first(counted));
-            match run[0] {
-                OPEN => row.escaped = share,
-                BACK => row.backface = share,
-                element => row.entries.push(Entry { element, share }),
-            }
-        }
-        row
+        row_of(&hits)
     }
+
+    /// The same in a scene with panes, with what passes them on the way to each item.
+    fn row_through_panes(
+        &self,
+        mesh: &Mesh,
+        patch: NodeId,
+        directions: impl Iterator<Item = DVec3>,
+        start: f64,
+    ) -> Row {
+        let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
+        let meets = |direction| {
+            let hit = self.rays.closest_hit(eye, direction, start, Some(own));
+            let end = hit.map_or(f64::INFINITY, |hit| hit.distance);
+            (item(mesh, hit), self.rays.transmittance(eye, direction, start..end))
+        };
+        let mut hits: Vec<(u32, Rgb)> = directions.map(meets).collect();
+        // Those of one item stay in their order, so that their sum is the same on every run.
+        hits.sort_by_key(|&(item, _)| item);
+        let items: Vec<u32> = hits.iter().map(|&(item, _)| item).collect();
+        let row = row_of(&items);
+        if hits.iter().all(|&(_, passed)| passed == Rgb::ONE) {
+            return row;
+        }
+        let mean = |run: &[(u32, Rgb)]| {
+            (run[0].0, run.iter().map(|&(_, passed)| passed).sum::<Rgb>() / run.len() as f64)
+        };
+        let means: FxHashMap<u32, Rgb> = hits.chunk_by(|a, b| a.0 == b.0).map(mean).collect();
+        let items = row.entries.iter().map(|entry| entry.element).chain([OPEN, BACK]);
+        let passed = |item| Row::passed(means.get(&item).copied().unwrap_or(Rgb::ONE));
+        Row { passed: items.map(passed).collect(), ..row }
+    }
+}
+
+/// What a ray that ends at `hit` meets.
+fn item(mesh: &Mesh, hit: Option<Hit>) -> u32 {
+    match hit {
+        None => OPEN,
+        Some(hit) if !hit.front => BACK,
+        Some(hit) => mesh.element_at(hit.triangle, hit.u, hit.v).0 as u32,
+    }
+}
+
+/// The row of rays that met these items, in ascending order.
+fn row_of(hits: &[u32]) -> Row {
+    // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
+    let share_of_first = |k: usize| (k as u64 * u64::from(Row::TOTAL) / hits.len() as u64) as u32;
+    let mut row = Row::default();
+    let (mut shares, mut counted) = (Apportion::default(), 0);
+    for run in hits.chunk_by(|a, b| a == b) {
+        counted += run.len();
+        let share = shares.part_up_to(share_of_first(counted));
+        match run[0] {
+            OPEN => row.escaped = share,
+            BACK => row.backface = share,
+            element => row.entries.push(Entry { element, share }),
+        }
+    }
+    row
 }
 
 impl FormFactors for RayRows {
@@ -92,7 +138,7 @@ impl FormFactors for RayRows {
             .max(resolution_policy::MIN_HALVED_RESOLUTION.pow(2))
             .min(self.count);
         let samples = HemisphereSamples::new(count)?;
-        Ok(patches.par_iter().map(|&p| self.row(mesh, p, &samples, count)).collect())
+        Ok(patches.par_iter().map(|&p| self.row(mesh, p, &samples)).collect())
     }
 
     /// The same on every machine, since it decides the order of shots; fewer where each takes long.

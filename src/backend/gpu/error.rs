@@ -1,6 +1,7 @@
 //! Failures of a graphics device in the crate's own error: place, what was found, remedy.
 
 use crate::error::{Error, ErrorKind};
+use crate::scene::Scene;
 
 /// What went wrong on the adapter of this name.
 pub fn device_error(adapter: &str, kind: ErrorKind, found: String) -> Error {
@@ -35,4 +36,16 @@ pub fn message(error: &wgpu::Error) -> String {
         next = e.source();
     }
     text
+}
+
+/// Checks that `scene` has no clear panes: hemicubes would take them for nothing at all.
+///
+/// # Errors
+/// [`ErrorKind::Device`] where it has.
+pub(crate) fn check_no_panes(scene: &Scene) -> Result<(), Error> {
+    if !scene.has_clear_panes() {
+        return Ok(());
+    }
+    let found = "clear panes, which hemicubes do not see";
+    Err(Error::new(ErrorKind::Device, "scene", found, "use rays on the CPU, which do"))
 }

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::draw_list::DrawList;
+use super::error::check_no_panes;
 use super::item_buffer::{ItemBuffer, View};
 use super::item_table::ItemTable;
 use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
@@ -93,6 +94,7 @@ impl HemicubeRows {
     /// hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeRows, Error> {
         hemicube::check_resolution(resolution)?;
+        check_no_panes(mesh.scene())?;
         let limits = gpu.limits();
         check_resolution_fits(limits, resolution)?;
         check_mesh_fits(limits, mesh)?;
@@ -306,7 +308,8 @@ fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
         .filter(|&(_, &share)| share != 0)
         .map(|(element, &share)| Entry { element, share })
         .collect();
-    let row = Row { entries, escaped: dense[OPEN as usize], backface: dense[BACK as usize] };
+    let (escaped, backface) = (dense[OPEN as usize], dense[BACK as usize]);
+    let row = Row { entries, escaped, backface, passed: vec![] };
     if row.sum() != u64::from(Row::TOTAL) {
         return Err(format!("shares of patch {} that sum to {}", patch.0, row.closure()));
     }

@@ -84,9 +84,10 @@ Files and devices:
   --north x,y,z     where north is, for --sun-at [-z; +y where +z is up]
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
                     are wound, front or both [auto]
-  --specular WHICH  what the light that is spread takes mirrors and glass for: diffuse, their
-                    diffuse part, or black; pictures show them as such. ignore takes all for
-                    diffuse [diffuse]
+  --specular WHICH  what the light that is spread takes mirrors and glass for: clear, it passes
+                    glass straight on, and mirrors are their diffuse part; diffuse, both are their
+                    diffuse part; or black. Pictures show them as such. ignore takes all for
+                    diffuse [clear]
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times

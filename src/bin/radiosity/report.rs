@@ -206,10 +206,14 @@ impl Report {
                 100.0 * light.relative_change
             ),
             format!(
-                "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, unshot {:.2} %",
+                "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, {}unshot {:.2} %",
                 share(ledger.absorbed),
                 share(ledger.escaped),
                 share(ledger.backface_loss),
+                match share(ledger.pane_loss) {
+                    0.0 => String::new(),
+                    lost => format!("in panes {lost:.2} %, "),
+                },
                 share(ledger.unshot)
             ),
             format!(
@@ -271,12 +275,13 @@ fn merge(object: &mut Value, other: Value) {
 
 /// Where the light went, W per channel.
 fn ledger(ledger: &Ledger) -> Value {
-    let Ledger { emitted, absorbed, escaped, backface_loss, unshot, overshot } = ledger;
+    let Ledger { emitted, absorbed, escaped, backface_loss, pane_loss, unshot, overshot } = ledger;
     json!({
         "emitted": emitted.to_array(),
         "absorbed": absorbed.to_array(),
         "left": escaped.to_array(),
         "back": backface_loss.to_array(),
+        "panes": pane_loss.to_array(),
         "unshot": unshot.to_array(),
         "overshot": overshot.to_array(),
     })

@@ -17,6 +17,13 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
+    /// Those under which mirrors and glass are surfaces as all others are.
+    pub fn ignoring_specular() -> SceneOptions {
+        let mut options = SceneOptions::default();
+        options.obj.specular = SpecularSurfaces::Ignore;
+        options
+    }
+
     /// Takes option `name` with its value, if it is one of these.
     pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
         match name {
@@ -67,9 +74,10 @@ fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
 fn specular(parser: &mut lexopt::Parser) -> Result<SpecularSurfaces, Stop> {
     let text = parser.value()?.string()?;
     match text.as_str() {
+        "clear" => Ok(SpecularSurfaces::Clear),
         "diffuse" => Ok(SpecularSurfaces::Diffuse),
         "black" => Ok(SpecularSurfaces::Black),
         "ignore" => Ok(SpecularSurfaces::Ignore),
-        _ => Err(wrong_value("specular", &text, "diffuse, black or ignore")),
+        _ => Err(wrong_value("specular", &text, "clear, diffuse, black or ignore")),
     }
 }

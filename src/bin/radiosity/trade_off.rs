@@ -57,8 +57,8 @@ given.
                     for other skies and a sun see `radiosity bake --help`
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
                     are wound, front or both [auto]
-  --specular WHICH  what mirrors and glass count as: diffuse, their diffuse part, black, or
-                    ignore [diffuse]
+  --specular WHICH  what mirrors and glass count as: clear, light passes glass, diffuse, their
+                    diffuse part, black, or ignore [clear]
   --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu           rays on the CPU instead of hemicubes
 

@@ -44,7 +44,7 @@ last line compares the two. After Ctrl-C what was measured so far is printed.
   --sky r,g,b       radiance of a uniform sky, or none; another sky and a sun are given by the
                     options that the bake had, those of `radiosity bake --help`
   --sides WHICH     auto, front or both (as the bake had) [auto]
-  --specular WHICH  diffuse, black or ignore (as the bake had) [diffuse]
+  --specular WHICH  clear, diffuse, black or ignore (as the bake had) [clear]
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
                     (the error of all) to red (four times that or more), grey where hidden
 Radiosity at given points, to judge this instrument itself:

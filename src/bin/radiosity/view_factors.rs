@@ -87,7 +87,7 @@ impl Options {
         let (mut error, mut two_sided) = (None, vec![]);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let mut device = None;
-        let mut reading = SceneOptions::default();
+        let mut reading = SceneOptions::ignoring_specular();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),

@@ -162,9 +162,13 @@ impl MtlMaterial {
         self.specular.filter(|_| settings.specular != SpecularSurfaces::Ignore)
     }
 
-    /// Whether light is spread as if it reflected nothing.
+    /// Whether light is spread as if it reflected nothing: it is black, or clear.
     fn is_black(&self, settings: &ObjSettings) -> bool {
-        self.specular.is_some() && settings.specular == SpecularSurfaces::Black
+        match settings.specular {
+            SpecularSurfaces::Black => self.specular.is_some(),
+            SpecularSurfaces::Clear => self.specular.is_some_and(|specular| specular.is_glass()),
+            _ => false,
+        }
     }
 
     /// What a mirror or glass leaves of one for diffuse reflectance, in every channel.

@@ -39,7 +39,7 @@ pub struct ObjSettings {
     pub sky: Option<Sky>,
     /// What surfaces do on their two sides.
     pub sides: Sides,
-    /// What the light that is spread takes mirrors and glass for.
+    /// What the light that is spread takes mirrors and glass for; it passes glass unless set.
     pub specular: SpecularSurfaces,
 }
 
@@ -112,7 +112,7 @@ impl ObjSettings {
 impl Default for ObjSettings {
     fn default() -> ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
-        let (sides, specular) = (Sides::Auto, SpecularSurfaces::Diffuse);
+        let (sides, specular) = (Sides::Auto, SpecularSurfaces::Clear);
         let (emit, transmit) = (vec![], vec![]);
         ObjSettings { strict: false, max_reflectance, emit, transmit, sky: None, sides, specular }
     }

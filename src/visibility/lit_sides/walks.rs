@@ -115,9 +115,11 @@ impl<'a> Walks<'a> {
             }
             let direction = self.random_direction(side, rng);
             let Some(next) = self.next(at, side, direction) else {
+                throughput *= self.passed(at, direction, f64::INFINITY);
                 let sky = throughput * PI * self.scene.sky().radiance(direction).element_sum();
                 return (sky > 0.0).then_some(sky);
             };
+            throughput *= self.passed(at, direction, at.distance(next.0));
             (at, side) = next;
             let (t, is_back) = (side / 2, side % 2 == 1);
             if self.shines_from_back(t) == Some(is_back) {
@@ -192,7 +194,14 @@ impl<'a> Walks<'a> {
         let hides = |hit: &Hit| hit.triangle != side / 2;
         let is_seen =
             cosine > 0.0 && !self.rays.occluded(at, direction, self.contact..f64::INFINITY, hides);
-        is_seen.then(|| sun.irradiance.element_sum() * cosine)
+        let irradiance = || sun.irradiance.element_sum() * cosine;
+        is_seen.then(|| irradiance() * self.passed(at, direction, f64::INFINITY))
+    }
+
+    /// The share that clear panes let through, in the mean over the channels.
+    fn passed(&self, at: DVec3, direction: DVec3, distance: f64) -> f64 {
+        let reach = self.contact..distance - self.contact;
+        self.rays.transmittance(at, direction, reach).element_sum() / 3.0
     }
 
     /// Irradiance at a place on a side from a lamp, chosen by its power; none if it is not seen.
@@ -216,7 +225,8 @@ impl<'a> Walks<'a> {
         // The power of all lamps as seen from there, but not more than the lamp sends near by.
         let power = self.powers.total_area() * self.brightest;
         let far = power * cosine * facing / (PI * distance * distance);
-        (!blocked).then_some(far.min(power / self.scene.area(lamp)))
+        let near = power / self.scene.area(lamp);
+        (!blocked).then(|| far.min(near) * self.passed(at, direction, distance))
     }
 
     /// A point of a triangle, uniform over its area.

@@ -17,10 +17,10 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+use super::{Scene, Specular};
 use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
-use crate::scene::{Scene, Specular};
 
 /// What encloses less than this share of its area to the power of 3/2 is flat: a sheet that a file
 /// has twice. A ball has 0.094, what is 10⁻⁶ as thick as it is wide some 10⁻⁷.
@@ -28,7 +28,7 @@ const FLAT: f64 = 1e-9;
 
 /// What a triangle of glass is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum GlassFace {
+pub(crate) enum GlassFace {
     /// A part of a sheet.
     Pane,
     /// A part of the boundary of a body.
@@ -42,15 +42,20 @@ pub(super) enum GlassFace {
 
 /// A medium around a point: a body, and its refractive index.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Medium {
+pub(crate) struct Medium {
     pub body: u32,
     pub refractive_index: f64,
 }
 
 /// The glass of a scene.
-pub(super) struct GlassBodies {
+pub(crate) struct GlassBodies {
     /// Per triangle of the scene; none for what is not glass.
     pub faces: Vec<Option<GlassFace>>,
+    /// Per triangle, whether another before it has its corners and material.
+    is_copy: Vec<bool>,
+    /// Per triangle, whether it is in a closed surface that encloses nothing: a sheet that is there
+    /// twice, over other diagonals.
+    is_layer: Vec<bool>,
     shells: Vec<Shell>,
 }
 
@@ -96,12 +101,19 @@ impl GlassBodies {
             all.push((t, corners, number));
         }
         let found = shells(scene, &unique);
-        let mut bodies = GlassBodies { faces: vec![None; scene.triangles().len()], shells: vec![] };
+        let mut bodies = {
+            let count = scene.triangles().len();
+            let (is_copy, is_layer) = (vec![false; count], vec![false; count]);
+            GlassBodies { faces: vec![None; count], is_copy, is_layer, shells: vec![] }
+        };
         let of_faces: Vec<Option<(u32, bool)>> = {
             let mut of_faces = vec![None; unique.len()];
             for (members, outward) in found {
                 let shell = Shell::new(scene, &unique, &members, &outward);
-                let Some((shell, flipped)) = shell else { continue };
+                let Some((shell, flipped)) = shell else {
+                    members.iter().for_each(|&k| bodies.is_layer[unique[k].triangle] = true);
+                    continue;
+                };
                 for (&k, outward) in members.iter().zip(outward) {
                     of_faces[k] = Some((bodies.shells.len() as u32, outward != flipped));
                 }
@@ -117,8 +129,21 @@ impl GlassBodies {
                 GlassFace::Boundary { body, front_is_outside: (outward == alike) != is_cavity }
             });
             bodies.faces[t] = Some(face.unwrap_or(GlassFace::Pane));
+            bodies.is_copy[t] = unique[number].triangle != t;
         }
         bodies
+    }
+
+    /// How much of the way through a pane or a body light goes where it crosses triangle `t`: all
+    /// through a pane, half at the surface of a body, nothing at a copy of another triangle.
+    pub fn crossing(&self, t: usize) -> f64 {
+        match self.faces[t] {
+            _ if self.is_copy[t] => 0.0,
+            Some(GlassFace::Boundary { .. }) => 0.5,
+            Some(GlassFace::Pane) if self.is_layer[t] => 0.5,
+            Some(GlassFace::Pane) => 1.0,
+            None => 0.0,
+        }
     }
 
     /// The bodies around `point`, the innermost last.
