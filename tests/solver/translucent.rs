@@ -41,7 +41,7 @@ impl FormFactors for Spheres {
                 entries.push(Entry { element: e as u32, share: end - given });
                 given = end;
             }
-            Row { entries, escaped: 0, backface: Row::TOTAL - given }
+            Row { entries, backface: Row::TOTAL - given, ..Row::default() }
         };
         Ok(patches.iter().map(row).collect())
     }
