@@ -219,4 +219,32 @@ mod tests {
         // Of equal rows, the row.
         assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
     }
+
+    #[test]
+    fn mean_through_panes_is_weighted_by_shares() {
+        let row = |entries: &[(u32, u32)], passed: &[u32]| {
+            let entries = entries.iter().map(|&(element, share)| Entry { element, share });
+            let row = Row { entries: entries.collect(), ..Row::default() };
+            let backface = (u64::from(Row::TOTAL) - row.sum()) as u32;
+            Row { backface, passed: passed.iter().map(|&p| [p; 3]).collect(), ..row }
+        };
+        let (all, half) = (Row::TOTAL, Row::TOTAL / 2);
+        // The second has no panes before it.
+        let rows =
+            [row(&[(1, 3 << 20), (5, 1 << 20)], &[0, half, all, half]), row(&[(1, 1 << 20)], &[])];
+        let mean = Row::mean(&rows.each_ref());
+        assert_eq!(mean.sum(), u64::from(Row::TOTAL));
+        assert_eq!(mean.entries.iter().map(|e| e.element).collect::<Vec<_>>(), [1, 5]);
+        let passed: Vec<f64> = mean.passed.iter().map(|p| Row::transmittance(*p).x).collect();
+        // A quarter of what element 1 gets is of the second row; so are some half of the backs.
+        let backs = rows.each_ref().map(|row| f64::from(row.backface));
+        let of_backs = (backs[0] / 2.0 + backs[1]) / (backs[0] + backs[1]);
+        for (found, want) in passed.iter().zip([0.25, 0.5, 1.0, of_backs]) {
+            assert!((found - want).abs() < 1e-9, "{passed:?}");
+        }
+        // An entry that is rounded away takes what passes it along.
+        let mut row = rows[0].clone();
+        row.set_factors(&[0.0, 0.25, 0.0, 0.75]);
+        assert_eq!((row.entries.len(), &row.passed[..]), (1, &rows[0].passed[1..]));
+    }
 }

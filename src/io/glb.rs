@@ -33,7 +33,8 @@ use primitives::{Primitive, primitives};
 /// A node for each group and a primitive for each of its materials, by their names. Vertices have
 /// `POSITION`, `NORMAL`, `COLOR_0` (linear, through `tone`, a curve of radiosity, within [0, 1])
 /// and `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
-/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is; their `extras` have
+/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is, and clear panes let through
+/// the mean of their transmittance (`alphaMode` `BLEND`); their `extras` have
 /// reflectance and exitance. All numbers are 32-bit floats.
 ///
 /// In a scene with textures, vertices whose corners have texture coordinates in the file have

@@ -15,13 +15,16 @@ use crate::form_factor::Row;
 use crate::form_factor::closed_form::point_to_polygon;
 use crate::geometry::aabb::Aabb;
 use crate::mesh::{Mesh, NodeId};
+use crate::scene::{Rgb, Scene};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// What has moved from one mesh to another.
 pub(super) struct GeometryDelta {
-    /// Whether each triangle has moved.
+    /// Whether each triangle has moved, or lets another share of light through.
     has_moved: Vec<bool>,
+    /// Whether any of these is a clear pane, which rows have no entries on.
+    has_moved_panes: bool,
     /// Boxes about the moved triangles of each group that has any.
     groups: Vec<MovedBox>,
     /// The scene as it is now; none where nothing has moved.
@@ -47,8 +50,14 @@ impl GeometryDelta {
         }
         let (before, after) = (old.scene(), new.scene());
         let count = before.triangles().len();
-        let has_moved: Vec<bool> =
-            (0..count).map(|t| before.corners(t) != after.corners(t)).collect();
+        let has_moved: Vec<bool> = (0..count)
+            .map(|t| {
+                before.corners(t) != after.corners(t)
+                    || share_passing(before, t) != share_passing(after, t)
+            })
+            .collect();
+        let is_pane = |t: usize| before.is_clear(t) || after.is_clear(t);
+        let has_moved_panes = (0..count).any(|t| has_moved[t] && is_pane(t));
         let mut groups: Vec<MovedBox> = (0..before.groups().len())
             .map(|_| MovedBox { before: Aabb::EMPTY, after: Aabb::EMPTY })
             .collect();
@@ -59,7 +68,7 @@ impl GeometryDelta {
         }
         groups.retain(|group| group.before.low.is_finite());
         let rays = (!groups.is_empty()).then(|| RayScene::of_scene(after));
-        Ok(GeometryDelta { has_moved, groups, rays })
+        Ok(GeometryDelta { has_moved, has_moved_panes, groups, rays })
     }
 
     /// Whether nothing has moved.
@@ -74,6 +83,7 @@ impl GeometryDelta {
             return 1.0;
         }
         let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
+        let row = row.filter(|_| !self.has_moved_panes);
         let sent_before = row.map_or(1.0, |row| self.share_on_moved(mesh, row));
         let boxes_before: f64 =
             self.groups.iter().map(|g| form_factor_to(&g.before, eye, normal)).sum();
@@ -109,6 +119,11 @@ impl GeometryDelta {
         };
         (targets().filter(is_open).count() + 1) as f64 / (targets().count() + 1) as f64
     }
+}
+
+/// What passes triangle `t` of `scene` if it is clear.
+fn share_passing(scene: &Scene, t: usize) -> Option<Rgb> {
+    scene.clear_panes()?.transmittance(t)
 }
 
 /// The form factor to `bounds` from a point `eye` with that `normal`, as if nothing were in

@@ -66,3 +66,46 @@ impl Panes {
         passed
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Specular, Triangle};
+
+    #[test]
+    fn sides_between_two_triangles_count_once() {
+        // A square of glass, above another that lies askew to it; the floor is out of the way.
+        let transmittance = Rgb::new(0.5, 0.25, 0.75);
+        let specular = Some(Specular::Glass { refractive_index: 1.5, transmittance });
+        let glass = Material { specular, ..Material::grey("glass", 0.0) };
+        let corner = |k: usize| {
+            let angle = (k % 4) as f64 * std::f64::consts::FRAC_PI_2 + (k / 4) as f64 * 0.3;
+            DVec3::new(angle.cos(), angle.sin(), (k / 4) as f64 + 1.0)
+        };
+        let positions = (0..8).map(corner).chain([1.0, 2.0, 3.0].map(|k| DVec3::splat(-k * k)));
+        let positions: Vec<DVec3> = positions.chain([DVec3::new(-5.0, -3.0, -9.0)]).collect();
+        let triangle = |corners, material| Triangle { corners, material, ..Default::default() };
+        let corners = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let mut triangles = corners.map(|corners| triangle(corners, 0)).to_vec();
+        triangles.push(triangle([8, 9, 11], 1));
+        let materials = vec![glass, Material::grey("floor", 0.5)];
+        let scene = Scene::new(positions, triangles, vec!["all".into()], materials).unwrap();
+        let rays = RayScene::of_scene(&scene);
+        for k in -9..10 {
+            for turn in [0.0, 0.3, 0.7] {
+                // Along the diagonals of both, and elsewhere.
+                let across = DVec3::new(f64::cos(turn), f64::sin(turn), 0.0) * f64::from(k) / 20.0;
+                for from in [across, across + DVec3::new(0.1, -0.2, 0.0)] {
+                    let to = DVec3::new(across.x, across.y, 1.0) - from;
+                    let passed = rays.transmittance(from, to, 0.0..3.0);
+                    let off = (passed - transmittance * transmittance).abs().max_element();
+                    assert!(off < 1e-15, "{k} {turn}: {passed}");
+                    // The second begins at the end of this reach.
+                    let passed = rays.transmittance(from, to, 0.0..2.0);
+                    assert!((passed - transmittance).abs().max_element() < 1e-15);
+                }
+            }
+        }
+        assert_eq!(rays.closest_hit(DVec3::ZERO, DVec3::Z, 0.0, None), None);
+    }
+}

@@ -1,3 +1,4 @@
 mod cpu_gather;
 mod doubled_faces;
 mod gpu;
+mod panes;

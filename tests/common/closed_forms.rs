@@ -44,7 +44,7 @@ impl FormFactors for ClosedForms {
                     given = upto;
                 }
             }
-            Row { entries, escaped: Row::TOTAL - given, backface: 0 }
+            Row { entries, escaped: Row::TOTAL - given, ..Row::default() }
         };
         Ok(patches.iter().map(row).collect())
     }

@@ -27,7 +27,7 @@ fn every_user_rejects_invalid_rows() {
     let mesh = Mesh::new(cube(&paint(0.5, 1.0)), 0.3).unwrap();
     let row = |element: u32, share: u32, escaped: u32| {
         let entries = vec![Entry { element, share }];
-        Row { entries, escaped, backface: 0 }
+        Row { entries, escaped, ..Row::default() }
     };
     let total = Row::TOTAL;
     // An element that does not exist; sums too small, too large and beyond 32 bits; a row missing.
@@ -71,6 +71,8 @@ fn shooting_rejects_invalid_rows() {
             ..Default::default()
         }],
         vec![Row { entries: vec![entry(12, Row::TOTAL)], ..Default::default() }],
+        vec![Row { passed: vec![[0; 3]; 3], ..good.clone() }],
+        vec![Row { passed: vec![[0; 3]; 5], ..good.clone() }],
     ];
     for rows in bad {
         let e = Solver::default().solve(&mesh, &mut GivenRows(rows), keep_going).unwrap_err();

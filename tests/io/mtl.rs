@@ -139,17 +139,17 @@ fn mirrors_and_glass_are_read_and_said() {
         (
             "Kd 0.3\nillum 7\nNi 1.4\nTf 0.5 0.9 1",
             Specular::Glass { refractive_index: 1.4, transmittance: Rgb::new(0.5, 0.9, 1.0) },
-            [0.3, 1.0 - 0.9, 0.0],
+            [0.0; 3],
         ),
         (
             "Kd 0.3\nillum 4\nd -halo 0.75",
             Specular::Glass { refractive_index: 1.5, transmittance: Rgb::splat(0.25) },
-            [0.3; 3],
+            [0.0; 3],
         ),
         (
             "Kd 0.3\nillum 9\nTr 0.25",
             Specular::Glass { refractive_index: 1.5, transmittance: Rgb::splat(0.25) },
-            [0.3; 3],
+            [0.0; 3],
         ),
     ] {
         let scene = with_library(&format!("newmtl chalk\n{text}\n")).unwrap();
@@ -169,7 +169,7 @@ fn mirrors_and_glass_are_read_and_said() {
 }
 
 #[test]
-fn mirrors_and_glass_may_be_black_or_ignored() {
+fn mirrors_and_glass_may_be_diffuse_black_or_ignored() {
     let (text, library) = (room(), "newmtl chalk\nKd 0.3\nKe 1\nillum 9\nd 0.5\n");
     let files = chalk_files(&text, library);
     let with = |specular| {
@@ -177,6 +177,16 @@ fn mirrors_and_glass_may_be_black_or_ignored() {
         settings.specular = specular;
         settings.read("room.obj", files[0].1, &files[1..]).unwrap()
     };
+    let clear = with(SpecularSurfaces::Clear);
+    assert_eq!(
+        (clear.material(0).reflectance, clear.material(0).specular.is_some()),
+        (Rgb::ZERO, true)
+    );
+    warned(&clear, "light passes glass");
+    let diffuse = with(SpecularSurfaces::Diffuse);
+    assert_eq!(diffuse.material(0).reflectance, Rgb::splat(0.3));
+    assert!(diffuse.material(0).specular.is_some());
+    warned(&diffuse, "only its diffuse part counts");
     let black = with(SpecularSurfaces::Black);
     assert!(black.material(0).specular.is_some());
     assert_eq!(black.material(0).reflectance, Rgb::ZERO);

@@ -88,7 +88,7 @@ impl FormFactors for Sent {
             let to = if emits { &self.lit } else { &self.black };
             let share = Row::TOTAL / to.len() as u32;
             let entries: Vec<Entry> = to.iter().map(|&element| Entry { element, share }).collect();
-            Row { entries, escaped: Row::TOTAL - share * to.len() as u32, backface: 0 }
+            Row { entries, escaped: Row::TOTAL - share * to.len() as u32, ..Row::default() }
         };
         let rows = patches.iter().map(row).collect();
         self.asked.extend(patches.iter().filter(|&&p| mesh.material(p).exitance == Rgb::ZERO));

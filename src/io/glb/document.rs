@@ -7,7 +7,7 @@ use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Stride, Target, View};
 use gltf_json::extras::RawValue;
 use gltf_json::image::MimeType;
-use gltf_json::material::PbrMetallicRoughness;
+use gltf_json::material::{AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
 use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::scene::Node;
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
@@ -205,9 +205,15 @@ impl Model<'_> {
             ("exitance", channels(material.exitance)),
         ]);
         let unlit = gltf_json::extensions::material::Unlit {};
+        // Viewers see through clear panes.
+        let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
+        let alpha_mode = if passed.is_some() { AlphaMode::Blend } else { AlphaMode::Opaque };
+        let alpha = 1.0 - passed.unwrap_or(0.0) as f32;
         Material {
+            alpha_mode: Valid(alpha_mode),
             name: Some(material.name.clone()),
             pbr_metallic_roughness: PbrMetallicRoughness {
+                base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
                 base_color_texture: self.texture(root, primitive),
                 metallic_factor: gltf_json::material::StrengthFactor(0.0),
                 ..Default::default()
