@@ -126,9 +126,9 @@ mod tests {
         for k in 0..100 {
             let out = (1.0 - face) * inside * passed;
             if k % 2 == 0 {
-                through += out
+                through += out;
             } else {
-                reflected += out
+                reflected += out;
             }
             (inside, passed) = (face * inside, passed * tint);
         }

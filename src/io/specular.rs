@@ -21,10 +21,10 @@
 //! - Channels of `Ks` and `Tf` count as 0 below 0 and as 1 above 1. `Ns` does not count: what
 //!   is a mirror is a perfect one.
 //!
-//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each channel
-//! both together reflect no more than they get. Without a `Kd` there is none. Glass that light
-//! passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the colour of a
-//! preview more often than a haze.
+//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each
+//! channel both together reflect no more than they get. Without a `Kd` there is none. Glass that
+//! light passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the
+//! colour of a preview more often than a haze.
 
 use crate::scene::{Rgb, Specular};
 

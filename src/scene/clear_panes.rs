@@ -40,7 +40,7 @@ impl ClearPanes {
         Some(ClearPanes { transmittance: (0..count).map(transmittance).collect() })
     }
 
-    /// Those of a scene made of pieces of this one's triangles: of each the triangle it is cut from.
+    /// Those of a scene made of pieces of these triangles: of each piece the one it is cut from.
     pub fn of_pieces(&self, triangles: impl Iterator<Item = usize>) -> ClearPanes {
         ClearPanes { transmittance: triangles.map(|t| self.transmittance[t]).collect() }
     }

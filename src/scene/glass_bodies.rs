@@ -214,8 +214,7 @@ impl Shell {
         let volume: f64 = triangles.iter().map(cone).sum();
         let areas = || members.iter().map(|&k| scene.area(faces[k].triangle));
         let area: f64 = areas().sum();
-        // Written so that NaN is flat.
-        if !(volume.abs() > FLAT * area.powf(1.5)) {
+        if volume.is_nan() || volume.abs() <= FLAT * area.powf(1.5) {
             return None;
         }
         let flipped = volume < 0.0;
@@ -277,7 +276,7 @@ fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
             for (edge, forward) in edges(k) {
                 let Some(other) = neighbour(k, edge) else { continue 'sets };
                 // Wound alike, they run along their side in opposite directions.
-                let runs_forward = edges(other).iter().any(|&e| e == (edge, true));
+                let runs_forward = edges(other).contains(&(edge, true));
                 let wanted = alike[k].map(|alike| alike == (forward != runs_forward));
                 match alike[other] {
                     None => queue.push(other),
