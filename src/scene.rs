@@ -64,7 +64,8 @@ pub struct Material {
     /// Which sides do: fronts, unless set. Backs of others only block light.
     pub sides: Sides,
     /// A mirror or glass, beside that: pictures show it. The light that is spread passes glass that
-    /// reflects nothing diffusely, weakened by its transmittance; else it is as if it were not there.
+    /// reflects nothing diffusely and does not emit, weakened by its transmittance; for it all else
+    /// is as if it were not there.
     pub specular: Option<Specular>,
 }
 

@@ -44,8 +44,8 @@ use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
 /// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
 /// [`crate::Material::DEFAULT_REFLECTANCE`]. `illum` 3 to 7 and 9 make mirrors and glass
-/// ([`crate::Specular`]), which pictures show; light is spread as if mirrors were their diffuse part
-/// alone, and passes glass straight on, weakened by its transmittance
+/// ([`crate::Specular`]), which pictures show; light is spread as if mirrors were their diffuse
+/// part alone, and passes glass straight on, weakened by its transmittance
 /// ([`ObjSettings::specular`]).
 ///
 /// What is merely odd is repaired, and said in [`Scene::warnings`]: libraries under other names or

@@ -24,8 +24,8 @@
 //!
 //! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each
 //! channel both together reflect no more than they get. Without a `Kd` there is none. Glass that
-//! light passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the colour
-//! of a preview more often than a haze.
+//! light passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the
+//! colour of a preview more often than a haze.
 
 use crate::scene::{Rgb, Specular};
 

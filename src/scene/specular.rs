@@ -1,7 +1,8 @@
 //! Surfaces that reflect as a mirror does, or let light through: what a picture shows of them.
 //!
 //! Radiosity is diffuse. A solver takes such a surface for its diffuse part alone
-//! ([`Material::reflectance`](super::Material::reflectance)); a picture shows both.
+//! ([`Material::reflectance`](super::Material::reflectance)), and lets light pass straight through
+//! glass that has none; a picture shows both.
 
 use super::rgb::Rgb;
 

@@ -39,8 +39,8 @@ impl<'m> SolveSession<'m> {
     /// `mesh` is made of the present one by [`Mesh::with_scene`].
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] when elements are others or have moved, clear panes let another share of
-    /// light through, or the emitted flux is not finite. Nothing has changed then.
+    /// [`ErrorKind::Scene`] when elements are others or have moved, clear panes let another share
+    /// of light through, or the emitted flux is not finite. Nothing has changed then.
     pub fn update_materials(&mut self, mesh: &'m Mesh) -> Result<(), Error> {
         if !GeometryDelta::between(self.mesh(), mesh)?.is_empty() {
             let remedy = "use SolveSession::update_geometry, which takes sources of rows as well";
