@@ -158,6 +158,14 @@ fn what_a_texture_reflects_is_let_through_in_its_colours() {
     assert!(transmittance.abs_diff_eq(Rgb::new(0.3, 0.15, 0.0), 1e-9), "{transmittance}");
     assert!(scene.reflectance_at(0, white).abs_diff_eq(Rgb::new(0.4, 0.2, 0.1), 1e-9));
     assert_eq!(scene.reflectance_at(1, black), Rgb::ZERO);
+    // On a piece of the texture that is brighter, both are: without the black quarter but for a
+    // corner of it, as the one triangle has it.
+    let text = text.replace("f 1/1 2/2 3/3 4/4", "f 1/1 2/2 3/3");
+    let files: [(&str, &[u8]); 2] = [("a.mtl", library), ("a.tga", &image)];
+    let half =
+        transmitting(&[("leaf", [0.3, 0.15, 0.0])]).read("leaf.obj", text.as_bytes(), &files);
+    let Material { reflectance: rho, transmittance: tau, .. } = half.unwrap().material(0).clone();
+    assert!(rho.x > 0.3 && (tau - rho).abs().truncate().max_element() < 1e-9, "{rho} {tau}");
     // More than it reflects takes the place of `Kd`, and of that nearly all may go through.
     let scene = read([0.9; 3]);
     let Material { reflectance, transmittance, .. } = scene.material(0);

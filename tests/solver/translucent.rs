@@ -11,7 +11,7 @@ use radiosity::form_factor::{Entry, Row};
 use radiosity::mesh::NodeId;
 use radiosity::solver::Method;
 use radiosity::{
-    Error, FormFactors, Material, Mesh, Rgb, Scene, Sides, Solution, Solver, StopReason,
+    Error, FormFactors, Material, Mesh, Rgb, Scene, Sides, Solution, Solver, StopReason, Triangle,
 };
 
 use crate::common::changes::{assert_balanced, by_elements, flux_difference, painted};
@@ -217,4 +217,11 @@ fn what_is_translucent_has_two_sides() {
         // Once is enough.
         assert_eq!(scene.resolve_sides().triangles(), scene.triangles());
     }
+    // Given again, the same way round: else it would pass on twice what it receives.
+    let twice = quads(&[(BETWEEN, paper.clone()), (BETWEEN, paper)]);
+    let again = |t: &Triangle| Triangle { material: 0, group: 0, ..*t };
+    let triangles = twice.triangles().iter().map(again).collect();
+    let (groups, materials) = (twice.groups().to_vec(), twice.materials().to_vec());
+    let twice = Scene::new(twice.positions().to_vec(), triangles, groups, materials).unwrap();
+    assert_eq!(twice.resolve_sides().triangles().len(), 4);
 }
