@@ -242,8 +242,8 @@ impl Bake {
             Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
         args::print_warnings(&scene);
-        let (warnings, triangles) =
-            (scene.warnings().iter().map(ToString::to_string).collect(), scene.triangles().len());
+        let mut warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        let triangles = scene.triangles().len();
         let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
         let device = progress::of_stage("opening the device", || self.device.open())?;
@@ -255,6 +255,10 @@ impl Bake {
             |report| self.bake(scene, &device, &unshot_goal, report),
         )?;
         let stopped = interrupt::stopped();
+        if let Some(error) = &baked.device_failure {
+            warnings.push(format!("rays on the CPU took the place of the device: {error}"));
+            warnings.last().iter().for_each(|warning| eprintln!("warning: {warning}"));
+        }
         if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) {
             let scene = baked.mesh.scene();
             let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
