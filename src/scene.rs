@@ -11,7 +11,7 @@ mod clear_panes;
 mod covered_backs;
 mod covers;
 mod cut;
-mod glass_bodies;
+pub(crate) mod glass_bodies;
 mod rgb;
 mod scene_textures;
 mod sides;
@@ -33,7 +33,6 @@ pub use crate::geometry::aabb::Aabb;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
-pub(crate) use glass_bodies::{GlassBodies, GlassFace, Medium};
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 pub use sides::Sides;
@@ -310,7 +309,7 @@ impl Scene {
 
     /// The panes that light passes; none in a scene without.
     pub(crate) fn clear_panes(&self) -> Option<&ClearPanes> {
-        self.clear_panes.get_or_init(|| ClearPanes::new(self)).as_ref()
+        self.clear_panes.get_or_init(|| glass_bodies::clear_panes(self)).as_ref()
     }
 
     /// Whether there are panes that light passes.

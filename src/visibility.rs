@@ -3,6 +3,6 @@
 pub(crate) mod buried;
 pub(crate) mod lit_sides;
 pub(crate) mod offset;
-mod panes;
+pub(crate) mod panes;
 pub(crate) mod ray_scene;
 mod wide_bvh;

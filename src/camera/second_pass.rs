@@ -24,7 +24,8 @@ use super::optics::{fresnel, pane, refracted, schlick};
 use super::textured::{LitSurface, Sight};
 use crate::mesh::SurfaceTopology;
 use crate::sampling::hash::split_mix64;
-use crate::scene::{GlassBodies, GlassFace, Medium, Rgb, Specular};
+use crate::scene::glass_bodies::{GlassBodies, GlassFace, Medium};
+use crate::scene::{Rgb, Specular};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 

@@ -14,32 +14,17 @@
 //!
 //! Neither Fresnel's reflection nor refraction counts here; pictures have both.
 
-use super::glass_bodies::GlassBodies;
-use super::{Material, Rgb, Scene, Specular};
+use super::rgb::Rgb;
 
 /// What passes the triangles of a scene.
 #[derive(Clone, Debug)]
 pub(crate) struct ClearPanes {
     /// Per triangle the share of light per channel that passes it once, from either side; none for
     /// triangles that are not clear.
-    transmittance: Vec<Option<Rgb>>,
+    pub transmittance: Vec<Option<Rgb>>,
 }
 
 impl ClearPanes {
-    /// Those of `scene`; none if it has none.
-    pub fn new(scene: &Scene) -> Option<ClearPanes> {
-        let of_material: Vec<Option<Rgb>> =
-            scene.materials().iter().map(Material::clear_transmittance).collect();
-        let of = |t: usize| of_material[scene.triangles()[t].material as usize];
-        let count = scene.triangles().len();
-        if !(0..count).any(|t| of(t).is_some()) {
-            return None;
-        }
-        let glass = GlassBodies::new(scene);
-        let transmittance = |t: usize| Some(of(t)?.powf(glass.crossing(t)));
-        Some(ClearPanes { transmittance: (0..count).map(transmittance).collect() })
-    }
-
     /// The same where triangle t is cut into the pieces from `firsts[t]` to `firsts[t + 1]`.
     pub fn cut(&self, firsts: &[u32]) -> ClearPanes {
         let of_pieces = |(of_triangle, ends): (&Option<Rgb>, &[u32])| {
@@ -52,20 +37,5 @@ impl ClearPanes {
     /// The share per channel that passes triangle `t` once; none if it is not clear.
     pub fn transmittance(&self, t: usize) -> Option<Rgb> {
         self.transmittance[t]
-    }
-}
-
-impl Material {
-    /// The share of light per channel that passes a pane or body of it straight on; none where it
-    /// blocks light. Glass with a diffuse part blocks light and reflects that part.
-    pub(crate) fn clear_transmittance(&self) -> Option<Rgb> {
-        match self.specular {
-            Some(Specular::Glass { transmittance, .. })
-                if transmittance != Rgb::ZERO && !self.scatters() && self.exitance == Rgb::ZERO =>
-            {
-                Some(transmittance)
-            }
-            _ => None,
-        }
     }
 }

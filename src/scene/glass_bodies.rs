@@ -17,7 +17,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use super::{Scene, Specular};
+use super::clear_panes::ClearPanes;
+use super::{Material, Rgb, Scene, Specular};
 use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
@@ -305,4 +306,33 @@ fn solid_angle(corners: [DVec3; 3], point: DVec3) -> f64 {
     let [x, y, z] = [a.length(), b.length(), c.length()];
     let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
     2.0 * a.dot(b.cross(c)).atan2(below)
+}
+
+/// What passes the clear panes and bodies of `scene`; none if it has none.
+pub(super) fn clear_panes(scene: &Scene) -> Option<ClearPanes> {
+    let of_material: Vec<Option<Rgb>> =
+        scene.materials().iter().map(Material::clear_transmittance).collect();
+    let of = |t: usize| of_material[scene.triangles()[t].material as usize];
+    let count = scene.triangles().len();
+    if !(0..count).any(|t| of(t).is_some()) {
+        return None;
+    }
+    let glass = GlassBodies::new(scene);
+    let transmittance = |t: usize| Some(of(t)?.powf(glass.crossing(t)));
+    Some(ClearPanes { transmittance: (0..count).map(transmittance).collect() })
+}
+
+impl Material {
+    /// The share of light per channel that passes a pane or body of it straight on; none where it
+    /// blocks light. Glass with a diffuse part blocks light and reflects that part.
+    pub(crate) fn clear_transmittance(&self) -> Option<Rgb> {
+        match self.specular {
+            Some(Specular::Glass { transmittance, .. })
+                if transmittance != Rgb::ZERO && !self.scatters() && self.exitance == Rgb::ZERO =>
+            {
+                Some(transmittance)
+            }
+            _ => None,
+        }
+    }
 }

@@ -26,6 +26,7 @@ use super::emitters::{Emitters, Weights};
 use crate::progress::BatchSizer;
 use crate::scene::{Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
+use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Paths go on with this probability at most. What reflects more ends as often and counts the more:
@@ -44,6 +45,7 @@ const ALIKE: f64 = 0.8;
 pub struct PathTracer<'a> {
     scene: &'a Scene,
     rays: RayScene,
+    panes: Panes,
     normals: Vec<DVec3>,
     emitters: Emitters,
     /// Surfaces within this distance of each other are in one place, scene unit.
@@ -78,6 +80,7 @@ impl<'a> PathTracer<'a> {
         PathTracer {
             scene,
             rays: RayScene::of_scene(scene),
+            panes: Panes::of_scene(scene),
             normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
             emitters: Emitters::new(scene),
             contact: (offset::PATH_CONTACT * diagonal)
@@ -259,7 +262,7 @@ impl<'a> PathTracer<'a> {
     /// The share per channel that clear panes let through from `at` along `direction` (unit length)
     /// to a surface at that distance.
     fn passed(&self, at: &SurfacePoint, direction: DVec3, distance: f64) -> Rgb {
-        self.rays.transmittance(at.position, direction, self.contact..distance - self.contact)
+        self.panes.transmittance(at.position, direction, self.contact..distance - self.contact)
     }
 
     /// What a ray along `direction` (unit length) meets first. What lies in one place with the

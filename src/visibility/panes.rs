@@ -15,7 +15,8 @@ use crate::scene::{Rgb, Scene};
 /// The panes of a scene, for rays.
 #[derive(Debug)]
 pub(crate) struct Panes {
-    rays: RayScene,
+    /// None in a scene without.
+    rays: Option<RayScene>,
     /// Share per channel that passes each of its triangles.
     transmittance: Vec<Rgb>,
 }
@@ -29,23 +30,39 @@ const SEAM: f64 = 1e-11;
 const SAME_PLACE: f64 = 1e-9;
 
 impl Panes {
-    /// Those of `scene`; none if it has none.
-    pub fn of_scene(scene: &Scene) -> Option<Panes> {
-        let panes = scene.clear_panes()?;
+    /// Those of `scene`.
+    pub fn of_scene(scene: &Scene) -> Panes {
+        let Some(panes) = scene.clear_panes() else {
+            return Panes { rays: None, transmittance: vec![] };
+        };
         let clear = |t: usize| Some((t, panes.transmittance(t)?));
         let (triangles, transmittance): (Vec<usize>, Vec<Rgb>) =
             (0..scene.triangles().len()).filter_map(clear).unzip();
         let rays = RayScene::new(triangles.into_iter().map(|t| scene.corners(t)));
-        Some(Panes { rays, transmittance })
+        Panes { rays: Some(rays), transmittance }
+    }
+
+    /// Whether there are none.
+    pub fn is_none(&self) -> bool {
+        self.rays.is_none()
     }
 
     /// The share per channel of light along `direction` (any length) from `from` that passes all
-    /// panes within `reach` in units of it. A pane right at its end does not count.
+    /// panes within `reach` in units of it; all where there are none. A pane right at its end does
+    /// not count.
+    #[inline]
     pub fn transmittance(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
+        match &self.rays {
+            None => Rgb::ONE,
+            Some(rays) => self.passed(rays, from, direction, reach),
+        }
+    }
+
+    fn passed(&self, rays: &RayScene, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
         let passed = Cell::new(Rgb::ONE);
         let seams: RefCell<Vec<(f64, Rgb)>> = RefCell::default();
         let reach = reach.start..reach.end * (1.0 - offset::SEGMENT_END);
-        self.rays.occluded(from, direction, reach, |hit| {
+        rays.occluded(from, direction, reach, |hit| {
             let share = self.transmittance[hit.triangle];
             if hit.u.min(hit.v).min(1.0 - hit.u - hit.v) > SEAM {
                 passed.set(passed.get() * share);
@@ -90,18 +107,18 @@ mod tests {
         triangles.push(triangle([8, 9, 11], 1));
         let materials = vec![glass, Material::grey("floor", 0.5)];
         let scene = Scene::new(positions, triangles, vec!["all".into()], materials).unwrap();
-        let rays = RayScene::of_scene(&scene);
+        let (rays, panes) = (RayScene::of_scene(&scene), Panes::of_scene(&scene));
         for k in -9..10 {
             for turn in [0.0, 0.3, 0.7] {
                 // Along the diagonals of both, and elsewhere.
                 let across = DVec3::new(f64::cos(turn), f64::sin(turn), 0.0) * f64::from(k) / 20.0;
                 for from in [across, across + DVec3::new(0.1, -0.2, 0.0)] {
                     let to = DVec3::new(across.x, across.y, 1.0) - from;
-                    let passed = rays.transmittance(from, to, 0.0..3.0);
+                    let passed = panes.transmittance(from, to, 0.0..3.0);
                     let off = (passed - transmittance * transmittance).abs().max_element();
                     assert!(off < 1e-15, "{k} {turn}: {passed}");
                     // The second begins at the end of this reach.
-                    let passed = rays.transmittance(from, to, 0.0..2.0);
+                    let passed = panes.transmittance(from, to, 0.0..2.0);
                     assert!((passed - transmittance).abs().max_element() < 1e-15);
                 }
             }

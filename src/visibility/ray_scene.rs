@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
-//! clear panes ([`Scene::is_clear`]): [`RayScene::transmittance`] tells what they let through.
+//! clear panes ([`Scene::is_clear`]): [`Panes`](super::panes::Panes) tell what they let through.
 //!
 //! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
 //! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
@@ -21,9 +21,8 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 
 use crate::geometry::aabb::Aabb;
-use crate::scene::{Rgb, Scene};
+use crate::scene::Scene;
 
-use super::panes::Panes;
 use super::wide_bvh::hierarchy;
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
@@ -36,8 +35,6 @@ pub(crate) struct RayScene {
     origin: DVec3,
     /// From the scene's unit to the hierarchy's.
     scale: f64,
-    /// None in a scene without clear panes.
-    panes: Option<Box<Panes>>,
 }
 
 /// Where a ray first met a triangle.
@@ -95,7 +92,7 @@ impl RayScene {
         let mut bvh = hierarchy(&boxes);
         bvh.primitive_indices.iter_mut().for_each(|k| *k = met[*k as usize]);
         let triangles = corners.into_iter().map(TrianglePlane::new).collect();
-        RayScene { bvh, triangles, origin, scale, panes: None }
+        RayScene { bvh, triangles, origin, scale }
     }
 
     /// The same, where nothing meets the backs of triangles that are `covered`.
@@ -106,28 +103,12 @@ impl RayScene {
         self
     }
 
-    /// For the triangles of `scene` that block light, by their numbers, and its clear panes.
+    /// For the triangles of `scene` that block light, by their numbers.
     pub fn of_scene(scene: &Scene) -> RayScene {
         let count = scene.triangles().len();
         let met = (0..count as u32).filter(|&t| !scene.is_clear(t as usize)).collect();
-        let rays = RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met);
-        let panes = Panes::of_scene(scene).map(Box::new);
-        RayScene { panes, ..rays }.with_covered_backs(|t| scene.is_back_covered(t))
-    }
-
-    /// Whether there are clear panes.
-    pub fn has_panes(&self) -> bool {
-        self.panes.is_some()
-    }
-
-    /// The share of light per channel along `direction` (any length) from `from` that passes the
-    /// clear panes within `reach` in units of it; all of it where there are none.
-    #[inline]
-    pub fn transmittance(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
-        match &self.panes {
-            None => Rgb::ONE,
-            Some(panes) => panes.transmittance(from, direction, reach),
-        }
+        RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
+            .with_covered_backs(|t| scene.is_back_covered(t))
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and

@@ -6,10 +6,12 @@ use glam::DVec3;
 use radiosity::bake::Outcome;
 use radiosity::verify::{PathTracer, Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, Camera, Material, Rgb, Scene, Sky, SkyDistribution, Sun, VertexMesh,
+    Backend, BakeTarget, Camera, Material, ObjSettings, Rgb, Scene, Sky, SkyDistribution, Sun,
+    VertexMesh,
 };
 
 use crate::common::scenes::{Quad, facing_up, lamp, paint, quads, walls};
+use crate::common::textured::tga;
 use crate::common::{gpu, keep_counting, keep_going};
 
 const RHO: Rgb = Rgb::new(0.2, 0.3, 0.0);
@@ -127,4 +129,43 @@ fn a_lit_curtain_is_as_path_traced() {
     let found = verify(&scene, &baked.light.surface, &settings, keep_going);
     let measured = found.unwrap().error.unwrap();
     assert!(measured.value - 2.0 * measured.standard_error < 0.05, "{measured:?}");
+}
+
+#[test]
+fn a_textured_leaf_lets_light_through_in_its_colours() {
+    // Two halves, of which one reflects and lets through a fifth of what the other does, all the
+    // same under a sky from all around, before any vertex gathers: (ρ + τ) π L.
+    let grey = [128; 3];
+    let image = tga(4, &[[255; 3], [255; 3], grey, grey]);
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+        usemtl leaf\nf 1/1 2/2 3/3 4/4\n";
+    let library: &[u8] = b"newmtl leaf\nKd 0.8\nmap_Kd -clamp on a.tga\n";
+    let mut settings = ObjSettings::default();
+    settings.transmit.push(("leaf".into(), Rgb::splat(0.4)));
+    settings.sky = Some(Rgb::ONE.into());
+    let files: [(&str, &[u8]); 2] = [("a.mtl", library), ("a.tga", &image)];
+    let scene = settings.read("leaf.obj", text.as_bytes(), &files).unwrap();
+    let baked = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, keep_going).unwrap();
+    // Of sRGB, linear.
+    let dim = ((128.0 / 255.0 + 0.055) / 1.055f64).powf(2.4);
+    let mut seen = [0, 0];
+    for e in 0..baked.mesh.element_count() {
+        let corners = baked.mesh.corners(baked.mesh.element(e)).map(|p| p.x);
+        let (low, high) =
+            corners.into_iter().fold((1.0f64, 0.0f64), |(low, high), x| (low.min(x), high.max(x)));
+        // Between the middles of texels they blend.
+        let half = if high <= 0.375 {
+            0
+        } else if low >= 0.625 {
+            1
+        } else {
+            continue;
+        };
+        seen[half] += 1;
+        let truth = 0.8 * [1.0, dim][half] * PI;
+        let off = (baked.solution.radiosity[e] / truth - 1.0).abs().max_element();
+        // Weights of rays that add up to 1, in 32-bit floats; textures have 16 bits a channel.
+        assert!(off < 1e-4, "{half}: {off:e}");
+    }
+    assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
 }

@@ -1,6 +1,6 @@
 //! Random scenes that are open to random skies and suns, of surfaces with one side or two, opaque,
-//! translucent or clear: what must hold whatever is in them. See `properties.rs` for how to try more of
-//! them.
+//! translucent or clear: what must hold whatever is in them. See `properties.rs` for how to try
+//! more of them.
 
 use glam::DVec3;
 use proptest::prelude::*;

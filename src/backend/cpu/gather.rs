@@ -30,6 +30,7 @@ use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::offset;
+use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
@@ -40,6 +41,7 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 #[derive(Debug)]
 pub struct RayGather {
     scene: RayScene,
+    panes: Panes,
     lights: Lights,
     rotations: CellRotation,
     samples: HemisphereSamples,
@@ -75,6 +77,7 @@ impl RayGather {
         let min_rays = 1 << f64::from(count).log2().round().max(1.0) as u32;
         Ok(RayGather {
             scene: RayScene::of_scene(mesh.scene()),
+            panes: Panes::of_scene(mesh.scene()),
             lights: Lights::new(mesh.shared_scene()),
             rotations: CellRotation::new(&mesh.scene().bounds()),
             samples: samples(mesh.scene(), min_rays, min_rays),
@@ -148,7 +151,7 @@ impl RayGather {
             else {
                 out.escaped += 1.0;
                 let reach = point.near..f64::INFINITY;
-                let passed = self.scene.transmittance(point.position, direction, reach);
+                let passed = self.panes.transmittance(point.position, direction, reach);
                 let radiosity = PI * sky.radiance(direction) * passed;
                 out.irradiance += radiosity;
                 sums.max_contribution = sums.max_contribution.max(radiosity.length());
@@ -160,7 +163,7 @@ impl RayGather {
                 continue;
             }
             let reach = point.near..hit.distance;
-            let passed = self.scene.transmittance(point.position, direction, reach);
+            let passed = self.panes.transmittance(point.position, direction, reach);
             let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v) * passed;
             out.irradiance += reflected;
             sums.max_contribution = sums.max_contribution.max(reflected.length());
@@ -230,7 +233,7 @@ impl RayGather {
             out.all += cosine;
             let (from, any) = (point.position, |_: &Hit| true);
             if cosine > 0.0 && !self.scene.occluded(from, direction, reach.clone(), any) {
-                out.seen += cosine * self.scene.transmittance(from, direction, reach);
+                out.seen += cosine * self.panes.transmittance(from, direction, reach);
             }
         }
         out
@@ -274,7 +277,7 @@ impl RayGather {
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
             let reach = near..1.0 - offset::SEGMENT_END;
             if !self.scene.occluded(point.position, to, reach.clone(), other) {
-                out.seen += factor * self.scene.transmittance(point.position, to, reach);
+                out.seen += factor * self.panes.transmittance(point.position, to, reach);
             }
         }
         out

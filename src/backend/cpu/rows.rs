@@ -17,6 +17,7 @@ use crate::sampling::hash::low_bias32;
 use crate::sampling::hemisphere::HemisphereSamples;
 use crate::scene::Rgb;
 use crate::visibility::offset;
+use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid.
@@ -29,6 +30,7 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 #[derive(Debug)]
 pub struct RayRows {
     rays: RayScene,
+    panes: Panes,
     count: u32,
     pub(crate) full_share: f64,
 }
@@ -46,8 +48,8 @@ impl RayRows {
     /// [`crate::ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayRows, Error> {
         HemisphereSamples::new(count)?;
-        let rays = RayScene::of_scene(mesh.scene());
-        Ok(RayRows { rays, count, full_share: RayRows::FULL_SHARE })
+        let (rays, panes) = (RayScene::of_scene(mesh.scene()), Panes::of_scene(mesh.scene()));
+        Ok(RayRows { rays, panes, count, full_share: RayRows::FULL_SHARE })
     }
 
     /// All rays for patches that shoot at least this share of the emitted flux, in [0, 1]; for
@@ -64,7 +66,7 @@ impl RayRows {
         let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
         let meets = |direction| item(mesh, self.rays.closest_hit(eye, direction, start, Some(own)));
         let directions = samples.directions(mesh.normal(patch), rotation);
-        if self.rays.has_panes() {
+        if !self.panes.is_none() {
             return self.row_through_panes(mesh, patch, directions, start);
         }
         let mut hits: Vec<u32> = directions.map(meets).collect();
@@ -84,7 +86,7 @@ impl RayRows {
         let meets = |direction| {
             let hit = self.rays.closest_hit(eye, direction, start, Some(own));
             let end = hit.map_or(f64::INFINITY, |hit| hit.distance);
-            (item(mesh, hit), self.rays.transmittance(eye, direction, start..end))
+            (item(mesh, hit), self.panes.transmittance(eye, direction, start..end))
         };
         let mut hits: Vec<(u32, Rgb)> = directions.map(meets).collect();
         // Those of one item stay in their order, so that their sum is the same on every run.

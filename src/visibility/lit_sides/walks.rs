@@ -12,6 +12,7 @@ use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Scene, Sides};
 use crate::visibility::offset;
+use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Surfaces that a walk meets at most. Through a door of a thirtieth of a room's area four in ten
@@ -34,6 +35,7 @@ pub struct Walks<'a> {
     /// Of each material.
     sides: &'a [Sides],
     rays: RayScene,
+    panes: Panes,
     normals: Vec<DVec3>,
     /// Triangles that emit.
     lamps: Vec<usize>,
@@ -59,6 +61,7 @@ impl<'a> Walks<'a> {
             scene,
             sides,
             rays: RayScene::of_scene(scene),
+            panes: Panes::of_scene(scene),
             normals: (0..count).map(|t| scene.normal(t)).collect(),
             shining_backs: FxHashMap::default(),
             powers: AreaSampler::new(lamps.iter().map(power)),
@@ -201,7 +204,7 @@ impl<'a> Walks<'a> {
     /// The share that clear panes let through, in the mean over the channels.
     fn passed(&self, at: DVec3, direction: DVec3, distance: f64) -> f64 {
         let reach = self.contact..distance - self.contact;
-        self.rays.transmittance(at, direction, reach).element_sum() / 3.0
+        self.panes.transmittance(at, direction, reach).element_sum() / 3.0
     }
 
     /// Irradiance at a place on a side from a lamp, chosen by its power; none if it is not seen.
