@@ -136,6 +136,8 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
         let [is_front_lit, is_back_lit] = [2 * t, 2 * t + 1].map(|side| lit.is_lit[side]);
         let turned = match (walks.sides_of(t), walks.shines_from_back(t)) {
             (Sides::Auto, Some(shines_from_back)) => shines_from_back,
+            // What is translucent has both sides, and no triangle of it need face another way.
+            (Sides::Auto, None) if is_translucent => false,
             (Sides::Auto, None) => is_back_lit && !is_front_lit && !is_room[t],
             _ => false,
         };

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use radiosity::scene::WarningKind;
 use radiosity::{
-    Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, Sides, Triangle, VertexMesh, load_obj,
+    Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, Sides, Sky, Sun, Triangle, VertexMesh,
+    load_obj,
 };
 
 use crate::common::keep_going;
@@ -285,15 +286,28 @@ fn both_sides_of_a_plate_receive_the_sky() {
 fn light_through_a_translucent_lid_reaches_what_is_below() {
     // A well with black walls, whose floor is wound the wrong way; all of the sky is above a lid.
     for transmittance in [0.0, 0.5] {
-        let lid = Material { transmittance: Rgb::splat(transmittance), ..paint(0.0, 0.0) };
+        let lid = Material { transmittance: Rgb::splat(transmittance), ..auto(0.0, 0.0) };
         let [x0, x1, y0, y1, ..] = room();
         let mut parts = [x0, x1, y0, y1].map(|wall| (wall, paint(0.0, 0.0))).to_vec();
         parts.push((facing_down([0.0, 1.0], [0.0, 1.0], 0.0), auto(0.5, 0.0)));
-        parts.push((facing_up([-0.1, 1.1], [-0.1, 1.1], 1.0), lid));
+        parts.push((facing_down([-0.1, 1.1], [-0.1, 1.1], 1.0), lid));
         let below = facing_up([-3.0, 3.0], [-3.0, 3.0], -0.1);
         parts.push((below, paint(0.0, 0.0)));
         let scene = quads(&parts).with_sky(Rgb::ONE).unwrap().resolve_sides();
         let is_turned = scene.normal(8) == DVec3::Z;
         assert_eq!(is_turned, transmittance > 0.0, "{:?}", scene.warnings());
+    }
+}
+
+#[test]
+fn translucent_sheets_stay_as_they_are_wound() {
+    // Lit from behind alone: what is opaque is turned, what is translucent has both sides anyway.
+    for (transmittance, front) in [(0.0, DVec3::Z), (0.5, -DVec3::Z)] {
+        let sheet = Material { transmittance: Rgb::splat(transmittance), ..auto(0.4, 0.0) };
+        let sun = Sun { direction: DVec3::Z, irradiance: Rgb::ONE };
+        let scene = quads(&[(facing_down([0.0, 1.0], [0.0, 1.0], 0.0), sheet)]);
+        let scene = scene.with_sky(Sky::default().with_sun(sun).unwrap()).unwrap().resolve_sides();
+        assert_eq!(scene.normal(0), front, "{:?}", scene.warnings());
+        assert_eq!(scene.triangles().len(), if transmittance > 0.0 { 4 } else { 2 });
     }
 }
