@@ -80,14 +80,16 @@
 //!   unit squared.
 //! - A face's front is where its corners run counter-clockwise. The front reflects and emits, and
 //!   the back reflects if its material says so ([`Sides`]; in files, if light reaches it). Both
-//!   block; light that meets the back of others is lost there, and counted.
+//!   block, but for what is translucent or clear ([`Material`]); light that meets the back of
+//!   others is lost there, and counted.
 //! - Shares of light are whole numbers of 1/[`Row::TOTAL`](form_factor::Row::TOTAL), so rows sum to
 //!   one exactly and a solve gives the same bits on every run with the same adapter.
 //!
 //! # What it does not model
 //!
-//! Specular or glossy reflection, transparency, participating media, polarisation, time.
-//! Light leaves and arrives diffusely, and an emitter is a surface.
+//! Glossy reflection, what mirrors and lenses throw onto others, cut-outs, participating media,
+//! polarisation, time. Light leaves and arrives diffusely, passes clear glass straight on, and an
+//! emitter is a surface or the light from outside. Pictures show mirrors and glass.
 
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.
 #![cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
