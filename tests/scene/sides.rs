@@ -286,11 +286,11 @@ fn both_sides_of_a_plate_receive_the_sky() {
 fn light_through_a_translucent_lid_reaches_what_is_below() {
     // A well with black walls, whose floor is wound the wrong way; all of the sky is above a lid.
     for transmittance in [0.0, 0.5] {
-        let lid = Material { transmittance: Rgb::splat(transmittance), ..auto(0.0, 0.0) };
+        let lid = Material { transmittance: Rgb::splat(transmittance), ..paint(0.0, 0.0) };
         let [x0, x1, y0, y1, ..] = room();
         let mut parts = [x0, x1, y0, y1].map(|wall| (wall, paint(0.0, 0.0))).to_vec();
         parts.push((facing_down([0.0, 1.0], [0.0, 1.0], 0.0), auto(0.5, 0.0)));
-        parts.push((facing_down([-0.1, 1.1], [-0.1, 1.1], 1.0), lid));
+        parts.push((facing_up([-0.1, 1.1], [-0.1, 1.1], 1.0), lid));
         let below = facing_up([-3.0, 3.0], [-3.0, 3.0], -0.1);
         parts.push((below, paint(0.0, 0.0)));
         let scene = quads(&parts).with_sky(Rgb::ONE).unwrap().resolve_sides();
