@@ -12,6 +12,7 @@ mod covered_backs;
 mod covers;
 mod cut;
 pub(crate) mod glass_bodies;
+mod material;
 mod rgb;
 mod scene_textures;
 mod sides;
@@ -33,6 +34,7 @@ pub use crate::geometry::aabb::Aabb;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
+pub use material::Material;
 pub use rgb::Rgb;
 use scene_textures::SceneTextures;
 pub use sides::Sides;
@@ -44,29 +46,6 @@ pub(crate) use sky_map::SkyMap;
 pub use specular::Specular;
 use texture::MaterialTextures;
 pub use warning::{Warning, WarningKind};
-
-/// How faces reflect and emit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// Name, for messages and look-up.
-    pub name: String,
-    /// Diffuse hemispherical reflectance ρ per channel, in [0, 1). Of a texture the mean over all
-    /// triangles of the material; [`Scene::reflectance_at`] has it in detail.
-    pub reflectance: Rgb,
-    /// Exitance E per channel, W/m²: π times the emitted radiance. Of a texture the mean over all
-    /// triangles of the material; [`Scene::exitance_at`] has it in detail.
-    pub exitance: Rgb,
-    /// Diffuse transmittance τ per channel: of the light that arrives on either side, the share
-    /// that leaves diffusely from the other. ρ + τ < 1. What is translucent reflects on both sides,
-    /// whatever `sides` says. With a texture, τ follows it as ρ does, and this is its mean.
-    pub transmittance: Rgb,
-    /// Which sides do: fronts, unless set. Backs of others only block light.
-    pub sides: Sides,
-    /// A mirror or glass, beside that: pictures show it. The light that is spread passes glass that
-    /// reflects nothing diffusely and does not emit, weakened by its transmittance; for it all else
-    /// is as if it were not there.
-    pub specular: Option<Specular>,
-}
 
 /// A face of the scene: counter-clockwise corners seen from its front.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -131,9 +110,8 @@ impl Scene {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a reflectance, alone or with a transmittance, outside [0, 1), a
-    /// negative exitance, a number that
-    /// is not finite, a mirror or glass that returns more light than it gets, an index out of
-    /// range, or when no triangle with area is left.
+    /// negative exitance, a number that is not finite, a mirror or glass that returns more light
+    /// than it gets, an index out of range, or when no triangle with area is left.
     pub fn new(
         positions: Vec<DVec3>,
         triangles: Vec<Triangle>,
@@ -299,7 +277,7 @@ impl Scene {
     /// through it leaves from them. None of others.
     pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {
         let is_translucent = |t: usize| self.material(t).is_translucent();
-        let covers = if is_translucent(t) { self.covered_backs().covers(t) } else { &[] };
+        let covers = if is_translucent(t) { self.covered_backs().of(t) } else { &[] };
         covers.iter().map(|&s| s as usize).filter(move |&s| is_translucent(s))
     }
 
@@ -404,72 +382,6 @@ impl Scene {
 
     pub(crate) fn warn(&mut self, warning: Warning) {
         self.warnings.push(warning);
-    }
-}
-
-impl Material {
-    /// Reflectance ρ, in every channel, of faces that name no material.
-    pub const DEFAULT_REFLECTANCE: f64 = 0.5;
-
-    /// A surface that reflects `reflectance` in every channel and emits nothing.
-    pub fn grey(name: impl Into<String>, reflectance: f64) -> Material {
-        let (reflectance, exitance) = (Rgb::splat(reflectance), Rgb::ZERO);
-        let (name, sides) = (name.into(), Sides::Front);
-        let transmittance = Rgb::ZERO;
-        Material { name, reflectance, transmittance, exitance, sides, specular: None }
-    }
-
-    /// Whether any light that arrives leaves again diffusely, on either side, in any channel.
-    pub(crate) fn scatters(&self) -> bool {
-        self.albedo() != Rgb::ZERO
-    }
-
-    /// Whether any light that arrives leaves diffusely from the other side.
-    pub(crate) fn is_translucent(&self) -> bool {
-        self.transmittance != Rgb::ZERO
-    }
-
-    /// The share of the light that arrives which leaves again diffusely, on either side: ρ + τ per
-    /// channel.
-    pub(crate) fn albedo(&self) -> Rgb {
-        self.reflectance + self.transmittance
-    }
-
-    /// Reflectance and transmittance in [0, 1) together, exitance finite and not negative, no more
-    /// light than there is.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let place = || format!("material {}", quoted(&[&self.name]));
-        for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
-            if !(0.0..1.0).contains(&rho) {
-                return Err(bad(
-                    place(),
-                    format!("reflectance {rho} in channel {channel}"),
-                    "must be at least 0 and below 1: a surface cannot return all light or more",
-                ));
-            }
-        }
-        let both = self.transmittance.to_array().into_iter().zip(self.albedo().to_array());
-        for (channel, (tau, albedo)) in ["r", "g", "b"].iter().zip(both) {
-            if !(tau >= 0.0 && albedo < 1.0) {
-                let rho = albedo - tau;
-                return Err(bad(
-                    place(),
-                    format!("transmittance {tau} beside reflectance {rho} in channel {channel}"),
-                    "must be at least 0, and both together below 1",
-                ));
-            }
-        }
-        for (channel, e) in ["r", "g", "b"].iter().zip(self.exitance.to_array()) {
-            if !(e.is_finite() && e >= 0.0) {
-                return Err(bad(
-                    place(),
-                    format!("exitance {e} in channel {channel}"),
-                    "must be finite and not negative",
-                ));
-            }
-        }
-        let fault = self.specular.and_then(|specular| specular.fault(self.albedo()));
-        fault.map_or(Ok(()), |(found, remedy)| Err(bad(place(), found, remedy)))
     }
 }
 

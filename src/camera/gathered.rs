@@ -257,8 +257,8 @@ impl GatheredView<'_> {
         });
     }
 
-    /// Mean albedo and exitance of what was hit, and the sum of the radiosity that the
-    /// vertices give it, W/m²: each by its weight.
+    /// Mean albedo and exitance of what was hit, and the sum of the radiosity that the vertices
+    /// give it, W/m²: each by its weight.
     fn seen_of(&self, hits: &[SeenHit]) -> (Rgb, Rgb, Rgb) {
         let interpolated =
             |seen: &SeenHit| seen.weight * self.lit.radiosity(&seen.hit, &seen.sight);

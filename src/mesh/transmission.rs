@@ -130,8 +130,8 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, Sides, Triangle};
 
-    /// A square of translucent triangles that has been given its second side, split further where
-    /// `is_split` says of a triangle.
+    /// A square of translucent triangles that has been given its second side, each split so many
+    /// times.
     fn sheet(levels: [u32; 4]) -> Mesh {
         let positions = [[0.1, 0.0], [2.3, 0.2], [2.0, 1.9], [0.0, 1.4]]
             .map(|[x, y]| x * DVec3::new(0.6, 0.0, 0.8) + y * DVec3::Y);

@@ -44,12 +44,7 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let surfaces = Surfaces { scene, corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
         (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
-    let is_covered: Vec<bool> = covers.iter().map(Option::is_some).collect();
-    if !is_covered.contains(&true) {
-        return Covers::default();
-    }
-    let covers = (0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect();
-    Covers { is_covered, covers }
+    Covers((0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect())
 }
 
 /// Triangles by the positions of their corners.

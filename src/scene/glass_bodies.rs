@@ -321,18 +321,3 @@ pub(super) fn clear_panes(scene: &Scene) -> Option<ClearPanes> {
     let transmittance = |t: usize| Some(of(t)?.powf(glass.crossing(t)));
     Some(ClearPanes { transmittance: (0..count).map(transmittance).collect() })
 }
-
-impl Material {
-    /// The share of light per channel that passes a pane or body of it straight on; none where it
-    /// blocks light. Glass with a diffuse part blocks light and reflects that part.
-    pub(crate) fn clear_transmittance(&self) -> Option<Rgb> {
-        match self.specular {
-            Some(Specular::Glass { transmittance, .. })
-                if transmittance != Rgb::ZERO && !self.scatters() && self.exitance == Rgb::ZERO =>
-            {
-                Some(transmittance)
-            }
-            _ => None,
-        }
-    }
-}
