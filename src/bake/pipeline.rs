@@ -106,7 +106,8 @@ fn first_gather_mesh(
     let sizing = solve.sizing(scene, gather.element_size);
     let sizing = sizing.within(scene, Mesh::MAX_DEPTH, most / 2);
     let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?;
-    let at_contacts =
-        mesh.split_at_contacts(gather.contact_levels).split_beside_cuts(gather.contact_levels);
+    let at_contacts = mesh
+        .split_at_contacts(gather.contact_levels)
+        .split_beside_cuts(gather.contact_levels, gather.refinement.min_edge);
     Ok(if at_contacts.element_count() > most { mesh } else { at_contacts })
 }

@@ -19,23 +19,20 @@ const OPENNESS_RAYS: u32 = 32;
 /// Shares of a segment's length at which both its sides are looked at.
 const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
 
-/// Shorter segments are not cut along, in units of the finest edge: light that leaks there stays
-/// within some elements.
-const MIN_LENGTH: f64 = 4.0;
-
 /// Looks on which side of a contact segment light may fall.
 pub(super) struct Openness {
     rays: RayScene,
     directions: HemisphereSamples,
-    /// How far above the surface, and how far beside the segment; scene unit.
+    /// How far beside a segment, which is no shorter, scene unit: within and beyond thin walls.
+    beside: [f64; 2],
+    /// How far above the surface, in units of that.
     above: f64,
-    beside: f64,
 }
 
 impl Openness {
-    pub fn new(scene: &Scene, above: f64, beside: f64) -> Openness {
+    pub fn new(scene: &Scene, above: f64, beside: [f64; 2]) -> Openness {
         let directions = HemisphereSamples::progressive(OPENNESS_RAYS);
-        Openness { rays: RayScene::of_scene(scene), directions, above, beside }
+        Openness { rays: RayScene::of_scene(scene), directions, beside, above }
     }
 
     /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
@@ -43,14 +40,15 @@ impl Openness {
     pub fn has_light_on_both_sides(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
         let Some(ends) = clipped(segment.ends) else { return false };
         let [from, to] = ends.map(|p| a + p.x * (b - a) + p.y * (c - a));
-        if from.distance(to) < MIN_LENGTH * self.beside {
-            return false;
-        }
         let normal = (b - a).cross(c - a).normalize();
-        let across = normal.cross(to - from).normalize_or_zero() * self.beside;
-        OPENNESS_PLACES.into_iter().any(|share| {
-            let place = from.lerp(to, share) + self.above * normal;
-            self.is_open(place + across, normal) && self.is_open(place - across, normal)
+        let across = normal.cross(to - from).normalize_or_zero();
+        let mut long_enough = self.beside.iter().filter(|&&beside| from.distance(to) >= beside);
+        long_enough.any(|&beside| {
+            OPENNESS_PLACES.into_iter().any(|share| {
+                let place = from.lerp(to, share) + self.above * beside * normal;
+                self.is_open(place + beside * across, normal)
+                    && self.is_open(place - beside * across, normal)
+            })
         })
     }
 
