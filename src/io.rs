@@ -25,6 +25,7 @@ mod png;
 mod radiance;
 mod specular;
 mod text;
+mod masks;
 mod textures;
 mod tone;
 pub mod view_factors;

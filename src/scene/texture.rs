@@ -82,6 +82,24 @@ impl Texture {
         self.filtered(uv, 0.0, clamped)
     }
 
+    /// Linear colour of the texel at `uv`, as far as it reaches.
+    pub(super) fn texel_at(&self, uv: DVec2, clamped: bool) -> Rgb {
+        let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
+        let [x, y] = [(uv.x, self.width), (1.0 - uv.y, self.height)]
+            .map(|(place, count)| ((place * f64::from(count)) as u32).min(count - 1));
+        self.cell(0, x, y)
+    }
+
+    /// Whether both are the same image.
+    pub(super) fn has_texels_of(&self, other: &Texture) -> bool {
+        std::ptr::eq(self, other) || self.width == other.width && self.texels == other.texels
+    }
+
+    /// All texels as bytes, rows from the top.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        self.texels.as_flattened()
+    }
+
     /// The same, between the means of so many texels that one covers `area` of the image at most;
     /// 1 is all of it. (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983)
     fn filtered(&self, uv: DVec2, area: f64, clamped: bool) -> Rgb {
@@ -115,7 +133,7 @@ impl Texture {
     }
 
     /// The same, with so many cells along the triangle's outline, and as many repetitions.
-    fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
+    pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
         let size = DVec2::new(self.width.into(), self.height.into());
         let [a, b, c] = corners;
         let low = a.min(b).min(c);
@@ -324,6 +342,8 @@ pub struct MaterialTextures {
     pub reflectance: Option<TextureMap>,
     /// Of its exitance, W/m².
     pub exitance: Option<TextureMap>,
+    /// Where it is solid: white. What is black is a hole.
+    pub mask: Option<TextureMap>,
 }
 
 /// A triangle cut by a rectangle has seven corners at most.
