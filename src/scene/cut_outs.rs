@@ -113,11 +113,6 @@ impl TextureMap {
         !uv.is_finite() || self.texel(uv) != Rgb::ZERO
     }
 
-    /// The texel, as large as it is drawn, that lies at texture coordinates as the file has them.
-    fn texel(&self, uv: DVec2) -> Rgb {
-        self.texture.texel_at(uv * self.scale + self.offset, self.clamped)
-    }
-
     /// The share of a mask that is solid over a triangle with these texture coordinates, in [0, 1];
     /// with so many cells of the image along the triangle's outline.
     fn solid_share(&self, corners: [DVec2; 3], cells: f64) -> f64 {
@@ -157,7 +152,7 @@ impl TextureMap {
             _ => {
                 let solid = spread_over(corners, cells).filter(|&uv| mask.is_solid(uv));
                 let (sum, count) = solid.fold((Rgb::ZERO, 0.0), |(sum, count), uv| {
-                    (sum + self.factor * self.texel(uv), count + 1.0)
+                    (sum + self.texel(uv), count + 1.0)
                 });
                 (count > 0.0).then(|| sum / count)
             }

@@ -15,7 +15,6 @@
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::rgb::Rgb;
 
@@ -64,11 +63,6 @@ impl Texture {
     /// Texels along u and v.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
-    }
-
-    /// Linear colours of all texels, rows from the top.
-    pub fn linear_texels(&self) -> impl IndexedParallelIterator<Item = Rgb> {
-        self.texels.par_iter().map(|&texel| linear_colour(texel))
     }
 
     /// Linear mean of all texels.
@@ -299,6 +293,11 @@ impl TextureMap {
     /// The value at texture coordinates as the file has them.
     pub fn at(&self, uv: DVec2) -> Rgb {
         self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
+    }
+
+    /// The value of the texel that texture coordinates, as the file has them, lie in.
+    pub(crate) fn texel(&self, uv: DVec2) -> Rgb {
+        self.value(self.texture.texel_at(uv * self.scale + self.offset, self.clamped))
     }
 
     /// The value at texture coordinates as the file has them, of which `area` is to be filtered.
