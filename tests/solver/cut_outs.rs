@@ -81,7 +81,7 @@ fn solve(mesh: &Mesh, method: Method) -> Solution {
 
 #[test]
 fn areas_are_those_of_the_cells() {
-    let mesh = cut(furnace(0.5, 0.0), 0.2);
+    let mesh = cut(furnace(0.5, 0.0), 0.3);
     let sheet = 0.7 * 0.7 * MASK.share();
     for group in [6, 7] {
         let triangles = (0..mesh.scene().triangles().len())
@@ -139,7 +139,7 @@ fn all_light_of_a_furnace_by_rays_is_accounted_for() {
 #[test]
 fn states_know_the_holes() {
     let mesh = cut(furnace(0.5, 0.0), 0.3);
-    let moved = Lattice { side: 8, is_solid: |x, y| (MASK.is_solid)(y, x) };
+    let moved = Lattice { side: 8, is_solid: |x, y| (MASK.is_solid)(7 - x, y) };
     assert_eq!(moved.share(), MASK.share());
     let solver = Solver { unshot: 1e-6, ..Solver::new(Method::GaussSeidel) };
     let mut solve = solver.begin(&mesh).unwrap();
