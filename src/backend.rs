@@ -131,7 +131,10 @@ impl Backend {
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if self.gathers_by_hemicubes() && mesh.scene().hidden_from_hemicubes().is_none() => {
+            Backend::Gpu(gpu)
+                if self.gathers_by_hemicubes()
+                    && mesh.scene().hidden_from_hemicubes().is_none() =>
+            {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
                 Ok(Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?))

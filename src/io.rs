@@ -15,6 +15,7 @@ mod files;
 #[cfg(feature = "glb")]
 mod glb;
 mod lights;
+mod masks;
 mod mtl;
 mod obj;
 mod ply;
@@ -25,7 +26,6 @@ mod png;
 mod radiance;
 mod specular;
 mod text;
-mod masks;
 mod textures;
 mod tone;
 pub mod view_factors;

@@ -232,9 +232,8 @@ impl ErrorEstimator<'_> {
             let element = surface.elements[face] as usize;
             let face = &surface.faces[face];
             let node = mesh.element(element);
-            let at = |[u, v]: [f64; 2]| {
-                move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v
-            };
+            let at =
+                |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
             let is_solid = |&place: &[f64; 2]| mesh.is_solid(node, at(place)(corners(face)));
             let [u, v] = shifted(barycentric).map(inset).find(is_solid)?;
             let mix = at([u, v]);

@@ -57,7 +57,8 @@ impl Transmission {
                     let passage = Passage {
                         behind: behind as u32,
                         passed: mesh.transmittance(behind) * (area / mesh.solid_area(node)),
-                        returned: mesh.transmittance(e) * (area / mesh.solid_area(mesh.element(behind))),
+                        returned: mesh.transmittance(e)
+                            * (area / mesh.solid_area(mesh.element(behind))),
                     };
                     passed += passage.passed;
                     all.passages.push(passage);

@@ -98,8 +98,7 @@ impl Scene {
         let of_t = corners.map(|corner| self.texture_place(t, corner));
         let of_s = Scene::WHOLE.map(|corner| other.texture_place(s, corner));
         let near = |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, SAME_PLACE * (1.0 + b.length()));
-        self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask))
-            && of_t.iter().zip(&of_s).all(near)
+        self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
     }
 }
 
@@ -151,9 +150,8 @@ impl TextureMap {
             1.0 => Some(self.mean_by_cells(corners, cells)),
             _ => {
                 let solid = spread_over(corners, cells).filter(|&uv| mask.is_solid(uv));
-                let (sum, count) = solid.fold((Rgb::ZERO, 0.0), |(sum, count), uv| {
-                    (sum + self.texel(uv), count + 1.0)
-                });
+                let (sum, count) = solid
+                    .fold((Rgb::ZERO, 0.0), |(sum, count), uv| (sum + self.texel(uv), count + 1.0));
                 (count > 0.0).then(|| sum / count)
             }
         }

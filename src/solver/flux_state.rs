@@ -53,8 +53,11 @@ impl Flux {
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
     pub fn after(mesh: &Mesh, received: &ReceivedLight) -> Result<Flux, Error> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let emitted: Vec<Rgb> =
-            elements.clone().enumerate().map(|(e, n)| mesh.exitance(e) * mesh.solid_area(n)).collect();
+        let emitted: Vec<Rgb> = elements
+            .clone()
+            .enumerate()
+            .map(|(e, n)| mesh.exitance(e) * mesh.solid_area(n))
+            .collect();
         let reflectance: Vec<Rgb> = (0..emitted.len()).map(|e| mesh.reflectance(e)).collect();
         let transmission = Transmission::new(mesh);
         let mut unshot = emitted.clone();

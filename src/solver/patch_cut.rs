@@ -335,8 +335,7 @@ impl<'m> PatchCut<'m> {
         let elements = || indices(&patch.elements);
         let total: f64 = elements().map(light).sum();
         let mean = total / elements().map(area).sum::<f64>();
-        let is_lit =
-            |&e: &usize| area(e) > 0.0 && light(e) >= MIN_LIT_SHARE * mean * area(e);
+        let is_lit = |&e: &usize| area(e) > 0.0 && light(e) >= MIN_LIT_SHARE * mean * area(e);
         if let Source::Node(node) = patch.source
             && !self.occluded_viewpoints.contains(&node)
             && mesh.elements_of(self.middle(node)).all(|e| is_lit(&e))

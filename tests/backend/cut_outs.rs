@@ -166,9 +166,10 @@ fn a_closed_room_with_holes_in_it_is_closed() {
     for (row, patch) in same_rays(&mesh).rows(&mesh, &patches, 1.0).unwrap().iter().zip(patches) {
         row.check(&mesh, patch).unwrap();
         assert_eq!((row.escaped, row.backface), (0, 0));
-        let holes = row.entries.iter().filter(|entry| {
-            mesh.solid_area(mesh.element(entry.element as usize)) == 0.0
-        });
+        let holes = row
+            .entries
+            .iter()
+            .filter(|entry| mesh.solid_area(mesh.element(entry.element as usize)) == 0.0);
         assert_eq!(holes.count(), 0, "nothing meets a hole");
     }
 }
@@ -224,7 +225,8 @@ fn a_lamp_with_holes_shines_with_what_is_left() {
         let all = Lattice { side: 4, is_solid: |_, _| true };
         scene(&parts, if parts.len() == 6 { &mask } else { &all }, Rgb::ZERO)
     });
-    let area = |scene: &Scene| (0..scene.triangles().len()).map(|t| scene.solid_area(t)).sum::<f64>();
+    let area =
+        |scene: &Scene| (0..scene.triangles().len()).map(|t| scene.solid_area(t)).sum::<f64>();
     assert!((area(&masked) - area(&cut)).abs() < 1e-12);
     for at in [[0.0, 0.0], [0.3, -0.2]] {
         let [found, truth] = [&masked, &cut].map(|scene| on_floor(scene, at, 1 << 14));
@@ -243,10 +245,8 @@ fn a_lamp_with_holes_shines_with_what_is_left() {
 
 #[test]
 fn devices_leave_scenes_with_cut_outs_to_rays() {
-    let mesh = Mesh::new(
-        scene(&room_with_a_sheet(), &Lattice { side: 6, is_solid: board }, SKY),
-        0.5,
-    );
+    let mesh =
+        Mesh::new(scene(&room_with_a_sheet(), &Lattice { side: 6, is_solid: board }, SKY), 0.5);
     let (mesh, gpu) = (mesh.unwrap(), gpu());
     assert_eq!(HemicubeRows::new(&gpu, &mesh, 16).unwrap_err().kind(), ErrorKind::Device);
     assert_eq!(HemicubeGather::new(&gpu, &mesh, 16).unwrap_err().kind(), ErrorKind::Device);
