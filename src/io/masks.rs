@@ -4,6 +4,7 @@
 //! either is solid from a half on. Exporters name the image of the colours as a mask where its
 //! alpha channel is meant. If it has none, dark colours are no holes, and all of it is solid.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::textures::{Textures, Unread};
@@ -13,14 +14,16 @@ use crate::scene::texture::Texture;
 #[cfg(feature = "textures")]
 const HALF: u8 = 128;
 
+/// Masks by the name of the image, and whether the material has its colours from there too.
+pub(super) type KnownMasks = HashMap<(String, bool), ReadMask>;
+
+/// A mask, if it has a hole.
+type ReadMask = Result<Option<Arc<Texture>>, Unread>;
+
 impl Textures<'_> {
     /// The mask in the image `name`, white where it is solid and black elsewhere, if it can be
     /// read; none without a hole. `colours` is the image that the material has its colours from.
-    pub fn mask(
-        &mut self,
-        name: &str,
-        colours: Option<&str>,
-    ) -> Result<Option<Arc<Texture>>, Unread> {
+    pub fn mask(&mut self, name: &str, colours: Option<&str>) -> ReadMask {
         let found = self.find(name)?;
         let of_colours = colours.is_some_and(|colours| self.find(colours).as_ref() == Ok(&found));
         let key = (found, of_colours);

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::files::FileSource;
+use super::masks::KnownMasks;
 use super::text::finite;
 #[cfg(feature = "textures")]
 use crate::error::shortened;
@@ -104,8 +105,7 @@ impl TextureStatement {
 pub(super) struct Textures<'a> {
     files: &'a FileSource<'a>,
     known: HashMap<String, Result<Arc<Texture>, Unread>>,
-    /// By name, and whether the material has its colours from there: see [`super::masks`].
-    pub(super) masks: HashMap<(String, bool), Result<Option<Arc<Texture>>, Unread>>,
+    pub(super) masks: KnownMasks,
     /// Texels that may yet be read.
     #[cfg(feature = "textures")]
     texels_left: u64,
@@ -123,7 +123,7 @@ impl<'a> Textures<'a> {
         Textures {
             files,
             known: HashMap::new(),
-            masks: HashMap::new(),
+            masks: KnownMasks::new(),
             #[cfg(feature = "textures")]
             texels_left: MAX_TEXELS,
         }

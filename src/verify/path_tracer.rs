@@ -235,7 +235,7 @@ impl<'a> PathTracer<'a> {
         let cosine = self.normals[at.triangle].dot(direction);
         let facing = -self.normals[light].dot(direction);
         // Written so that NaN, of a light that is met, sees nothing.
-        if !(cosine > 0.0 && facing > 0.0) || !self.scene.is_solid(light, place) {
+        if !(cosine > 0.0 && facing > 0.0 && self.scene.is_solid(light, place)) {
             return Rgb::ZERO;
         }
         let between = self.contact..distance - self.contact;
