@@ -70,7 +70,7 @@ fn a_room_with_a_lamp_behind_a_screen_is_as_path_traced() {
     let mask = Lattice { side: 8, is_solid: |x, y| x < 4 && (x + y) % 2 == 0 || x >= 4 && y < 5 };
     let screen: Quad = [[1.4, 0.2, 0.1], [1.4, 1.8, 0.1], [1.4, 1.8, 1.7], [1.4, 0.2, 1.7]];
     let mut parts: Vec<Part> = walls([0.0; 3], [2.0; 3]).map(|wall| (wall, "wall")).into();
-    parts.push((facing_down([1.6, 1.9], [0.5, 1.5], 1.9), "lamp"));
+    parts.push((facing_down([1.55, 1.75], [0.6, 1.4], 1.99), "lamp"));
     let library = "newmtl wall\nKd 0.6\nnewmtl screen\nKd 0.7 0.3 0.2\nmap_d mask.tga\n\
         newmtl cell\nKd 0.7 0.3 0.2\nnewmtl lamp\nKd 0\nKe 9 8 6\n";
     let images = [("mask.tga", &mask.image()[..])];
