@@ -198,7 +198,8 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// The same for the surface of `light`, which knows its holes, and what its backs are covered by.
+    /// The same for the surface of `light`, which knows its holes and what its backs are covered
+    /// by.
     fn of_light<'a>(
         camera: &Camera,
         light: &'a GatheredMesh,

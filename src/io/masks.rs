@@ -4,21 +4,14 @@
 //! either is solid from a half on. Exporters name the image of the colours as a mask where its
 //! alpha channel is meant. If it has none, dark colours are no holes, and all of it is solid.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::textures::{Textures, Unread};
+use super::textures::{ReadMask, Textures, Unread};
 use crate::scene::texture::Texture;
 
 /// The least of 255 that is solid.
 #[cfg(feature = "textures")]
 const HALF: u8 = 128;
-
-/// Masks by the name of the image, and whether the material has its colours from there too.
-pub(super) type KnownMasks = HashMap<(String, bool), ReadMask>;
-
-/// A mask, if it has a hole.
-type ReadMask = Result<Option<Arc<Texture>>, Unread>;
 
 impl Textures<'_> {
     /// The mask in the image `name`, white where it is solid and black elsewhere, if it can be

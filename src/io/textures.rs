@@ -11,7 +11,6 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::files::FileSource;
-use super::masks::KnownMasks;
 use super::text::finite;
 #[cfg(feature = "textures")]
 use crate::error::shortened;
@@ -101,11 +100,15 @@ impl TextureStatement {
     }
 }
 
+/// A mask, if it has a hole.
+pub(super) type ReadMask = Result<Option<Arc<Texture>>, Unread>;
+
 /// Images by name, each read once.
 pub(super) struct Textures<'a> {
     files: &'a FileSource<'a>,
     known: HashMap<String, Result<Arc<Texture>, Unread>>,
-    pub(super) masks: KnownMasks,
+    /// Masks by name, and whether the material has its colours from there: see [`super::masks`].
+    pub(super) masks: HashMap<(String, bool), ReadMask>,
     /// Texels that may yet be read.
     #[cfg(feature = "textures")]
     texels_left: u64,
@@ -123,7 +126,7 @@ impl<'a> Textures<'a> {
         Textures {
             files,
             known: HashMap::new(),
-            masks: KnownMasks::new(),
+            masks: HashMap::new(),
             #[cfg(feature = "textures")]
             texels_left: MAX_TEXELS,
         }

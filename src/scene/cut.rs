@@ -50,7 +50,7 @@ impl Scene {
         }
         scene.textures = Arc::new(textures);
         if self.has_cut_outs() {
-            scene.share_solid_areas();
+            scene.find_solid_shares();
         }
         scene.covered_backs = OnceLock::from(self.covered_backs().cut(&firsts));
         scene.clear_panes = OnceLock::from(self.clear_panes().map(|panes| panes.cut(&firsts)));

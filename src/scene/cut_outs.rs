@@ -7,8 +7,8 @@
 //!
 //! A mask is a texture of white, which is solid, and black texels, and these are squares: there is
 //! nothing between. So the solid share of a piece of a triangle is the mean of the mask over it,
-//! and the area that light counts is this share of the geometric one. What lies in a mask's way
-//! has no coordinates in it, or not all: such triangles are solid.
+//! and the area that light counts is this share of the geometric one. Triangles that lack texture
+//! coordinates at a corner are solid.
 
 use glam::DVec2;
 
@@ -20,6 +20,10 @@ use super::textured::Piece;
 
 /// Shares of a piece nearer to none and to all of it than this are rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Texture coordinates this near, over one more than their length, are the same: what a file's six
+/// digits leave.
+const SAME_PLACE: f64 = 1e-4;
 
 /// Points along each side that a piece is looked at by where its mean has no closed form.
 const MAX_POINTS: f64 = 48.0;
@@ -73,17 +77,17 @@ impl Scene {
         shares.into_iter().map(|share| share.unwrap_or(1.0)).collect()
     }
 
-    /// Looks at the masks of all triangles.
-    pub(super) fn share_solid_areas(&mut self) {
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
-        let solid_shares = self.solid_shares(&pieces);
-        self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
-    }
-
     /// The same of one piece.
     pub(crate) fn solid_share(&self, (t, corners): Piece) -> f64 {
         let place = || corners.map(|corner| self.texture_place(t, corner));
         self.mask(t).map_or(1.0, |mask| mask.solid_share(place(), MAX_OUTLINE_CELLS))
+    }
+
+    /// Finds the solid shares of all triangles, by the textures that lie on them.
+    pub(super) fn find_solid_shares(&mut self) {
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let solid_shares = self.solid_shares(&pieces);
+        self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
     }
 
     /// Whether triangle `s` of `other` is solid wherever triangle `t` is, where the corners of `s`
@@ -101,10 +105,6 @@ impl Scene {
         self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
     }
 }
-
-/// Texture coordinates this near, over one more than their length, are the same: what a file's six
-/// digits leave.
-const SAME_PLACE: f64 = 1e-4;
 
 impl TextureMap {
     /// A mask: what is white in `texture` is solid, all else is a hole.

@@ -136,7 +136,7 @@ impl Scene {
         self.textures = SceneTextures { coordinates, of_materials, ..Default::default() }.into();
         let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
         if has_masks {
-            self.share_solid_areas();
+            self.find_solid_shares();
         }
         let reflected = self.solid_means(&pieces, |textures| textures.reflectance.as_ref());
         let emitted = self.solid_means(&pieces, |textures| textures.exitance.as_ref());

@@ -1,8 +1,7 @@
-//! The holes of triangles that rays are cast at: a hit in one is none.
+//! The holes of triangles that rays are cast at: what meets one meets nothing.
 
 use glam::DVec2;
 
-use super::ray_scene::Hit;
 use crate::scene::Scene;
 use crate::scene::texture::TextureMap;
 
@@ -11,7 +10,7 @@ use crate::scene::texture::TextureMap;
 pub(crate) struct CutOuts {
     /// Of each material of the scene.
     masks: Vec<Option<TextureMap>>,
-    /// Of each triangle its material, and the texture coordinates of its corners.
+    /// Of each piece its material, and the texture coordinates of its corners.
     places: Vec<(u32, [DVec2; 3])>,
 }
 
@@ -38,12 +37,12 @@ impl CutOuts {
         Some(CutOuts { masks, places })
     }
 
-    /// Whether what was hit is there.
+    /// Whether the piece of this number is there, where its second and third corner have these
+    /// weights.
     #[inline]
-    pub fn is_solid(&self, hit: &Hit) -> bool {
-        let (material, [a, b, c]) = self.places[hit.triangle];
-        self.masks[material as usize]
-            .as_ref()
-            .is_none_or(|mask| mask.is_solid(a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v))
+    pub fn is_solid(&self, piece: usize, [u, v]: [f64; 2]) -> bool {
+        let (material, [a, b, c]) = self.places[piece];
+        let mask = self.masks[material as usize].as_ref();
+        mask.is_none_or(|mask| mask.is_solid(a * (1.0 - u - v) + b * u + c * v))
     }
 }

@@ -8,8 +8,8 @@
 //!
 //! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
 //! clear panes ([`Scene::is_clear`]): [`Panes`](super::panes::Panes) tell what they let through;
-//! nor holes, [`CutOuts`], which are looked up once a triangle is hit. A scene has them or not: that
-//! is asked once a ray.
+//! nor holes, [`CutOuts`], which are looked up where a triangle is hit. Whether there are any is
+//! asked once a ray.
 //!
 //! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
 //! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
@@ -146,7 +146,8 @@ impl RayScene {
         match &self.cut_outs {
             None => self.nearest(from, direction, start, ignored, counts),
             Some(holes) => {
-                let counts = |hit: &Hit| holes.is_solid(hit) && counts(hit);
+                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
+                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
                 self.nearest(from, direction, start, ignored, counts)
             }
         }
@@ -196,7 +197,8 @@ impl RayScene {
         match &self.cut_outs {
             None => self.any(from, direction, reach, counts),
             Some(holes) => {
-                let counts = |hit: &Hit| holes.is_solid(hit) && counts(hit);
+                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
+                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
                 self.any(from, direction, reach, counts)
             }
         }

@@ -11,8 +11,8 @@ use crate::common::textured::tga;
 
 const SKY: Rgb = Rgb::new(1.0, 2.0, 0.5);
 
-/// Bakes `scene` to an error, which path tracing `truth` finds too: the same, or one with holes that
-/// are there.
+/// Bakes `scene` to an error, which path tracing `truth` finds too: the same scene, or one with
+/// holes that are there.
 fn checked(scene: &Scene, truth: &Scene, error: f64) -> BakeResult {
     let baked = BakeTarget::Error(error).bake(scene.clone(), &Backend::Cpu, keep_going).unwrap();
     assert_eq!(baked.outcome, Outcome::Reached, "{:?}", baked.estimate);
