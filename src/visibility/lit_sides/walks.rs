@@ -236,8 +236,8 @@ impl<'a> Walks<'a> {
         (!blocked).then(|| far.min(near) * self.passed(at, direction, distance))
     }
 
-    /// A point of a triangle, uniform over its solid area; where little of it is solid, it may be in
-    /// a hole.
+    /// A point of a triangle, uniform over its solid area; in a hole where next to nothing is
+    /// solid.
     pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
         let [a, b, c] = self.scene.corners(t);
         let place = fold_to_triangle([rng.f64(), rng.f64()]);
