@@ -64,7 +64,7 @@ impl Backend {
 
     /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
     /// the top face, or from `rotations`·`resolution`² rays. Rays on the CPU in a scene with clear
-    /// panes, which hemicubes do not see.
+    /// panes or cut-outs, which hemicubes do not see.
     ///
     /// # Errors
     /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new) and [`RayRows::new`].
@@ -76,7 +76,7 @@ impl Backend {
     ) -> Result<BackendRows, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if !mesh.scene().has_clear_panes() => {
+            Backend::Gpu(gpu) if mesh.scene().hidden_from_hemicubes().is_none() => {
                 let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?;
                 Ok(hemicubes.with_rotations(rotations).into())
             }
@@ -99,19 +99,19 @@ impl Backend {
     }
 
     /// Why rays on the CPU take the place of a device in `scene`, if they do: hemicubes do not see
-    /// clear panes.
-    pub(crate) fn blind_to_panes(&self, scene: &Scene) -> Option<Error> {
+    /// clear panes and cut-outs.
+    pub(crate) fn blind_to(&self, scene: &Scene) -> Option<Error> {
         #[cfg(not(feature = "gpu"))]
         let _ = scene;
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(_) => gpu::check_no_panes(scene).err(),
+            Backend::Gpu(_) => gpu::check_hemicubes_see(scene).err(),
             Backend::Cpu => None,
         }
     }
 
     /// A gatherer over the scene of `mesh` with about `rays` samples a point: hemicubes on graphics
-    /// hardware, rays on the CPU otherwise and in scenes with clear panes.
+    /// hardware, rays on the CPU otherwise and in scenes with clear panes or cut-outs.
     ///
     /// # Errors
     /// Those of [`HemicubeGather::new`](crate::backend::gpu::HemicubeGather::new) and
@@ -131,7 +131,10 @@ impl Backend {
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if self.gathers_by_hemicubes() && !mesh.scene().has_clear_panes() => {
+            Backend::Gpu(gpu)
+                if self.gathers_by_hemicubes()
+                    && mesh.scene().hidden_from_hemicubes().is_none() =>
+            {
                 // A pixel of the top face is worth half a ray, or a little less.
                 let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
                 Ok(Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?))

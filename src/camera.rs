@@ -30,6 +30,7 @@ use crate::error::{Error, ErrorKind};
 use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
+use crate::visibility::cut_outs::CutOuts;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// A pinhole camera.
@@ -197,7 +198,8 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// The same for the surface of `light`, which knows what its backs are covered by.
+    /// The same for the surface of `light`, which knows its holes and what its backs are covered
+    /// by.
     fn of_light<'a>(
         camera: &Camera,
         light: &'a GatheredMesh,
@@ -209,7 +211,14 @@ impl PrimaryRays<'_> {
         let GatheredMesh { mesh, surface, .. } = light;
         let triangle = |face: usize| mesh.triangle(mesh.element(surface.elements[face] as usize));
         let covered = |face| mesh.scene().is_back_covered(triangle(face));
-        Ok(PrimaryRays { scene: rays.scene.with_covered_backs(covered), ..rays })
+        let piece = |(face, corners): (usize, &[u32; 3])| {
+            let t = triangle(face);
+            (t, corners.map(|v| mesh.scene().barycentric(t, surface.positions[v as usize])))
+        };
+        let pieces = surface.faces.iter().enumerate().map(piece);
+        let scene = rays.scene.with_covered_backs(covered);
+        let scene = scene.with_cut_outs(CutOuts::new(mesh.scene(), pieces));
+        Ok(PrimaryRays { scene, ..rays })
     }
 
     /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.

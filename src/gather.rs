@@ -132,8 +132,8 @@ impl RadiosityField<'_> {
             let node = self.mesh.element(e);
             if self.mesh.material(node).scatters() {
                 let mean = corners.iter().map(|&v| self.reflected[v as usize]).sum::<Rgb>() / 3.0;
-                flux += mean.length() * self.mesh.area(node);
-                area += self.mesh.area(node);
+                flux += mean.length() * self.mesh.solid_area(node);
+                area += self.mesh.solid_area(node);
             }
         }
         RADIOSITY_FLOOR_SHARE * flux / area

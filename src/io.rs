@@ -15,6 +15,7 @@ mod files;
 #[cfg(feature = "glb")]
 mod glb;
 mod lights;
+mod masks;
 mod mtl;
 mod obj;
 mod ply;

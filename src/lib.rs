@@ -87,7 +87,7 @@
 //!
 //! # What it does not model
 //!
-//! Glossy reflection, what mirrors and lenses throw onto others, cut-outs, participating media,
+//! Glossy reflection, what mirrors and lenses throw onto others, participating media,
 //! polarisation, time. Light leaves and arrives diffusely, passes clear glass straight on, and an
 //! emitter is a surface or the light from outside. Pictures show mirrors and glass.
 

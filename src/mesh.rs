@@ -22,6 +22,7 @@ mod contact_cuts;
 mod contacts;
 mod quadtree;
 pub(crate) mod sizing;
+mod solid_areas;
 mod textured;
 mod topology;
 mod transmission;
@@ -83,6 +84,8 @@ pub struct Mesh {
     clusters: Arc<OnceLock<Clusters>>,
     /// See [`Mesh::reflectance`]; empty without textures. Made when they are asked for.
     textured_reflectances: Arc<OnceLock<Vec<Rgb>>>,
+    /// See [`Mesh::solid_area`]; empty without holes. Made when they are asked for.
+    solid_shares: Arc<OnceLock<Vec<f64>>>,
 }
 
 impl Mesh {
@@ -157,6 +160,7 @@ impl Mesh {
             areas: (0..count).map(|t| scene.area(t)).collect(),
             clusters: Arc::default(),
             textured_reflectances: Arc::default(),
+            solid_shares: Arc::default(),
             scene,
         };
         for root in 0..count {
@@ -223,8 +227,8 @@ impl Mesh {
         self.clusters();
         let normals = (0..count).map(|t| scene.normal(t)).collect();
         let areas = (0..count).map(|t| scene.area(t)).collect();
-        let textured_reflectances = Arc::default();
-        Ok(Mesh { scene, normals, areas, textured_reflectances, ..self.clone() })
+        let (textured_reflectances, solid_shares) = (Arc::default(), Arc::default());
+        Ok(Mesh { scene, normals, areas, textured_reflectances, solid_shares, ..self.clone() })
     }
 
     /// Clusters of triangles.
@@ -259,6 +263,18 @@ impl Mesh {
             for t in 0..self.scene.triangles().len() {
                 let share = panes.transmittance(t).unwrap_or(-Rgb::ONE);
                 all.update(bytemuck::bytes_of(&share.to_array()));
+            }
+        }
+        for (m, mask) in self.scene.masks() {
+            let [scale, offset] = [mask.scale, mask.offset].map(|v| v.to_array());
+            all.update(bytemuck::bytes_of(&[m, mask.clamped.into(), mask.texture.size()[0]]));
+            all.update(bytemuck::bytes_of(&[scale, offset]));
+            all.update(mask.texture.bytes());
+        }
+        if self.scene.has_cut_outs() {
+            for t in 0..self.scene.triangles().len() {
+                let places = self.scene.texture_coordinates(t).unwrap_or_default();
+                all.update(bytemuck::bytes_of(&places.map(|place| place.to_array())));
             }
         }
         self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
@@ -327,7 +343,7 @@ impl Mesh {
         self.node(node).triangle as usize
     }
 
-    /// Area of `node`, length unit squared.
+    /// Area of `node`, holes included, length unit squared.
     pub fn area(&self, node: NodeId) -> f64 {
         let n = self.node(node);
         self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
@@ -336,13 +352,13 @@ impl Mesh {
     /// Area of all elements that scatter light, length unit squared.
     pub(crate) fn scattering_area(&self) -> f64 {
         let elements = self.elements.iter().filter(|&&node| self.material(node).scatters());
-        elements.map(|&node| self.area(node)).sum()
+        elements.map(|&node| self.solid_area(node)).sum()
     }
 
     /// Mean albedo by area of the elements that scatter light, per channel; 0 where none does. What
     /// is black is left out, since a black sky around a scene makes the scene no darker.
     pub(crate) fn mean_albedo(&self) -> Rgb {
-        let scattering = |(e, &node): (usize, &NodeId)| self.albedo(e) * self.area(node);
+        let scattering = |(e, &node): (usize, &NodeId)| self.albedo(e) * self.solid_area(node);
         let area = self.scattering_area().max(f64::MIN_POSITIVE);
         self.elements.iter().enumerate().map(scattering).sum::<Rgb>() / area
     }

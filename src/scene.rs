@@ -11,6 +11,7 @@ mod clear_panes;
 mod covered_backs;
 mod covers;
 mod cut;
+mod cut_outs;
 pub(crate) mod glass_bodies;
 mod material;
 mod rgb;
@@ -261,7 +262,7 @@ impl Scene {
         (e1 * scale).cross(e2 * scale).normalize()
     }
 
-    /// Area of triangle `t`, length unit squared.
+    /// Area of triangle `t`, holes included, length unit squared.
     pub fn area(&self, t: usize) -> f64 {
         let [a, b, c] = self.corners(t);
         0.5 * (b - a).cross(c - a).length()
@@ -293,6 +294,17 @@ impl Scene {
     /// Whether there are panes that light passes.
     pub(crate) fn has_clear_panes(&self) -> bool {
         self.clear_panes().is_some()
+    }
+
+    /// What hemicubes do not see of the scene, in words; none where they see all.
+    #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
+    pub(crate) fn hidden_from_hemicubes(&self) -> Option<&'static str> {
+        match (self.has_clear_panes(), self.has_cut_outs()) {
+            (true, true) => Some("clear panes and cut-outs"),
+            (true, false) => Some("clear panes"),
+            (false, true) => Some("cut-outs"),
+            (false, false) => None,
+        }
     }
 
     /// Whether light passes triangle `t` straight on: nothing meets it.

@@ -205,7 +205,7 @@ impl VertexAverage<'_> {
     fn new<'a>(mesh: &Mesh, vertices: &'a Vertices) -> VertexAverage<'a> {
         let outlines = &vertices.outlines;
         let element_areas: Vec<f64> =
-            outlines.iter().map(|(e, _)| mesh.area(mesh.element(e))).collect();
+            outlines.iter().map(|(e, _)| mesh.weight(mesh.element(e))).collect();
         let mut vertex_areas = vec![0.0; vertices.positions.len()];
         for (e, outline) in outlines.iter() {
             for &v in outline {

@@ -28,7 +28,7 @@ mod test_support;
 
 pub use crate::backend::adapter::AdapterInfo;
 pub use device::Gpu;
-pub(crate) use error::check_no_panes;
+pub(crate) use error::check_hemicubes_see;
 pub use gather::HemicubeGather;
 pub use limits::GpuLimits;
 pub use rows::HemicubeRows;

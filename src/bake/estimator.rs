@@ -25,7 +25,7 @@ use crate::gather::{Gather, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::rotation::CellRotation;
-use crate::sampling::surface::{AreaSampler, SurfacePoint};
+use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
 use crate::visibility::buried;
@@ -226,13 +226,17 @@ impl ErrorEstimator<'_> {
             (b - a).cross(c - a).length() / 2.0
         };
         let above = SurfaceOffset::new(mesh.scene());
+        let inset = |place: [f64; 2]| place.map(|b| b + (1.0 / 3.0 - b) * INSET);
         let rotations = CellRotation::new(&mesh.scene().bounds());
         let sample = |stratum: usize, weight: f64, face: usize, barycentric: [f64; 2]| {
-            let [u, v] = barycentric.map(|b| b + (1.0 / 3.0 - b) * INSET);
             let element = surface.elements[face] as usize;
             let face = &surface.faces[face];
-            let mix = |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
             let node = mesh.element(element);
+            let at =
+                |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
+            let is_solid = |&place: &[f64; 2]| mesh.is_solid(node, at(place)(corners(face)));
+            let [u, v] = shifted(barycentric).map(inset).find(is_solid)?;
+            let mix = at([u, v]);
             let material = mesh.material(node);
             let size = mesh.area(node).sqrt();
             // Next to a side, another surface may be nearer than what a point of this size sees.
@@ -246,7 +250,7 @@ impl ErrorEstimator<'_> {
             } else {
                 interpolated(&surface.radiosity) - material.exitance
             };
-            Sample {
+            Some(Sample {
                 stratum,
                 weight,
                 element,
@@ -256,19 +260,19 @@ impl ErrorEstimator<'_> {
                 interpolated: reflected,
                 size,
                 rotation: rotations.at(point.position, point.near),
-            }
+            })
         };
         let faces = (0..surface.faces.len()).filter_map(|face| {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
-            if !mesh.material(node).scatters() {
+            if !mesh.scatters(node) {
                 return None;
             }
             let corners = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
             let reflected = (corners.iter().sum::<Rgb>() / 3.0).length();
             let scale = reflected.max(floor);
             let residual = self.element_residual.get(element).copied().unwrap_or(0.0) / scale;
-            let area = area(&surface.faces[face]);
+            let area = mesh.solid_share(node) * area(&surface.faces[face]);
             Some(SampledFace {
                 face,
                 group: mesh.group(node),
@@ -287,7 +291,7 @@ impl ErrorEstimator<'_> {
             };
             let sampler = AreaSampler::new(stratum.faces.iter().map(density));
             let places = sampler.spread(stratum.samples, 0.5);
-            samples.extend(places.map(|SurfacePoint { triangle, barycentric }| {
+            samples.extend(places.filter_map(|SurfacePoint { triangle, barycentric }| {
                 let face = &stratum.faces[triangle];
                 let weight = face.area / density(face) / stratum.area / stratum.samples as f64;
                 sample(k, weight, face.face, barycentric)
@@ -310,12 +314,12 @@ impl ErrorEstimator<'_> {
         for e in 0..mesh.element_count() {
             let node = mesh.element(e);
             let material = mesh.material(node);
-            if !material.scatters() {
+            if !mesh.scatters(node) {
                 continue;
             }
             let corners = sources.corners[e].iter().map(|&v| sources.reflected[v as usize]);
             let reflected = corners.sum::<Rgb>() / 3.0;
-            let (element_area, group) = (mesh.area(node), mesh.group(node) as usize);
+            let (element_area, group) = (mesh.solid_area(node), mesh.group(node) as usize);
             let ambient = material.albedo() * ambient_irradiance;
             let scale = (reflected + ambient).length().max(floor);
             squares[group] += (ambient.length() / scale).powi(2) * element_area;
@@ -342,7 +346,7 @@ impl ErrorEstimator<'_> {
         let mut sums = vec![(0.0, 0.0); surface.positions.len()];
         for (face, &e) in surface.faces.iter().zip(&surface.elements) {
             let (e, mesh) = (e as usize, &self.light.mesh);
-            let area = mesh.area(mesh.element(e));
+            let area = mesh.weight(mesh.element(e));
             let residual =
                 self.element_residual[e] * (mesh.relative_reflectance(e).element_sum() / 3.0);
             for &v in face {

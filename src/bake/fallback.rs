@@ -47,7 +47,7 @@ impl<'a> ResilientBackend<'a> {
     }
 
     /// A source of rows as `settings` ask for: on the CPU if `mesh` is too large for the device, or
-    /// has clear panes.
+    /// has clear panes or cut-outs.
     /// What else keeps the device from starting is an error, since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
@@ -61,7 +61,7 @@ impl<'a> ResilientBackend<'a> {
                 None => rows,
             })
         };
-        if let Some(e) = self.backend.blind_to_panes(mesh.scene()) {
+        if let Some(e) = self.backend.blind_to(mesh.scene()) {
             self.record(e);
         }
         let first = match rows(self.backend) {

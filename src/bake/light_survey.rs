@@ -21,7 +21,7 @@ use crate::gather::RadiosityField;
 use crate::gather::gather_points::SurfaceOffset;
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::Mesh;
-use crate::sampling::surface::{AreaSampler, SurfacePoint};
+use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Aabb, Material, Rgb, Scene, Sky};
 
 /// Where the light of a scene falls.
@@ -129,7 +129,7 @@ struct MaterialLight {
 fn strongest_lights(scene: &Scene) -> Vec<MaterialLight> {
     let mut areas = vec![0.0; scene.materials().len()];
     for (t, triangle) in scene.triangles().iter().enumerate() {
-        areas[triangle.material as usize] += scene.area(t);
+        areas[triangle.material as usize] += scene.solid_area(t);
     }
     let light = |(material, area): (u32, f64)| {
         let flux = scene.materials()[material as usize].exitance.length() * area;
@@ -145,19 +145,20 @@ fn strongest_lights(scene: &Scene) -> Vec<MaterialLight> {
 /// Points spread over all surfaces that reflect: half by area, half by triangles, so that small
 /// surfaces get some beside large ones.
 fn places(scene: &Scene) -> Vec<Place> {
-    let triangles: Vec<usize> =
-        (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters()).collect();
-    let area: f64 = triangles.iter().map(|&t| scene.area(t)).sum();
-    let density = |t: usize| 0.5 * scene.area(t) / area + 0.5 / triangles.len() as f64;
+    let scatters = |&t: &usize| scene.material(t).scatters() && scene.solid_area(t) > 0.0;
+    let triangles: Vec<usize> = (0..scene.triangles().len()).filter(scatters).collect();
+    let area: f64 = triangles.iter().map(|&t| scene.solid_area(t)).sum();
+    let density = |t: usize| 0.5 * scene.solid_area(t) / area + 0.5 / triangles.len() as f64;
     let sampler = AreaSampler::new(triangles.iter().map(|&t| density(t)));
     let above = SurfaceOffset::new(scene);
-    let place = |SurfacePoint { triangle, barycentric: [u, v] }: SurfacePoint| {
+    let place = |SurfacePoint { triangle, barycentric }: SurfacePoint| {
         let t = triangles[triangle];
+        let [u, v] = scene.first_solid(t, shifted(barycentric)).unwrap_or(barycentric);
         let [a, b, c] = scene.corners(t);
         let position = a * (1.0 - u - v) + b * u + c * v;
         let size = scene.area(t).sqrt();
         let point = above.gather_point(position, scene.normal(t), size.min(area.sqrt() * 1e-3));
-        Place { point, area: scene.area(t) / density(t) / PLACES as f64 }
+        Place { point, area: scene.solid_area(t) / density(t) / PLACES as f64 }
     };
     sampler.spread(PLACES, 0.5).map(place).collect()
 }

@@ -34,7 +34,7 @@ pub(super) fn resolved_light(mesh: &Mesh, radiosity: &[Rgb], size: f64) -> Vec<R
         // Reflected flux, and what it would be for an irradiance of 1.
         let (mut flux, mut unit_flux) = (Rgb::ZERO, Rgb::ZERO);
         for e in elements() {
-            let area = mesh.area(mesh.element(e));
+            let area = mesh.solid_area(mesh.element(e));
             flux += (radiosity[e] - mesh.exitance(e)) * area;
             unit_flux += mesh.albedo(e) * area;
         }

@@ -125,11 +125,10 @@ fn received(
     let mesh = &mesh.with_scene(scene.with_materials(lit)?)?;
     let above = SurfaceOffset::new(mesh.scene());
     let elements = 0..mesh.element_count();
-    let reflecting: Vec<usize> =
-        elements.filter(|&e| mesh.material(mesh.element(e)).scatters()).collect();
+    let reflecting: Vec<usize> = elements.filter(|&e| mesh.scatters(mesh.element(e))).collect();
     let point = |&e: &usize| {
         let node = mesh.element(e);
-        above.gather_point(mesh.centroid(node), mesh.normal(node), mesh.area(node).sqrt())
+        above.gather_point(mesh.viewpoint(node), mesh.normal(node), mesh.area(node).sqrt())
     };
     let points: Vec<GatherPoint> = reflecting.iter().map(point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];

@@ -96,7 +96,8 @@ impl ViewScorer<'_> {
             }
             let [a, b, c] = face.map(|v| surface.positions[v as usize]);
             let radiosity: Rgb = face.map(|v| surface.radiosity[v as usize]).into_iter().sum();
-            let area = (b - a).cross(c - a).length() / 2.0;
+            let share = mesh.solid_share(mesh.element(element as usize));
+            let area = share * (b - a).cross(c - a).length() / 2.0;
             let next = Part { index: self.parts.len(), ..Default::default() };
             let part = self.parts.entry(self.key(t, (a + b + c) / 3.0)).or_insert(next);
             part.area += area;

@@ -85,13 +85,23 @@ impl ViewNode {
         self.children = mesh.children(self.node).into_iter().flatten().map(ViewNode::new).collect();
     }
 
-    /// The mean of the children's rows, or its own where it has none.
-    fn mean_row(&self) -> Row {
+    /// The mean of the children's rows, or its own where it has none. With holes children count by
+    /// what is solid of them, in sixteenths of the most.
+    fn mean_row(&self, mesh: &Mesh) -> Row {
         if self.children.is_empty() {
             return self.corrected.clone();
         }
-        let rows: Vec<Row> = self.children.iter().map(ViewNode::mean_row).collect();
-        Row::mean(&rows.iter().collect::<Vec<_>>())
+        let share = |child: &ViewNode| mesh.solid_share(child.node);
+        let most = self.children.iter().map(share).fold(0.0, f64::max);
+        let count = |child: &ViewNode| match share(child) / most {
+            ratio if ratio < 1.0 => (16.0 * ratio).round() as usize,
+            _ if self.children.iter().all(|child| share(child) == most) => 1,
+            _ => 16,
+        };
+        let row = |child: &ViewNode| (child.mean_row(mesh), count(child));
+        let rows: Vec<(Row, usize)> = self.children.iter().map(row).collect();
+        let rows = rows.iter().flat_map(|(row, count)| std::iter::repeat_n(row, *count));
+        Row::mean(&rows.collect::<Vec<_>>())
     }
 
     /// The share of the light that lands on another scene triangle by the mean of the children than
@@ -224,7 +234,7 @@ impl<M: FormFactors> FormFactors for AdaptiveViewpoints<M> {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
         let mut views: Vec<ViewNode> = patches.iter().map(|&patch| ViewNode::new(patch)).collect();
         self.refine(mesh, &mut views.iter_mut().collect::<Vec<_>>(), 0, weight)?;
-        Ok(views.par_iter().map(ViewNode::mean_row).collect())
+        Ok(views.par_iter().map(|view| view.mean_row(mesh)).collect())
     }
 
     /// As many patches as fill a batch of the source where their children disagree, and 1 at least.

@@ -74,9 +74,10 @@ impl<'a> VertexGatherPoints<'a> {
         self.around.at(v)
     }
 
-    /// Albedo of the surface that vertex `v` is on.
+    /// Albedo of the surface that vertex `v` is on; 0 where holes are all around it.
     pub fn albedo(&self, v: u32) -> Rgb {
-        self.material(v).albedo()
+        let is_solid = |&e: &u32| self.mesh.solid_share(self.mesh.element(e as usize)) > 0.0;
+        if self.around(v).iter().any(is_solid) { self.material(v).albedo() } else { Rgb::ZERO }
     }
 
     fn material(&self, v: u32) -> &Material {

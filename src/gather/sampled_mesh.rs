@@ -62,7 +62,7 @@ impl SampledMesh {
     /// reflected.
     pub fn is_splittable(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
-        self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.material(node).scatters()
+        self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.scatters(node)
     }
 
     /// Mean of 1/distance to what is seen from those corners of element `e` that reflect less than
@@ -130,7 +130,7 @@ impl SampledMesh {
         let mut difference = 0.0;
         let mut total = 0.0;
         for (e, corners) in self.corners().iter().enumerate() {
-            let area = self.mesh.area(self.mesh.element(e));
+            let area = self.mesh.solid_area(self.mesh.element(e));
             for v in corners.map(|v| v as usize) {
                 difference += area * (self.reflected[v] - previous[v]).length_squared();
                 total += area * self.reflected[v].length_squared();

@@ -148,7 +148,7 @@ impl HierarchicalSurplus {
 pub(super) fn mean_preserving(samples: &SampledMesh) -> Vec<Rgb> {
     let mut sums = vec![(Rgb::ZERO, 0.0); samples.reflected.len()];
     for (e, corners) in samples.corners().iter().enumerate() {
-        let area = samples.mesh.area(samples.mesh.element(e));
+        let area = samples.mesh.weight(samples.mesh.element(e));
         let surplus =
             HierarchicalSurplus::of_parent(samples, e).filter(HierarchicalSurplus::is_smooth);
         let shift = surplus.map_or(Rgb::ZERO, |s| s.child_mean_shift());

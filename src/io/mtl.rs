@@ -7,8 +7,9 @@
 //! | `Ke` | emitted radiance L per channel: exitance π L |
 //! | `Ka` | radiance, if above 1 and no material has a `Ke`: see [`super::lights`] |
 //! | `illum`, `Ks`, `Ni`, `Tf`, `d`, `Tr` | mirrors and glass: see [`super::specular`] |
-//! | `d`, `Tr`, `map_d` of others | transparency: not modelled, warned about |
+//! | `d`, `Tr` of others | transparency: not modelled, warned about |
 //! | `map_Kd`, `map_Ke` | textures, multiplied by `Kd` and `Ke`: see [`super::textures`] |
+//! | `map_d` | a mask: holes where it is below a half |
 //!
 //! All others do not change diffuse light, and are skipped. tobj reads the materials, one at a time
 //! so that its large records do not pile up. It gets the statements above alone, with three finite
@@ -49,6 +50,8 @@ pub(super) struct MtlMaterial {
     pub ambient: Option<Rgb>,
     /// `map_Kd` and `map_Ke`, with their options.
     pub textures: [Option<Box<str>>; 2],
+    /// `map_d`, with its options.
+    pub mask: Option<Box<str>>,
     /// `illum` and what belongs to it.
     pub specular: Option<Specular>,
     transparent: bool,
@@ -249,6 +252,11 @@ fn escaped_words(text: &str) -> Vec<String> {
 }
 
 impl MtlMaterial {
+    /// Whether it has any image.
+    pub fn has_images(&self) -> bool {
+        self.textures.iter().chain([&self.mask]).any(Option::is_some)
+    }
+
     fn new(mut material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
         let emitted = material.unknown_param.remove("map_Ke");
         let text = |key: &str| material.unknown_param.get(key).map(String::as_str);
@@ -270,9 +278,8 @@ impl MtlMaterial {
             ambient: rgb(material.ambient),
             textures: [material.diffuse_texture, emitted]
                 .map(|name| name.map(String::into_boxed_str)),
-            transparent: material.dissolve.is_some_and(|d| d < 1.0)
-                || between.is_some()
-                || material.dissolve_texture.is_some(),
+            mask: material.dissolve_texture.map(String::into_boxed_str),
+            transparent: material.dissolve.is_some_and(|d| d < 1.0) || between.is_some(),
             name: material.name,
             line,
             file,

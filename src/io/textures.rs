@@ -1,4 +1,4 @@
-//! Textures that materials name: `map_Kd` and `map_Ke` with their options, and the images.
+//! Textures that materials name: `map_Kd`, `map_Ke` and `map_d` with their options, and the images.
 //!
 //! Images are PNG, JPEG, BMP or TGA, all of which hold sRGB. They are looked for as libraries are
 //! ([`super::files`]). What an image claims to be is checked before memory is taken for it.
@@ -46,7 +46,7 @@ const OTHER_TEXELS: u64 = 512;
 #[cfg(feature = "textures")]
 const MAX_ANCILLARY_BYTES: u64 = 1 << 24;
 
-/// `map_Kd` or `map_Ke`.
+/// `map_Kd`, `map_Ke` or `map_d`.
 #[derive(Debug, PartialEq)]
 pub(super) struct TextureStatement {
     pub name: String,
@@ -100,10 +100,15 @@ impl TextureStatement {
     }
 }
 
+/// A mask, if it has a hole.
+pub(super) type ReadMask = Result<Option<Arc<Texture>>, Unread>;
+
 /// Images by name, each read once.
 pub(super) struct Textures<'a> {
     files: &'a FileSource<'a>,
     known: HashMap<String, Result<Arc<Texture>, Unread>>,
+    /// Masks by name, and whether the material has its colours from there: see [`super::masks`].
+    pub(super) masks: HashMap<(String, bool), ReadMask>,
     /// Texels that may yet be read.
     #[cfg(feature = "textures")]
     texels_left: u64,
@@ -121,15 +126,21 @@ impl<'a> Textures<'a> {
         Textures {
             files,
             known: HashMap::new(),
+            masks: HashMap::new(),
             #[cfg(feature = "textures")]
             texels_left: MAX_TEXELS,
         }
     }
 
+    /// Where the image `name` is.
+    pub(super) fn find(&self, name: &str) -> Result<String, Unread> {
+        let missing = Unread { kind: WarningKind::MissingTexture, reason: None };
+        self.files.find(name).ok_or(missing)
+    }
+
     /// The image `name`, if it is there and can be read.
     pub fn get(&mut self, name: &str) -> Result<Arc<Texture>, Unread> {
-        let missing = Unread { kind: WarningKind::MissingTexture, reason: None };
-        let found = self.files.find(name).ok_or(missing)?;
+        let found = self.find(name)?;
         if let Some(known) = self.known.get(&found) {
             return known.clone();
         }
@@ -140,6 +151,15 @@ impl<'a> Textures<'a> {
 
     #[cfg(feature = "textures")]
     fn read(&mut self, found: &str) -> Result<Texture, Unread> {
+        let image = self.decode(found)?;
+        let (width, height) = (image.width(), image.height());
+        let texels = image.into_rgb8().into_raw().as_chunks().0.to_vec();
+        Texture::new(width, height, texels).ok_or_else(|| Unread::unreadable("no texels"))
+    }
+
+    /// The image that was found there, if the limits let it in.
+    #[cfg(feature = "textures")]
+    pub(super) fn decode(&mut self, found: &str) -> Result<image::DynamicImage, Unread> {
         let bytes = self.files.read(found, MAX_IMAGE_BYTES).map_err(|e| match e.kind() {
             io::ErrorKind::FileTooLarge => Unread::large(e),
             _ => Unread::unreadable(e),
@@ -159,9 +179,8 @@ impl<'a> Textures<'a> {
         let (width, height) = image::ImageDecoder::dimensions(&decoder);
         self.check(width, height, length * if is_png { PNG_TEXELS } else { OTHER_TEXELS })?;
         let image = image::DynamicImage::from_decoder(decoder).map_err(Unread::undecoded)?;
-        let texels = image.into_rgb8().into_raw().as_chunks().0.to_vec();
-        self.texels_left -= texels.len() as u64;
-        Texture::new(width, height, texels).ok_or_else(|| Unread::unreadable("no texels"))
+        self.texels_left -= u64::from(width) * u64::from(height);
+        Ok(image)
     }
 
     /// Whether an image may be so large, whose file has bytes enough for `most` texels.
@@ -186,18 +205,23 @@ impl<'a> Textures<'a> {
     }
 
     #[cfg(not(feature = "textures"))]
-    fn read(&mut self, _: &str) -> Result<Texture, Unread> {
+    pub(super) fn read(&mut self, _: &str) -> Result<Texture, Unread> {
         Err(Unread::unreadable("this program was built without the feature `textures`"))
     }
 }
 
 impl Unread {
+    /// Its reason, and what is `done`.
+    pub fn and_so(&self, done: &str) -> String {
+        self.reason.as_ref().map_or(done.into(), |reason| format!("{reason}; {done}"))
+    }
+
     #[cfg(feature = "textures")]
     fn large(reason: impl std::fmt::Display) -> Unread {
         Unread { kind: WarningKind::LargeTexture, reason: Some(reason.to_string()) }
     }
 
-    fn unreadable(reason: impl std::fmt::Display) -> Unread {
+    pub(super) fn unreadable(reason: impl std::fmt::Display) -> Unread {
         Unread { kind: WarningKind::UnreadableTexture, reason: Some(reason.to_string()) }
     }
 

@@ -56,8 +56,9 @@ impl Transmission {
                 for (behind, area) in overlaps(mesh, node, mesh.root(s)) {
                     let passage = Passage {
                         behind: behind as u32,
-                        passed: mesh.transmittance(behind) * (area / mesh.area(node)),
-                        returned: mesh.transmittance(e) * (area / mesh.area(mesh.element(behind))),
+                        passed: mesh.transmittance(behind) * (area / mesh.solid_area(node)),
+                        returned: mesh.transmittance(e)
+                            * (area / mesh.solid_area(mesh.element(behind))),
                     };
                     passed += passage.passed;
                     all.passages.push(passage);
@@ -95,32 +96,53 @@ impl Transmission {
     }
 }
 
-/// Elements below `other` that share area with `node`, in one plane, and how much.
+/// Elements below `other` that share area with `node`, in one plane, and how much, holes left out.
 fn overlaps(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<(usize, f64)> {
     let (mut open, mut found) = (vec![other], vec![]);
     while let Some(other) = open.pop() {
         let least = SLIVER * mesh.area(node).min(mesh.area(other));
-        let area = shared_area(mesh, node, other);
+        let shared = shared_polygon(mesh, node, other);
+        let area = polygon_area(&shared);
         if area <= least {
             continue;
         }
         match mesh.children(other) {
             Some(children) => open.extend(children.into_iter().rev()),
-            None => found.push((mesh.elements_of(other).start, area)),
+            None => match solid_share(mesh, node, &shared) * area {
+                area if area <= least => {}
+                area => found.push((mesh.elements_of(other).start, area)),
+            },
         }
     }
     found
 }
 
-/// Area that two nodes in one plane share.
-fn shared_area(mesh: &Mesh, node: NodeId, other: NodeId) -> f64 {
+/// What two nodes in one plane share.
+fn shared_polygon(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<DVec3> {
     let (corners, normal) = (mesh.corners(node), mesh.normal(node));
     let mut shared: Vec<DVec3> = mesh.corners(other).to_vec();
     for k in 0..3 {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         shared = clip(&shared, a, normal.cross(b - a).normalize_or_zero());
     }
-    polygon_area(&shared)
+    shared
+}
+
+/// The share of a convex polygon on `node` that is in no hole.
+fn solid_share(mesh: &Mesh, node: NodeId, polygon: &[DVec3]) -> f64 {
+    let (scene, t) = (mesh.scene(), mesh.triangle(node));
+    let [first, rest @ ..] = polygon else { return 1.0 };
+    if mesh.solid_share(node) == 1.0 {
+        return 1.0;
+    }
+    let (mut solid, mut all) = (0.0, 0.0);
+    for edge in rest.windows(2) {
+        let part = [*first, edge[0], edge[1]];
+        let area = polygon_area(&part);
+        solid += area * scene.solid_share((t, part.map(|p| scene.barycentric(t, p))));
+        all += area;
+    }
+    if all > 0.0 { solid / all } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -11,6 +11,9 @@
 
 use crate::sampling::low_discrepancy::{fold_to_triangle, r2_point};
 
+/// Places that are tried in the stead of one. Chosen by hand.
+const MAX_SHIFTS: usize = 64;
+
 /// Chooses triangles in proportion to their areas.
 #[derive(Clone, Debug)]
 pub(crate) struct AreaSampler {
@@ -63,6 +66,16 @@ impl AreaSampler {
             SurfacePoint { triangle, barycentric: fold_to_triangle(r2_point(k, offset)) }
         })
     }
+}
+
+/// A place on a triangle, by the weights of its second and third corner, and others in its stead,
+/// spread evenly over the triangle.
+pub(crate) fn shifted([u, v]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    let shift = move |k: usize| {
+        let [x, y] = r2_point(k, 0.0);
+        fold_to_triangle([(u + x).fract(), (v + y).fract()])
+    };
+    std::iter::once([u, v]).chain((1..MAX_SHIFTS).map(shift))
 }
 
 #[cfg(test)]

@@ -78,7 +78,7 @@ impl Surfaces<'_> {
         let mut k = 0;
         while k < queue.len() && known.len() < MAX_TRIANGLES {
             for &s in self.meeting_at(queue[k]) {
-                let cover = self.cover(corners, normal, s as usize);
+                let cover = self.cover(t, (corners, normal), s as usize);
                 let Some(cover) = cover.filter(|_| known.insert(s)) else { continue };
                 let taken_off = |part: &Vec<DVec3>| polygon_difference(part, &cover, -normal);
                 let left: Vec<Vec<DVec3>> = open.iter().flat_map(taken_off).collect();
@@ -98,9 +98,14 @@ impl Surfaces<'_> {
         None
     }
 
-    /// Triangle `s` in the plane of a triangle with these `corners` and unit `normal`, if it lies
-    /// there and faces the other way.
-    fn cover(&self, corners: [DVec3; 3], normal: DVec3, s: usize) -> Option<[DVec3; 3]> {
+    /// Triangle `s` in the plane of triangle `t`, which has these `corners` and this unit `normal`,
+    /// if it lies there, faces the other way and has no holes but those of `t`.
+    fn cover(
+        &self,
+        t: usize,
+        (corners, normal): ([DVec3; 3], DVec3),
+        s: usize,
+    ) -> Option<[DVec3; 3]> {
         if normal.dot(self.scene.normal(s)) >= 0.0 || self.scene.is_clear(s) {
             return None;
         }
@@ -108,7 +113,11 @@ impl Surfaces<'_> {
         let height = |p: DVec3| normal.dot(p - corners[0]);
         let reach = SAME_PLACE * longest_edge(corners).max(longest_edge(of_s));
         let in_plane = of_s.iter().all(|&p| height(p).abs() <= reach);
-        in_plane.then(|| of_s.map(|p| p - height(p) * normal))
+        let weights = || of_s.map(|p| self.scene.barycentric(t, p));
+        let covers = in_plane
+            && (!self.scene.has_cut_outs()
+                || self.scene.has_no_other_holes(t, (self.scene, s), weights()));
+        covers.then(|| of_s.map(|p| p - height(p) * normal))
     }
 }
 

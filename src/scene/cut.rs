@@ -30,6 +30,7 @@ impl Scene {
         let mut textures = (*self.textures).clone();
         textures.coordinates.clear();
         textures.relative_exitance.clear();
+        textures.solid_shares.clear();
         scene.cut_sides.clear();
         let mut firsts = vec![0];
         for (t, pieces) in pieces.into_iter().enumerate() {
@@ -48,6 +49,9 @@ impl Scene {
             firsts.push(scene.triangles.len() as u32);
         }
         scene.textures = Arc::new(textures);
+        if self.has_cut_outs() {
+            scene.find_solid_shares();
+        }
         scene.covered_backs = OnceLock::from(self.covered_backs().cut(&firsts));
         scene.clear_panes = OnceLock::from(self.clear_panes().map(|panes| panes.cut(&firsts)));
         scene

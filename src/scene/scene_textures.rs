@@ -16,4 +16,6 @@ pub(super) struct SceneTextures {
     pub of_materials: BTreeMap<u32, MaterialTextures>,
     /// Exitance of each triangle over that of its material; empty where no texture emits.
     pub relative_exitance: Vec<Rgb>,
+    /// The share of each triangle that is solid; empty where no material has a mask.
+    pub solid_shares: Vec<f64>,
 }

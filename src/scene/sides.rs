@@ -58,6 +58,7 @@ impl Scene {
         scene.cut_sides.clear();
         textures.coordinates.clear();
         textures.relative_exitance.clear();
+        textures.solid_shares.clear();
         let mut dark: BTreeMap<u32, u32> = BTreeMap::new();
         let is_kept = |&t: &usize| !treatments[t].dropped;
         let is_doubled = |t: &usize| is_kept(t) && treatments[*t].doubled;
@@ -90,6 +91,7 @@ impl Scene {
             scene.cut_sides.extend(cut);
             textures.coordinates.extend(coordinates);
             textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
+            textures.solid_shares.extend(self.textures.solid_shares.get(t));
         }
         (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
         Scene { textures: Arc::new(textures), ..scene }

@@ -15,7 +15,6 @@
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::rgb::Rgb;
 
@@ -66,11 +65,6 @@ impl Texture {
         [self.width, self.height]
     }
 
-    /// Linear colours of all texels, rows from the top.
-    pub fn linear_texels(&self) -> impl IndexedParallelIterator<Item = Rgb> {
-        self.texels.par_iter().map(|&texel| linear_colour(texel))
-    }
-
     /// Linear mean of all texels.
     pub fn whole_mean(&self) -> Rgb {
         self.cell(self.levels.len(), 0, 0)
@@ -80,6 +74,24 @@ impl Texture {
     /// image repeats, or, `clamped`, goes on as its border.
     pub fn at(&self, uv: DVec2, clamped: bool) -> Rgb {
         self.filtered(uv, 0.0, clamped)
+    }
+
+    /// Linear colour of the texel at `uv`, as far as it reaches.
+    pub(super) fn texel_at(&self, uv: DVec2, clamped: bool) -> Rgb {
+        let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
+        let [x, y] = [(uv.x, self.width), (1.0 - uv.y, self.height)]
+            .map(|(place, count)| ((place * f64::from(count)) as u32).min(count - 1));
+        self.cell(0, x, y)
+    }
+
+    /// Whether both are the same image.
+    pub(super) fn has_texels_of(&self, other: &Texture) -> bool {
+        std::ptr::eq(self, other) || self.width == other.width && self.texels == other.texels
+    }
+
+    /// All texels as bytes, rows from the top.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        self.texels.as_flattened()
     }
 
     /// The same, between the means of so many texels that one covers `area` of the image at most;
@@ -115,7 +127,7 @@ impl Texture {
     }
 
     /// The same, with so many cells along the triangle's outline, and as many repetitions.
-    fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
+    pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
         let size = DVec2::new(self.width.into(), self.height.into());
         let [a, b, c] = corners;
         let low = a.min(b).min(c);
@@ -283,6 +295,11 @@ impl TextureMap {
         self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
     }
 
+    /// The value of the texel that texture coordinates, as the file has them, lie in.
+    pub(crate) fn texel(&self, uv: DVec2) -> Rgb {
+        self.value(self.texture.texel_at(uv * self.scale + self.offset, self.clamped))
+    }
+
     /// The value at texture coordinates as the file has them, of which `area` is to be filtered.
     pub(crate) fn filtered(&self, uv: DVec2, area: f64) -> Rgb {
         let area = area * (self.scale.x * self.scale.y).abs();
@@ -324,6 +341,8 @@ pub struct MaterialTextures {
     pub reflectance: Option<TextureMap>,
     /// Of its exitance, W/m².
     pub exitance: Option<TextureMap>,
+    /// Where it is solid: white. What is black is a hole.
+    pub mask: Option<TextureMap>,
 }
 
 /// A triangle cut by a rectangle has seven corners at most.

@@ -23,9 +23,6 @@ use super::{Rgb, Scene};
 /// at the three corners of the piece.
 pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
-/// All of a triangle.
-const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-
 /// Cells of images along the outlines of all pieces that are looked at together: some 10 s on two
 /// cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`], so
 /// that the time is bounded for any number that each show all of a large image.
@@ -35,6 +32,9 @@ const SCENE_OUTLINE_CELLS: f64 = 2e7;
 const MIN_OUTLINE_CELLS: f64 = 64.0;
 
 impl Scene {
+    /// All of a triangle, as a [`Piece`] has it.
+    pub(crate) const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
     /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
     /// where the scene has no textures. Not finite for a corner that has none.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
@@ -93,7 +93,7 @@ impl Scene {
         (barycentric, share): ([f64; 2], f64),
     ) -> Rgb {
         let Some(map) = map else { return mean };
-        let [a, b, c] = WHOLE.map(|corner| self.texture_place(t, corner));
+        let [a, b, c] = Scene::WHOLE.map(|corner| self.texture_place(t, corner));
         let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
         map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
     }
@@ -117,7 +117,7 @@ impl Scene {
 
     /// Mean reflectance per channel of each of `pieces`.
     pub(crate) fn mean_reflectances(&self, pieces: &[Piece]) -> Vec<Rgb> {
-        let means = self.means(pieces, |textures| textures.reflectance.as_ref());
+        let means = self.solid_means(pieces, |textures| textures.reflectance.as_ref());
         let scaled = |(&(t, _), mean): (&Piece, Option<Rgb>)| {
             let whole = self.material(t).reflectance;
             let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
@@ -132,11 +132,14 @@ impl Scene {
         coordinates: Vec<[DVec2; 3]>,
         of_materials: BTreeMap<u32, MaterialTextures>,
     ) {
-        self.textures =
-            SceneTextures { coordinates, of_materials, relative_exitance: vec![] }.into();
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
-        let reflected = self.means(&pieces, |textures| textures.reflectance.as_ref());
-        let emitted = self.means(&pieces, |textures| textures.exitance.as_ref());
+        let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
+        self.textures = SceneTextures { coordinates, of_materials, ..Default::default() }.into();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        if has_masks {
+            self.find_solid_shares();
+        }
+        let reflected = self.solid_means(&pieces, |textures| textures.reflectance.as_ref());
+        let emitted = self.solid_means(&pieces, |textures| textures.exitance.as_ref());
         let reflectances = self.means_of_materials(&reflected);
         let exitances = self.means_of_materials(&emitted);
         let mut textures = (*self.textures).clone();
@@ -173,38 +176,57 @@ impl Scene {
         for (t, mean) in of_triangles.iter().enumerate() {
             if let Some(mean) = mean {
                 let (sum, area) = sums.entry(self.triangles[t].material).or_default();
-                *sum += self.area(t) * *mean;
-                *area += self.area(t);
+                *sum += self.solid_area(t) * *mean;
+                *area += self.solid_area(t);
             }
         }
-        sums.into_iter().map(|(m, (sum, area))| (m, sum / area)).collect()
+        let seen = sums.into_iter().filter(|(_, (_, area))| *area > 0.0);
+        seen.map(|(m, (sum, area))| (m, sum / area)).collect()
     }
 
-    /// Mean of a texture over each of `pieces`; none for those without one. Many triangles of a
-    /// scene may show the same piece, which is looked at once.
-    fn means(
+    /// Mean of a texture over the solid part of each of `pieces`; none for those without one.
+    fn solid_means(
         &self,
         pieces: &[Piece],
-        map_of: impl Fn(&MaterialTextures) -> Option<&TextureMap> + Sync,
+        map_of: impl Fn(&MaterialTextures) -> Option<&TextureMap>,
     ) -> Vec<Option<Rgb>> {
+        let mean = |map: &TextureMap, mask: Option<&TextureMap>, place: [DVec2; 3], cells: f64| {
+            mask.map_or_else(
+                || Some(map.mean_by_cells(place, cells)),
+                |mask| map.mean_where_solid(mask, place, cells),
+            )
+        };
+        self.of_pieces(pieces, map_of, mean).into_iter().map(Option::flatten).collect()
+    }
+
+    /// What `find` finds of a texture over each of `pieces`, of it, the mask beside it, the place
+    /// of the piece on it, and the cells of its image along the piece's outline; none for those
+    /// without one. Many triangles of a scene may show the same piece, which is looked at once.
+    pub(super) fn of_pieces<T: Copy + Send>(
+        &self,
+        pieces: &[Piece],
+        map_of: impl Fn(&MaterialTextures) -> Option<&TextureMap>,
+        find: impl Fn(&TextureMap, Option<&TextureMap>, [DVec2; 3], f64) -> T + Sync,
+    ) -> Vec<Option<T>> {
         let mut numbers: FxHashMap<(u32, [u64; 6]), u32> = FxHashMap::default();
-        let mut different: Vec<(&TextureMap, [DVec2; 3])> = vec![];
+        let mut different: Vec<(&TextureMap, Option<&TextureMap>, [DVec2; 3])> = vec![];
         let number_of = |&(t, corners): &Piece| {
-            let map = map_of(self.textures(t)?)?;
+            let textures = self.textures(t)?;
+            let (map, mask) = (map_of(textures)?, textures.mask.as_ref());
             let [a, b, c] = corners.map(|corner| self.texture_place(t, corner));
             let bits = [a.x, a.y, b.x, b.y, c.x, c.y].map(f64::to_bits);
             let key = (self.triangles[t].material, bits);
             Some(*numbers.entry(key).or_insert_with(|| {
-                different.push((map, [a, b, c]));
+                different.push((map, mask, [a, b, c]));
                 different.len() as u32 - 1
             }))
         };
         let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
         let cells = SCENE_OUTLINE_CELLS / different.len().max(1) as f64;
         let cells = cells.clamp(MIN_OUTLINE_CELLS, MAX_OUTLINE_CELLS);
-        let mean = |&(map, place): &(&TextureMap, _)| map.mean_by_cells(place, cells);
-        let means: Vec<Rgb> = different.par_iter().map(mean).collect();
-        numbers.into_iter().map(|number| Some(means[number? as usize])).collect()
+        let found = different.par_iter().map(|&(map, mask, place)| find(map, mask, place, cells));
+        let found: Vec<T> = found.collect();
+        numbers.into_iter().map(|number| Some(found[number? as usize])).collect()
     }
 
     /// Weights of the second and third corner of triangle `t` at `position` in its plane.

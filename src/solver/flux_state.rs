@@ -53,8 +53,11 @@ impl Flux {
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
     pub fn after(mesh: &Mesh, received: &ReceivedLight) -> Result<Flux, Error> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
-        let emitted: Vec<Rgb> =
-            elements.clone().enumerate().map(|(e, n)| mesh.exitance(e) * mesh.area(n)).collect();
+        let emitted: Vec<Rgb> = elements
+            .clone()
+            .enumerate()
+            .map(|(e, n)| mesh.exitance(e) * mesh.solid_area(n))
+            .collect();
         let reflectance: Vec<Rgb> = (0..emitted.len()).map(|e| mesh.reflectance(e)).collect();
         let transmission = Transmission::new(mesh);
         let mut unshot = emitted.clone();
@@ -64,7 +67,7 @@ impl Flux {
                 unshot[e] = Rgb::ZERO;
             }
             if reflectance[e] + transmission.passed(e) != Rgb::ZERO {
-                incident[e] = received.irradiance[e] * mesh.area(node);
+                incident[e] = received.irradiance[e] * mesh.solid_area(node);
                 unshot[e] += reflectance[e] * incident[e];
             }
         }
@@ -292,10 +295,13 @@ impl<'m> FluxState<'m> {
         ))
     }
 
-    /// Radiosity of each element, W/m².
+    /// Radiosity of each element, W/m²; 0 of holes.
     pub fn radiosity(&self) -> Vec<Rgb> {
-        let area = |e| self.mesh.area(self.mesh.element(e));
-        (0..self.mesh.element_count()).map(|e| self.flux.leaving(e) / area(e)).collect()
+        let radiosity = |e| match self.mesh.solid_area(self.mesh.element(e)) {
+            0.0 => Rgb::ZERO,
+            area => self.flux.leaving(e) / area,
+        };
+        (0..self.mesh.element_count()).map(radiosity).collect()
     }
 }
 

@@ -54,6 +54,8 @@ impl GeometryDelta {
             .map(|t| {
                 before.corners(t) != after.corners(t)
                     || share_passing(before, t) != share_passing(after, t)
+                    || !before.has_no_other_holes(t, (after, t), Scene::WHOLE)
+                    || !after.has_no_other_holes(t, (before, t), Scene::WHOLE)
             })
             .collect();
         let is_pane = |t: usize| before.is_clear(t) || after.is_clear(t);

@@ -335,12 +335,13 @@ impl Cycle {
     }
 }
 
-/// Σ A over A of each element of `mesh`.
+/// Σ A over A of each element of `mesh`; 0 of holes.
 fn inner_product_weights(mesh: &Mesh) -> Vec<f64> {
-    let area = |e: usize| mesh.area(mesh.element(e));
+    let area = |e: usize| mesh.solid_area(mesh.element(e));
     let count = mesh.element_count();
     let total: f64 = (0..count).map(area).sum();
-    (0..count).map(|e| total / area(e)).collect()
+    let weight = |e: usize| if area(e) > 0.0 { total / area(e) } else { 0.0 };
+    (0..count).map(weight).collect()
 }
 
 /// Σ weight a b over the elements, by channel.

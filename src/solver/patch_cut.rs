@@ -330,12 +330,12 @@ impl<'m> PatchCut<'m> {
         if let Some(viewpoint) = patch.viewpoint {
             return viewpoint;
         }
-        let area = |e: usize| mesh.area(mesh.element(e));
+        let area = |e: usize| mesh.solid_area(mesh.element(e));
         let light = |e: usize| flux.leaving(e).element_sum();
         let elements = || indices(&patch.elements);
         let total: f64 = elements().map(light).sum();
         let mean = total / elements().map(area).sum::<f64>();
-        let is_lit = |&e: &usize| light(e) >= MIN_LIT_SHARE * mean * area(e);
+        let is_lit = |&e: &usize| area(e) > 0.0 && light(e) >= MIN_LIT_SHARE * mean * area(e);
         if let Source::Node(node) = patch.source
             && !self.occluded_viewpoints.contains(&node)
             && mesh.elements_of(self.middle(node)).all(|e| is_lit(&e))
@@ -413,7 +413,7 @@ fn indices(ranges: &[Range<usize>]) -> impl Iterator<Item = usize> {
 }
 
 fn surface_area(mesh: &Mesh) -> f64 {
-    (0..mesh.scene().triangles().len()).map(|t| mesh.scene().area(t)).sum()
+    (0..mesh.scene().triangles().len()).map(|t| mesh.scene().solid_area(t)).sum()
 }
 
 fn centroids(mesh: &Mesh) -> Vec<DVec3> {

@@ -154,7 +154,7 @@ pub(super) fn patch_error(
     for e in elements.iter().cloned().flatten() {
         let node = mesh.element(e);
         let (offset, deviation) = (centroids[e] - eye, mesh.normal(node) - normal);
-        let element = SourceMoments::of_element(light(e), mesh.area(node), offset, deviation);
+        let element = SourceMoments::of_element(light(e), mesh.solid_area(node), offset, deviation);
         moments = moments.combine(element);
     }
     if moments.flux <= 0.0 {
@@ -162,7 +162,7 @@ pub(super) fn patch_error(
     }
     let mut deviation = 0.0;
     for e in elements.iter().cloned().flatten() {
-        let even = moments.flux / moments.area * mesh.area(mesh.element(e));
+        let even = moments.flux / moments.area * mesh.solid_area(mesh.element(e));
         deviation += (light(e) - even).abs();
     }
     let q = moments.misplaced_share(deviation / moments.flux, distances);

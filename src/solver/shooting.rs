@@ -165,7 +165,7 @@ impl FluxState<'_> {
             flux += unshot;
             overshot += unshot.min(Rgb::ZERO);
             if ambient_overshoot != Rgb::ZERO {
-                let area = self.mesh.area(self.mesh.element(e));
+                let area = self.mesh.solid_area(self.mesh.element(e));
                 let limit = MAX_OVERSHOOT * unshot.max(Rgb::ZERO);
                 let over = (self.flux.albedo(e) * area * ambient_overshoot).min(limit);
                 self.flux.unshot[e] -= over;

@@ -37,6 +37,9 @@ const MAX_SURVIVAL: f64 = 0.999;
 /// files have 32 bits or six digits; of several surfaces within it the nearest counts.
 const LOOKUP_REACH: f64 = 1e-4;
 
+/// Points of a triangle at which one is looked for that is in no hole. Chosen by hand.
+const MAX_TRIES: usize = 1000;
+
 /// Surfaces whose normals agree by this cosine face alike.
 const ALIKE: f64 = 0.8;
 
@@ -232,7 +235,7 @@ impl<'a> PathTracer<'a> {
         let cosine = self.normals[at.triangle].dot(direction);
         let facing = -self.normals[light].dot(direction);
         // Written so that NaN, of a light that is met, sees nothing.
-        if !(cosine > 0.0 && facing > 0.0) {
+        if !(cosine > 0.0 && facing > 0.0 && self.scene.is_solid(light, place)) {
             return Rgb::ZERO;
         }
         let between = self.contact..distance - self.contact;
@@ -310,9 +313,13 @@ pub(super) fn random_numbers(words: &[u64]) -> Rng {
     Rng::with_seed(words.iter().fold(0, hash))
 }
 
-/// A point of a triangle, uniform over its area.
-pub(super) fn random_point(corners: [DVec3; 3], rng: &mut Rng) -> DVec3 {
-    point_at(corners, random_barycentric(rng))
+/// A point of triangle `t`, uniform over its solid area; where little of it is solid, it may be in
+/// a hole.
+pub(super) fn random_point(scene: &Scene, t: usize, rng: &mut Rng) -> DVec3 {
+    let place = random_barycentric(rng);
+    let others = std::iter::repeat_with(|| random_barycentric(rng)).take(MAX_TRIES);
+    let solid = scene.first_solid(t, std::iter::once(place).chain(others));
+    point_at(scene.corners(t), solid.unwrap_or(place))
 }
 
 /// Weights of the second and third corner of a triangle, uniform over its area (Osada et al. 2002).

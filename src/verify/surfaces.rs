@@ -22,10 +22,10 @@ impl ReflectingGroup {
     pub fn all(scene: &Scene) -> Result<Vec<ReflectingGroup>, Error> {
         let mut areas: Vec<Vec<(usize, f64)>> = vec![vec![]; scene.groups().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
-            if scene.material(t).scatters() {
+            if scene.material(t).scatters() && scene.solid_area(t) > 0.0 {
                 let list = &mut areas[triangle.group as usize];
                 let before = list.last().map_or(0.0, |&(_, sum)| sum);
-                list.push((t, before + scene.area(t)));
+                list.push((t, before + scene.solid_area(t)));
             }
         }
         let whole = |areas: &[(usize, f64)]| areas.last().map_or(0.0, |&(_, sum)| sum);
@@ -50,7 +50,7 @@ impl ReflectingGroup {
         let at = rng.f64() * whole;
         let k = self.areas.partition_point(|&(_, sum)| sum <= at);
         let triangle = self.areas.get(k).map_or(last, |&(t, _)| t);
-        let position: DVec3 = random_point(scene.corners(triangle), rng);
+        let position: DVec3 = random_point(scene, triangle, rng);
         SurfacePoint { triangle, position }
     }
 }

@@ -86,7 +86,7 @@ fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -
     let row_of = |e: u32| {
         let node = mesh.element(e as usize);
         let (offset, area) = (mesh.centroid(node) - position, mesh.area(node));
-        let weight = area / (offset.length_squared() + area);
+        let weight = mesh.solid_share(node) * area / (offset.length_squared() + area);
         let scale = 1.0 / area.sqrt();
         let x = DVec3::new(1.0, offset.dot(tangent) * scale, offset.dot(bitangent) * scale);
         matrix += DMat3::from_cols(x * x.x, x * x.y, x * x.z) * weight;

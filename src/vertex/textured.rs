@@ -33,7 +33,7 @@ impl VertexMesh {
         }
         let mut sums = vec![(Rgb::ZERO, Rgb::ZERO, 0.0); reflected.len()];
         for (e, outline) in outlines.iter() {
-            let area = mesh.area(mesh.element(e));
+            let area = mesh.weight(mesh.element(e));
             let (relative, emitted) = (mesh.relative_reflectance(e), mesh.exitance(e));
             for &v in outline {
                 let sum = &mut sums[v as usize];

@@ -75,7 +75,7 @@ pub(super) fn sample(
     let mut done = 0;
     for batch in elements.chunks(form_factors.preferred_batch_len().max(1)) {
         for (row, &from) in checked_rows(form_factors, mesh, batch, 1.0)?.iter().zip(batch) {
-            let (fine, coarse) = (mesh.area(from), coarse_areas[done]);
+            let (fine, coarse) = (mesh.solid_area(from), coarse_areas[done]);
             let sum = &mut sums[group(from) as usize];
             for entry in &row.entries {
                 let to = group(mesh.element(entry.element as usize));
@@ -111,7 +111,7 @@ fn coarse_areas(mesh: &Mesh) -> Vec<f64> {
         // The middle child is the last.
         let middle = children[3];
         if children.iter().all(|&child| mesh.children(child).is_none()) {
-            areas[mesh.elements_of(middle).start] = mesh.area(node);
+            areas[mesh.elements_of(middle).start] = mesh.solid_area(node);
         }
         stack.extend(children);
     }

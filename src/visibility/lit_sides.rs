@@ -178,8 +178,8 @@ impl<'a> LitSides<'a> {
             let objects = own.hits == 0.0 && (1.0 - share).powf(own.places) < OBJECTION;
             is_lit[side] = share >= LIT_SHARE && !objects;
             if is_lit[side] && scene.material(side / 2).scatters() {
-                flux += own.mean() * scene.area(side / 2);
-                lit_area += scene.area(side / 2);
+                flux += own.mean() * scene.solid_area(side / 2);
+                lit_area += scene.solid_area(side / 2);
             }
         }
         LitSides { is_lit, light, least: MIN_IRRADIANCE * flux / lit_area }

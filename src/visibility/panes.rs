@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::cut_outs::CutOuts;
 use super::offset;
 use super::ray_scene::RayScene;
 use crate::scene::{Rgb, Scene};
@@ -38,7 +39,9 @@ impl Panes {
         let clear = |t: usize| Some((t, panes.transmittance(t)?));
         let (triangles, transmittance): (Vec<usize>, Vec<Rgb>) =
             (0..scene.triangles().len()).filter_map(clear).unzip();
-        let rays = RayScene::new(triangles.into_iter().map(|t| scene.corners(t)));
+        let rays = RayScene::new(triangles.iter().map(|&t| scene.corners(t)));
+        let whole = triangles.into_iter().map(|t| (t, Scene::WHOLE));
+        let rays = rays.with_cut_outs(CutOuts::new(scene, whole));
         Panes { rays: Some(rays), transmittance }
     }
 

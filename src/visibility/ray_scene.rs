@@ -7,7 +7,9 @@
 //! ```
 //!
 //! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
-//! clear panes ([`Scene::is_clear`]): [`Panes`](super::panes::Panes) tell what they let through.
+//! clear panes ([`Scene::is_clear`]): [`Panes`](super::panes::Panes) tell what they let through;
+//! nor holes, [`CutOuts`], which are looked up where a triangle is hit. Whether there are any is
+//! asked once a ray.
 //!
 //! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
 //! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
@@ -23,6 +25,7 @@ use obvhs::ray::{Ray, RayHit};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
+use super::cut_outs::CutOuts;
 use super::wide_bvh::hierarchy;
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
@@ -35,6 +38,8 @@ pub(crate) struct RayScene {
     origin: DVec3,
     /// From the scene's unit to the hierarchy's.
     scale: f64,
+    /// None where nothing has holes.
+    cut_outs: Option<CutOuts>,
 }
 
 /// Where a ray first met a triangle.
@@ -92,7 +97,7 @@ impl RayScene {
         let mut bvh = hierarchy(&boxes);
         bvh.primitive_indices.iter_mut().for_each(|k| *k = met[*k as usize]);
         let triangles = corners.into_iter().map(TrianglePlane::new).collect();
-        RayScene { bvh, triangles, origin, scale }
+        RayScene { bvh, triangles, origin, scale, cut_outs: None }
     }
 
     /// The same, where nothing meets the backs of triangles that are `covered`.
@@ -103,12 +108,18 @@ impl RayScene {
         self
     }
 
+    /// The same, where rays go through these holes.
+    pub fn with_cut_outs(self, cut_outs: Option<CutOuts>) -> RayScene {
+        RayScene { cut_outs, ..self }
+    }
+
     /// For the triangles of `scene` that block light, by their numbers.
     pub fn of_scene(scene: &Scene) -> RayScene {
         let count = scene.triangles().len();
         let met = (0..count as u32).filter(|&t| !scene.is_clear(t as usize)).collect();
         RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
             .with_covered_backs(|t| scene.is_back_covered(t))
+            .with_cut_outs(CutOuts::new(scene, (0..count).map(|t| (t, Scene::WHOLE))))
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and
@@ -125,6 +136,24 @@ impl RayScene {
 
     /// The same of those hits that `counts`.
     pub fn closest_hit_of(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        start: f64,
+        ignored: Option<usize>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
+        match &self.cut_outs {
+            None => self.nearest(from, direction, start, ignored, counts),
+            Some(holes) => {
+                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
+                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
+                self.nearest(from, direction, start, ignored, counts)
+            }
+        }
+    }
+
+    fn nearest(
         &self,
         from: DVec3,
         direction: DVec3,
@@ -159,6 +188,23 @@ impl RayScene {
     /// Whether any hit that `counts` lies along `direction` (any length) from `from`, within
     /// `reach` in units of it.
     pub fn occluded(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        reach: Range<f64>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> bool {
+        match &self.cut_outs {
+            None => self.any(from, direction, reach, counts),
+            Some(holes) => {
+                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
+                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
+                self.any(from, direction, reach, counts)
+            }
+        }
+    }
+
+    fn any(
         &self,
         from: DVec3,
         direction: DVec3,

@@ -1,4 +1,6 @@
 mod cpu_gather;
+#[cfg(feature = "textures")]
+mod cut_outs;
 mod doubled_faces;
 mod gpu;
 mod panes;

@@ -1,5 +1,7 @@
 mod contacts;
 pub mod cornell_box;
+#[cfg(feature = "textures")]
+mod cut_outs;
 mod outcome;
 mod sky;
 mod sky_models;

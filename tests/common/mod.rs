@@ -3,6 +3,7 @@
 
 pub mod changes;
 pub mod closed_forms;
+pub mod cut_outs;
 pub mod fakes;
 pub mod files;
 pub mod framed;

@@ -1,5 +1,7 @@
 mod glb;
 mod image;
+#[cfg(feature = "textures")]
+mod masks;
 mod mtl;
 mod obj;
 mod obj_libraries;

@@ -1,4 +1,6 @@
 mod checkpoint;
+#[cfg(feature = "textures")]
+mod cut_outs;
 mod incremental;
 mod methods;
 mod odd_geometry;

@@ -1,3 +1,4 @@
+mod cut_outs;
 mod elements;
 mod light;
 mod pictures;

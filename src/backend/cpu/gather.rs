@@ -263,6 +263,7 @@ impl RayGather {
             // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
             let (root, v) = (across.sqrt(), (y + rotation).fract());
             let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
+            let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
             let to = target - point.position;
             let facing = -scene.normal(triangle).dot(to);
             let above = point.normal.dot(to);
@@ -276,7 +277,7 @@ impl RayGather {
             let near = point.near / r2.sqrt();
             let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
             let reach = near..1.0 - offset::SEGMENT_END;
-            if !self.scene.occluded(point.position, to, reach.clone(), other) {
+            if !is_hole && !self.scene.occluded(point.position, to, reach.clone(), other) {
                 out.seen += factor * self.panes.transmittance(point.position, to, reach);
             }
         }

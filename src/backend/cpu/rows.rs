@@ -61,7 +61,7 @@ impl RayRows {
     }
 
     fn row(&self, mesh: &Mesh, patch: NodeId, samples: &HemisphereSamples) -> Row {
-        let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
+        let (eye, own) = (mesh.viewpoint(patch), mesh.triangle(patch));
         let start = offset::RAY_START * mesh.area(patch).sqrt();
         let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
         let meets = |direction| item(mesh, self.rays.closest_hit(eye, direction, start, Some(own)));
@@ -82,7 +82,7 @@ impl RayRows {
         directions: impl Iterator<Item = DVec3>,
         start: f64,
     ) -> Row {
-        let (eye, own) = (mesh.centroid(patch), mesh.triangle(patch));
+        let (eye, own) = (mesh.viewpoint(patch), mesh.triangle(patch));
         let meets = |direction| {
             let hit = self.rays.closest_hit(eye, direction, start, Some(own));
             let end = hit.map_or(f64::INFINITY, |hit| hit.distance);

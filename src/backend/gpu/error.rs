@@ -38,14 +38,13 @@ pub fn message(error: &wgpu::Error) -> String {
     text
 }
 
-/// Checks that `scene` has no clear panes: hemicubes would take them for nothing at all.
+/// Checks that `scene` has nothing that hemicubes do not see: they would take clear panes for
+/// nothing at all, and holes for solid.
 ///
 /// # Errors
 /// [`ErrorKind::Device`] where it has.
-pub(crate) fn check_no_panes(scene: &Scene) -> Result<(), Error> {
-    if !scene.has_clear_panes() {
-        return Ok(());
-    }
-    let found = "clear panes, which hemicubes do not see";
+pub(crate) fn check_hemicubes_see(scene: &Scene) -> Result<(), Error> {
+    let Some(hidden) = scene.hidden_from_hemicubes() else { return Ok(()) };
+    let found = format!("{hidden}, which hemicubes do not see");
     Err(Error::new(ErrorKind::Device, "scene", found, "use rays on the CPU, which do"))
 }

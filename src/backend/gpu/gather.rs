@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::draw_list::DrawList;
-use super::error::check_no_panes;
+use super::error::check_hemicubes_see;
 use super::hemisphere_sum::HemisphereSum;
 use super::layout::{Corner, RadianceTriangle, RadianceView, Sums, TILE, Tile};
 use super::limits::GpuLimits;
@@ -98,7 +98,7 @@ impl HemicubeGather {
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeGather, Error> {
         hemicube::check_resolution(resolution)?;
         let scene = mesh.scene();
-        check_no_panes(scene)?;
+        check_hemicubes_see(scene)?;
         let lights = Lights::new(mesh.shared_scene());
         let sky = scene.sky();
         let tiles = lights.lights.len() + usize::from(sky.sun().is_some());

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::draw_list::DrawList;
-use super::error::check_no_panes;
+use super::error::check_hemicubes_see;
 use super::item_buffer::{ItemBuffer, View};
 use super::item_table::ItemTable;
 use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
@@ -94,7 +94,7 @@ impl HemicubeRows {
     /// hemicube; [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, resolution: u32) -> Result<HemicubeRows, Error> {
         hemicube::check_resolution(resolution)?;
-        check_no_panes(mesh.scene())?;
+        check_hemicubes_see(mesh.scene())?;
         let limits = gpu.limits();
         check_resolution_fits(limits, resolution)?;
         check_mesh_fits(limits, mesh)?;

@@ -42,7 +42,7 @@ pub fn textured_scene() -> Mesh {
     };
     let textures = |(m, material): (u32, &Material)| {
         let exitance = Some(map(material.exitance)).filter(|_| material.exitance != Rgb::ZERO);
-        (m, MaterialTextures { reflectance: Some(map(Rgb::splat(0.9))), exitance })
+        (m, MaterialTextures { reflectance: Some(map(Rgb::splat(0.9))), exitance, mask: None })
     };
     let place = |t: usize| {
         let turned = DVec2::from_angle(t as f64);

@@ -7,7 +7,7 @@ use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Stride, Target, View};
 use gltf_json::extras::RawValue;
 use gltf_json::image::MimeType;
-use gltf_json::material::{AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
+use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
 use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::scene::Node;
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
@@ -207,10 +207,16 @@ impl Model<'_> {
         let unlit = gltf_json::extensions::material::Unlit {};
         // Viewers see through clear panes.
         let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
-        let alpha_mode = if passed.is_some() { AlphaMode::Blend } else { AlphaMode::Opaque };
+        let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
+        let alpha_mode = match (passed, has_mask) {
+            (Some(_), _) => AlphaMode::Blend,
+            (None, true) => AlphaMode::Mask,
+            (None, false) => AlphaMode::Opaque,
+        };
         let alpha = 1.0 - passed.unwrap_or(0.0) as f32;
         Material {
             alpha_mode: Valid(alpha_mode),
+            alpha_cutoff: (alpha_mode == AlphaMode::Mask).then_some(AlphaCutoff(0.5)),
             name: Some(material.name.clone()),
             pbr_metallic_roughness: PbrMetallicRoughness {
                 base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
@@ -226,7 +232,7 @@ impl Model<'_> {
 
     /// The image of a primitive, repeated or not, smoothly filtered; none without a texture.
     fn texture(&self, root: &mut Root, primitive: &Primitive<'_>) -> Option<Info> {
-        let clamped = primitive.shown?.map.clamped;
+        let clamped = primitive.shown?.frame()?.clamped;
         let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
         let sampler = root.push(Sampler {
             mag_filter: Some(Valid(MagFilter::Linear)),

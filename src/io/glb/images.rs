@@ -7,7 +7,8 @@
 
 use std::collections::BTreeMap;
 
-use image::ExtendedColorType::Rgb8;
+use glam::DVec2;
+use image::ExtendedColorType::{Rgb8, Rgba8};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageResult};
 use rayon::prelude::*;
@@ -79,27 +80,36 @@ impl Images {
 impl Image {
     fn new(
         material: &Material,
-        Shown { map, emits }: Shown<'_>,
+        shown: Shown<'_>,
         irradiance: Rgb,
         tone: &ToneCurve,
     ) -> ImageResult<Image> {
         let colour = |texel: Rgb| {
-            let scaled = |mean: Rgb| map.scaled(map.factor * texel, mean);
-            tone.linear(if emits {
+            let scaled = |mean: Rgb| shown.colours.map_or(mean, |map| map.scaled(texel, mean));
+            tone.linear(if shown.emits {
                 scaled(material.exitance) + material.reflectance * irradiance
             } else {
                 material.exitance + scaled(material.reflectance) * irradiance
             })
         };
+        let texels = Texels::new(shown);
         // Twice, since all colours of a large image would take gigabytes.
-        let colours = || map.texture.linear_texels().map(colour);
+        let colours = || texels.all().map(|texel| colour(texels.colour(texel)));
         let peak = colours().map(Rgb::max_element).reduce(|| 0.0, f64::max);
         let byte = |c: Rgb| (c / if peak > 0.0 { peak } else { 1.0 }).to_array().map(srgb);
-        let bytes: Vec<[u8; 3]> = colours().map(byte).collect();
+        let bytes = colours().map(byte);
+        let (bytes, format) = match shown.mask {
+            None => (bytes.collect::<Vec<_>>().into_flattened(), Rgb8),
+            Some(_) => {
+                let alpha = texels.all().map(|texel| u8::from(texels.is_solid(texel)) * u8::MAX);
+                let bytes = bytes.zip(alpha).map(|([r, g, b], alpha)| [r, g, b, alpha]);
+                (bytes.collect::<Vec<_>>().into_flattened(), Rgba8)
+            }
+        };
         let mut png = vec![];
-        let [width, height] = map.texture.size();
+        let [width, height] = texels.size;
         PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
-            .write_image(bytes.as_flattened(), width, height, Rgb8)?;
+            .write_image(&bytes, width, height, format)?;
         Ok(Image { png, peak, mean: tone.linear(mean_radiosity(material, irradiance)) })
     }
 
@@ -108,6 +118,41 @@ impl Image {
     pub fn vertex_colour(&self, colour: Rgb) -> Rgb {
         let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), colour / self.mean, Rgb::ONE);
         (self.peak * relative).min(Rgb::ONE)
+    }
+}
+
+/// The texels of an image that shows one texture, or both in one place: as many along a side as the
+/// one that has more.
+struct Texels<'a> {
+    shown: Shown<'a>,
+    size: [u32; 2],
+}
+
+impl Texels<'_> {
+    fn new(shown: Shown<'_>) -> Texels<'_> {
+        let both = [shown.colours, shown.mask].into_iter().flatten();
+        let sizes = both.map(|map| map.texture.size());
+        let size = sizes.reduce(|[a, b], [c, d]| [a.max(c), b.max(d)]).unwrap_or([1, 1]);
+        Texels { shown, size }
+    }
+
+    /// The middles of all, in texture coordinates as the file has them, rows from the top.
+    fn all(&self) -> impl IndexedParallelIterator<Item = DVec2> {
+        let ([width, height], frame) = (self.size, self.shown.frame());
+        let count = width as usize * height as usize;
+        (0..count).into_par_iter().map(move |k| {
+            let [x, y] = [k % width as usize, k / width as usize].map(|k| k as f64 + 0.5);
+            let place = DVec2::new(x / f64::from(width), 1.0 - y / f64::from(height));
+            frame.map_or(place, |map| (place - map.offset) / map.scale)
+        })
+    }
+
+    fn colour(&self, texel: DVec2) -> Rgb {
+        self.shown.colours.map_or(Rgb::ONE, |map| map.texel(texel))
+    }
+
+    fn is_solid(&self, texel: DVec2) -> bool {
+        self.shown.mask.is_none_or(|mask| mask.is_solid(texel))
     }
 }
 

@@ -25,19 +25,27 @@ pub(super) struct Primitive<'a> {
     pub faces: Vec<[u32; 3]>,
 }
 
-/// The texture that a surface is shown with.
+/// The textures that a surface is shown with: one, or both.
 #[derive(Clone, Copy)]
 pub(super) struct Shown<'a> {
-    pub map: &'a TextureMap,
-    /// Whether it is that of the light that is emitted, and not of what is reflected.
+    pub colours: Option<&'a TextureMap>,
+    /// Whether they are those of the light that is emitted, and not of what is reflected.
     pub emits: bool,
+    pub mask: Option<&'a TextureMap>,
 }
 
-impl Shown<'_> {
-    /// The texture of what is emitted, else of what is reflected.
-    pub fn of(textures: &MaterialTextures) -> Option<Shown<'_>> {
-        let emitted = textures.exitance.as_ref().map(|map| Shown { map, emits: true });
-        emitted.or(textures.reflectance.as_ref().map(|map| Shown { map, emits: false }))
+impl<'a> Shown<'a> {
+    /// The texture of what is emitted, else of what is reflected, and the mask.
+    pub fn of(textures: &'a MaterialTextures) -> Option<Shown<'a>> {
+        let MaterialTextures { reflectance, exitance, mask } = textures;
+        let (colours, emits) = (exitance.as_ref().or(reflectance.as_ref()), exitance.is_some());
+        let shown = Shown { colours, emits, mask: mask.as_ref() };
+        shown.frame().is_some().then_some(shown)
+    }
+
+    /// The one that texture coordinates are scaled and shifted for.
+    pub fn frame(&self) -> Option<&'a TextureMap> {
+        self.colours.or(self.mask)
     }
 }
 
@@ -112,7 +120,8 @@ fn textured<'a>(
     let mut number = |v: u32, t: usize| {
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
         let place = scene.texture_place(t, barycentric);
-        let place = shown.map_or(place, |Shown { map, .. }| place * map.scale + map.offset);
+        let frame = shown.and_then(|shown| shown.frame());
+        let place = frame.map_or(place, |map| place * map.scale + map.offset);
         let place = DVec2::new(place.x, 1.0 - place.y);
         let cell = (place / SEAM).round().to_array().map(|x| x as i64);
         *numbers.entry((v, cell)).or_insert_with(|| {

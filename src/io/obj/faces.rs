@@ -34,8 +34,7 @@ impl ObjFile<'_> {
             triangles: Vec::with_capacity(self.statements.faces.len()),
             texture_coordinates: vec![],
         };
-        let has_texture = |m: &MtlMaterial| m.textures.iter().any(Option::is_some);
-        let textured = self.library.materials.iter().any(has_texture);
+        let textured = self.library.materials.iter().any(MtlMaterial::has_images);
         let (mut face, mut bare) = (0, 0);
         for tobj::Model { mesh, name } in models {
             // A model that has no face has no number either.

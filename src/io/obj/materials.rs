@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 
 use super::super::mtl::MtlMaterial;
 use super::super::specular::SpecularSurfaces;
-use super::super::textures::{TextureStatement, Textures, Unread};
+use super::super::textures::{TextureStatement, Textures};
+use super::repairs::Repairs;
 use super::statements::UNKNOWN_MATERIAL;
 use super::{ObjFile, ObjSettings};
 use crate::error::{Error, ErrorKind, quoted};
@@ -45,10 +46,9 @@ impl ObjFile<'_> {
                 }
                 let texture = match images.get(name) {
                     Ok(texture) => texture,
-                    Err(Unread { kind, reason }) => {
-                        let reason = reason.map_or(String::new(), |reason| format!("{reason}; "));
-                        let done = format!("{reason}`Kd` and `Ke` count alone");
-                        self.repairs.note_at(kind, place, name, done)?;
+                    Err(unread) => {
+                        let done = unread.and_so("`Kd` and `Ke` count alone");
+                        self.repairs.note_at(unread.kind, place, name, done)?;
                         continue;
                     }
                 };
@@ -81,6 +81,9 @@ impl ObjFile<'_> {
                 } else if !emitted {
                     all.entry(index).or_default().exitance = Some(map);
                 }
+            }
+            if let Some(mask) = mask(mtl, &mut images, &mut self.repairs, place)? {
+                all.entry(index).or_default().mask = Some(mask);
             }
         }
         Ok(all)
@@ -153,6 +156,37 @@ impl ObjFile<'_> {
         let found = format!("no material {} {what}", quoted(&[name]));
         let remedy = format!("its materials are {}", quoted(&names));
         Err(Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy))
+    }
+}
+
+/// The mask of a material at this `place`; none if it has none, or one without a hole.
+fn mask(
+    mtl: &MtlMaterial,
+    images: &mut Textures,
+    repairs: &mut Repairs,
+    place: impl Fn() -> String,
+) -> Result<Option<TextureMap>, Error> {
+    let Some(statement) = &mtl.mask else { return Ok(None) };
+    let TextureStatement { name, scale, offset, clamped, more } =
+        TextureStatement::parse(statement);
+    if more {
+        repairs.note_at(WarningKind::TextureOptions, &place, &name, "other options count")?;
+    }
+    let colours = mtl.textures[0].as_deref().map(|colours| TextureStatement::parse(colours).name);
+    match images.mask(&name, colours.as_deref()) {
+        Ok(texture) => Ok(texture.map(|texture| TextureMap {
+            texture,
+            factor: Rgb::ONE,
+            ceiling: 1.0,
+            mean: Rgb::ONE,
+            scale,
+            offset,
+            clamped,
+        })),
+        Err(unread) => {
+            repairs.note_at(unread.kind, place, &name, unread.and_so("it is opaque"))?;
+            Ok(None)
+        }
     }
 }
 

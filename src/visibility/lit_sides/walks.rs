@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
+use std::iter::{once, repeat_with};
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -28,6 +29,9 @@ const FURTHER: f64 = 16.0;
 /// covered backs, where they face alike by this cosine.
 const SAME_PLACE: f64 = 1e-4;
 const ALIKE: f64 = 0.999;
+
+/// Points of a triangle at which one is looked for that is in no hole. Chosen by hand.
+const MAX_TRIES: usize = 1000;
 
 /// What walks meet.
 pub struct Walks<'a> {
@@ -232,10 +236,13 @@ impl<'a> Walks<'a> {
         (!blocked).then(|| far.min(near) * self.passed(at, direction, distance))
     }
 
-    /// A point of a triangle, uniform over its area.
+    /// A point of a triangle, uniform over its solid area; in a hole where next to nothing is
+    /// solid.
     pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
         let [a, b, c] = self.scene.corners(t);
-        let [u, v] = fold_to_triangle([rng.f64(), rng.f64()]);
+        let place = fold_to_triangle([rng.f64(), rng.f64()]);
+        let others = repeat_with(|| fold_to_triangle([rng.f64(), rng.f64()])).take(MAX_TRIES);
+        let [u, v] = self.scene.first_solid(t, once(place).chain(others)).unwrap_or(place);
         a + u * (b - a) + v * (c - a)
     }
 }

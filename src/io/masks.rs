@@ -1,0 +1,54 @@
+//! Masks that materials name (`map_d`): which texels of an image are solid, and which are holes.
+//!
+//! An alpha channel counts if it is not the same everywhere, else the luminance of the colours:
+//! either is solid from a half on. Exporters name the image of the colours as a mask where its
+//! alpha channel is meant. If it has none, dark colours are no holes, and all of it is solid.
+
+use std::sync::Arc;
+
+use super::textures::{ReadMask, Textures, Unread};
+use crate::scene::texture::Texture;
+
+/// The least of 255 that is solid.
+#[cfg(feature = "textures")]
+const HALF: u8 = 128;
+
+impl Textures<'_> {
+    /// The mask in the image `name`, white where it is solid and black elsewhere, if it can be
+    /// read; none without a hole. `colours` is the image that the material has its colours from.
+    pub fn mask(&mut self, name: &str, colours: Option<&str>) -> ReadMask {
+        let found = self.find(name)?;
+        let of_colours = colours.is_some_and(|colours| self.find(colours).as_ref() == Ok(&found));
+        let key = (found, of_colours);
+        if let Some(known) = self.masks.get(&key) {
+            return known.clone();
+        }
+        let mask = self.read_mask(&key.0, of_colours).map(|mask| mask.map(Arc::new));
+        self.masks.insert(key, mask.clone());
+        mask
+    }
+
+    #[cfg(feature = "textures")]
+    fn read_mask(&mut self, found: &str, of_colours: bool) -> Result<Option<Texture>, Unread> {
+        let image = self.decode(found)?.into_luma_alpha8();
+        let [width, height] = [image.width(), image.height()];
+        let texels = image.into_raw().as_chunks().0.to_vec();
+        let has_alpha = texels.iter().any(|[_, alpha]| *alpha != texels[0][1]);
+        let is_solid = |&[luminance, alpha]: &[u8; 2]| match (has_alpha, of_colours) {
+            (true, _) => alpha >= HALF,
+            (false, true) => true,
+            (false, false) => luminance >= HALF,
+        };
+        if texels.iter().all(is_solid) {
+            return Ok(None);
+        }
+        let white = texels.iter().map(|texel| if is_solid(texel) { [255; 3] } else { [0; 3] });
+        let mask = Texture::new(width, height, white.collect());
+        mask.map(Some).ok_or_else(|| Unread::unreadable("no texels"))
+    }
+
+    #[cfg(not(feature = "textures"))]
+    fn read_mask(&mut self, found: &str, _: bool) -> Result<Option<Texture>, Unread> {
+        self.read(found).map(Some)
+    }
+}

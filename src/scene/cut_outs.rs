@@ -1,0 +1,178 @@
+//! Cut-outs: holes in triangles, where the mask of their material has them.
+//!
+//! ```text
+//!   ■■□□■    ■ solid: it blocks, reflects, emits and receives
+//!   ■□□■■    □ a hole: nothing is there
+//! ```
+//!
+//! A mask is a texture of white, which is solid, and black texels, and these are squares: there is
+//! nothing between. So the solid share of a piece of a triangle is the mean of the mask over it,
+//! and the area that light counts is this share of the geometric one. Triangles that lack texture
+//! coordinates at a corner are solid.
+
+use glam::DVec2;
+
+use super::Scene;
+use super::rgb::Rgb;
+use super::scene_textures::SceneTextures;
+use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
+use super::textured::Piece;
+
+/// Shares of a piece nearer to none and to all of it than this are rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Texture coordinates this near, over one more than their length, are the same: what a file's six
+/// digits leave.
+const SAME_PLACE: f64 = 1e-4;
+
+/// Points along each side that a piece is looked at by where its mean has no closed form.
+const MAX_POINTS: f64 = 48.0;
+const MIN_POINTS: f64 = 8.0;
+
+impl Scene {
+    /// Area of triangle `t` without its holes, length unit squared: what light counts.
+    pub fn solid_area(&self, t: usize) -> f64 {
+        let area = self.area(t);
+        self.textures.solid_shares.get(t).map_or(area, |share| share * area)
+    }
+
+    /// Whether triangle `t` is no hole at a point, where its second and third corner have these
+    /// weights.
+    pub fn is_solid(&self, t: usize, barycentric: [f64; 2]) -> bool {
+        self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_place(t, barycentric)))
+    }
+
+    /// Whether any material has a mask.
+    pub(crate) fn has_cut_outs(&self) -> bool {
+        !self.textures.solid_shares.is_empty()
+    }
+
+    /// All masks, by the indices of their materials.
+    pub(crate) fn masks(&self) -> impl Iterator<Item = (u32, &TextureMap)> {
+        let all = self.textures.of_materials.iter();
+        all.filter_map(|(&m, textures)| Some((m, textures.mask.as_ref()?)))
+    }
+
+    /// The mask of triangle `t`; none where it is solid.
+    pub(crate) fn mask(&self, t: usize) -> Option<&TextureMap> {
+        if self.has_cut_outs() { self.textures(t)?.mask.as_ref() } else { None }
+    }
+
+    /// The first of `places` on triangle `t`, weights of its second and third corner, that is
+    /// solid.
+    pub(crate) fn first_solid(
+        &self,
+        t: usize,
+        places: impl IntoIterator<Item = [f64; 2]>,
+    ) -> Option<[f64; 2]> {
+        places.into_iter().find(|&place| self.is_solid(t, place))
+    }
+
+    /// The share of each of `pieces` that is solid, in [0, 1].
+    pub(crate) fn solid_shares(&self, pieces: &[Piece]) -> Vec<f64> {
+        let share = |mask: &TextureMap, _: Option<&TextureMap>, place: [DVec2; 3], cells: f64| {
+            mask.solid_share(place, cells)
+        };
+        let shares = self.of_pieces(pieces, |textures| textures.mask.as_ref(), share);
+        shares.into_iter().map(|share| share.unwrap_or(1.0)).collect()
+    }
+
+    /// The same of one piece.
+    pub(crate) fn solid_share(&self, (t, corners): Piece) -> f64 {
+        let place = || corners.map(|corner| self.texture_place(t, corner));
+        self.mask(t).map_or(1.0, |mask| mask.solid_share(place(), MAX_OUTLINE_CELLS))
+    }
+
+    /// Finds the solid shares of all triangles, by the textures that lie on them.
+    pub(super) fn find_solid_shares(&mut self) {
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let solid_shares = self.solid_shares(&pieces);
+        self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
+    }
+
+    /// Whether triangle `s` of `other` is solid wherever triangle `t` is, where the corners of `s`
+    /// have these weights in `t`: it has no holes, or those of `t`.
+    pub(crate) fn has_no_other_holes(
+        &self,
+        t: usize,
+        (other, s): (&Scene, usize),
+        corners: [[f64; 2]; 3],
+    ) -> bool {
+        let Some(mask) = other.mask(s) else { return true };
+        let of_t = corners.map(|corner| self.texture_place(t, corner));
+        let of_s = Scene::WHOLE.map(|corner| other.texture_place(s, corner));
+        let near = |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, SAME_PLACE * (1.0 + b.length()));
+        self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
+    }
+}
+
+impl TextureMap {
+    /// A mask: what is white in `texture` is solid, all else is a hole.
+    pub(crate) fn is_solid(&self, uv: DVec2) -> bool {
+        !uv.is_finite() || self.texel(uv) != Rgb::ZERO
+    }
+
+    /// The share of a mask that is solid over a triangle with these texture coordinates, in [0, 1];
+    /// with so many cells of the image along the triangle's outline.
+    fn solid_share(&self, corners: [DVec2; 3], cells: f64) -> f64 {
+        if !corners.iter().all(|corner| corner.is_finite()) {
+            return 1.0;
+        }
+        let [a, b, c] = corners.map(|uv| uv * self.scale + self.offset);
+        let is_within = |p: &DVec2| p.min_element() >= 0.0 && p.max_element() <= 1.0;
+        let is_exact = !self.clamped || [a, b, c].iter().all(is_within);
+        let share = if is_exact && (b - a).perp_dot(c - a) != 0.0 {
+            self.texture.mean_by_cells([a, b, c], self.clamped, cells).x
+        } else {
+            let places = spread_over(corners, cells);
+            let (all, solid) = places.fold((0.0, 0.0), |(all, solid), uv| {
+                (all + 1.0, solid + f64::from(u8::from(self.is_solid(uv))))
+            });
+            solid / all
+        };
+        match share {
+            share if share < ROUNDING => 0.0,
+            share if share > 1.0 - ROUNDING => 1.0,
+            share => share,
+        }
+    }
+
+    /// The mean over the part of a triangle with these texture coordinates that is solid by `mask`,
+    /// if any is.
+    pub(super) fn mean_where_solid(
+        &self,
+        mask: &TextureMap,
+        corners: [DVec2; 3],
+        cells: f64,
+    ) -> Option<Rgb> {
+        match mask.solid_share(corners, cells) {
+            0.0 => None,
+            1.0 => Some(self.mean_by_cells(corners, cells)),
+            _ => {
+                let solid = spread_over(corners, cells).filter(|&uv| mask.is_solid(uv));
+                let (sum, count) = solid
+                    .fold((Rgb::ZERO, 0.0), |(sum, count), uv| (sum + self.texel(uv), count + 1.0));
+                (count > 0.0).then(|| sum / count)
+            }
+        }
+    }
+
+    /// Whether this mask has the holes of another, for the same texture coordinates.
+    fn has_holes_of(&self, other: &TextureMap) -> bool {
+        self.texture.has_texels_of(&other.texture)
+            && (self.scale, self.offset, self.clamped) == (other.scale, other.offset, other.clamped)
+    }
+}
+
+/// Points spread evenly over a triangle that gets so many cells along its outline: a square of them
+/// folded onto it.
+fn spread_over([a, b, c]: [DVec2; 3], cells: f64) -> impl Iterator<Item = DVec2> {
+    let n = (MAX_POINTS * cells / MAX_OUTLINE_CELLS).clamp(MIN_POINTS, MAX_POINTS) as u32;
+    (0..n).flat_map(move |i| (0..n).map(move |j| [i, j])).map(move |ij| {
+        let [mut s, mut t] = ij.map(|k| (f64::from(k) + 0.5) / f64::from(n));
+        if s + t > 1.0 {
+            (s, t) = (1.0 - s, 1.0 - t);
+        }
+        a + s * (b - a) + t * (c - a)
+    })
+}
