@@ -11,9 +11,9 @@
 //! ```
 //!
 //! Light falls from full to none at such a line, and a point in the dark that is given some of the
-//! light beside it is off by many times its own: where things are stuck into one another, a strip of
-//! next to no area makes most of the error, and no element is small enough. So nearly every line is
-//! cut along that has light on both its sides: see [`openness`]. What is nearer than
+//! light beside it is off by many times its own: where things are stuck into one another, a strip
+//! of next to no area makes most of the error, and no element is small enough. So nearly every line
+//! is cut along that has light on both its sides: see [`openness`]. What is nearer than
 //! [`SNAP_DISTANCE`] is one point: see [`snapping`].
 
 mod openness;
@@ -34,9 +34,9 @@ use openness::Openness;
 use snapping::{Cuts, STEPS, Snapping};
 use triangulation::CutTriangle;
 
-/// Length of the shortest cuts, in units of the finest edge. With cuts down to 4, 0.1 and 0.02, bakes
-/// for 10 % of two models with many parts that are stuck into one another were off by 84, 7.8 and
-/// 7.3 % (a room full of things), and by 59, 24 and 10 % (a castle).
+/// Length of the shortest cuts, in units of the finest edge. With cuts down to 4, 0.1 and 0.02,
+/// bakes for 10 % of two models with many parts that are stuck into one another were off by 84, 7.8
+/// and 7.3 % (a room full of things), and by 59, 24 and 10 % (a castle).
 const SHORTEST_CUT: f64 = 0.02;
 
 /// What comes nearer to a triangle's plane than this touches it, in units of the shortest cut: a
@@ -51,8 +51,8 @@ const SNAP_DISTANCE: f64 = 0.02;
 /// makes some pieces, and a mesh that fine resolves little of them.
 const MAX_SEGMENTS: usize = 1 << 17;
 
-/// `scene` with its reflecting triangles cut where others touch them, for elements with edges down to
-/// `finest` (scene unit); as it is where none are.
+/// `scene` with its reflecting triangles cut where others touch them, for elements with edges down
+/// to `finest` (scene unit); as it is where none are.
 pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
     let topology = SurfaceTopology::new(scene);
     let mut cuts = find_cuts(scene, &topology, finest);
