@@ -11,9 +11,14 @@
 //! - The scene is baked to several errors, and the settings and seconds that it came to are fitted.
 //! - The standard errors of vertices are compared with how far they are from a finer bake.
 //!
+//! With `rows` before the scenes it measures rows of form factors instead, on the graphics adapter:
+//! the cost by which bakes choose between hemicubes and rays (`radiosity::backend::cost`).
+//!
 //! Fits are by least squares of the logarithms. A part below 1e-6 is left out of its fit.
 
 mod common;
+#[path = "error_model/row_cost.rs"]
+mod row_cost;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -48,8 +53,17 @@ fn main() -> Result<(), Error> {
     }
     let arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
     let mut scenes: Vec<String> = arguments.collect();
+    let only_rows = scenes.first().is_some_and(|first| first == "rows");
+    scenes.drain(..usize::from(only_rows));
     if scenes.is_empty() {
         scenes.push(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj").into());
+    }
+    if only_rows {
+        let scenes: Vec<_> = scenes
+            .iter()
+            .map(|path| Ok(Arc::new(load_obj(path)?)))
+            .collect::<Result<_, Error>>()?;
+        return row_cost::measure(&common::gpu(), &scenes);
     }
     for path in &scenes {
         let start = Instant::now();

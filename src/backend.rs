@@ -9,24 +9,31 @@
 //! Both columns hold to one contract each ([`crate::FormFactors`], [`crate::Gather`]), so that a
 //! solver does not know which backend it uses, and [`Fallback`] can go from one to the other in the
 //! middle of a solve. Without the feature `gpu` only the CPU is there.
+//!
+//! A bake takes rays on a device too where [hemicubes cost more](cost): [`Backend::row_maker`].
 
 mod adapter;
+pub mod cost;
 pub mod cpu;
 mod fallback;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod row_maker;
 mod rows;
 
 use std::num::NonZeroU32;
 
 pub use adapter::{AdapterInfo, AdapterKind};
 pub use fallback::Fallback;
+pub use row_maker::RowMaker;
 pub use rows::BackendRows;
 
 use crate::error::Error;
 use crate::gather::Gather;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
+#[cfg(feature = "gpu")]
+use cost::RowCost;
 use cpu::{RayGather, RayRows};
 #[cfg(feature = "gpu")]
 use gpu::{Gpu, HemicubeGather, HemicubeRows};
@@ -66,6 +73,9 @@ impl Backend {
     /// the top face, or from `rotations`·`resolution`² rays. Rays on the CPU in a scene with clear
     /// panes or cut-outs, which hemicubes do not see.
     ///
+    /// A device draws hemicubes here even where rays would take less time, as they do where many
+    /// triangles meet few pixels: bakes ask [`Backend::row_maker`] first.
+    ///
     /// # Errors
     /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new) and [`RayRows::new`].
     pub fn rows(
@@ -85,6 +95,24 @@ impl Backend {
                 let rays = (resolution * resolution).saturating_mul(rotations.get());
                 Ok(RayRows::new(mesh, rays)?.into())
             }
+        }
+    }
+
+    /// What a bake of `scene` makes rows with, each of a hemicube with `resolution` pixels along an
+    /// edge of the top face or of `resolution`² rays: what [takes less time](cost) on an adapter
+    /// of this kind, to the same error. Where that is rays, they are those of [`Backend::Cpu`].
+    ///
+    /// It depends on the kind of the adapter, the number of triangles, clear panes and `resolution`
+    /// alone, so that every run chooses alike.
+    pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
+        #[cfg(not(feature = "gpu"))]
+        let _ = (scene, resolution);
+        match self {
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(gpu) if !scene.has_clear_panes() => {
+                RowCost::of(gpu.adapter().kind).cheaper(scene.triangles().len(), resolution)
+            }
+            _ => RowMaker::Rays,
         }
     }
 

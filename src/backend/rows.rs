@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::cpu::RayRows;
 #[cfg(feature = "gpu")]
 use super::gpu::HemicubeRows;
+use super::row_maker::RowMaker;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::{Mesh, NodeId};
@@ -14,6 +15,7 @@ use crate::progress::Timings;
 #[derive(Debug)]
 pub struct BackendRows {
     source: Box<dyn RowSource>,
+    maker: RowMaker,
     seconds: f64,
 }
 
@@ -56,14 +58,14 @@ impl RowSource for HemicubeRows {
 
 impl From<RayRows> for BackendRows {
     fn from(rows: RayRows) -> BackendRows {
-        BackendRows { source: Box::new(rows), seconds: 0.0 }
+        BackendRows { source: Box::new(rows), maker: RowMaker::Rays, seconds: 0.0 }
     }
 }
 
 #[cfg(feature = "gpu")]
 impl From<HemicubeRows> for BackendRows {
     fn from(rows: HemicubeRows) -> BackendRows {
-        BackendRows { source: Box::new(rows), seconds: 0.0 }
+        BackendRows { source: Box::new(rows), maker: RowMaker::Hemicubes, seconds: 0.0 }
     }
 }
 
@@ -73,6 +75,11 @@ impl BackendRows {
     pub fn with_full_share(mut self, full_share: f64) -> BackendRows {
         self.source.set_full_share(full_share);
         self
+    }
+
+    /// What these rows are made with.
+    pub fn maker(&self) -> RowMaker {
+        self.maker
     }
 
     /// Hemicubes drawn so far at each resolution (pixels along an edge of the top face, count);

@@ -5,7 +5,7 @@
 
 use std::cell::{Cell, OnceCell};
 
-use crate::backend::{Backend, BackendRows, Fallback};
+use crate::backend::{Backend, BackendRows, Fallback, RowMaker};
 use crate::bake::settings::SolveSettings;
 use crate::error::{Error, ErrorKind};
 use crate::gather::Gather;
@@ -46,8 +46,9 @@ impl<'a> ResilientBackend<'a> {
         let _ = self.failure.set(error);
     }
 
-    /// A source of rows as `settings` ask for: on the CPU if `mesh` is too large for the device, or
-    /// has clear panes or cut-outs.
+    /// A source of rows as `settings` ask for: on the CPU if rays are faster
+    /// ([`Backend::row_maker`]), or if `mesh` is too large for the device or has clear panes or
+    /// cut-outs.
     /// What else keeps the device from starting is an error, since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
@@ -64,7 +65,12 @@ impl<'a> ResilientBackend<'a> {
         if let Some(e) = self.backend.blind_to(mesh.scene()) {
             self.record(e);
         }
-        let first = match rows(self.backend) {
+        // All rows alike: most are at full resolution.
+        let backend = match self.backend.row_maker(mesh.scene(), settings.hemicube_resolution) {
+            RowMaker::Hemicubes => self.backend,
+            RowMaker::Rays => &Backend::Cpu,
+        };
+        let first = match rows(backend) {
             Err(e) if e.kind() == ErrorKind::Memory => {
                 self.record(e);
                 rows(&Backend::Cpu)?

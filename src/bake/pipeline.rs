@@ -88,6 +88,7 @@ pub(super) fn run(
         outcome: baked.outcome,
         settings: baked.settings,
         hemicubes: shot.hemicubes,
+        row_maker: shot.row_maker,
         hemicubes_by_resolution: shot.hemicubes_by_resolution,
         mean_near_correction: shot.mean_near_correction,
         device_failure: backend.failure(),

@@ -1,5 +1,6 @@
 //! What comes out of a bake.
 
+use crate::backend::RowMaker;
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::outcome::Outcome;
 use crate::bake::settings::BakeSettings;
@@ -31,6 +32,9 @@ pub struct BakeResult {
     pub settings: BakeSettings,
     /// Hemicubes drawn, or rows of rays cast: those of all rotations and viewpoints.
     pub hemicubes: u64,
+    /// Which of the two: what [`Backend::row_maker`](crate::Backend::row_maker) chose, or rays
+    /// where the mesh does not fit the device. Where a device failed on the way, what it began with.
+    pub row_maker: RowMaker,
     /// Hemicubes drawn at each resolution (pixels along an edge of the top face); empty where rays
     /// were cast.
     pub hemicubes_by_resolution: Vec<(u32, u64)>,

@@ -14,6 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
@@ -45,6 +46,7 @@ pub(super) struct ShotLight {
     pub solution: Solution,
     /// Rows drawn or cast, those of all rotations and viewpoints.
     pub hemicubes: u64,
+    pub row_maker: RowMaker,
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
     /// Mean share of a row that the proximity correction moved.
     pub mean_near_correction: f64,
@@ -83,9 +85,17 @@ pub(super) fn shoot(
     let rotations = u64::from(settings.rotations.get());
     let hemicubes = (solution.rows_made + rows.extra_rows()) * rotations;
     let mean_near_correction = rows.inner().mean_correction();
+    let row_maker = sources.first().maker();
     let hemicubes_by_resolution = sources.first().drawn_by_resolution();
     drop(rows);
-    Ok(ShotLight { mesh, solution, hemicubes, hemicubes_by_resolution, mean_near_correction })
+    Ok(ShotLight {
+        mesh,
+        solution,
+        hemicubes,
+        row_maker,
+        hemicubes_by_resolution,
+        mean_near_correction,
+    })
 }
 
 /// Spreads the light of `mesh`; from a checkpoint on if there is one, and writes one now and then.

@@ -1,8 +1,9 @@
 //! What holds of the public types whatever is in them.
 
+use radiosity::backend::cost::RowCost;
 use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::{GpuLimits, HemicubeGather};
-use radiosity::backend::{AdapterInfo, BackendRows};
+use radiosity::backend::{AdapterInfo, BackendRows, RowMaker};
 use radiosity::bake::{GatherSettings, SolveSettings};
 use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
 use radiosity::gather::{
@@ -63,6 +64,8 @@ fn public_types_are_send_and_sync() {
         RefinementSettings,
         Rgb,
         Row,
+        RowCost,
+        RowMaker,
         Scene,
         Solution,
         SolveSession<'_>,

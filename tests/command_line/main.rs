@@ -46,7 +46,7 @@ fn bake_writes_all_it_says() {
     let folder = tempfile::tempdir().unwrap();
     let stem = folder.path().join("box.one");
     let mut args = vec![cornell(), "--out", stem.to_str().unwrap(), "--element-size", "150"];
-    args.extend(["--hemicube", "32", "--unshot", "0.01", "--row-memory", "16"]);
+    args.extend(["--hemicube", "64", "--unshot", "0.01", "--row-memory", "16"]);
     args.extend(["--camera", "278,273,-800,278,273,0,39.3077", "--image", "24,16", "--elements"]);
     args.extend(device());
     let out = run("bake", &args);
@@ -70,12 +70,14 @@ fn bake_writes_all_it_says() {
         assert!(json["seconds"][stage].is_number(), "{stage}");
     }
     assert_eq!(json["triangles"], 32);
-    assert_eq!(json["settings"]["hemicube"], 32);
+    assert_eq!(json["settings"]["hemicube"], 64);
     let drawn = json["hemicubes_by_resolution"].as_object().unwrap();
     if device().is_empty() {
-        assert_eq!(drawn.keys().collect::<Vec<_>>(), ["32", "16"]);
+        assert_eq!(json["rows_by"], "hemicubes");
+        assert_eq!(drawn.keys().collect::<Vec<_>>(), ["64", "32", "16"]);
         let all: u64 = drawn.values().map(|n| n.as_u64().unwrap()).sum();
-        assert!(json["hemicubes"] == all && drawn["16"] != 0, "{json}");
+        assert!(json["hemicubes"] == all && drawn["32"] != 0, "{json}");
+        assert!(said.contains(&format!(" {all} hemicubes, ")), "{said}");
     }
     assert!(json["ledger"]["emitted"][0].as_f64().unwrap() > 0.0);
     assert!(json["seconds"]["total"].as_f64().unwrap() > 0.0);
@@ -91,8 +93,19 @@ fn bake_writes_all_it_says() {
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(json["settings"]["full_share"], 0.0);
     if device().is_empty() {
-        assert_eq!(json["hemicubes_by_resolution"]["32"], json["hemicubes"]);
+        assert_eq!(json["hemicubes_by_resolution"]["64"], json["hemicubes"]);
     }
+    // Rays say that they are rays.
+    args.push("--cpu");
+    let out = run("bake", &args);
+    let said = String::from_utf8_lossy(&out.stdout);
+    let json = std::fs::read(folder.path().join("box.one.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(
+        (&json["rows_by"], &json["hemicubes_by_resolution"]),
+        (&"rays".into(), &serde_json::json!({}))
+    );
+    assert!(said.contains(&format!(" {} rows of rays, ", json["hemicubes"])), "{said}");
 }
 
 /// Without `--camera` there is a picture too, and the camera that is told draws it again.

@@ -72,6 +72,22 @@ pub fn cornell_box(size: f64) -> Mesh {
     Mesh::new(radiosity::load_obj(path).expect("the scene loads"), size).expect("a good size")
 }
 
+/// The scene with all triangles cut at the middles of their sides.
+pub fn cut_into_four(scene: &Scene) -> Scene {
+    let (mut positions, mut triangles) = (vec![], vec![]);
+    for (t, triangle) in scene.triangles().iter().enumerate() {
+        let [a, b, c] = scene.corners(t);
+        let [ab, bc, ca] = [a.midpoint(b), b.midpoint(c), c.midpoint(a)];
+        for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+            let first = positions.len() as u32;
+            positions.extend(corners);
+            triangles.push(Triangle { corners: [first, first + 1, first + 2], ..*triangle });
+        }
+    }
+    let (groups, materials) = (scene.groups().to_vec(), scene.materials().to_vec());
+    Scene::new(positions, triangles, groups, materials).expect("a good scene")
+}
+
 /// A material that reflects half of the light.
 pub fn grey() -> Material {
     Material::grey("grey", 0.5)

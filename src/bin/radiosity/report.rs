@@ -1,7 +1,7 @@
 //! The report of a bake: what was done, with what, and where the light and the time went; as JSON
 //! and as a small table.
 
-use radiosity::backend::AdapterInfo;
+use radiosity::backend::{AdapterInfo, RowMaker};
 use radiosity::bake::{GroupError, Obstacle, Outcome};
 use radiosity::solver::Ledger;
 use radiosity::{BakeResult, ErrorEstimate, Rgb};
@@ -72,6 +72,7 @@ impl Report {
             "vertices": baked.light.surface.positions.len(),
             "shots": baked.solution.shots,
             "hemicubes": baked.hemicubes,
+            "rows_by": baked.row_maker.to_string(),
             "hemicubes_by_resolution": by_resolution,
             "gathers": baked.light.gather_count,
             "gather_change": baked.light.relative_change,
@@ -196,8 +197,14 @@ impl Report {
                 light.surface.positions.len()
             ),
             format!(
-                "shooting   {} shots, {} hemicubes, {}",
-                baked.solution.shots, baked.hemicubes, baked.solution.stop
+                "shooting   {} shots, {} {}, {}",
+                baked.solution.shots,
+                baked.hemicubes,
+                match baked.row_maker {
+                    RowMaker::Hemicubes => "hemicubes",
+                    RowMaker::Rays => "rows of rays",
+                },
+                baked.solution.stop
             ),
             format!(
                 "gathering  {} places, {}, changed the vertices by {:.2} %",

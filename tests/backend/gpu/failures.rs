@@ -21,6 +21,9 @@ use radiosity::{
 
 use crate::common::{cornell_box, cube, gpu, keep_going};
 
+/// Pixels along an edge with which hemicubes are drawn on software devices, too.
+const MANY_PIXELS: u32 = 64;
+
 /// The device as if it had no more than `limits`.
 fn within(limits: GpuLimits) -> Gpu {
     Gpu::within(None, &limits).unwrap()
@@ -85,6 +88,8 @@ fn lost_device_is_an_error_everywhere() {
     let light = GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
     let place =
         GatherPoint { position: [0.5; 3].into(), normal: [0.0, 0.0, 1.0].into(), near: 1e-3 };
+    let mut drawn = BakeSettings::for_error(0.1, mesh.scene());
+    drawn.solve.hemicube_resolution = MANY_PIXELS;
     gpu.close();
     let errors = [
         rows.rows(&mesh, &[mesh.element(0)], 1.0).unwrap_err(),
@@ -93,9 +98,7 @@ fn lost_device_is_an_error_everywhere() {
         HemicubeRows::new(&gpu, &mesh, 64).unwrap_err(),
         HemicubeGather::new(&gpu, &mesh, 64).unwrap_err(),
         Backend::Gpu(gpu.clone()).rows(&mesh, 64, NonZeroU32::MIN).unwrap_err(),
-        BakeSettings::for_error(0.1, mesh.scene())
-            .bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), keep_going)
-            .unwrap_err(),
+        drawn.bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), keep_going).unwrap_err(),
     ];
     for e in errors {
         assert_eq!(e.kind(), ErrorKind::Device);
@@ -206,8 +209,9 @@ fn bake_falls_back_and_reports_failure_once() {
     for stop in [false, true] {
         let gpu = Gpu::new(None).unwrap();
         let (mut told, mut calls, mut after) = (vec![], 0, 0);
+        let drawn = |s: &mut BakeSettings| s.solve.hemicube_resolution = MANY_PIXELS;
         let baked = BakeTarget::Error(0.1)
-            .bake(scene.clone(), &Backend::Gpu(gpu.clone()), |stage| {
+            .bake_with(scene.clone(), &Backend::Gpu(gpu.clone()), drawn, |stage| {
                 calls += 1;
                 after += u32::from(!told.is_empty());
                 if calls == 40 {
@@ -328,16 +332,16 @@ fn limits_of_small_device_are_reported() {
             HemicubeGather::new(&small, &mesh, most).unwrap();
         }
     }
-    // Rows of 4 bytes an element in buffers of 32 KiB: some 8 000 elements.
-    let few = within(GpuLimits { buffer: 32 << 10, ..GpuLimits::MOST });
-    let large = cornell_box(30.0);
+    // Rows of 4 bytes an element in buffers of 64 KiB: some 16 000 elements.
+    let few = within(GpuLimits { buffer: 64 << 10, ..GpuLimits::MOST });
+    let large = cornell_box(20.0);
     let e = HemicubeRows::new(&few, &large, 16).unwrap_err();
     assert!(e.kind() == ErrorKind::Memory && e.place() == "mesh", "{e}");
-    assert!(e.to_string().contains(&format!("{}", (32 << 10) / 4 - 16)), "{e}");
+    assert!(e.to_string().contains(&format!("{}", (64 << 10) / 4 - 16)), "{e}");
     // A bake says so, and casts rays on the CPU.
     let mut settings = BakeSettings::elements_only(large.scene());
-    settings.solve.element_size = 30.0;
-    settings.solve.hemicube_resolution = 32;
+    settings.solve.element_size = 20.0;
+    settings.solve.hemicube_resolution = MANY_PIXELS;
     settings.solve.solver.unshot = 0.5;
     let bake = |device: Backend| settings.bake(large.scene().clone(), &device, keep_going).unwrap();
     let (baked, on_the_cpu) = (bake(Backend::Gpu(few)), bake(Backend::Cpu));

@@ -3,5 +3,6 @@
 mod failures;
 mod gather;
 mod resolutions;
+mod row_maker;
 mod rows;
 mod solves;

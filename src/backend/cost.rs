@@ -1,0 +1,154 @@
+//! What a row costs, by a hemicube and by rays: bakes choose by it.
+//!
+//! ```text
+//! hemicube   hemicube + triangle · T + pixel · 3 N²                    T triangles, N pixels an edge
+//! N² rays    ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
+//! ```
+//!
+//! A device sends all triangles through its vertex stage, however few the pixels; a ray descends
+//! one more level of a tree where there are twice as many. So hemicubes are for many pixels and few
+//! triangles. No clock is read: the choice is the same on every run.
+//!
+//! `RADIOSITY_BENCH=full cargo bench --bench error_model -- rows [SCENE.obj …]` measures the
+//! constants by least squares of relative errors.
+
+use super::adapter::AdapterKind;
+use super::row_maker::RowMaker;
+
+/// Seconds that parts of a row take, of the processors of one kind of adapter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowCost {
+    /// A hemicube, whatever it shows: five views set up, a row reduced and read back; s.
+    pub hemicube: f64,
+    /// A triangle of the scene, on those of the five faces that may see it; s.
+    pub triangle: f64,
+    /// A pixel, drawn and reduced; s.
+    pub pixel: f64,
+    /// A ray, on each level of a binary tree of the triangles; s.
+    pub ray_level: f64,
+}
+
+/// Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle cut into
+/// 1 to 4096, at 16 to 256 pixels. Hemicubes are off by up to half of that, rays by up to a factor
+/// of two.
+const SOFTWARE: RowCost =
+    RowCost { hemicube: 1.8e-4, triangle: 1.3e-7, pixel: 5.8e-9, ray_level: 8.5e-9 };
+
+/// Not measured: as fast as such devices can be, a triangle a clock and nothing for the rest of a
+/// hemicube but its pixels, against rays on two cores. So rays take their place only where they
+/// are faster for certain.
+const INTEGRATED: RowCost = RowCost { hemicube: 0.0, triangle: 1e-9, pixel: 1e-10, ..SOFTWARE };
+
+/// Not measured: the same of larger devices.
+const DISCRETE: RowCost = RowCost { hemicube: 0.0, triangle: 5e-10, pixel: 2e-11, ..SOFTWARE };
+
+/// Rays that a row takes for the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
+/// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
+pub const RAYS_AT_EQUAL_ERROR: f64 = 1.7;
+
+/// Scenes of fewer triangles count as so many: with less than that, rays slow down faster from
+/// triangle to triangle than hemicubes do, and more triangles could bring hemicubes back.
+const MIN_TRIANGLES: usize = 512;
+
+impl RowCost {
+    /// The cost where the adapter is of `kind`; the fastest where the driver does not say.
+    pub fn of(kind: AdapterKind) -> RowCost {
+        match kind {
+            AdapterKind::Cpu => SOFTWARE,
+            AdapterKind::IntegratedGpu => INTEGRATED,
+            AdapterKind::DiscreteGpu | AdapterKind::VirtualGpu | AdapterKind::Other => DISCRETE,
+        }
+    }
+
+    /// Seconds of a hemicube with `resolution` pixels along an edge of its top face, in a scene of
+    /// so many `triangles`.
+    pub fn hemicube_seconds(&self, triangles: usize, resolution: u32) -> f64 {
+        let pixels = 3.0 * f64::from(resolution).powi(2);
+        self.hemicube + self.triangle * triangles as f64 + self.pixel * pixels
+    }
+
+    /// Seconds of `rays` rays.
+    pub fn ray_seconds(&self, triangles: usize, rays: f64) -> f64 {
+        self.ray_level * tree_levels(triangles) * rays
+    }
+
+    /// What makes a row in less time, to the error of a hemicube of `resolution`.
+    pub fn cheaper(&self, triangles: usize, resolution: u32) -> RowMaker {
+        let triangles = triangles.max(MIN_TRIANGLES);
+        let rays = RAYS_AT_EQUAL_ERROR * f64::from(resolution).powi(2);
+        if self.ray_seconds(triangles, rays) < self.hemicube_seconds(triangles, resolution) {
+            RowMaker::Rays
+        } else {
+            RowMaker::Hemicubes
+        }
+    }
+}
+
+/// Levels of a binary tree with so many leaves: 1 + log₂ of their number, linear between powers of
+/// two. Sums and products have the same bits on all machines, logarithms may not.
+pub fn tree_levels(leaves: usize) -> f64 {
+    let leaves = leaves.max(1);
+    let doublings = leaves.ilog2();
+    f64::from(doublings) + leaves as f64 / (1u64 << doublings) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KINDS: [AdapterKind; 5] = [
+        AdapterKind::DiscreteGpu,
+        AdapterKind::IntegratedGpu,
+        AdapterKind::VirtualGpu,
+        AdapterKind::Other,
+        AdapterKind::Cpu,
+    ];
+
+    #[test]
+    fn software_draws_few_triangles_at_many_pixels_and_casts_otherwise() {
+        let software = RowCost::of(AdapterKind::Cpu);
+        for resolution in [64, 128, 256] {
+            assert_eq!(software.cheaper(32, resolution), RowMaker::Hemicubes, "{resolution}");
+        }
+        for resolution in [16, 32, 64] {
+            assert_eq!(software.cheaper(128_000, resolution), RowMaker::Rays, "{resolution}");
+        }
+        assert_eq!(software.cheaper(4000, 32), RowMaker::Rays);
+        assert_eq!(software.cheaper(4000, 256), RowMaker::Hemicubes);
+    }
+
+    #[test]
+    fn hardware_draws_all_but_huge_scenes() {
+        for kind in KINDS.into_iter().filter(|&kind| kind != AdapterKind::Cpu) {
+            for resolution in [32, 64, 128, 256] {
+                assert_eq!(RowCost::of(kind).cheaper(128_000, resolution), RowMaker::Hemicubes);
+            }
+            assert_eq!(RowCost::of(kind).cheaper(100_000_000, 32), RowMaker::Rays, "{kind}");
+        }
+    }
+
+    #[test]
+    fn more_triangles_never_bring_hemicubes_back_nor_more_pixels_rays() {
+        let casts = |kind, triangles, resolution| {
+            RowCost::of(kind).cheaper(triangles, resolution) == RowMaker::Rays
+        };
+        let counts = |k: u32| (1.15f64.powi(k as i32)) as usize;
+        for kind in KINDS {
+            for resolution in (16..=512).step_by(2) {
+                let by_triangles: Vec<bool> =
+                    (0..150).map(|k| casts(kind, counts(k), resolution)).collect();
+                assert!(by_triangles.is_sorted(), "{kind}, {resolution}: {by_triangles:?}");
+            }
+            for k in 0..150 {
+                let by_pixels = (8..=256).map(|half| casts(kind, counts(k), 2 * half));
+                assert!(by_pixels.rev().is_sorted(), "{kind}, {} triangles", counts(k));
+            }
+        }
+    }
+
+    #[test]
+    fn levels_are_those_of_powers_of_two_and_lines_between_them() {
+        let found = [0, 1, 2, 3, 4, 6, 8, 1 << 20].map(tree_levels);
+        assert_eq!(found, [1.0, 1.0, 2.0, 2.5, 3.0, 3.5, 4.0, 21.0]);
+    }
+}
