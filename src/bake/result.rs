@@ -33,7 +33,8 @@ pub struct BakeResult {
     /// Hemicubes drawn, or rows of rays cast: those of all rotations and viewpoints.
     pub hemicubes: u64,
     /// Which of the two: what [`Backend::row_maker`](crate::Backend::row_maker) chose, or rays
-    /// where the mesh does not fit the device. Where a device failed on the way, what it began with.
+    /// where the mesh does not fit the device. Where a device failed on the way, what it began
+    /// with.
     pub row_maker: RowMaker,
     /// Hemicubes drawn at each resolution (pixels along an edge of the top face); empty where rays
     /// were cast.
