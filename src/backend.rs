@@ -102,14 +102,14 @@ impl Backend {
     /// edge of the top face or of `resolution`² rays: what [takes less time](cost) on an adapter
     /// of this kind, to the same error. Where that is rays, they are those of [`Backend::Cpu`].
     ///
-    /// It depends on the kind of the adapter, the number of triangles, clear panes and `resolution`
-    /// alone, so that every run chooses alike.
+    /// It depends on the kind of the adapter, the number of triangles, clear panes and cut-outs, and
+    /// `resolution` alone, so that every run chooses alike.
     pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
         #[cfg(not(feature = "gpu"))]
         let _ = (scene, resolution);
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if !scene.has_clear_panes() => {
+            Backend::Gpu(gpu) if scene.hidden_from_hemicubes().is_none() => {
                 RowCost::of(gpu.adapter().kind).cheaper(scene.triangles().len(), resolution)
             }
             _ => RowMaker::Rays,

@@ -145,11 +145,7 @@ impl RayScene {
     ) -> Option<Hit> {
         match &self.cut_outs {
             None => self.nearest(from, direction, start, ignored, counts),
-            Some(holes) => {
-                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
-                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
-                self.nearest(from, direction, start, ignored, counts)
-            }
+            Some(holes) => self.nearest(from, direction, start, ignored, solid_hits(holes, counts)),
         }
     }
 
@@ -196,11 +192,7 @@ impl RayScene {
     ) -> bool {
         match &self.cut_outs {
             None => self.any(from, direction, reach, counts),
-            Some(holes) => {
-                let is_solid = |hit: &Hit| holes.is_solid(hit.triangle, [hit.u, hit.v]);
-                let counts = |hit: &Hit| is_solid(hit) && counts(hit);
-                self.any(from, direction, reach, counts)
-            }
+            Some(holes) => self.any(from, direction, reach, solid_hits(holes, counts)),
         }
     }
 
@@ -263,6 +255,11 @@ impl RayScene {
             && u + v <= 1.0 + BARYCENTRIC_TOLERANCE;
         inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
     }
+}
+
+/// Of the hits that `counts`, those that are in none of the `holes`.
+fn solid_hits(holes: &CutOuts, counts: impl Fn(&Hit) -> bool) -> impl Fn(&Hit) -> bool {
+    move |hit| holes.is_solid(hit.triangle, [hit.u, hit.v]) && counts(hit)
 }
 
 /// A triangle, prepared for intersection.
