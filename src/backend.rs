@@ -102,7 +102,7 @@ impl Backend {
     /// edge of the top face or of `resolution`² rays: what [takes less time](cost) on an adapter
     /// of this kind, to the same error. Where that is rays, they are those of [`Backend::Cpu`].
     ///
-    /// It depends on the kind of the adapter, the number of triangles, clear panes and cut-outs, and
+    /// It depends on the kind of the adapter, the number of triangles, clear panes, cut-outs and
     /// `resolution` alone, so that every run chooses alike.
     pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
         #[cfg(not(feature = "gpu"))]
