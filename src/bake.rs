@@ -34,6 +34,7 @@ mod estimator;
 mod fallback;
 mod gather_phase;
 mod judge;
+mod light_in_gaps;
 mod light_survey;
 pub mod model;
 mod outcome;

@@ -106,6 +106,21 @@ pub trait Gather {
         field: &RadiosityField,
         points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error>;
+
+    /// What arrives at each of `points` from two fields of one scene, field by field, with the same
+    /// directions. Worth implementing where finding what is seen costs more than looking its light
+    /// up.
+    ///
+    /// # Errors
+    /// Those of [`Gather::gather`].
+    fn gather_both(
+        &mut self,
+        fields: [&RadiosityField; 2],
+        points: &[GatherPoint],
+    ) -> Result<[Vec<IrradianceSample>; 2], Error> {
+        let [first, second] = fields;
+        Ok([self.gather(first, points)?, self.gather(second, points)?])
+    }
 }
 
 impl<G: Gather + ?Sized> Gather for Box<G> {
@@ -115,6 +130,14 @@ impl<G: Gather + ?Sized> Gather for Box<G> {
         points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
         (**self).gather(field, points)
+    }
+
+    fn gather_both(
+        &mut self,
+        fields: [&RadiosityField; 2],
+        points: &[GatherPoint],
+    ) -> Result<[Vec<IrradianceSample>; 2], Error> {
+        (**self).gather_both(fields, points)
     }
 }
 

@@ -94,6 +94,17 @@ impl<A: Gather, B: Gather> Gather for Fallback<'_, A, B> {
     ) -> Result<Vec<IrradianceSample>, Error> {
         self.ask(|first| first.gather(sources, places), |second| second.gather(sources, places))
     }
+
+    fn gather_both(
+        &mut self,
+        sources: [&RadiosityField; 2],
+        places: &[GatherPoint],
+    ) -> Result<[Vec<IrradianceSample>; 2], Error> {
+        self.ask(
+            |first| first.gather_both(sources, places),
+            |second| second.gather_both(sources, places),
+        )
+    }
 }
 
 impl<A: fmt::Debug, B: fmt::Debug> fmt::Debug for Fallback<'_, A, B> {

@@ -81,8 +81,7 @@ pub(super) enum Step {
     /// All vertices gather once more, after a `bounce` what they gathered themselves; then elements
     /// are split.
     AllVertices { bounce: bool },
-    /// What was reached lights the vertices, all of which gather the difference to what did before;
-    /// then elements are split.
+    /// What was reached lights the vertices, all of which gather the difference to what did before.
     Bounce,
     /// Elements are split, and new vertices gather.
     Split,
@@ -158,6 +157,10 @@ pub(super) fn refined(
         }
     }
     if steps.bounce {
+        if steps.sampling.is_none() {
+            // It takes few rays, and by its light there may be less to split.
+            refined = gather.clone();
+        }
         refined.refinement.gather_passes += 1;
     }
     if let Some((rays, noise)) = steps.sampling {

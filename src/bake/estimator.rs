@@ -20,7 +20,7 @@ use crate::bake::strata::{SampleCounts, SampledFace, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
-use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
+use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
@@ -197,12 +197,17 @@ impl ErrorEstimator<'_> {
                 let points: Vec<TwoSidedPoint> = batch.iter().map(|&k| samples[k].point).collect();
                 let jittered: Vec<TwoSidedPoint> =
                     batch.iter().map(|&k| samples[k].jittered()).collect();
-                let first = gather_two_sided(gatherer, &sources, &points)?;
-                let second = gather_two_sided(gatherer, &sources, &jittered)?;
-                let next = match self.lit_by {
-                    Some(_) => gather_two_sided(gatherer, &self.light.radiosity_field(), &points)?,
-                    None => first.clone(),
+                let [first, next] = match self.lit_by {
+                    Some(_) => {
+                        let fields = [&sources, &self.light.radiosity_field()];
+                        gather_both_two_sided(gatherer, fields, &points)?
+                    }
+                    None => {
+                        let first = gather_two_sided(gatherer, &sources, &points)?;
+                        [first.clone(), first]
+                    }
                 };
+                let second = gather_two_sided(gatherer, &sources, &jittered)?;
                 for (i, &k) in batch.iter().enumerate() {
                     let (first, second, next) = (first[i], second[i], next[i]);
                     gathers[k] = Some(SampleGathers { first, second, next });

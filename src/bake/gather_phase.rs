@@ -182,12 +182,7 @@ impl<'a> GatherPhase<'a> {
             }
             Step::Bounce => {
                 let mut coarse = self.gatherer(model::COARSE_RAY_DIVISOR)?;
-                match self.state.gather_difference(&mut *coarse, &mut progress)? {
-                    StopReason::Converged => {
-                        self.state.refine(&refinement, &mut *self.gatherer, &mut progress)
-                    }
-                    stop => Ok(stop),
-                }
+                self.state.gather_difference(&mut *coarse, &mut progress)
             }
             Step::Split => self.state.refine(&refinement, &mut *self.gatherer, &mut progress),
         }

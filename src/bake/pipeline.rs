@@ -7,15 +7,16 @@ use crate::backend::Backend;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::gather_phase::GatherPhase;
+use crate::bake::light_in_gaps::light_in_gaps;
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
 use crate::bake::resolved_light::resolved_light;
 use crate::bake::result::BakeResult;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
-use crate::bake::shooting_phase;
+use crate::bake::shooting_phase::{self, ShotLight};
 use crate::error::Error;
-use crate::gather::GatheredMesh;
+use crate::gather::{GatheredMesh, Progress};
 use crate::mesh::{Mesh, cut_at_contacts};
 use crate::progress::StopReason;
 use crate::scene::Scene;
@@ -58,15 +59,15 @@ pub(super) fn run(
     };
     let scene = &cut_at_contacts(scene, finest);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
-    let baked = match &settings.gather {
-        Some(gather) if shot.solution.stop != StopReason::Cancelled => {
+    let source = match &settings.gather {
+        Some(_) => light_to_gather(&settings.solve, &shot, backend, &mut reporter)?,
+        None => None,
+    };
+    let baked = match (&settings.gather, &source) {
+        (Some(gather), Some(source)) => {
             let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
-            let diagonal = light_survey::diagonal(settings.solve.region.as_ref(), scene);
-            let footprint = model::pixel_footprint(settings.solve.hemicube_resolution) * diagonal;
-            let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
-            let source = GatheredMesh::from_elements(&shot.mesh, &resolved)?;
             let halves = (settings.solve.clone(), gather.clone());
-            GatherPhase::new(halves, target, mesh, &source, &shot, backend)?
+            GatherPhase::new(halves, target, mesh, source, &shot, backend)?
                 .run(&mut reporter, &mut clock)?
         }
         _ => shooting_phase::estimate_elements(
@@ -94,6 +95,26 @@ pub(super) fn run(
         device_failure: backend.failure(),
         timings: clock.timings,
     })
+}
+
+/// What was shot, as vertices gather it; none if the bake was cancelled.
+fn light_to_gather(
+    solve: &SolveSettings,
+    shot: &ShotLight,
+    backend: &ResilientBackend,
+    reporter: &mut Reporter,
+) -> Result<Option<GatheredMesh>, Error> {
+    if shot.solution.stop == StopReason::Cancelled {
+        return Ok(None);
+    }
+    let diagonal = light_survey::diagonal(solve.region.as_ref(), shot.mesh.scene());
+    let footprint = model::pixel_footprint(solve.hemicube_resolution) * diagonal;
+    let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
+    let mut progress = |p: &Progress| reporter.report(BakeProgress::Gathering(*p));
+    match light_in_gaps(&shot.mesh, &resolved, footprint, backend, &mut progress)? {
+        Some(light) => Ok(Some(GatheredMesh::from_elements(&shot.mesh, &light)?)),
+        None => Ok(None),
+    }
 }
 
 /// The mesh whose vertices gather first: coarser than asked for where that alone would be more than

@@ -202,7 +202,8 @@ pub(super) fn estimate_elements(
     };
     let counts =
         SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };
-    let mut cancelled = shot.solution.stop == StopReason::Cancelled;
+    // With settings to gather by, it was cancelled before vertices could.
+    let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
     let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled =
             cancelled || reporter.report(BakeProgress::Estimating { samples, of }).is_break();

@@ -1,7 +1,7 @@
 //! A batch of vertices that gather at once, and what follows for their values.
 
 use super::gather_points::VertexGatherPoints;
-use super::two_sided::{TwoSidedPoint, gather_two_sided};
+use super::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
@@ -31,10 +31,13 @@ pub(super) fn gather_batch<'v>(
     previous: Option<&RadiosityField>,
     gatherer: &mut dyn Gather,
 ) -> Result<Batch<'v>, Error> {
-    let samples = gather_two_sided(gatherer, source, &places)?;
-    let previous = match previous {
-        Some(previous) => Some(gather_two_sided(gatherer, previous, &places)?),
-        None => None,
+    let (samples, previous) = match previous {
+        Some(previous) => {
+            let fields = [source, previous];
+            let [samples, previous] = gather_both_two_sided(gatherer, fields, &places)?;
+            (samples, Some(previous))
+        }
+        None => (gather_two_sided(gatherer, source, &places)?, None),
     };
     Ok(Batch { vertices, samples, previous })
 }

@@ -3,14 +3,19 @@
 //! An element of size h may have a surplus of
 //!
 //! ```text
-//!   surplus_tolerance · (h_max / h)^¾ · max(B, floor)
+//!   surplus_tolerance · h_max / h · max(min B, floor)
 //! ```
 //!
-//! with h_max the longest edge of the mesh that refinement started on, larger away from the region
-//! of the light, as elements are. An element is judged by its
-//! parent's midsides, which have gathered. An element of the first mesh has no parent; it is judged
-//! by the differences of its corners, and by the light before the gather, if that is known more
-//! finely there.
+//! with min B the radiosity of its darkest corner, and h_max the longest edge of the mesh that
+//! refinement started on, larger away from the region of the light, as elements are. That is the
+//! rule for the least squares of relative errors by a given number of elements: at their minimum,
+//! splitting any element takes the same away from the sum of area times squared error (Dörfler
+//! 1996 marks by that sum too), so errors go as 1/h; and what is between a bright corner and a dark
+//! one may be as dark as the latter, which its error is relative to.
+//!
+//! An element is judged by its parent's midsides, which have gathered. An element of the first mesh
+//! has no parent; it is judged by the differences of its corners, and by the light before the
+//! gather, if that is known more finely there.
 
 use glam::DVec2;
 
@@ -22,11 +27,6 @@ use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Aabb, Rgb, longest_edge};
 use crate::visibility::buried;
-
-/// The tolerance of an element grows as its size to minus this power. 0 would make the errors of
-/// all elements equal and split contacts without end; 1 would make errors times edge length equal.
-/// Chosen by hand in between; no measurement kept.
-const ERROR_SIZE_EXPONENT: f64 = 0.75;
 
 /// Steps along an element's side of the lattice at which the source light is compared with its
 /// linear interpolant. Chosen by hand; no measurement kept.
@@ -120,12 +120,18 @@ pub(super) fn refinement_indicator(
         return 0.0;
     }
     let emitted = samples.mesh.material(node).exitance;
-    let size_factor = (scale.max_edge / size).powf(ERROR_SIZE_EXPONENT);
+    let size_factor = scale.max_edge / size;
     let factor = if in_gap { gap_factor } else { group_factor };
     let tolerance = settings.surplus_tolerance * factor * size_factor;
-    // Difference of two values of reflected radiosity, relative to the first, over the tolerance.
+    let open = samples.vertices.corners[e].into_iter().map(|v| v as usize);
+    let darkest = open
+        .filter(|&v| !samples.buried[v])
+        .map(|v| (samples.reflected[v] + emitted).length())
+        .fold(f64::INFINITY, f64::min);
+    // Difference of two values of reflected radiosity, relative to the first or that of the darkest
+    // corner, over the tolerance.
     let error = |value: Rgb, other: Rgb| {
-        let radiosity = (value + emitted).length().max(scale.radiosity_floor);
+        let radiosity = (value + emitted).length().min(darkest).max(scale.radiosity_floor);
         if radiosity > 0.0 { (value - other).length() / radiosity / tolerance } else { 0.0 }
     };
     let end_error = |[a, b]: [NodeValue; 2]| error(a.value, b.value) * END_DIFFERENCE_SHARE;

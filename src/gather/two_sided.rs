@@ -55,19 +55,41 @@ pub(crate) fn gather_two_sided(
     field: &RadiosityField,
     points: &[TwoSidedPoint],
 ) -> Result<Vec<IrradianceSample>, Error> {
+    let [samples] = with_both_sides(points, |points| Ok([gatherer.gather(field, points)?]))?;
+    Ok(samples)
+}
+
+/// The same from two fields of one scene, field by field, with the same directions.
+///
+/// # Errors
+/// Those of [`Gather::gather`].
+pub(crate) fn gather_both_two_sided(
+    gatherer: &mut dyn Gather,
+    fields: [&RadiosityField; 2],
+    points: &[TwoSidedPoint],
+) -> Result<[Vec<IrradianceSample>; 2], Error> {
+    with_both_sides(points, |points| gatherer.gather_both(fields, points))
+}
+
+/// What `gather` finds at `points` from each of its fields, on both sides.
+fn with_both_sides<const FIELDS: usize>(
+    points: &[TwoSidedPoint],
+    mut gather: impl FnMut(&[GatherPoint]) -> Result<[Vec<IrradianceSample>; FIELDS], Error>,
+) -> Result<[Vec<IrradianceSample>; FIELDS], Error> {
     let fronts: Vec<GatherPoint> = points.iter().map(|p| p.point).collect();
-    let mut samples = gatherer.gather(field, &fronts)?;
+    let mut samples = gather(&fronts)?;
     let is_two_sided = |k: &usize| points[*k].behind != Rgb::ZERO;
     let two_sided: Vec<usize> = (0..points.len()).filter(is_two_sided).collect();
     if two_sided.is_empty() {
         return Ok(samples);
     }
     let backs: Vec<GatherPoint> = two_sided.iter().map(|&k| points[k].other_side()).collect();
-    let behind = gatherer.gather(field, &backs)?;
-    for (&k, back) in two_sided.iter().zip(&behind) {
-        let (sample, share) = (&mut samples[k], points[k].behind);
-        sample.irradiance += share * (back.irradiance - sample.irradiance);
-        sample.direct += share * (back.direct - sample.direct);
+    for (samples, behind) in samples.iter_mut().zip(gather(&backs)?) {
+        for (&k, back) in two_sided.iter().zip(&behind) {
+            let (sample, share) = (&mut samples[k], points[k].behind);
+            sample.irradiance += share * (back.irradiance - sample.irradiance);
+            sample.direct += share * (back.direct - sample.direct);
+        }
     }
     Ok(samples)
 }

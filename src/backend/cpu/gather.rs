@@ -103,29 +103,37 @@ impl RayGather {
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
-    fn irradiance(&self, sources: &RadiosityField, point: &GatherPoint) -> IrradianceSample {
+    /// What arrives at `point` from each of `fields`, all of one scene, with the same rays: as many
+    /// as the first takes.
+    fn irradiance<const FIELDS: usize>(
+        &self,
+        fields: [&RadiosityField; FIELDS],
+        point: &GatherPoint,
+    ) -> [IrradianceSample; FIELDS] {
+        let scene = fields[0].mesh.scene();
         let mut lights = self.lights.importance_ranked(point);
         // A light without a closed form that reaches far around is sampled better by rays over the
         // hemisphere than by points spread over its area.
         lights.retain(|&(light, _)| {
             let light = &self.lights.lights[light as usize];
-            let corner = |&t: &u32| sources.mesh.scene().corners(t as usize);
+            let corner = |&t: &u32| scene.corners(t as usize);
             light.convex
                 || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
         });
-        let sun = sources.mesh.scene().sky().sun();
-        let trace = |range| self.trace(sources, point, &lights, range);
-        let sample = |sums: &RaySums, count| self.sample(sums, (point, &lights, sun), count);
+        let sun = scene.sky().sun();
+        let trace = |range| self.trace(fields, point, &lights, range);
+        let sample =
+            |sums: &RaySums<FIELDS>, count| self.samples_of(sums, (point, &lights, sun), count);
         let mut count = self.min_rays;
         let mut sums = trace(0..count / 2);
         loop {
             let second = trace(count / 2..count);
-            let [a, b] = [&sums, &second].map(|half| sample(half, count / 2));
+            let [a, b] = [&sums, &second].map(|half| sample(half, count / 2)[0].irradiance);
             sums.add(&second);
             let all = sample(&sums, count);
             let largest_share = sums.max_contribution / f64::from(count);
-            let difference = a.irradiance.distance(b.irradiance).max(largest_share);
-            let allowed = self.noise * all.irradiance.length().max(self.dim);
+            let difference = a.distance(b).max(largest_share);
+            let allowed = self.noise * all[0].irradiance.length().max(self.dim);
             if difference / 2.0 <= allowed || count == self.max_rays {
                 return all;
             }
@@ -134,17 +142,18 @@ impl RayGather {
     }
 
     /// Sums over the rays of `range`.
-    fn trace(
+    fn trace<const FIELDS: usize>(
         &self,
-        sources: &RadiosityField,
+        fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
         lights: &[(u32, f64)],
         range: Range<u32>,
-    ) -> RaySums {
+    ) -> RaySums<FIELDS> {
+        let scene = fields[0].mesh.scene();
         let rotation = self.rotations.at(point.position, point.near);
         let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
         let mut sums = RaySums::default();
-        let sky = sources.mesh.scene().sky();
+        let sky = scene.sky();
         let out = &mut sums.hemisphere;
         for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
             let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
@@ -164,9 +173,12 @@ impl RayGather {
             }
             let reach = point.near..hit.distance;
             let passed = self.panes.transmittance(point.position, direction, reach);
-            let reflected = sources.reflected_at(hit.triangle, hit.u, hit.v) * passed;
-            out.irradiance += reflected;
-            sums.max_contribution = sums.max_contribution.max(reflected.length());
+            let reflected =
+                fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v) * passed);
+            sums.max_contribution = sums.max_contribution.max(reflected[0].length());
+            for (sum, reflected) in sums.reflected.iter_mut().zip(reflected) {
+                *sum += reflected;
+            }
             let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !has_shadow_rays(light) {
                 out.irradiance += self.lights.lights[light as usize].exitance * passed;
@@ -174,7 +186,7 @@ impl RayGather {
         }
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
         let visible = |&(light, _): &(u32, f64)| {
-            self.shadow_rays(sources.mesh.scene(), point, light, range.clone(), rotation)
+            self.shadow_rays(scene, point, light, range.clone(), rotation)
         };
         sums.lights = lights.iter().map(visible).collect();
         if let Some(sun) = sky.sun() {
@@ -183,13 +195,13 @@ impl RayGather {
         sums
     }
 
-    /// The irradiance by sums over `count` rays.
-    fn sample(
+    /// The irradiance from each field by sums over `count` rays.
+    fn samples_of<const FIELDS: usize>(
         &self,
-        sums: &RaySums,
+        sums: &RaySums<FIELDS>,
         (point, lights, sun): (&GatherPoint, &[(u32, f64)], Option<&Sun>),
         count: u32,
-    ) -> IrradianceSample {
+    ) -> [IrradianceSample; FIELDS] {
         let (share, mut out) = (1.0 / f64::from(count), sums.hemisphere);
         out.irradiance *= share;
         out.escaped *= share;
@@ -212,7 +224,10 @@ impl RayGather {
             };
         }
         out.irradiance += out.direct;
-        out
+        sums.reflected.map(|reflected| {
+            let irradiance = out.irradiance + reflected * share;
+            IrradianceSample { irradiance, ..out }
+        })
     }
 
     /// The cosines at `point` of points spread over the sun: of those of `range` that are seen, and
@@ -296,10 +311,13 @@ fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
 }
 
 /// Sums over rays.
-#[derive(Debug, Default)]
-struct RaySums {
+#[derive(Debug)]
+struct RaySums<const FIELDS: usize> {
+    /// Without what surfaces reflect.
     hemisphere: IrradianceSample,
-    /// The largest reflected radiosity, or that of the sky, that one ray found, W/m².
+    /// What surfaces reflect, by field.
+    reflected: [Rgb; FIELDS],
+    /// The largest radiosity that one ray found, reflected by the first field or the sky's, W/m².
     max_contribution: f64,
     lights: Vec<Visible>,
     /// Cosines instead of form factors.
@@ -316,13 +334,28 @@ struct Visible {
     all: f64,
 }
 
-impl RaySums {
-    fn add(&mut self, other: &RaySums) {
+impl<const FIELDS: usize> Default for RaySums<FIELDS> {
+    fn default() -> RaySums<FIELDS> {
+        RaySums {
+            hemisphere: IrradianceSample::default(),
+            reflected: [Rgb::ZERO; FIELDS],
+            max_contribution: 0.0,
+            lights: vec![],
+            sun: Visible::default(),
+        }
+    }
+}
+
+impl<const FIELDS: usize> RaySums<FIELDS> {
+    fn add(&mut self, other: &RaySums<FIELDS>) {
         let (sum, term) = (&mut self.hemisphere, &other.hemisphere);
         sum.irradiance += term.irradiance;
         sum.escaped += term.escaped;
         sum.backface += term.backface;
         sum.inverse_distance += term.inverse_distance;
+        for (sum, term) in self.reflected.iter_mut().zip(other.reflected) {
+            *sum += term;
+        }
         self.max_contribution = self.max_contribution.max(other.max_contribution);
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
             sum.add(term);
@@ -345,6 +378,16 @@ impl Gather for RayGather {
         sources: &RadiosityField,
         places: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        Ok(places.par_iter().map(|p| self.irradiance(sources, p)).collect())
+        Ok(places.par_iter().map(|p| self.irradiance([sources], p)[0]).collect())
+    }
+
+    fn gather_both(
+        &mut self,
+        sources: [&RadiosityField; 2],
+        places: &[GatherPoint],
+    ) -> Result<[Vec<IrradianceSample>; 2], Error> {
+        let both = places.par_iter().map(|p| self.irradiance(sources, p).into());
+        let (first, second) = both.unzip::<IrradianceSample, IrradianceSample, _, _>();
+        Ok([first, second])
     }
 }
