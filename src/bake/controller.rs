@@ -101,6 +101,11 @@ impl Step {
     }
 }
 
+/// The noise tolerance of vertices where `target` is asked for.
+pub(super) fn noise_tolerance(target: f64) -> f64 {
+    model::OUTLIER_FACTOR * model::SAMPLING_SHARE * model::allowed_error(target)
+}
+
 /// `gather` with as many rays as bring `sampling`, the error of those it has, down to its share of
 /// the `target`.
 pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64) -> GatherSettings {
@@ -108,7 +113,7 @@ pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64)
     let rays = f64::from(gather.rays) * model::ray_factor(sampling, allowed);
     let mut chosen = gather.clone();
     chosen.rays = model::clamped(rays, model::RAYS).ceil() as u32;
-    chosen.noise_tolerance = model::OUTLIER_FACTOR * allowed;
+    chosen.noise_tolerance = noise_tolerance(target);
     chosen
 }
 
@@ -278,6 +283,11 @@ mod tests {
                 estimate.truncation > 0.0
             );
         }
+        // A bounce comes first, and alone: it changes what there is to split.
+        let both = ErrorEstimate { mesh: 0.05, truncation: 0.05, ..small };
+        let new = refined(&gather, judged(&both, &[]), &target(0.02, false));
+        assert_eq!(Step::between(&gather, &new), Step::Bounce);
+        assert_eq!(new.refinement.surplus_tolerance, gather.refinement.surplus_tolerance);
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
         let new = refined(&gather, judged(&met, &[]), &target(0.02, false));
         assert_eq!(new, gather, "0.0112 is below 0.9 · 0.75 · 0.02");

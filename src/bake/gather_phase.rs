@@ -265,9 +265,10 @@ impl<'a> GatherPhase<'a> {
             gather_passes: 0,
             diagonal: self.diagonal(),
         };
-        // Rays are not doubled where they disagree: that is for what these few points do not show.
-        let rays = self.gather.rays;
-        let mut gatherer = self.backend.gather(&self.shot.mesh, rays, f64::INFINITY, 0.0)?;
+        // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for more
+        // of them everywhere.
+        self.gather.noise_tolerance = controller::noise_tolerance(target.error);
+        let mut gatherer = self.gatherer(1)?;
         let sampling = pilot.sampling_error(model::PILOT_POINTS, &mut *gatherer)?;
         let chosen = controller::with_rays_for(&self.gather, sampling, target.error);
         let settings = BakeSettings { solve: self.solve.clone(), gather: Some(chosen) };

@@ -183,3 +183,92 @@ impl GapGather<'_> {
         (self.progress)(&Progress { pass: 0, refinements: 0, elements, gathered, total })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::backend::Backend;
+    use crate::scene::{Material, Scene, Triangle};
+
+    /// A floor of 8 × 8 under a white sky, and on it, 0.01 above, a lid of 2 × 2 that is 0.1 high,
+    /// seen from within; all reflect a half.
+    fn lid() -> Mesh {
+        let quads = [
+            [[-4.0, -4.0, 0.0], [4.0, -4.0, 0.0], [4.0, 4.0, 0.0], [-4.0, 4.0, 0.0]],
+            [[-1.0, -1.0, 0.11], [-1.0, 1.0, 0.11], [1.0, 1.0, 0.11], [1.0, -1.0, 0.11]],
+            [[-1.0, -1.0, 0.01], [-1.0, 1.0, 0.01], [-1.0, 1.0, 0.11], [-1.0, -1.0, 0.11]],
+            [[1.0, -1.0, 0.01], [1.0, -1.0, 0.11], [1.0, 1.0, 0.11], [1.0, 1.0, 0.01]],
+            [[-1.0, -1.0, 0.01], [-1.0, -1.0, 0.11], [1.0, -1.0, 0.11], [1.0, -1.0, 0.01]],
+            [[-1.0, 1.0, 0.01], [1.0, 1.0, 0.01], [1.0, 1.0, 0.11], [-1.0, 1.0, 0.11]],
+        ];
+        let positions: Vec<DVec3> = quads.iter().flatten().copied().map(DVec3::from).collect();
+        let triangles = (0..quads.len() as u32)
+            .flat_map(|k| [[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]])
+            .map(|corners| Triangle { corners, ..Default::default() })
+            .collect();
+        let materials = vec![Material::grey("grey", 0.5)];
+        let scene = Scene::new(positions, triangles, vec!["all".into()], materials).unwrap();
+        Mesh::new(Arc::new(scene.with_sky(Rgb::ONE / std::f64::consts::PI).unwrap()), 0.5).unwrap()
+    }
+
+    fn progress(_: &Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    #[test]
+    fn a_gap_is_as_dark_as_what_it_sees() {
+        let mesh = lid();
+        // As if all had got the light of the open floor.
+        let before = vec![Rgb::splat(0.5); mesh.element_count()];
+        let backend = ResilientBackend::new(&Backend::Cpu);
+        let after = light_in_gaps(&mesh, &before, 0.0, &backend, &mut progress).unwrap().unwrap();
+        let (mut open, mut inside) = (0, vec![]);
+        for e in 0..mesh.element_count() {
+            let centre = mesh.centroid(mesh.element(e));
+            let from_middle = centre.x.abs().max(centre.y.abs());
+            if from_middle > 2.0 {
+                assert_eq!(before[e], after[e], "at {centre}");
+                open += 1;
+            } else if from_middle < 0.8 {
+                inside.push(after[e].x);
+            }
+        }
+        let mean = inside.iter().sum::<f64>() / inside.len() as f64;
+        let most = inside.iter().copied().fold(0.0, f64::max);
+        println!("{open} open, {} inside: {mean:.5}, at most {most:.5}", inside.len());
+        // The slit of 0.01 is seen from 0.2 off under 0.05, at most: a share of sin² 0.05 = 0.0025
+        // of the floor's hemisphere, and of the lid's sin² 0.5 − sin² 0.46 = 0.03, by the side that
+        // it is nearest to. Where one of 32 rays goes through, an element has 0.5/32 = 0.016; two
+        // or three may.
+        assert!(open > 100 && inside.len() > 50);
+        assert!(mean < 0.016 && most < 0.05, "{mean} {most}");
+    }
+
+    #[test]
+    fn a_break_ends_it() {
+        let mesh = lid();
+        let before = vec![Rgb::splat(0.5); mesh.element_count()];
+        let backend = ResilientBackend::new(&Backend::Cpu);
+        let mut calls = 0;
+        let mut stop_at = |last: u32, calls: &mut u32| {
+            *calls = 0;
+            light_in_gaps(&mesh, &before, 0.0, &backend, &mut |p: &Progress| {
+                assert!(p.gathered <= p.total && p.elements == mesh.element_count());
+                *calls += 1;
+                if *calls == last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .unwrap()
+        };
+        assert!(stop_at(u32::MAX, &mut calls).is_some());
+        let all = calls;
+        assert!(all > 2, "several rounds");
+        for last in [1, 2] {
+            assert!(stop_at(last, &mut calls).is_none());
+            assert_eq!(calls, last);
+        }
+    }
+}

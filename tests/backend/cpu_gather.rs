@@ -48,3 +48,33 @@ fn noisy_points_get_more_rays() {
         .map(|mut g| g.gather(&even.sources(), &places).unwrap());
     assert_eq!(one, two);
 }
+
+/// The same rays for both: as many as the first field takes.
+#[test]
+fn two_fields_are_seen_by_the_same_rays() {
+    let spot = [[-0.3, 0.0, 1.4], [0.3, 0.0, 1.4], [0.3, 0.0, 2.0], [-0.3, 0.0, 2.0]];
+    let scene = quads(&[(spot.map(DVec3::from_array), Material::grey("spot", 0.5))]);
+    let mesh = Mesh::new(scene, 1.0).unwrap();
+    let [bright, dark] =
+        [Rgb::ONE, Rgb::ZERO].map(|value| GivenRadiosity::new(mesh.clone(), |_, _| value));
+    let place = |k: usize| {
+        let position = DVec3::new(0.01 * k as f64 - 0.5, -1.5, 0.0);
+        GatherPoint { position, normal: DVec3::Z, near: 1e-6 }
+    };
+    let places: Vec<GatherPoint> = (0..100).map(place).collect();
+    let few = || RayGather::new(&bright.mesh, 256).unwrap();
+    let more = || few().with_noise(0.02, 0.0);
+    let alone = |mut gather: RayGather| gather.gather(&bright.sources(), &places).unwrap();
+    assert_ne!(alone(few()), alone(more()), "some places take more rays");
+    let (bright, dark) = (bright.sources(), dark.sources());
+    let [first, second] = more().gather_both([&bright, &dark], &places).unwrap();
+    assert_eq!(first, alone(more()));
+    assert!(second.iter().all(|sample| sample.irradiance == Rgb::ZERO));
+    let shares = |samples: &[radiosity::gather::IrradianceSample]| {
+        samples.iter().map(|s| (s.escaped, s.inverse_distance)).collect::<Vec<_>>()
+    };
+    assert_eq!(shares(&first), shares(&second));
+    // Of darkness the fewest do.
+    let [_, second] = more().gather_both([&dark, &bright], &places).unwrap();
+    assert_eq!(second, alone(few()));
+}
