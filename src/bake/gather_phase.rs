@@ -265,8 +265,8 @@ impl<'a> GatherPhase<'a> {
             gather_passes: 0,
             diagonal: self.diagonal(),
         };
-        // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for more
-        // of them everywhere.
+        // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for
+        // more of them everywhere.
         self.gather.noise_tolerance = controller::noise_tolerance(target.error);
         let mut gatherer = self.gatherer(1)?;
         let sampling = pilot.sampling_error(model::PILOT_POINTS, &mut *gatherer)?;
