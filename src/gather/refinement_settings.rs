@@ -8,9 +8,9 @@ use crate::scene::Aabb;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinementSettings {
     /// An element is split where the value gathered in the middle of a side differs from the mean
-    /// of the side's ends by more than this share of the element's radiosity, in (0, 1]. Splitting
-    /// leaves about a quarter of that. The allowance grows towards small elements: 1.7 times for
-    /// every halving below the longest edge of the mesh given.
+    /// of the side's ends by more than this share of the element's radiosity, that of its darkest
+    /// corner where this is less, in (0, 1]. Splitting leaves about a quarter of that. The
+    /// allowance doubles with every halving below the longest edge of the mesh given.
     pub surplus_tolerance: f64,
     /// Elements whose longest edge is at most this long are not split; scene unit, above 0.
     pub min_edge: f64,
