@@ -254,7 +254,7 @@ mod tests {
         let before = vec![Rgb::splat(0.5); mesh.element_count()];
         let backend = ResilientBackend::new(&Backend::Cpu);
         let mut calls = 0;
-        let mut stop_at = |last: u32, calls: &mut u32| {
+        let stop_at = |last: u32, calls: &mut u32| {
             *calls = 0;
             light_in_gaps(&mesh, &before, 0.0, &backend, &mut |p: &Progress| {
                 assert!(p.gathered <= p.total && p.elements == mesh.element_count());
