@@ -53,7 +53,7 @@ fn noisy_points_get_more_rays() {
 #[test]
 fn two_fields_are_seen_by_the_same_rays() {
     let spot = [[-0.3, 0.0, 1.4], [0.3, 0.0, 1.4], [0.3, 0.0, 2.0], [-0.3, 0.0, 2.0]];
-    let scene = quads(&[(spot.map(DVec3::from_array), Material::grey("spot", 0.5))]);
+    let scene = quads(&[(spot, Material::grey("spot", 0.5))]);
     let mesh = Mesh::new(scene, 1.0).unwrap();
     let [bright, dark] =
         [Rgb::ONE, Rgb::ZERO].map(|value| GivenRadiosity::new(mesh.clone(), |_, _| value));
