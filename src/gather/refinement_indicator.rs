@@ -15,7 +15,9 @@
 //!
 //! An element is judged by its parent's midsides, which have gathered. An element of the first mesh
 //! has no parent; it is judged by the differences of its corners, and by the light before the
-//! gather, if that is known more finely there.
+//! gather, if that is known more finely there. Nothing is known of the middle of an element whose
+//! corners are all buried, under houses that stand on a ground, say: if there was light before, it
+//! is split.
 
 use glam::DVec2;
 
@@ -140,7 +142,15 @@ pub(super) fn refinement_indicator(
         buried: samples.buried[v as usize],
     });
     let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
+    let is_scouted = size <= SCOUTED_SIZE * settings.min_edge * group_factor;
     match HierarchicalSurplus::of_parent(samples, e) {
+        // What stands on the corners may leave the middle in the open.
+        _ if !is_scouted
+            && corners.iter().all(|c| c.buried)
+            && brightest(&samples.mesh, source, e) > scale.radiosity_floor =>
+        {
+            UNKNOWN_INDICATOR
+        }
         Some(surplus) => {
             let midsides = surplus.sampled_midsides();
             let indicator =
@@ -153,7 +163,7 @@ pub(super) fn refinement_indicator(
         // unknown.
         None if gap_factor.is_finite() && samples.is_narrow(e) => UNKNOWN_INDICATOR,
         // Corners far apart say little of what lies between them.
-        None if size > SCOUTED_SIZE * settings.min_edge * group_factor => UNKNOWN_INDICATOR,
+        None if !is_scouted => UNKNOWN_INDICATOR,
         None => {
             let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
             // A vector over the channels as long as the root mean square.
@@ -167,18 +177,76 @@ pub(super) fn refinement_indicator(
 /// How far `source` is from linear over element `e` of `mesh`: root mean square over a lattice,
 /// W/m², a length over the channels.
 pub(super) fn source_nonlinearity(mesh: &Mesh, source: &RadiosityField, e: usize) -> f64 {
+    let values: Vec<([f64; 3], Rgb)> = source_lattice(mesh, source, e).collect();
+    let end = |k: usize| values.iter().find(|(at, _)| at[k] == 1.0).map_or(Rgb::ZERO, |(_, b)| *b);
+    let ends = [0, 1, 2].map(end);
+    let square = |([u, v, w], value): &([f64; 3], Rgb)| {
+        value.distance_squared(ends[0] * *u + ends[1] * *v + ends[2] * *w)
+    };
+    (values.iter().map(square).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// The brightest that `source` is over a lattice on element `e` of `mesh`, W/m²: a length over the
+/// channels.
+fn brightest(mesh: &Mesh, source: &RadiosityField, e: usize) -> f64 {
+    source_lattice(mesh, source, e).map(|(_, value)| value.length()).fold(0.0, f64::max)
+}
+
+/// What `source` reflects, W/m², at the places of a lattice on element `e` of `mesh`, by their
+/// barycentric weights.
+fn source_lattice(
+    mesh: &Mesh,
+    source: &RadiosityField,
+    e: usize,
+) -> impl Iterator<Item = ([f64; 3], Rgb)> {
     let node = mesh.element(e);
     let t = mesh.triangle(node);
     let [a, b, c] = mesh.cell(node).corners().map(DVec2::from_array);
-    let value_at = |p: DVec2| source.untextured_at(t, p.x, p.y);
-    let ends = [a, b, c].map(value_at);
-    let mut squares = 0.0;
-    for i in 0..=SOURCE_SAMPLES {
-        for j in 0..=SOURCE_SAMPLES - i {
-            let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(SOURCE_SAMPLES));
-            let linear = ends[0] * (1.0 - u - v) + ends[1] * u + ends[2] * v;
-            squares += value_at(a * (1.0 - u - v) + b * u + c * v).distance_squared(linear);
-        }
+    let steps = |i: u32| (0..=SOURCE_SAMPLES - i).map(move |j| [i, j, SOURCE_SAMPLES - i - j]);
+    (0..=SOURCE_SAMPLES).flat_map(steps).map(move |place| {
+        let [u, v, w] = place.map(|k| f64::from(k) / f64::from(SOURCE_SAMPLES));
+        let at = a * u + b * v + c * w;
+        ([u, v, w], source.untextured_at(t, at.x, at.y))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::gather::GatheredMesh;
+    use crate::scene::{Material, Scene, Triangle};
+
+    /// Ground of 64 × 64 whose elements, children of two triangles, have buried corners only.
+    #[test]
+    fn elements_on_buried_corners_are_split_where_there_was_light() {
+        let positions = [[0.0, 0.0], [64.0, 0.0], [64.0, 64.0], [0.0, 64.0]];
+        let triangle = |corners| Triangle { corners, ..Default::default() };
+        let scene = Scene::new(
+            positions.map(|[x, y]| DVec3::new(x, y, 0.0)).to_vec(),
+            vec![triangle([0, 1, 2]), triangle([0, 2, 3])],
+            vec!["ground".into()],
+            vec![Material::grey("grey", 0.5)],
+        );
+        let mesh = Mesh::new(Arc::new(scene.unwrap()), 100.0).unwrap();
+        let [lit, dark] =
+            [1.0, 0.0].map(|b| GatheredMesh::from_elements(&mesh, &[Rgb::splat(b); 2]).unwrap());
+        let scale = ErrorScale::new(&mesh, &lit.radiosity_field(), None);
+        let mut samples = SampledMesh::new(mesh, &dark.radiosity_field());
+        samples.split(&[0, 1]).unwrap();
+        samples.buried.fill(true);
+        let indicator = |source: &GatheredMesh, min_edge: f64| {
+            let settings = RefinementSettings::new(min_edge);
+            let of =
+                |e| refinement_indicator(&samples, &source.radiosity_field(), &scale, &settings, e);
+            (0..samples.mesh.element_count()).map(of).fold(0.0, f64::max)
+        };
+        // Their longest edge is 45.3.
+        assert_eq!(indicator(&lit, 1.0), UNKNOWN_INDICATOR);
+        assert_eq!(indicator(&dark, 1.0), 0.0);
+        assert_eq!(indicator(&lit, 11.4), 0.0, "no longer than four of the shortest");
     }
-    (squares / f64::from((SOURCE_SAMPLES + 1) * (SOURCE_SAMPLES + 2) / 2)).sqrt()
 }
