@@ -267,8 +267,9 @@ impl<'a> GatherPhase<'a> {
         };
         // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for
         // more of them everywhere.
-        self.gather.noise_tolerance = controller::noise_tolerance(target.error);
-        let mut gatherer = self.gatherer(1)?;
+        let noise = controller::noise_tolerance(target.error);
+        let dim = self.state.radiosity_floor();
+        let mut gatherer = self.backend.gather(&self.shot.mesh, self.gather.rays, noise, dim)?;
         let sampling = pilot.sampling_error(model::PILOT_POINTS, &mut *gatherer)?;
         let chosen = controller::with_rays_for(&self.gather, sampling, target.error);
         let settings = BakeSettings { solve: self.solve.clone(), gather: Some(chosen) };

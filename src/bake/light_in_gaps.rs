@@ -113,9 +113,7 @@ impl GapGather<'_> {
 
     fn point(&self, e: usize) -> TwoSidedPoint {
         let node = self.mesh.element(e);
-        let (viewpoint, normal) = (self.mesh.viewpoint(node), self.mesh.normal(node));
-        let point = self.above.gather_point(viewpoint, normal, self.size(e));
-        TwoSidedPoint::new(point, self.mesh.material(node))
+        TwoSidedPoint::new(self.above.above_element(self.mesh, node), self.mesh.material(node))
     }
 
     /// Those of `elements` that are in gaps, and what they reflect of the light of `field`, W/m²;
@@ -127,24 +125,16 @@ impl GapGather<'_> {
         footprint: f64,
     ) -> Result<Option<Vec<(usize, Rgb)>>, Error> {
         let mut narrow = vec![];
-        let mut remaining = elements;
-        let mut batches = BatchSizer::new(FIRST_BATCH);
-        while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
-                let points: Vec<TwoSidedPoint> = batch.iter().map(|&e| self.point(e)).collect();
-                let samples = gather_two_sided(&mut *self.gatherer, field, &points)?;
-                for (&e, sample) in batch.iter().zip(samples) {
-                    if sample.inverse_distance * self.size(e).max(footprint) > 1.0 {
-                        narrow.push((e, self.albedo(e) * sample.irradiance));
-                    }
+        let flow = self.in_batches(elements, |gaps, batch, points| {
+            let samples = gather_two_sided(&mut *gaps.gatherer, field, points)?;
+            for (&e, sample) in batch.iter().zip(samples) {
+                if sample.inverse_distance * gaps.size(e).max(footprint) > 1.0 {
+                    narrow.push((e, gaps.albedo(e) * sample.irradiance));
                 }
-                Ok::<_, Error>(())
-            })?;
-            if self.report(elements.len(), remaining.len()).is_break() {
-                return Ok(None);
             }
-        }
-        Ok(Some(narrow))
+            Ok(())
+        })?;
+        Ok(flow.is_continue().then_some(narrow))
     }
 
     /// Adds to what `elements` reflect, W/m², what they gather more of the first field than of the
@@ -154,33 +144,40 @@ impl GapGather<'_> {
         elements: &mut [(usize, Rgb)],
         fields: [&RadiosityField; 2],
     ) -> Result<ControlFlow<()>, Error> {
-        let count = elements.len();
-        let points: Vec<TwoSidedPoint> = elements.iter().map(|&(e, _)| self.point(e)).collect();
-        let mut remaining = &points[..];
-        let mut done = 0;
+        let numbers: Vec<usize> = elements.iter().map(|&(e, _)| e).collect();
+        let mut remaining = elements.iter_mut();
+        self.in_batches(&numbers, |gaps, _, points| {
+            let [now, before] = gather_both_two_sided(&mut *gaps.gatherer, fields, points)?;
+            let changes = now.iter().zip(before);
+            for ((now, before), (e, value)) in changes.zip(remaining.by_ref()) {
+                let change = gaps.albedo(*e) * (now.irradiance - before.irradiance);
+                *value = (*value + change).max(Rgb::ZERO);
+            }
+            Ok(())
+        })
+    }
+
+    /// Has `work` done on batches of `elements` and their points, until it is done or cancelled.
+    fn in_batches(
+        &mut self,
+        elements: &[usize],
+        mut work: impl FnMut(&mut Self, &[usize], &[TwoSidedPoint]) -> Result<(), Error>,
+    ) -> Result<ControlFlow<()>, Error> {
+        let total = elements.len();
+        let mut remaining = elements;
         let mut batches = BatchSizer::new(FIRST_BATCH);
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
-                let [now, before] = gather_both_two_sided(&mut *self.gatherer, fields, batch)?;
-                for (now, before) in now.iter().zip(before) {
-                    let (e, value) = elements[done];
-                    let change = self.albedo(e) * (now.irradiance - before.irradiance);
-                    elements[done].1 = (value + change).max(Rgb::ZERO);
-                    done += 1;
-                }
-                Ok::<_, Error>(())
+                let points: Vec<TwoSidedPoint> = batch.iter().map(|&e| self.point(e)).collect();
+                work(self, batch, &points)
             })?;
-            if self.report(count, remaining.len()).is_break() {
+            let (elements, gathered) = (self.mesh.element_count(), total - remaining.len());
+            let report = Progress { pass: 0, refinements: 0, elements, gathered, total };
+            if (self.progress)(&report).is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
         Ok(ControlFlow::Continue(()))
-    }
-
-    fn report(&mut self, total: usize, remaining: usize) -> ControlFlow<()> {
-        let elements = self.mesh.element_count();
-        let gathered = total - remaining;
-        (self.progress)(&Progress { pass: 0, refinements: 0, elements, gathered, total })
     }
 }
 

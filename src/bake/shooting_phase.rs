@@ -136,10 +136,7 @@ fn received(
     let above = SurfaceOffset::new(mesh.scene());
     let elements = 0..mesh.element_count();
     let reflecting: Vec<usize> = elements.filter(|&e| mesh.scatters(mesh.element(e))).collect();
-    let point = |&e: &usize| {
-        let node = mesh.element(e);
-        above.gather_point(mesh.viewpoint(node), mesh.normal(node), mesh.area(node).sqrt())
-    };
+    let point = |&e: &usize| above.above_element(mesh, mesh.element(e));
     let points: Vec<GatherPoint> = reflecting.iter().map(point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];
     let mut gatherer = backend.gather(mesh, model::RECEIVED_RAYS, f64::INFINITY, 0.0)?;

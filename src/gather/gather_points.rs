@@ -15,7 +15,7 @@ use glam::DVec3;
 use super::two_sided::TwoSidedPoint;
 use super::{GatherPoint, IrradianceSample};
 use crate::geometry::incidence::Incidence;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::keys::Vertices;
 use crate::visibility::{buried, offset};
@@ -111,6 +111,11 @@ impl<'a> VertexGatherPoints<'a> {
 impl SurfaceOffset {
     pub fn new(scene: &Scene) -> SurfaceOffset {
         SurfaceOffset { min_offset: offset::MIN_LIFT_ULPS * scene.coordinate_ulp() }
+    }
+
+    /// The gather point above the viewpoint of `node`.
+    pub fn above_element(&self, mesh: &Mesh, node: NodeId) -> GatherPoint {
+        self.gather_point(mesh.viewpoint(node), mesh.normal(node), mesh.area(node).sqrt())
     }
 
     /// The gather point above `position` on a surface with elements of `size`: the square root of
