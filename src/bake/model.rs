@@ -346,7 +346,7 @@ pub(super) fn affordable_improvement(remaining: f64, taken: f64) -> f64 {
 // ---- Estimation of the error -------------------------------------------------------------------
 
 /// Random points that the estimate takes: at least, and at most.
-pub const SAMPLES: RangeInclusive<usize> = 192..=1024;
+pub const SAMPLES: RangeInclusive<usize> = 192..=1 << 14;
 
 /// The estimate takes one point for so many that vertices gathered at; each gathers three times, so
 /// that it costs about a sixteenth of them.

@@ -69,6 +69,19 @@ fn until(scene: &Scene, solution: &VertexMesh, wanted: f64) -> Verification {
 }
 
 #[test]
+fn a_fine_mesh_is_judged_at_many_points() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let few = solution(&scene, |t| furnace(&scene, t, 1.1));
+    let mut many = few.clone();
+    let pad = 4096 * 64 - many.positions.len();
+    many.positions.extend(vec![DVec3::splat(0.5); pad]);
+    many.normals.extend(vec![DVec3::Z; pad]);
+    many.radiosity.extend(vec![furnace(&scene, &scene.triangles()[0], 1.0); pad]);
+    let points = |mesh| verify(&scene, mesh, &settings(0.1), keep_going).unwrap().groups[0].points;
+    assert!(points(&few) < 4096 && points(&many) >= 4096, "one for 64 vertices");
+}
+
+#[test]
 fn an_exact_solution_has_no_error() {
     let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
     let exact = solution(&scene, |t| furnace(&scene, t, 1.0));
