@@ -63,8 +63,8 @@ const FIRST_PATHS: usize = 64;
 
 /// There is a point for so many vertices, at least: the more there are, the rarer are the places
 /// that a mesh so fine still misses, and points that meet none of them seem sure of too small an
-/// error. Chosen by hand: two rooms of half a million vertices were measured at half of their error
-/// by 1024 points, whose standard error was a tenth of it.
+/// error. Chosen by hand: of 26 901 points of a room of half a million vertices, two had 30 % of
+/// the squared error, which a thousand points mostly miss.
 const VERTICES_PER_POINT: usize = 64;
 
 /// A standard error below this share of the error leaves it known roughly.
