@@ -169,6 +169,9 @@ impl<'a> ObjFile<'a> {
         }
         self.find_default_library()?;
         let named = self.named_materials()?;
+        if settings.facets {
+            self.statements.make_each_face_a_group();
+        }
         let models = std::mem::take(&mut self.models);
         let mut geometry = self.geometry(models, &named)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();

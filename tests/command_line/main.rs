@@ -234,6 +234,44 @@ fn view_factors_writes_a_matrix_a_file() {
 }
 
 #[test]
+fn view_factors_of_facets_are_a_row_a_face() {
+    let folder = tempfile::tempdir().unwrap();
+    // A tent of two slopes over a floor: the slopes, two-sided, are facets of one group.
+    let tent = "o floor\nv 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf 1 2 3 4\n\
+                o tent\nv 1 0 1\nv 1 1 1\nf 1 5 6 4\nf 2 3 6 5\n";
+    let scene = write(folder.path(), "tent.obj", tent);
+    let scene = scene.to_str().unwrap();
+    let out = run("view-factors", &[scene, "--facets", "--two-sided", "tent"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let csv = std::fs::read_to_string(folder.path().join("tent.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows[0][1..4], ["floor/1", "tent/1", "tent/2"]);
+    let area = |row: usize| rows[row][6].parse::<f64>().unwrap();
+    // A slope of √2 × 1 has both its sides.
+    assert!((area(1) - 2.0).abs() < 1e-12 && (area(2) - 8f64.sqrt()).abs() < 1e-12, "{csv}");
+    let out = run("view-factors", &[scene, "--facets", "--two-sided", "tarp"]);
+    let error = String::from_utf8_lossy(&out.stderr);
+    assert!(error.contains("'tarp'") && error.contains("floor/1, tent/1, tent/2"), "{error}");
+    assert_eq!(out.status.code(), Some(1));
+}
+
+#[test]
+fn square_tables_of_many_facets_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // One more than there may be.
+    let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", "f 1 2 3\n".repeat(8193));
+    let scene = write(folder.path(), "stack.obj", &text);
+    for format in ["csv", "npy"] {
+        let out = run("view-factors", &[scene.to_str().unwrap(), "--facets", "--format", format]);
+        let error = String::from_utf8_lossy(&out.stderr);
+        let words = ["8193 groups", "above 8192 take", "list", "mtx"];
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+        assert_eq!(out.status.code(), Some(1));
+        assert!(!folder.path().join(format!("stack.{format}")).exists());
+    }
+}
+
+#[test]
 fn verify_prints_what_was_told_beside_what_it_measures() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).display().to_string();

@@ -6,7 +6,7 @@ use std::path::Path;
 use radiosity::backend::cpu::RayGather;
 use radiosity::gather::{RefinementSettings, gather_at_vertices};
 use radiosity::io::read_obj;
-use radiosity::{ErrorKind, GatheredMesh, Mesh, Rgb, VertexMesh, load_obj};
+use radiosity::{ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb, VertexMesh, load_obj};
 use tempfile::TempDir;
 
 use super::obj_texts::load_strictly;
@@ -250,6 +250,20 @@ fn repeated_group_is_one_group() {
     assert_eq!(scene.groups(), ["a", "b", "default"]);
     let groups: Vec<u32> = scene.triangles().iter().map(|t| t.group).collect();
     assert_eq!(groups, [0, 1, 0, 2]);
+}
+
+#[test]
+fn facets_are_groups_in_the_order_of_the_file() {
+    let long = "x".repeat(80);
+    let text = format!("{SQUARE}g a\nf 1 2 3\ng {long}\nf 1 2 3 4\ng a\nf 1 3 4\nf 2 3 4\n");
+    let mut settings = ObjSettings::default();
+    settings.facets = true;
+    let scene = settings.read("square.obj", text.as_bytes(), &[]).unwrap();
+    // A name that is too long to be there once a face is told by its number.
+    assert_eq!(scene.groups(), ["a/1", "group 2/1", "a/2", "a/3"]);
+    let groups: Vec<u32> = scene.triangles().iter().map(|t| t.group).collect();
+    // A face of four corners is one facet.
+    assert_eq!(groups, [0, 1, 1, 2, 3]);
 }
 
 #[test]

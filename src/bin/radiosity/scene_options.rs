@@ -24,6 +24,11 @@ impl SceneOptions {
         options
     }
 
+    /// Makes each face a group of its own.
+    pub fn by_facets(&mut self) {
+        self.obj.facets = true;
+    }
+
     /// Takes option `name` with its value, if it is one of these.
     pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
         match name {

@@ -18,9 +18,9 @@ use crate::progress;
 use crate::scene_options::SceneOptions;
 
 pub const USAGE: &str = "\
-usage: radiosity view-factors SCENE.obj… [--error E] [--two-sided NAME]… [--enforce]
+usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--enforce]
                     [--format F,…] [--out DIR]
-       radiosity view-factors SCENE.obj… --sampled [--element-size X] [--hemicube N]
+       radiosity view-factors SCENE.obj… --sampled [--facets] [--element-size X] [--hemicube N]
                     [--adapter NAME | --cpu] [--enforce] [--format F,…] [--out DIR]
 
 Writes the view factors between the groups (or objects) of each file beside it, or in DIR, and
@@ -28,12 +28,15 @@ prints them with their standard errors and what raw numbers say of closure, reci
 F[i, j] is the share of the flux leaving group i (row) that arrives at group j (column); `open` is
 what leaves the scene, `back` what meets the backs of surfaces.
 
+  --facets          between faces instead: each is a group of its own, in the file's order, named
+                    GROUP/1, GROUP/2, …; --two-sided takes the names of GROUPs too
   --error E         absolute error wanted of every factor [1e-4]
   --two-sided NAME  this group gives and takes on both sides; its area is that of both
   --enforce         make the matrix keep closure and reciprocity, and say what that changed
   --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
                     SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
-                    f_from_row_to_column and standard_error [csv,list]
+                    f_from_row_to_column and standard_error; square tables have 8192 groups at
+                    most [csv,list, or list for more]
   --sampled         from hemicubes, one an element: for scenes of more than some ten thousand
                     polygons; the error is what it is
   --element-size X  longest edge of the elements that are seen from [diagonal / 32]
@@ -57,13 +60,14 @@ struct Options {
     reading: SceneOptions,
     /// The folder for files, or none for that of each scene.
     out: Option<PathBuf>,
-    formats: Vec<Format>,
+    /// None for what suits the number of groups.
+    formats: Option<Vec<Format>>,
     enforce: bool,
     method: Method,
 }
 
 enum Method {
-    Exact { error: f64, two_sided: Vec<String> },
+    Exact { error: f64, two_sided: Vec<String>, facets: bool },
     Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
 }
 
@@ -83,16 +87,20 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
 impl Options {
     fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
         let (mut scenes, mut out, mut enforce) = (vec![], None, false);
-        let mut formats = vec![Format::Csv, Format::List];
+        let mut formats = None;
         let (mut error, mut two_sided) = (None, vec![]);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
-        let mut device = None;
+        let (mut device, mut facets) = (None, false);
         let mut reading = SceneOptions::ignoring_specular();
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
                 Long("out") => out = Some(parser.value()?.into()),
-                Long("format") => formats = Format::list(parser)?,
+                Long("format") => formats = Some(Format::list(parser)?),
+                Long("facets") => {
+                    facets = true;
+                    reading.by_facets();
+                }
                 Long("enforce") => enforce = true,
                 Long("error") => error = Some(args::value(parser, "error", "a number")?),
                 Long("two-sided") => {
@@ -135,7 +143,7 @@ impl Options {
                 let needing = "--element-size, --hemicube, --adapter and --cpu need --sampled";
                 return Err(Stop::usage(needing));
             }
-            Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided }
+            Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided, facets }
         };
         Ok(Options { scenes, reading, out, formats, enforce, method })
     }
@@ -145,10 +153,16 @@ impl Options {
             (Some(folder), Some(name)) => folder.join(name),
             _ => path.with_extension(""),
         };
-        for format in &self.formats {
+        for format in self.formats.iter().flatten() {
             args::check_writable(&format.path(&stem))?;
         }
         let scene = progress::of_reading(path, || self.reading.load(path))?;
+        let groups = scene.groups().len();
+        let formats = self.formats.clone().unwrap_or_else(|| Format::default_for(groups));
+        for format in &formats {
+            format.check(groups)?;
+            args::check_writable(&format.path(&stem))?;
+        }
         let of_light = |w: &&Warning| w.kind == WarningKind::NoLight;
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
@@ -164,7 +178,7 @@ impl Options {
         if matrix.names.len() <= MAX_PRINTED {
             print_factors(&matrix);
         }
-        for format in &self.formats {
+        for format in &formats {
             progress::of_writing(&format.path(&stem), |_| format.write(&stem, &matrix))?;
         }
         Ok(())
@@ -175,8 +189,8 @@ impl Method {
     /// The view factors between the groups of `scene`.
     fn matrix(&self, scene: Scene) -> Result<ViewFactors, Error> {
         let matrix = match self {
-            Method::Exact { error, two_sided } => {
-                let groups = group_indices(&scene, two_sided)?;
+            Method::Exact { error, two_sided, facets } => {
+                let groups = group_indices(&scene, two_sided, *facets)?;
                 progress::of_count("groups", |report| {
                     ViewFactors::new(&scene, *error, &groups, report)
                 })?
@@ -213,17 +227,28 @@ fn enforce(matrix: &ViewFactors) -> ViewFactors {
     enforced
 }
 
-/// Group numbers of names.
-fn group_indices(scene: &Scene, names: &[String]) -> Result<Vec<usize>, Error> {
-    let index = |name: &String| {
-        let index = scene.groups().iter().position(|group| group == name);
-        index.ok_or_else(|| {
-            let all = scene.groups().join(", ");
-            let remedy = format!("the scene has {all}");
-            Error::new(ErrorKind::Setting, "--two-sided", format!("no group '{name}'"), remedy)
-        })
-    };
-    names.iter().map(index).collect()
+/// Group numbers of names: with `facets` also those of the facets that a group was cut into.
+fn group_indices(scene: &Scene, names: &[String], facets: bool) -> Result<Vec<usize>, Error> {
+    let mut indices = vec![];
+    for name in names {
+        let before = indices.len();
+        let is_facet = |group: &str| {
+            group.rsplit_once('/').is_some_and(|(of, n)| of == name && n.parse::<u32>().is_ok())
+        };
+        let matching = |group: &String| group == name || facets && is_facet(group);
+        let groups = scene.groups().iter().enumerate();
+        indices.extend(groups.filter(|(_, group)| matching(group)).map(|(index, _)| index));
+        if indices.len() == before {
+            let found = format!("no group '{name}'");
+            let mut remedy = scene.groups()[..scene.groups().len().min(MAX_PRINTED)].join(", ");
+            remedy.insert_str(0, "the scene has ");
+            if scene.groups().len() > MAX_PRINTED {
+                remedy += &format!(" and {} more", scene.groups().len() - MAX_PRINTED);
+            }
+            return Err(Error::new(ErrorKind::Setting, "--two-sided", found, remedy));
+        }
+    }
+    Ok(indices)
 }
 
 /// Prints closure, reciprocity and bounds of the raw numbers, and which groups see out.

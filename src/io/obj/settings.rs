@@ -41,6 +41,9 @@ pub struct ObjSettings {
     pub sides: Sides,
     /// What the light that is spread takes mirrors and glass for; it passes glass unless set.
     pub specular: SpecularSurfaces,
+    /// Each face is a group of its own, in the order of the file, named `group/n` for the n-th face
+    /// of a group: for view factors between facets.
+    pub facets: bool,
 }
 
 impl ObjSettings {
@@ -114,6 +117,15 @@ impl Default for ObjSettings {
         let max_reflectance = ObjSettings::MAX_REFLECTANCE;
         let (sides, specular) = (Sides::Auto, SpecularSurfaces::Clear);
         let (emit, transmit) = (vec![], vec![]);
-        ObjSettings { strict: false, max_reflectance, emit, transmit, sky: None, sides, specular }
+        ObjSettings {
+            strict: false,
+            max_reflectance,
+            emit,
+            transmit,
+            sky: None,
+            sides,
+            specular,
+            facets: false,
+        }
     }
 }

@@ -34,6 +34,10 @@ const DEFAULT_GROUP: &str = "default";
 /// until then. Chosen by hand.
 const MODEL_CORNERS: usize = 1 << 14;
 
+/// Bytes of a group's name that its facets carry too, at most; a longer one would be there as often
+/// as it has faces, which is more memory than the file explains. Chosen by hand.
+const MAX_FACET_GROUP_NAME: usize = 64;
+
 /// What becomes of faces whose material is not known.
 pub(super) const UNKNOWN_MATERIAL: &str = "they are grey, reflectance 0.5";
 
@@ -222,6 +226,22 @@ impl Statements {
         }
         emit(out, format_args!("\n"));
         Ok(())
+    }
+
+    /// Turns each face into a group of its own, named `group/n` for the n-th face of its group.
+    pub fn make_each_face_a_group(&mut self) {
+        let of_file = std::mem::take(&mut self.groups.list);
+        let mut counts = vec![0u32; of_file.len()];
+        for (number, face) in (0..).zip(&mut self.faces) {
+            let count = &mut counts[face.group as usize];
+            *count += 1;
+            let name = &of_file[face.group as usize];
+            self.groups.list.push(match name.len() {
+                0..=MAX_FACET_GROUP_NAME => format!("{name}/{count}"),
+                _ => format!("group {}/{count}", face.group + 1),
+            });
+            face.group = number;
+        }
     }
 
     /// Index of the group that faces belong to now.

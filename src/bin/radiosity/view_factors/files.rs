@@ -11,6 +11,9 @@ use radiosity::{Error, ErrorKind, ViewFactors};
 
 use crate::args::{self, Stop};
 
+/// Groups of a square table at most: 134 million numbers, some gigabyte of text.
+const MAX_DENSE_GROUPS: usize = 1 << 13;
+
 #[derive(Clone, Copy, PartialEq)]
 pub enum Format {
     Csv,
@@ -43,6 +46,32 @@ impl Format {
             "npy" => Some(Format::Npy),
             _ => None,
         }
+    }
+
+    /// Those that are written unless others are asked for.
+    pub fn default_for(groups: usize) -> Vec<Format> {
+        if groups <= MAX_DENSE_GROUPS {
+            vec![Format::Csv, Format::List]
+        } else {
+            vec![Format::List]
+        }
+    }
+
+    /// # Errors
+    /// [`ErrorKind::Setting`] where so many groups are too many for a square table.
+    pub fn check(self, groups: usize) -> Result<(), Error> {
+        let (name, is_dense) = match self {
+            Format::Csv => ("csv", true),
+            Format::Npy => ("npy", true),
+            Format::List => ("list", false),
+            Format::MatrixMarket => ("mtx", false),
+        };
+        if is_dense && groups > MAX_DENSE_GROUPS {
+            let found = format!("a square table of {groups} groups");
+            let remedy = format!("above {MAX_DENSE_GROUPS} take list or mtx");
+            return Err(Error::new(ErrorKind::Setting, format!("--format {name}"), found, remedy));
+        }
+        Ok(())
     }
 
     pub fn path(self, stem: &Path) -> PathBuf {
