@@ -1,22 +1,30 @@
 //! View factors between whole groups of surfaces, as heat transfer means them.
 //!
 //! F_ij is the fraction of the flux leaving group i that arrives at fronts of group j, averaged
-//! over the area of i. There are two ways to a matrix:
+//! over the area of i. There are three ways to a matrix; [`ViewFactors::new`] takes one of the
+//! first two, by how long the first would take:
 //!
 //! ```text
-//! ViewFactors::new       exact but for an error that is asked for; time ~ polygons², and more
-//!                        where many stand between
+//! ViewFactors::exact     exact but for an error far below what is asked for; time ~ polygons²,
+//!                        and more where many stand between
 //!   coplanar triangles ─→ convex polygons ─→ each pair once
 //!     in full view   closed form (contour integral), or Gauss cubature where far
 //!     occluded       adaptive cubature over one of the two: at each point the other, less the
 //!                    shadows of all blockers, by Lambert's formula; blockers found by a shaft
 //!                    around the pair; cells cut along visual events
 //!
+//! ViewFactors::sparse    with the error that is asked for; time ~ polygons, and pairs that see
+//!                        one another
+//!   rays from each polygon ─→ pairs that matter
+//!     small          the count of rays
+//!     others         shadow rays, closed forms, or points that see the other past all blockers,
+//!                    whichever is cheapest
+//!
 //! ViewFactors::sampled   means over the rows of a mesh's elements, hemicubes or rays; time ~
 //!                        elements; the error is estimated, not asked for
 //! ```
 //!
-//! Of either, [`ViewFactors::checks`] measures closure, reciprocity and bounds, and
+//! Of all, [`ViewFactors::checks`] measures closure, reciprocity and bounds, and
 //! [`ViewFactors::enforced`] makes a matrix that keeps them. Files: [`crate::io`].
 
 mod assembler;
@@ -24,14 +32,23 @@ mod blocker_tree;
 mod checks;
 mod convex_polygons;
 mod cubature;
+mod effort;
 mod enforcement;
+mod fronts;
+mod known_blockers;
 mod matrix;
+mod pair_estimate;
 mod pair_visibility;
 mod point_visibility;
+mod polygon_points;
+mod ray_rows;
 mod sampled;
+mod shadow_rays;
 mod shaft;
+mod sparse;
 mod tolerances;
 mod unoccluded;
+mod visible_mean;
 mod visual_events;
 
 use std::ops::ControlFlow;
@@ -49,6 +66,28 @@ pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, Missing, ViewFactors};
 
 impl ViewFactors {
+    /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
+    /// or by far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
+    /// [`ViewFactors::sparse`]. Which of them it was, [`ViewFactors::absent`] tells.
+    ///
+    /// How long it would take is predicted from what stands between a few thousand pairs.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
+    pub fn new(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<ViewFactors>, Error> {
+        check_settings(scene, error, two_sided)?;
+        if effort::is_exact_too_long(scene, unit_of(scene), two_sided) {
+            ViewFactors::sparse(scene, error, two_sided, progress)
+        } else {
+            ViewFactors::exact(scene, error, two_sided, progress)
+        }
+    }
+
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
     ///
     /// The groups of index `two_sided` give and take on both sides. `progress` is told convex
@@ -65,19 +104,17 @@ impl ViewFactors {
     /// Reciprocity A_i F_ij = A_j F_ji holds to rounding, since every pair is met once.
     ///
     /// Time grows with the square of the number of polygons, and with those that stand in between.
-    /// For scenes of more than some ten thousand polygons see [`ViewFactors::sampled`].
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
-    pub fn new(
+    pub fn exact(
         scene: &Scene,
         error: f64,
         two_sided: &[usize],
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
-        // A power of two, so that dividing lengths by it does not round.
-        let unit = scene.bounds().longest_side().log2().floor().exp2();
+        let unit = unit_of(scene);
         let assembler = Assembler::new(scene, unit, error, two_sided);
         let mut sums = GroupSums::new(scene.groups().len());
         let count = assembler.row_count();
@@ -93,6 +130,56 @@ impl ViewFactors {
             }
         }
         Ok(Some(sums.into_matrix(scene, assembler.areas(), unit)))
+    }
+
+    /// The matrix of many polygons, of which each sees few: with two absolute standard errors of at
+    /// most `error` on every factor, where the limits on points and rays of a pair allow it.
+    ///
+    /// Rays from every polygon find what sees what; a pair is estimated where a ray of either has
+    /// met the other, by the cheapest method that is good enough: the count of rays, shadow rays, a
+    /// closed form, or the visible part of one from points of the other. What no ray has met is
+    /// left out ([`Missing::Unmet`]): by far most of it is below `error`. `open` is what is left
+    /// over. `progress` and `two_sided` are those of [`ViewFactors::exact`]. The same bits on every
+    /// run, whatever the number of threads.
+    ///
+    /// Where two surfaces lie in one place, rays meet one of them: sums of rows do not tell.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
+    pub fn sparse(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<ViewFactors>, Error> {
+        check_settings(scene, error, two_sided)?;
+        Ok(sparse::assemble(scene, unit_of(scene), error, two_sided, progress))
+    }
+
+    /// Rows of the exact matrix, those of the groups `from`: to hold another matrix against.
+    ///
+    /// Settings, errors and `progress`, told rows, are those of [`ViewFactors::exact`].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
+    pub fn exact_rows(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        from: &[usize],
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<Vec<Vec<Factor>>>, Error> {
+        check_settings(scene, error, two_sided)?;
+        check_settings(scene, error, from)?;
+        let assembler = Assembler::new(scene, unit_of(scene), error, two_sided);
+        let mut rows = Vec::with_capacity(from.len());
+        for &group in from {
+            rows.push(assembler.whole_row(group));
+            if progress(rows.len(), from.len()).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(rows))
     }
 
     /// Averages the rows of all elements of `mesh` over their groups, weighted by area: for scenes
@@ -154,6 +241,11 @@ const MIN_BATCH: usize = 4;
 
 /// Most polygons between two tellings of progress, so that cancelling is heard. Chosen by hand.
 const MAX_BATCH: usize = 64;
+
+/// A power of two near the size of `scene`, so that dividing lengths by it does not round.
+fn unit_of(scene: &Scene) -> f64 {
+    scene.bounds().longest_side().log2().floor().exp2()
+}
 
 /// Whether `error` and `two_sided` are settings of [`ViewFactors::new`].
 fn check_settings(scene: &Scene, error: f64, two_sided: &[usize]) -> Result<(), Error> {

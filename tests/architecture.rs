@@ -21,7 +21,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "gather",
         "error form_factor geometry hemicube mesh progress sampling scene vertex visibility",
     ),
-    ("view_factor", "error form_factor geometry mesh progress sampling scene"),
+    ("view_factor", "error form_factor geometry mesh progress sampling scene visibility"),
     (
         "backend",
         "error form_factor gather geometry hemicube mesh progress sampling scene visibility",

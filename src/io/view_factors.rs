@@ -33,8 +33,8 @@ pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<
             for j in 0..names.len() as u32 {
                 match row.next_if(|f| f.to == j) {
                     Some(f) => write!(out, ",{}", RoundedValue::of(f.value))?,
-                    None if matrix.absent == Missing::NotSeen => write!(out, ",")?,
-                    None => write!(out, ",0")?,
+                    None if matrix.absent == Missing::Zero => write!(out, ",0")?,
+                    None => write!(out, ",")?,
                 }
             }
             let [open, back] =
@@ -96,7 +96,7 @@ pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resu
             "% that arrives at group j (column); what is absent is {}",
             match matrix.absent {
                 Missing::Zero => "zero",
-                Missing::NotSeen => "not seen, zero or small",
+                Missing::NotSeen | Missing::Unmet => "not seen, zero or small",
             }
         )?;
         writeln!(out, "% group area open back name")?;

@@ -14,9 +14,12 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::blocker_tree::BlockerTree;
 use super::convex_polygons::{ConvexPolygon, Merge, convex_polygons};
 use super::cubature::integrate_adaptively;
+use super::fronts::Fronts;
 use super::matrix::{Estimate, Factor, Missing, ViewFactors};
 use super::pair_visibility::PairVisibility;
 use super::point_visibility::PointVisibility;
@@ -53,19 +56,10 @@ impl Assembler {
     /// Prepares `scene`, all lengths divided by `unit`. Groups of index `two_sided` have two
     /// fronts.
     pub fn new(scene: &Scene, unit: f64, error: f64, two_sided: &[usize]) -> Assembler {
-        let mut fronts = convex_polygons(scene, unit, Merge::WithinGroups);
-        let is_two_sided = |polygon: &&ConvexPolygon| two_sided.contains(&(polygon.group as usize));
-        let reversed: Vec<ConvexPolygon> =
-            fronts.iter().filter(is_two_sided).map(ConvexPolygon::reversed).collect();
-        fronts.extend(reversed);
-        fronts.sort_by_key(|polygon| polygon.group);
-        let blockers = BlockerTree::new(convex_polygons(scene, unit, Merge::AcrossGroups));
-        let backs = blockers.backs(&BlockerTree::new(fronts.clone()));
-        let mut areas = vec![0.0; scene.groups().len()];
-        for polygon in &fronts {
-            areas[polygon.group as usize] += polygon.area;
-        }
-        Assembler { fronts, backs, blockers, areas, error }
+        let fronts = Fronts::new(scene, unit, two_sided);
+        let blockers = BlockerTree::new(convex_polygons(scene, unit, Merge::AcrossGroups).polygons);
+        let backs = blockers.backs(&BlockerTree::new(fronts.polygons.clone()));
+        Assembler { fronts: fronts.polygons, backs, blockers, areas: fronts.areas, error }
     }
 
     /// Number of rows: of polygons that give and receive.
@@ -105,6 +99,31 @@ impl Assembler {
         let receivers = self.backs.iter().zip(self.fronts.len()..);
         let back = self.flux(s, receivers, share * group_area, &mut visibility);
         PolygonRow { fronts, back }
+    }
+
+    /// The factors of `group` to all groups, by ascending index, no zeros.
+    pub fn whole_row(&self, group: usize) -> Vec<Factor> {
+        let polygons = |group| {
+            let start = self.fronts.partition_point(|p| (p.group as usize) < group);
+            let count = self.fronts[start..].partition_point(|p| p.group as usize == group);
+            start..start + count
+        };
+        let to_group = |to: usize| {
+            let mut sum = EstimateSum::default();
+            let mut visibility = PointVisibility::default();
+            for s in polygons(group) {
+                let from = &self.fronts[s];
+                let share = BOUND_SHARE * self.error * (from.area / self.areas[group]).sqrt();
+                let tolerance = share * self.areas[group].min(self.areas[to]);
+                let receivers = polygons(to).filter(|t| *t != s);
+                let receivers = receivers.map(|t| (&self.fronts[t], t));
+                sum.add(self.flux(s, receivers, tolerance, &mut visibility), 1.0);
+            }
+            let Estimate { value, error } = sum.over(self.areas[group]);
+            Factor { to: to as u32, value, error }
+        };
+        let all = (0..self.areas.len()).into_par_iter().map(to_group);
+        all.filter(|factor| factor.value > 0.0 || factor.error > 0.0).collect()
     }
 
     /// A₁F₁₂ from polygon `s` to all of `receivers`, numbered.
@@ -209,7 +228,11 @@ impl GroupSums {
 }
 
 /// What is left of each row when all that arrives anywhere is taken off.
-fn open_shares(factors: &[Vec<Factor>], back: &[Estimate], areas: &[f64]) -> Vec<Estimate> {
+pub(super) fn open_shares(
+    factors: &[Vec<Factor>],
+    back: &[Estimate],
+    areas: &[f64],
+) -> Vec<Estimate> {
     let mut open = Vec::with_capacity(areas.len());
     for ((row, back), &area) in factors.iter().zip(back).zip(areas) {
         if area == 0.0 {

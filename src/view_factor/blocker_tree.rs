@@ -33,6 +33,11 @@ impl BlockerTree {
         BlockerTree { polygons, bvh }
     }
 
+    /// Unit normal of polygon `k`.
+    pub fn normal(&self, k: u32) -> glam::DVec3 {
+        self.polygons[k as usize].normal
+    }
+
     /// What of the polygons is strictly within `shaft`.
     pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
         let mut blockers = Vec::new();
@@ -47,6 +52,35 @@ impl BlockerTree {
             },
         );
         blockers
+    }
+
+    /// The same, or nothing where they are more than `most`.
+    pub fn few_within(&self, shaft: &Shaft, most: usize) -> Option<Vec<Blocker>> {
+        let mut blockers = Vec::new();
+        self.bvh.visit(
+            |node| shaft.intersects(node),
+            |k| {
+                let polygon = &self.polygons[k as usize];
+                if let Some(corners) = shaft.clip(&polygon.corners) {
+                    blockers.push(Blocker { corners, normal: polygon.normal });
+                }
+                if blockers.len() > most {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        );
+        (blockers.len() <= most).then_some(blockers)
+    }
+
+    /// What of the polygons of these indices is strictly within `shaft`.
+    pub fn of_these_within(&self, indices: &[u32], shaft: &Shaft) -> Vec<Blocker> {
+        let polygons = indices.iter().map(|&k| &self.polygons[k as usize]);
+        let inside = |polygon: &ConvexPolygon| {
+            Some(Blocker { corners: shaft.clip(&polygon.corners)?, normal: polygon.normal })
+        };
+        polygons.filter_map(inside).collect()
     }
 
     /// The polygons in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.

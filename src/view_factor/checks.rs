@@ -16,8 +16,8 @@ use super::matrix::{Missing, ViewFactors};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MatrixChecks {
-    /// Row sum + open + back − 1, over rows. The `open` of an exact matrix is not measured but left
-    /// over: there it is row sum + back − 1, over the rows that are closed.
+    /// Row sum + open + back − 1, over rows. The `open` of an exact or sparse matrix is not measured
+    /// but left over: there it is row sum + back − 1, over the rows that are closed.
     pub closure: ErrorStats,
     /// (A_i F_ij − A_j F_ji) / min(A_i, A_j), over pairs: an error of the smaller group's factor.
     pub reciprocity: ErrorStats,
@@ -75,11 +75,11 @@ impl MatrixChecks {
 }
 
 fn closure_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
-    let is_exact = m.absent == Missing::Zero;
-    let rows = (0..m.areas.len()).filter(move |&i| !is_exact || is_closed(m, i));
+    let is_left_over = m.absent != Missing::NotSeen;
+    let rows = (0..m.areas.len()).filter(move |&i| !is_left_over || is_closed(m, i));
     rows.map(move |i| {
         let sum: f64 = m.factors[i].iter().map(|f| f.value).sum();
-        let open = if is_exact { 0.0 } else { m.open[i].value };
+        let open = if is_left_over { 0.0 } else { m.open[i].value };
         ((i, i), sum + open + m.back[i].value - 1.0)
     })
 }

@@ -61,12 +61,19 @@ pub(super) enum Merge {
     AcrossGroups,
 }
 
-/// The scene as convex polygons around its middle, every length divided by `unit`, in the order of
-/// first triangles.
+/// Polygons of a scene, and what became of its triangles.
+pub(super) struct MergedTriangles {
+    /// In the order of first triangles.
+    pub polygons: Vec<ConvexPolygon>,
+    /// Per triangle, the index of the polygon that it is a part of; none without area.
+    pub of_triangle: Vec<Option<u32>>,
+}
+
+/// The scene as convex polygons around its middle, every length divided by `unit`.
 ///
 /// A connected coplanar region that is convex as a whole becomes one polygon; of any other region
 /// neighbours are joined across their longest common sides as long as the union stays convex.
-pub(super) fn convex_polygons(scene: &Scene, unit: f64, merge: Merge) -> Vec<ConvexPolygon> {
+pub(super) fn convex_polygons(scene: &Scene, unit: f64, merge: Merge) -> MergedTriangles {
     let mut outlines = Outlines::new(scene, unit, merge);
     outlines.join_whole_regions();
     outlines.join_neighbours();
@@ -241,16 +248,28 @@ impl Outlines {
         (normal.dot(into.cross(out)) / scale, into.dot(out) / scale)
     }
 
-    fn finish(self, scene: &Scene) -> Vec<ConvexPolygon> {
+    fn finish(self, scene: &Scene) -> MergedTriangles {
         let mut polygons = Vec::new();
+        // Of the triangles that stand for polygons.
+        let mut numbers = vec![None; self.loops.len()];
         for (t, outline) in self.loops.iter().enumerate() {
             let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT_SINE;
             let kept = (0..outline.len()).filter(bend);
             let corners = kept.map(|k| self.corners[outline[k] as usize]).collect();
-            polygons.extend(ConvexPolygon::new(corners, scene.triangles()[t].group));
+            if let Some(polygon) = ConvexPolygon::new(corners, scene.triangles()[t].group) {
+                numbers[t] = Some(polygons.len() as u32);
+                polygons.push(polygon);
+            }
         }
-        polygons
+        let of_triangle = (0..self.loops.len()).map(|t| numbers[self.find(t)]).collect();
+        MergedTriangles { polygons, of_triangle }
     }
+}
+
+/// A position, from the middle of the scene and over `unit`.
+pub(super) fn in_units(scene: &Scene, unit: f64) -> impl Fn(DVec3) -> DVec3 + use<> {
+    let centre = scene.bounds().centre();
+    move |p| (p - centre) / unit
 }
 
 /// Per triangle its corners as numbers of distinct positions, and these positions, from the middle
@@ -260,7 +279,6 @@ fn weld(scene: &Scene, unit: f64) -> (Vec<Vec<u32>>, Vec<DVec3>) {
     let loops = (0..scene.triangles().len())
         .map(|t| scene.corners(t).into_iter().map(|p| weld.number(p)).collect())
         .collect();
-    let centre = scene.bounds().centre();
-    let corners = weld.positions.into_iter().map(|p| (p - centre) / unit).collect();
+    let corners = weld.positions.into_iter().map(in_units(scene, unit)).collect();
     (loops, corners)
 }

@@ -6,10 +6,13 @@
 //! F_ij = x_i G_ij x_j / A_i
 //! ```
 
-use std::collections::BTreeMap;
+use rayon::prelude::*;
 
 use super::checks::is_closed;
-use super::matrix::{Factor, Missing, ViewFactors};
+use super::matrix::{Factor, ViewFactors};
+
+/// Exchange areas A_i F_ij from one group, by ascending index of the other.
+type ExchangeRow = Vec<(u32, f64)>;
 
 /// What enforcing closure and reciprocity has changed. Dimensionless, as form factors are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,36 +43,38 @@ pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) 
     let mut exchange = symmetric_exchange(matrix);
     let lost: Vec<f64> = (0..n).map(|i| lost_exchange(matrix, i, closed[i])).collect();
     let x = scaling(&exchange, &lost, &matrix.areas);
-    for (i, row) in exchange.iter_mut().enumerate() {
-        for (&j, area) in row.iter_mut() {
-            *area *= x[i] * x[j as usize];
-        }
-    }
-    let row_total =
-        |i: usize| (exchange[i].values().sum::<f64>() + x[i] * lost[i]) / matrix.areas[i];
+    exchange.par_iter_mut().enumerate().for_each(|(i, row)| {
+        row.iter_mut().for_each(|(j, area)| *area *= x[i] * x[*j as usize]);
+    });
+    let row_total = |i: usize| (row_sum(&exchange[i], |_| 1.0) + x[i] * lost[i]) / matrix.areas[i];
+    let totals: Vec<f64> = (0..n).into_par_iter().map(row_total).collect();
     // Below 1 by the rounding of a sum, so that no order of summation is above it.
-    let largest_total = (0..n).map(row_total).fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
-    let closure_left = (0..n).map(|i| (row_total(i) - 1.0).abs()).fold(0.0, f64::max);
-    let mut enforced = matrix.clone();
-    let mut sum_of_squares = 0.0;
-    let mut count = 0.0;
-    let mut max_change = 0.0_f64;
-    for (i, row) in exchange.iter().enumerate() {
-        let area = matrix.areas[i];
-        for (&j, &exchange_area) in row {
-            let value = exchange_area / area / largest_total;
-            let change = value - matrix.factor(i, j as usize).value;
-            sum_of_squares += change * change;
-            count += 1.0;
-            max_change = max_change.max(change.abs());
-            set_factor(&mut enforced, i, j, value);
-        }
+    let largest_total =
+        totals.iter().copied().fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
+    let closure_left = totals.iter().map(|total| (total - 1.0).abs()).fold(0.0, f64::max);
+    let scaled_row = |(i, row): (usize, &ExchangeRow)| {
+        let of_area = |&(j, area): &(u32, f64)| (j, area / matrix.areas[i] / largest_total);
+        changed_row(&matrix.factors[i], row.iter().map(of_area))
+    };
+    let rows: Vec<ChangedRow> = exchange.par_iter().enumerate().map(scaled_row).collect();
+    let count = rows.iter().map(|row| row.factors.len()).sum::<usize>() as f64;
+    let sum_of_squares: f64 = rows.iter().map(|row| row.sum_of_squares).sum();
+    let rms_change = if count > 0.0 { f64::sqrt(sum_of_squares / count) } else { 0.0 };
+    let max_change = rows.iter().map(|row| row.max_change).fold(0.0, f64::max);
+    let mut enforced = ViewFactors {
+        names: matrix.names.clone(),
+        areas: matrix.areas.clone(),
+        factors: rows.into_iter().map(|row| row.factors).collect(),
+        open: matrix.open.clone(),
+        back: matrix.back.clone(),
+        absent: matrix.absent,
+    };
+    for i in 0..n {
         let scale = x[i] / largest_total;
         enforced.back[i].value = (matrix.back[i].value * scale).max(0.0);
         let open = if closed[i] { 0.0 } else { (matrix.open[i].value * scale).max(0.0) };
         enforced.open[i].value = open;
     }
-    let rms_change = if count > 0.0 { f64::sqrt(sum_of_squares / count) } else { 0.0 };
     let closed_rows = closed.iter().filter(|c| **c).count();
     (enforced, EnforcementReport { rms_change, max_change, closed_rows, closure_left })
 }
@@ -81,55 +86,84 @@ fn lost_exchange(matrix: &ViewFactors, i: usize, is_closed: bool) -> f64 {
 }
 
 /// Exchange areas A_i F_ij, the same both ways: means weighted by inverse variances.
-fn symmetric_exchange(matrix: &ViewFactors) -> Vec<BTreeMap<u32, f64>> {
-    let mut rows: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); matrix.areas.len()];
-    for (i, row) in matrix.factors.iter().enumerate() {
-        for there in row {
-            let j = there.to as usize;
-            let back = matrix.factor(j, i);
-            let (a, b) = (matrix.areas[i], matrix.areas[j]);
-            let (value_there, error_there) = (a * there.value, a * there.error);
-            let (value_back, error_back) = (b * back.value, b * back.error);
-            let weight = if error_there * error_back > 0.0 {
-                let square = error_back * error_back;
-                square / (error_there * error_there + square)
-            } else {
-                0.5
-            };
-            let mean = weight * value_there + (1.0 - weight) * value_back;
-            let exchange_area = mean.max(0.0);
-            rows[i].insert(j as u32, exchange_area);
-            rows[j].insert(i as u32, exchange_area);
-        }
+fn symmetric_exchange(matrix: &ViewFactors) -> Vec<ExchangeRow> {
+    let n = matrix.areas.len();
+    let is_known = |i: usize, j: u32| matrix.factors[i].binary_search_by_key(&j, |f| f.to).is_ok();
+    let one_way = |i: usize| -> Vec<u32> {
+        let others = matrix.factors[i].iter().map(|f| f.to);
+        others.filter(|&j| !is_known(j as usize, i as u32)).collect()
+    };
+    let one_way: Vec<Vec<u32>> = (0..n).into_par_iter().map(one_way).collect();
+    // Per group, those that see it and that it does not see.
+    let mut unseen: Vec<Vec<u32>> = vec![Vec::new(); n];
+    for (i, to) in one_way.iter().enumerate() {
+        to.iter().for_each(|&j| unseen[j as usize].push(i as u32));
     }
-    rows
+    let row = |(i, unseen): (usize, Vec<u32>)| -> ExchangeRow {
+        let mut columns: Vec<u32> = matrix.factors[i].iter().map(|f| f.to).collect();
+        columns.extend(unseen);
+        columns.sort_unstable();
+        columns.into_iter().map(|j| (j, mean_exchange(matrix, i, j as usize))).collect()
+    };
+    unseen.into_par_iter().enumerate().map(row).collect()
 }
 
-/// Sets a factor; what it changes by is added to its error, in squares.
-fn set_factor(matrix: &mut ViewFactors, i: usize, to: u32, value: f64) {
-    let row = &mut matrix.factors[i];
-    match row.binary_search_by_key(&to, |f| f.to) {
-        Ok(k) => {
-            row[k].error = row[k].error.hypot(value - row[k].value);
-            row[k].value = value;
-        }
-        Err(k) => {
-            debug_assert_eq!(matrix.absent, Missing::NotSeen);
-            row.insert(k, Factor { to, value, error: value });
-        }
+/// The exchange area of two groups, from the factors both ways; the same bits either way.
+fn mean_exchange(matrix: &ViewFactors, i: usize, j: usize) -> f64 {
+    let (i, j) = (i.max(j), i.min(j));
+    let (there, back) = (matrix.factor(i, j), matrix.factor(j, i));
+    let (a, b) = (matrix.areas[i], matrix.areas[j]);
+    let (value_there, error_there) = (a * there.value, a * there.error);
+    let (value_back, error_back) = (b * back.value, b * back.error);
+    let weight = if error_there * error_back > 0.0 {
+        let square = error_back * error_back;
+        square / (error_there * error_there + square)
+    } else {
+        0.5
+    };
+    (weight * value_there + (1.0 - weight) * value_back).max(0.0)
+}
+
+/// A row with other values.
+struct ChangedRow {
+    factors: Vec<Factor>,
+    /// Of the changes of factors.
+    sum_of_squares: f64,
+    max_change: f64,
+}
+
+/// The row `before` with these `values`; what a factor changes by is added to its error, in
+/// squares. One that was not there is all error.
+fn changed_row(before: &[Factor], values: impl Iterator<Item = (u32, f64)>) -> ChangedRow {
+    let mut before = before.iter().peekable();
+    let mut row = ChangedRow { factors: vec![], sum_of_squares: 0.0, max_change: 0.0 };
+    for (to, value) in values {
+        let known = before.next_if(|f| f.to == to);
+        let change = value - known.map_or(0.0, |f| f.value);
+        let error = known.map_or(value, |f| f.error.hypot(change));
+        row.sum_of_squares += change * change;
+        row.max_change = row.max_change.max(change.abs());
+        row.factors.push(Factor { to, value, error });
     }
+    row
+}
+
+/// Σ_j G_ij x_j over a row of exchange areas.
+fn row_sum(row: &ExchangeRow, x: impl Fn(usize) -> f64) -> f64 {
+    row.iter().map(|&(j, area)| area * x(j as usize)).sum()
 }
 
 /// The x with x_i (Σ_j G_ij x_j + lost_i) = A_i, as closely as there is one (P. A. Knight, D. Ruiz,
 /// B. Uçar 2014, see [`ViewFactors::enforced`]).
-fn scaling(exchange: &[BTreeMap<u32, f64>], lost: &[f64], areas: &[f64]) -> Vec<f64> {
+fn scaling(exchange: &[ExchangeRow], lost: &[f64], areas: &[f64]) -> Vec<f64> {
     let mut x = vec![1.0; areas.len()];
     for _ in 0..MAX_SINKHORN_STEPS {
-        let ratio = |i: usize| {
-            let arrives: f64 = exchange[i].iter().map(|(&j, area)| area * x[j as usize]).sum();
-            x[i] * (arrives + lost[i]) / areas[i]
+        // A group without area gives nothing.
+        let ratio = |i: usize| match areas[i] > 0.0 {
+            true => x[i] * (row_sum(&exchange[i], |j| x[j]) + lost[i]) / areas[i],
+            false => 0.0,
         };
-        let ratios: Vec<f64> = (0..areas.len()).map(ratio).collect();
+        let ratios: Vec<f64> = (0..areas.len()).into_par_iter().map(ratio).collect();
         if ratios.iter().all(|r| *r == 0.0 || (r - 1.0).abs() <= CLOSURE_TOLERANCE) {
             break;
         }

@@ -46,6 +46,83 @@ struct End {
     standing: Vec<Blocker>,
 }
 
+/// Two convex polygons that are before one another: each clipped to what is before the other's
+/// plane.
+pub(super) struct FacingPair {
+    pub a: Vec<DVec3>,
+    /// Unit normal.
+    pub a_normal: DVec3,
+    pub b: Vec<DVec3>,
+    /// Unit normal.
+    pub b_normal: DVec3,
+}
+
+impl FacingPair {
+    /// Of `s` and `t`; none where one is behind the other.
+    pub fn new(s: &ConvexPolygon, t: &ConvexPolygon) -> Option<FacingPair> {
+        let (&at_s, &at_t) = (s.corners.first()?, t.corners.first()?);
+        if !reaches_before(t, s, at_s) || !reaches_before(s, t, at_t) {
+            return None;
+        }
+        let mut a = clip(&s.corners, at_t, t.normal);
+        let mut b = clip(&t.corners, at_s, s.normal);
+        merge_close_corners(&mut a, SAME_POSITION);
+        merge_close_corners(&mut b, SAME_POSITION);
+        let both = a.len() > 2 && b.len() > 2;
+        both.then_some(FacingPair { a, a_normal: s.normal, b, b_normal: t.normal })
+    }
+
+    /// The space between both.
+    pub fn shaft(&self) -> Shaft {
+        Shaft::new(&self.a, self.a_normal, &self.b, self.b_normal)
+    }
+
+    /// A₁F₁₂ with nothing in between.
+    pub fn unoccluded(&self) -> Estimate {
+        unoccluded_exchange(&self.a, self.a_normal, &self.b, self.b_normal)
+    }
+
+    /// The same, the other polygon first.
+    pub fn swapped(self) -> FacingPair {
+        let FacingPair { a, a_normal, b, b_normal } = self;
+        FacingPair { a: b, a_normal: b_normal, b: a, b_normal: a_normal }
+    }
+
+    /// Whether integrating over `a` rather than over `b` is cheaper past what is `between`.
+    pub fn is_better_from_a(&self, between: &[Blocker]) -> bool {
+        let end = |corners: &[DVec3], normal| End {
+            corners: corners.to_vec(),
+            normal,
+            standing: standing_on(corners, normal, between),
+        };
+        is_better_domain(&end(&self.a, self.a_normal), &end(&self.b, self.b_normal))
+    }
+
+    /// What they see of one another past all that is `between`, within their shaft; `seed` makes
+    /// cuts differ from pair to pair.
+    pub fn past(
+        self,
+        between: &[Blocker],
+        visibility: &mut PointVisibility,
+        seed: u64,
+    ) -> PairVisibility {
+        if between.is_empty() {
+            return PairVisibility::Unoccluded(self.unoccluded());
+        }
+        if between.iter().any(|blocker| fully_occludes(blocker, &self.a, &self.b)) {
+            return PairVisibility::Hidden;
+        }
+        let FacingPair { a, a_normal, b, b_normal } = self;
+        let standing_on_a = standing_on(&a, a_normal, between);
+        let standing_on_b = standing_on(&b, b_normal, between);
+        let a = End { corners: a, normal: a_normal, standing: standing_on_a };
+        let b = End { corners: b, normal: b_normal, standing: standing_on_b };
+        let (domain, target) = if is_better_domain(&a, &b) { (a, b) } else { (b, a) };
+        let occluded = occluded_pair(domain, target, between, visibility, seed);
+        PairVisibility::Occluded(Box::new(occluded))
+    }
+}
+
 impl PairVisibility {
     /// Of `s` and `t` past `blockers`; `seed` makes cuts differ from pair to pair.
     pub fn between(
@@ -55,34 +132,9 @@ impl PairVisibility {
         visibility: &mut PointVisibility,
         seed: u64,
     ) -> PairVisibility {
-        let (Some(&at_s), Some(&at_t)) = (s.corners.first(), t.corners.first()) else {
-            return PairVisibility::Hidden;
-        };
-        if !reaches_before(t, s, at_s) || !reaches_before(s, t, at_t) {
-            return PairVisibility::Hidden;
-        }
-        let mut a = clip(&s.corners, at_t, t.normal);
-        let mut b = clip(&t.corners, at_s, s.normal);
-        merge_close_corners(&mut a, SAME_POSITION);
-        merge_close_corners(&mut b, SAME_POSITION);
-        if a.len() < 3 || b.len() < 3 {
-            return PairVisibility::Hidden;
-        }
-        let between = blockers.within(&Shaft::new(&a, s.normal, &b, t.normal));
-        if between.is_empty() {
-            let exchange = unoccluded_exchange(&a, s.normal, &b, t.normal);
-            return PairVisibility::Unoccluded(exchange);
-        }
-        if between.iter().any(|blocker| fully_occludes(blocker, &a, &b)) {
-            return PairVisibility::Hidden;
-        }
-        let standing_on_a = standing_on(&a, s.normal, &between);
-        let standing_on_b = standing_on(&b, t.normal, &between);
-        let a = End { corners: a, normal: s.normal, standing: standing_on_a };
-        let b = End { corners: b, normal: t.normal, standing: standing_on_b };
-        let (domain, target) = if is_better_domain(&a, &b) { (a, b) } else { (b, a) };
-        let occluded = occluded_pair(domain, target, &between, visibility, seed);
-        PairVisibility::Occluded(Box::new(occluded))
+        let Some(pair) = FacingPair::new(s, t) else { return PairVisibility::Hidden };
+        let between = blockers.within(&pair.shaft());
+        pair.past(&between, visibility, seed)
     }
 }
 

@@ -78,8 +78,10 @@ impl PointVisibility {
         let reach = self.corners.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let depth = self.corners.first().map_or(0.0, |v| -facing.dot(*v));
         for blocker in blockers {
-            if self.set_shadow_cone(point, blocker) {
-                let shadow = shadow_bounds(point, blocker, facing, depth, SHADOW_MARGIN * reach);
+            let shadow = shadow_bounds(point, blocker, facing, depth, SHADOW_MARGIN * reach);
+            let mut regions = self.visible_regions.iter();
+            let reaches_any = regions.any(|region| region.bounds.overlaps(&shadow));
+            if reaches_any && self.set_shadow_cone(point, blocker) {
                 self.subtract_shadow(&shadow, PLANE_TOLERANCE * reach);
                 if self.visible_regions.is_empty() {
                     return PointFactors { visible: 0.0, unoccluded };
@@ -156,19 +158,30 @@ impl PointVisibility {
 }
 
 /// A box around what `blocker` hides, from `point`, of a plane at `depth` before it that faces
-/// `facing`, expanded by `margin`; everything where a part of the blocker is beside the point or
+/// `facing`, expanded by `margin`; everything where all of the blocker is beside the point or
 /// behind it.
 fn shadow_bounds(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
+    let least = SHADOW_MARGIN * depth;
     let mut bounds = Aabb::EMPTY;
+    let Some(&last) = blocker.corners.last() else { return bounds };
+    let mut before = last - point;
+    let mut height_before = -facing.dot(before);
+    let mut is_any_before = false;
     for corner in &blocker.corners {
         let v = corner - point;
         let height = -facing.dot(v);
-        if height <= SHADOW_MARGIN * depth {
-            return Aabb::EVERYTHING;
+        if (height > least) != (height_before > least) {
+            // Where the edge gets beside the point, its shadow goes far off.
+            let crossing = before.lerp(v, (least - height_before) / (height - height_before));
+            bounds.include(crossing * (depth / least));
         }
-        bounds.include(v * (depth / height));
+        if height > least {
+            is_any_before = true;
+            bounds.include(v * (depth / height));
+        }
+        (before, height_before) = (v, height);
     }
-    bounds.expanded(margin)
+    if is_any_before { bounds.expanded(margin) } else { Aabb::EVERYTHING }
 }
 
 #[cfg(test)]

@@ -256,6 +256,59 @@ fn view_factors_of_facets_are_a_row_a_face() {
 }
 
 #[test]
+fn sparse_rows_for_scipy_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    // A floor, a lid over its left half, and a wall behind the lid's back.
+    let text = "o floor\nv 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf 1 2 3 4\n\
+                o lid\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n\
+                o above\nv 0 0 2\nv 0 1 2\nv 1 1 2\nv 1 0 2\nf 9 10 11 12\n";
+    let scene = write(folder.path(), "lids.obj", text);
+    let arguments = ["--format", "npz,csv", "--check", "3"];
+    let out = run("view-factors", &[&[scene.to_str().unwrap()][..], &arguments].concat());
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    // Exact rows against an exact matrix.
+    assert!(said.contains("of 3 rows") && said.contains("100.00 % within two"), "{said}");
+    let file = std::fs::File::open(folder.path().join("lids.npz")).unwrap();
+    let mut archive = zip::ZipArchive::new(file).unwrap();
+    let mut bytes = |name: &str| {
+        let mut bytes = vec![];
+        let mut array = archive.by_name(&format!("{name}.npy")).unwrap();
+        std::io::Read::read_to_end(&mut array, &mut bytes).unwrap();
+        bytes
+    };
+    let format = bytes("format");
+    assert!(format.ends_with(b"csr") && String::from_utf8_lossy(&format).contains("'|S3'"));
+    fn numbers<T: npyz::Deserialize>(bytes: &[u8]) -> Vec<T> {
+        npyz::NpyFile::new(bytes).unwrap().into_vec().unwrap()
+    }
+    assert_eq!(numbers::<i64>(&bytes("shape")), [3, 3]);
+    let starts: Vec<i64> = numbers(&bytes("indptr"));
+    let columns: Vec<i32> = numbers(&bytes("indices"));
+    let (values, errors): (Vec<f64>, Vec<f64>) =
+        (numbers(&bytes("data")), numbers(&bytes("standard_error")));
+    let csv = std::fs::read_to_string(folder.path().join("lids.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    let number = |row: usize, column: usize| rows[row][column].parse::<f64>().unwrap();
+    let mut nonzeros = 0;
+    for i in 0..3 {
+        let row = starts[i] as usize..starts[i + 1] as usize;
+        nonzeros += row.len();
+        for k in row {
+            // The table has nine decimals.
+            assert!((values[k] - number(i, 1 + columns[k] as usize)).abs() < 1e-9, "{csv}");
+            assert!(errors[k] >= 0.0 && errors[k] < 1e-4);
+        }
+        for (name, column) in [("open", 4), ("back", 5), ("area", 6)] {
+            let all: Vec<f64> = numbers(&bytes(name));
+            assert!((all[i] - number(i, column)).abs() < 1e-9, "{name} {csv}");
+        }
+    }
+    let in_table = (0..3).map(|i| (1..4).filter(|j| number(i, *j) > 0.0).count()).sum();
+    assert_eq!((nonzeros, columns.len(), values.len()), (in_table, in_table, in_table));
+}
+
+#[test]
 fn square_tables_of_many_facets_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     // One more than there may be.
@@ -385,7 +438,7 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["bake", "a.obj", "--camera", "1,2,3"], &["--camera", "'1,2,3'", "7 numbers", "or 10"]),
         (&["bake", "a.obj", "--write", "ply,gif"], &["--write", "'ply,gif'", "json"]),
         (&["view-factors", "--error", "1e-3"], &["no scene", "usage: radiosity view-factors"]),
-        (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy"]),
+        (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy, npz"]),
         (&["view-factors", "a.obj", "--cpu"], &["--cpu need --sampled"]),
         (&["view-factors", "a.obj", "--sampled", "--error", "1"], &["not for --sampled"]),
         (&["verify", "a.obj"], &["PLY file of its solution", "usage: radiosity verify"]),

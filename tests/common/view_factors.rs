@@ -13,7 +13,7 @@ pub fn data(name: &str) -> PathBuf {
 
 /// Exact view factors of `scene`, to `error`.
 pub fn exact_view_factors(scene: &Scene, error: f64) -> ViewFactors {
-    ViewFactors::new(scene, error, &[], keep_counting).unwrap().unwrap()
+    ViewFactors::exact(scene, error, &[], keep_counting).unwrap().unwrap()
 }
 
 /// Which group has this name.

@@ -1,3 +1,4 @@
 mod checks;
 mod exact;
 mod sampled;
+mod sparse;

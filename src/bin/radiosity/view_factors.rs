@@ -1,5 +1,6 @@
 //! `radiosity view-factors`: view factors between the groups of scenes, as tables.
 
+mod check;
 mod files;
 
 use std::num::NonZeroU32;
@@ -18,8 +19,8 @@ use crate::progress;
 use crate::scene_options::SceneOptions;
 
 pub const USAGE: &str = "\
-usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--enforce]
-                    [--format F,…] [--out DIR]
+usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--check ROWS]
+                    [--enforce] [--format F,…] [--out DIR]
        radiosity view-factors SCENE.obj… --sampled [--facets] [--element-size X] [--hemicube N]
                     [--adapter NAME | --cpu] [--enforce] [--format F,…] [--out DIR]
 
@@ -30,13 +31,17 @@ what leaves the scene, `back` what meets the backs of surfaces.
 
   --facets          between faces instead: each is a group of its own, in the file's order, named
                     GROUP/1, GROUP/2, …; --two-sided takes the names of GROUPs too
-  --error E         absolute error wanted of every factor [1e-4]
+  --error E         absolute error wanted of every factor, two standard errors [1e-4]; far
+                    smaller errors where exact factors take no minutes
   --two-sided NAME  this group gives and takes on both sides; its area is that of both
+  --check ROWS      hold so many rows, drawn at random, against exact ones, and print how far off
+                    they are; an exact row of a large scene takes seconds
   --enforce         make the matrix keep closure and reciprocity, and say what that changed
   --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
                     SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
-                    f_from_row_to_column and standard_error; square tables have 8192 groups at
-                    most [csv,list, or list for more]
+                    f_from_row_to_column and standard_error; npz: sparse rows as SciPy's load_npz
+                    reads them, with standard errors, areas, open and back, SCENE.npz; square
+                    tables have 8192 groups at most [csv,list, or npz for more]
   --sampled         from hemicubes, one an element: for scenes of more than some ten thousand
                     polygons; the error is what it is
   --element-size X  longest edge of the elements that are seen from [diagonal / 32]
@@ -67,7 +72,7 @@ struct Options {
 }
 
 enum Method {
-    Exact { error: f64, two_sided: Vec<String>, facets: bool },
+    ToError { error: f64, two_sided: Vec<String>, facets: bool, check: usize },
     Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
 }
 
@@ -88,7 +93,7 @@ impl Options {
     fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
         let (mut scenes, mut out, mut enforce) = (vec![], None, false);
         let mut formats = None;
-        let (mut error, mut two_sided) = (None, vec![]);
+        let (mut error, mut two_sided, mut check) = (None, vec![], None);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let (mut device, mut facets) = (None, false);
         let mut reading = SceneOptions::ignoring_specular();
@@ -103,6 +108,9 @@ impl Options {
                 }
                 Long("enforce") => enforce = true,
                 Long("error") => error = Some(args::value(parser, "error", "a number")?),
+                Long("check") => {
+                    check = Some(args::value(parser, "check", "a whole number of rows")?);
+                }
                 Long("two-sided") => {
                     two_sided.push(args::value(parser, "two-sided", "a group's name")?);
                 }
@@ -129,11 +137,12 @@ impl Options {
         if scenes.is_empty() {
             return Err(Stop::usage("no scene given: name one or more OBJ files"));
         }
-        let only_exact = error.is_some() || !two_sided.is_empty();
+        let only_to_error = error.is_some() || !two_sided.is_empty() || check.is_some();
         let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
         let method = if sampled {
-            if only_exact {
-                return Err(Stop::usage("--error and --two-sided are not for --sampled"));
+            if only_to_error {
+                let not_for = "--error, --two-sided and --check are not for --sampled";
+                return Err(Stop::usage(not_for));
             }
             let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
             let device = device.unwrap_or(Device::Gpu(None));
@@ -143,7 +152,8 @@ impl Options {
                 let needing = "--element-size, --hemicube, --adapter and --cpu need --sampled";
                 return Err(Stop::usage(needing));
             }
-            Method::Exact { error: error.unwrap_or(DEFAULT_ERROR), two_sided, facets }
+            let (error, check) = (error.unwrap_or(DEFAULT_ERROR), check.unwrap_or(0));
+            Method::ToError { error, two_sided, facets, check }
         };
         Ok(Options { scenes, reading, out, formats, enforce, method })
     }
@@ -168,10 +178,13 @@ impl Options {
             eprintln!("warning: {warning}");
         }
         let start = Instant::now();
-        let mut matrix = self.method.matrix(scene)?;
+        let (mut matrix, scene) = self.method.matrix(scene)?;
         let seconds = start.elapsed().as_secs_f64();
-        say!("{}: {} groups, {seconds:.3} s", path.display(), matrix.names.len());
+        let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
+        let groups = matrix.names.len();
+        say!("{}: {groups} groups, {nonzeros} nonzeros, {seconds:.3} s", path.display());
         print_checks(&matrix);
+        self.method.check(&scene, &matrix)?;
         if self.enforce {
             matrix = enforce(&matrix);
         }
@@ -187,13 +200,14 @@ impl Options {
 
 impl Method {
     /// The view factors between the groups of `scene`.
-    fn matrix(&self, scene: Scene) -> Result<ViewFactors, Error> {
-        let matrix = match self {
-            Method::Exact { error, two_sided, facets } => {
+    fn matrix(&self, scene: Scene) -> Result<(ViewFactors, Scene), Error> {
+        let (matrix, scene) = match self {
+            Method::ToError { error, two_sided, facets, .. } => {
                 let groups = group_indices(&scene, two_sided, *facets)?;
-                progress::of_count("groups", |report| {
+                let matrix = progress::of_count("polygons", |report| {
                     ViewFactors::new(&scene, *error, &groups, report)
-                })?
+                })?;
+                (matrix, scene)
             }
             Method::Sampled { element_size, hemicube, device } => {
                 let size = element_size
@@ -203,12 +217,24 @@ impl Method {
                 let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
                 let AdapterInfo { name, kind, .. } = device.adapter();
                 say!("{} elements, {name} ({kind})", mesh.element_count());
-                progress::of_count("elements", |report| {
+                let matrix = progress::of_count("elements", |report| {
                     ViewFactors::sampled(&mesh, &mut rows, report)
-                })?
+                })?;
+                (matrix, mesh.scene().clone())
             }
         };
-        Ok(matrix.expect("its progress never stops it"))
+        Ok((matrix.expect("its progress never stops it"), scene))
+    }
+
+    /// Holds as many rows of `matrix` as are asked for against exact ones.
+    fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Error> {
+        match self {
+            Method::ToError { error, two_sided, facets, check: rows @ 1.. } => {
+                let groups = group_indices(scene, two_sided, *facets)?;
+                check::check(scene, matrix, *error, &groups, *rows)
+            }
+            _ => Ok(()),
+        }
     }
 }
 

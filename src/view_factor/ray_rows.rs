@@ -1,0 +1,203 @@
+//! Rows of view factors from rays: how many rays of a polygon meet each other one first.
+//!
+//! Rays start from points all over a polygon, in directions in proportion to the cosine, both from
+//! one low-discrepancy set of four dimensions. Each stands for the same share of the flux, so that
+//! a factor is a count.
+//!
+//! ```text
+//!     ╲  │  ╱      first half: which blockers stand around
+//!   ▭──╲─│─╱──▭    second half: what is behind blockers that the first half has not met
+//!  ───────────────
+//! ```
+//!
+//! A factor past only those blockers that are *known* is too large. By how much, the second half of
+//! the rays tells without bias, since what is known does not depend on it.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::convex_polygons::in_units;
+use super::fronts::Fronts;
+use super::polygon_points::{PolygonPoints, scrambled_point};
+use super::tolerances::CONTACT_HEIGHT;
+use crate::scene::Scene;
+use crate::visibility::ray_scene::{Hit, RayScene};
+
+/// A polygon, and how many rays have met it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Count {
+    pub polygon: u32,
+    pub rays: u32,
+}
+
+/// What the first half of the rays of a polygon has met.
+pub(super) struct FirstHalf {
+    /// Fronts, by ascending index.
+    pub fronts: Vec<Count>,
+    /// Rays that met a back.
+    back: u32,
+    /// Indices of blockers, ascending.
+    pub blockers: Vec<u32>,
+}
+
+/// What the rays of a polygon have met.
+pub(super) struct RayRow {
+    /// Rays in all, met something or not.
+    pub rays: u32,
+    /// Fronts, by ascending index.
+    pub fronts: Vec<Count>,
+    /// Rays that met a back.
+    pub back: u32,
+    /// Rays of the second half that met a blocker that was not known.
+    pub unknown: u32,
+    /// Fronts behind those blockers, that the rays would have met past known ones alone.
+    pub hidden: Vec<Count>,
+}
+
+/// The triangles of a scene for rays, in units around its middle.
+pub(super) struct RayCaster<'a> {
+    fronts: &'a Fronts,
+    rays: RayScene,
+    /// Per triangle, the index of the blocker that it is a part of.
+    blockers: Vec<Option<u32>>,
+}
+
+impl<'a> RayCaster<'a> {
+    /// For `scene`, all lengths divided by `unit`; `blockers` has each triangle's.
+    pub fn new(
+        scene: &Scene,
+        unit: f64,
+        fronts: &'a Fronts,
+        blockers: Vec<Option<u32>>,
+    ) -> RayCaster<'a> {
+        let place = in_units(scene, unit);
+        let corners = (0..scene.triangles().len()).map(|t| scene.corners(t).map(&place));
+        let rays = RayScene::new(corners).with_covered_backs(|t| scene.is_back_covered(t));
+        RayCaster { fronts, rays, blockers }
+    }
+
+    /// Per front, the index of the blocker that it is a part of.
+    pub fn blockers_of_fronts(&self) -> Vec<Option<u32>> {
+        let mut of_fronts = vec![None; self.fronts.polygons.len()];
+        for (t, &blocker) in self.blockers.iter().enumerate() {
+            for front in self.fronts.both_sides(t).into_iter().flatten() {
+                of_fronts[front as usize] = blocker;
+            }
+        }
+        of_fronts
+    }
+
+    /// What the first half of `rays` rays from polygon `s` meets.
+    pub fn first_half(&self, s: u32, rays: u32) -> FirstHalf {
+        let (mut met, mut blockers, mut back) = (vec![], vec![], 0);
+        self.cast(s, 0..rays / 2, |_, _, hit| {
+            match self.fronts.met(hit.triangle, hit.front) {
+                Some(front) => met.push(front),
+                None => back += 1,
+            }
+            blockers.extend(self.blockers[hit.triangle]);
+        });
+        blockers.sort_unstable();
+        blockers.dedup();
+        FirstHalf { fronts: counted(met), back, blockers }
+    }
+
+    /// All of `rays` rays from polygon `s`, after their first half; the `known` blockers ascend.
+    pub fn row(&self, s: u32, rays: u32, first: FirstHalf, known: &[u32]) -> RayRow {
+        let is_known = |hit: &Hit| {
+            self.blockers[hit.triangle].is_none_or(|blocker| known.binary_search(&blocker).is_ok())
+        };
+        let (mut met, mut hidden, mut back, mut unknown) = (vec![], vec![], first.back, 0);
+        self.cast(s, rays / 2..rays, |from, direction, hit| {
+            match self.fronts.met(hit.triangle, hit.front) {
+                Some(front) => met.push(front),
+                None => back += 1,
+            }
+            unknown += u32::from(!is_known(hit));
+            let mut last = *hit;
+            while !is_known(&last) {
+                let start = last.distance + CONTACT_HEIGHT;
+                let Some(next) = self.first_hit(s, from, direction, start) else { break };
+                hidden.extend(self.fronts.met(next.triangle, next.front));
+                last = next;
+            }
+        });
+        let fronts = sum_of_counts(&first.fronts, &counted(met));
+        RayRow { rays, fronts, back, unknown, hidden: counted(hidden) }
+    }
+
+    /// The share of a set of rays from polygon `s` that meet polygon `t` first; each `seed` gives
+    /// other rays.
+    pub fn share(&self, s: u32, t: u32, rays: u32, seed: u64) -> f64 {
+        let mut count = 0;
+        self.cast_set(s, 0..rays, seed, |_, _, hit| {
+            count += u32::from(self.fronts.met(hit.triangle, hit.front) == Some(t));
+        });
+        f64::from(count) / f64::from(rays)
+    }
+
+    /// Whether anything but polygons `s` and `t` is between two points, one on each.
+    pub fn is_hidden(&self, [s, t]: [u32; 2], from: DVec3, to: DVec3) -> bool {
+        let is_other = |hit: &Hit| {
+            let sides = self.fronts.both_sides(hit.triangle);
+            !sides.contains(&Some(s)) && !sides.contains(&Some(t))
+        };
+        self.rays.occluded(from, to - from, CONTACT_HEIGHT..1.0 - CONTACT_HEIGHT, is_other)
+    }
+
+    /// Calls `meets` with the start and direction of each of these rays of polygon `s` that meets
+    /// something, and what it meets.
+    fn cast(&self, s: u32, rays: Range<u32>, meets: impl FnMut(DVec3, DVec3, &Hit)) {
+        self.cast_set(s, rays, u64::from(s) << 32, meets);
+    }
+
+    fn cast_set(
+        &self,
+        s: u32,
+        rays: Range<u32>,
+        seed: u64,
+        mut meets: impl FnMut(DVec3, DVec3, &Hit),
+    ) {
+        let polygon = &self.fronts.polygons[s as usize];
+        let points = PolygonPoints::new(&polygon.corners);
+        let (x, y) = polygon.normal.any_orthonormal_pair();
+        for k in rays {
+            let [u, v, radius2, turn] = scrambled_point(k, seed);
+            let from = points.at(u, v);
+            // Malley's method, as in `sampling::hemisphere`.
+            let (sin, cos) = (TAU * turn).sin_cos();
+            let across = radius2.sqrt() * (x * cos + y * sin);
+            let direction = across + polygon.normal * (1.0 - radius2).sqrt();
+            if let Some(hit) = self.first_hit(s, from, direction, CONTACT_HEIGHT) {
+                meets(from, direction, &hit);
+            }
+        }
+    }
+
+    /// What a ray from polygon `s` meets first beyond `start`.
+    fn first_hit(&self, s: u32, from: DVec3, direction: DVec3, start: f64) -> Option<Hit> {
+        let is_other = |hit: &Hit| !self.fronts.both_sides(hit.triangle).contains(&Some(s));
+        self.rays.closest_hit_of(from, direction, start, None, is_other)
+    }
+}
+
+/// Polygons in any order, as counts by ascending index.
+fn counted(mut polygons: Vec<u32>) -> Vec<Count> {
+    polygons.sort_unstable();
+    let runs = polygons.chunk_by(|a, b| a == b);
+    runs.map(|run| Count { polygon: run[0], rays: run.len() as u32 }).collect()
+}
+
+/// The counts of two ascending lists added up.
+pub(super) fn sum_of_counts(a: &[Count], b: &[Count]) -> Vec<Count> {
+    let mut union = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    while let Some(polygon) = [a.peek(), b.peek()].into_iter().flatten().map(|c| c.polygon).min() {
+        let of_a = a.next_if(|c| c.polygon == polygon).map_or(0, |c| c.rays);
+        let of_b = b.next_if(|c| c.polygon == polygon).map_or(0, |c| c.rays);
+        union.push(Count { polygon, rays: of_a + of_b });
+    }
+    union
+}
