@@ -156,7 +156,7 @@ impl PairEstimator<'_> {
         let known = self.known[small as usize];
         let between = self.blockers.of_these_within(known, &pair.shaft());
         if between.len() > MAX_KNOWN_BLOCKERS {
-            return self.from_sets([small, large], tolerance);
+            return self.sets_of_rays([small, large], tolerance);
         }
         let past_known = if between.is_empty() {
             unoccluded
@@ -176,7 +176,7 @@ impl PairEstimator<'_> {
     }
 
     /// The exchange from sets of rays, until their means agree.
-    fn from_sets(&self, [s, t]: [u32; 2], tolerance: f64) -> Estimate {
+    fn sets_of_rays(&self, [s, t]: [u32; 2], tolerance: f64) -> Estimate {
         let area = self.polygon(s).area;
         let mut means: Vec<f64> = vec![];
         loop {
