@@ -16,8 +16,8 @@ use super::matrix::{Missing, ViewFactors};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MatrixChecks {
-    /// Row sum + open + back − 1, over rows. The `open` of an exact or sparse matrix is not measured
-    /// but left over: there it is row sum + back − 1, over the rows that are closed.
+    /// Row sum + open + back − 1, over rows. The `open` of an exact or sparse matrix is left over,
+    /// not measured: there it is row sum + back − 1, over the rows that are closed.
     pub closure: ErrorStats,
     /// (A_i F_ij − A_j F_ji) / min(A_i, A_j), over pairs: an error of the smaller group's factor.
     pub reciprocity: ErrorStats,

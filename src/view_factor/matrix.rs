@@ -16,8 +16,8 @@ pub struct ViewFactors {
     pub areas: Vec<f64>,
     /// Per group i, the groups j that it sees, by ascending index.
     pub factors: Vec<Vec<Factor>>,
-    /// Fraction of the flux leaving group i that meets nothing. Of an exact or sparse matrix this is
-    /// what is left over: in a closed scene, the closure error of the row.
+    /// Fraction of the flux leaving group i that meets nothing. Of an exact or a sparse matrix this
+    /// is what is left over: in a closed scene, the closure error of the row.
     pub open: Vec<Estimate>,
     /// Fraction of the flux leaving group i that meets the back of a surface.
     pub back: Vec<Estimate>,

@@ -12,11 +12,11 @@
 //! much was met                     sets of rays, until they agree
 //! ```
 //!
-//! The choice rests on U, not on the count, so that chance does not choose. Of the other methods,
-//! what comes out is divided by the chance that a ray meets the pair at all, 1 − exp(−D A₁F₁₂): what
-//! others miss is added to those that are met, and sums are right on the average (D. G. Horvitz,
-//! D. J. Thompson, "A generalization of sampling without replacement from a finite universe",
-//! 1952).
+//! The choice rests on U, not on the count, so that chance does not choose. What comes out of the
+//! other methods is divided by the chance that a ray meets the pair at all, 1 − exp(−D A₁F₁₂):
+//! those that are met stand for those that are not, and sums are right on the average
+//! (D. G. Horvitz, D. J. Thompson, "A generalization of sampling without replacement from a finite
+//! universe", 1952).
 
 use rayon::prelude::*;
 
