@@ -5,6 +5,8 @@
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
+
 use super::convex_polygons::ConvexPolygon;
 use super::shaft::{Blocker, Shaft};
 use super::tolerances::SAME_POSITION;
@@ -34,24 +36,13 @@ impl BlockerTree {
     }
 
     /// Unit normal of polygon `k`.
-    pub fn normal(&self, k: u32) -> glam::DVec3 {
+    pub fn normal(&self, k: u32) -> DVec3 {
         self.polygons[k as usize].normal
     }
 
     /// What of the polygons is strictly within `shaft`.
     pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
-        let mut blockers = Vec::new();
-        self.bvh.visit(
-            |node| shaft.intersects(node),
-            |k| {
-                let polygon = &self.polygons[k as usize];
-                if let Some(corners) = shaft.clip(&polygon.corners) {
-                    blockers.push(Blocker { corners, normal: polygon.normal });
-                }
-                ControlFlow::Continue(())
-            },
-        );
-        blockers
+        self.few_within(shaft, usize::MAX).unwrap_or_default()
     }
 
     /// The same, or nothing where they are more than `most`.
@@ -60,14 +51,10 @@ impl BlockerTree {
         self.bvh.visit(
             |node| shaft.intersects(node),
             |k| {
-                let polygon = &self.polygons[k as usize];
-                if let Some(corners) = shaft.clip(&polygon.corners) {
-                    blockers.push(Blocker { corners, normal: polygon.normal });
-                }
-                if blockers.len() > most {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
+                blockers.extend(self.part_within(k, shaft));
+                match blockers.len() > most {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
                 }
             },
         );
@@ -76,11 +63,13 @@ impl BlockerTree {
 
     /// What of the polygons of these indices is strictly within `shaft`.
     pub fn of_these_within(&self, indices: &[u32], shaft: &Shaft) -> Vec<Blocker> {
-        let polygons = indices.iter().map(|&k| &self.polygons[k as usize]);
-        let inside = |polygon: &ConvexPolygon| {
-            Some(Blocker { corners: shaft.clip(&polygon.corners)?, normal: polygon.normal })
-        };
-        polygons.filter_map(inside).collect()
+        indices.iter().filter_map(|&k| self.part_within(k, shaft)).collect()
+    }
+
+    /// What of polygon `k` is strictly within `shaft`, if anything.
+    fn part_within(&self, k: u32, shaft: &Shaft) -> Option<Blocker> {
+        let polygon = &self.polygons[k as usize];
+        Some(Blocker { corners: shaft.clip(&polygon.corners)?, normal: polygon.normal })
     }
 
     /// The polygons in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.

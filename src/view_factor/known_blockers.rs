@@ -6,6 +6,7 @@
 use rustc_hash::FxHashMap;
 
 use super::blocker_tree::BlockerTree;
+use super::convex_polygons::ConvexPolygon;
 use super::fronts::Fronts;
 use super::ray_rows::FirstHalf;
 
@@ -28,7 +29,7 @@ impl KnownBlockers {
         of_fronts: &[Option<u32>],
         halves: &[FirstHalf],
     ) -> KnownBlockers {
-        let side = |(polygon, &blocker): (&super::convex_polygons::ConvexPolygon, &Option<u32>)| {
+        let side = |(polygon, &blocker): (&ConvexPolygon, &Option<u32>)| {
             blocker.map(|k| (k, polygon.normal.dot(blockers.normal(k)) > 0.0))
         };
         let sides: Vec<_> = fronts.polygons.iter().zip(of_fronts).map(side).collect();

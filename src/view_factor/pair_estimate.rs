@@ -33,20 +33,19 @@ use super::visible_mean::{MIN_POINTS, visible_mean};
 use crate::sampling::hash::split_mix64;
 
 /// Shadow rays that are cast before a shaft is looked at; fewer are not cast, for their error would
-/// be uncertain. Measured: they take as long as a shaft.
+/// be uncertain. Measured: 13 µs, where a shaft takes 8 µs.
 const MIN_SHADOW_RAYS: u32 = 32;
 
-/// Shadow rays at most where much is in the shaft. Measured: they take as long as points past some
-/// ten blockers.
+/// Shadow rays at most where much is in the shaft: beyond, points are tried. Chosen by hand.
 const MAX_SHADOW_RAYS: f64 = 1000.0;
 
-/// Times of a point's view, and of one blocker of it, in shadow rays. Measured: 1 µs and 0.25 µs,
-/// where a ray takes 0.4 µs.
+/// Times of a point's view, and of one blocker of it, in shadow rays: some 1 µs and 0.25 µs, by 10
+/// to 16 µs measured past 40 to 70 blockers, where a ray takes 0.4 µs.
 const POINT_COST: f64 = 2.5;
 const BLOCKER_COST: f64 = 0.6;
 
-/// Blockers in a shaft that are few. Measured in a city: beyond, those that rays have met are
-/// fewer.
+/// Blockers in a shaft that are few: beyond, those that rays have met are likely fewer. Chosen by
+/// hand.
 const FEW_BLOCKERS: usize = 64;
 
 /// Known blockers past which points are dearer than rays. Chosen by hand.

@@ -28,8 +28,8 @@ use crate::scene::Scene;
 /// Standard errors are this share of the error asked for, so that 19 of 20 factors are within it.
 const ERROR_SHARE: f64 = 0.5;
 
-/// Rays of a polygon, times the error asked for. Measured in a city: half as many leave more to
-/// shadow rays, twice as many take longer themselves.
+/// Rays of a polygon, times the error asked for: a factor as large as that is met by a few. Chosen
+/// by hand; fewer leave more to shadow rays, more take longer themselves.
 const RAYS_TIMES_ERROR: f64 = 1.6;
 
 /// Rays of a polygon: at least, so that its half tells something; at most, to limit time.

@@ -178,7 +178,7 @@ impl Options {
             eprintln!("warning: {warning}");
         }
         let start = Instant::now();
-        let (mut matrix, scene) = self.method.matrix(scene)?;
+        let mut matrix = self.method.matrix(&scene)?;
         let seconds = start.elapsed().as_secs_f64();
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
         let groups = matrix.names.len();
@@ -200,30 +200,28 @@ impl Options {
 
 impl Method {
     /// The view factors between the groups of `scene`.
-    fn matrix(&self, scene: Scene) -> Result<(ViewFactors, Scene), Error> {
-        let (matrix, scene) = match self {
+    fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Error> {
+        let matrix = match self {
             Method::ToError { error, two_sided, facets, .. } => {
-                let groups = group_indices(&scene, two_sided, *facets)?;
-                let matrix = progress::of_count("polygons", |report| {
-                    ViewFactors::new(&scene, *error, &groups, report)
-                })?;
-                (matrix, scene)
+                let groups = group_indices(scene, two_sided, *facets)?;
+                progress::of_count("polygons", |report| {
+                    ViewFactors::new(scene, *error, &groups, report)
+                })?
             }
             Method::Sampled { element_size, hemicube, device } => {
                 let size = element_size
-                    .unwrap_or_else(|| BakeSettings::elements_only(&scene).solve.element_size);
-                let mesh = Mesh::new(scene, size)?;
+                    .unwrap_or_else(|| BakeSettings::elements_only(scene).solve.element_size);
+                let mesh = Mesh::new(scene.clone(), size)?;
                 let device = device.open()?;
                 let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
                 let AdapterInfo { name, kind, .. } = device.adapter();
                 say!("{} elements, {name} ({kind})", mesh.element_count());
-                let matrix = progress::of_count("elements", |report| {
+                progress::of_count("elements", |report| {
                     ViewFactors::sampled(&mesh, &mut rows, report)
-                })?;
-                (matrix, mesh.scene().clone())
+                })?
             }
         };
-        Ok((matrix.expect("its progress never stops it"), scene))
+        Ok(matrix.expect("its progress never stops it"))
     }
 
     /// Holds as many rows of `matrix` as are asked for against exact ones.
