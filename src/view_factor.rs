@@ -43,6 +43,7 @@ mod point_visibility;
 mod polygon_points;
 mod ray_rows;
 mod sampled;
+mod scene_polygons;
 mod shadow_rays;
 mod shaft;
 mod sparse;
@@ -53,9 +54,8 @@ mod visual_events;
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
-use self::assembler::{Assembler, GroupSums};
+use self::assembler::Assembler;
+use self::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
@@ -81,11 +81,12 @@ impl ViewFactors {
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
-        if effort::is_exact_too_long(scene, unit_of(scene), two_sided) {
-            ViewFactors::sparse(scene, error, two_sided, progress)
+        let polygons = ScenePolygons::new(scene, two_sided);
+        Ok(if effort::is_exact_too_long(&polygons) {
+            sparse::assemble(scene, polygons, error, progress)
         } else {
-            ViewFactors::exact(scene, error, two_sided, progress)
-        }
+            assembler::assemble(scene, polygons, error, progress)
+        })
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
@@ -111,25 +112,11 @@ impl ViewFactors {
         scene: &Scene,
         error: f64,
         two_sided: &[usize],
-        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
-        let unit = unit_of(scene);
-        let assembler = Assembler::new(scene, unit, error, two_sided);
-        let mut sums = GroupSums::new(scene.groups().len());
-        let count = assembler.row_count();
-        let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH);
-        for start in (0..count).step_by(batch) {
-            let end = (start + batch).min(count);
-            let rows: Vec<_> = (start..end).into_par_iter().map(|s| assembler.row(s)).collect();
-            for (s, row) in (start..end).zip(rows) {
-                sums.add(assembler.group(s), row);
-            }
-            if progress(end, count).is_break() {
-                return Ok(None);
-            }
-        }
-        Ok(Some(sums.into_matrix(scene, assembler.areas(), unit)))
+        let polygons = ScenePolygons::new(scene, two_sided);
+        Ok(assembler::assemble(scene, polygons, error, progress))
     }
 
     /// The matrix of many polygons, of which each sees few: with two absolute standard errors of at
@@ -153,7 +140,8 @@ impl ViewFactors {
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
-        Ok(sparse::assemble(scene, unit_of(scene), error, two_sided, progress))
+        let polygons = ScenePolygons::new(scene, two_sided);
+        Ok(sparse::assemble(scene, polygons, error, progress))
     }
 
     /// Rows of the exact matrix, those of the groups `from`: to hold another matrix against.
@@ -171,7 +159,7 @@ impl ViewFactors {
     ) -> Result<Option<Vec<Vec<Factor>>>, Error> {
         check_settings(scene, error, two_sided)?;
         check_settings(scene, error, from)?;
-        let assembler = Assembler::new(scene, unit_of(scene), error, two_sided);
+        let assembler = Assembler::new(ScenePolygons::new(scene, two_sided), error);
         let mut rows = Vec::with_capacity(from.len());
         for &group in from {
             rows.push(assembler.whole_row(group));
@@ -231,20 +219,6 @@ impl ViewFactors {
     pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
         enforcement::enforce(self)
     }
-}
-
-/// Times that progress is told of a large scene. Chosen by hand.
-const PROGRESS_CALLS: usize = 100;
-
-/// Fewest polygons between two tellings of progress, so that all cores have work. Chosen by hand.
-const MIN_BATCH: usize = 4;
-
-/// Most polygons between two tellings of progress, so that cancelling is heard. Chosen by hand.
-const MAX_BATCH: usize = 64;
-
-/// A power of two near the size of `scene`, so that dividing lengths by it does not round.
-fn unit_of(scene: &Scene) -> f64 {
-    scene.bounds().longest_side().log2().floor().exp2()
 }
 
 /// Whether `error` and `two_sided` are settings of [`ViewFactors::new`].

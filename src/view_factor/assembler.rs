@@ -13,16 +13,17 @@
 //! shared between the polygons of the giving group by area, in squares.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
 use super::blocker_tree::BlockerTree;
-use super::convex_polygons::{ConvexPolygon, Merge, convex_polygons};
+use super::convex_polygons::ConvexPolygon;
 use super::cubature::integrate_adaptively;
-use super::fronts::Fronts;
 use super::matrix::{Estimate, Factor, Missing, ViewFactors};
 use super::pair_visibility::PairVisibility;
 use super::point_visibility::PointVisibility;
+use super::scene_polygons::ScenePolygons;
 use crate::sampling::hash::split_mix64;
 use crate::scene::Scene;
 
@@ -30,6 +31,40 @@ use crate::scene::Scene;
 /// brought to a tenth of that again: rows of thousands of factors then close to a tenth of what was
 /// asked.
 const BOUND_SHARE: f64 = 0.1;
+
+/// Times that progress is told of a large scene. Chosen by hand.
+const PROGRESS_CALLS: usize = 100;
+
+/// Fewest polygons between two tellings of progress, so that all cores have work. Chosen by hand.
+const MIN_BATCH: usize = 4;
+
+/// Most polygons between two tellings of progress, so that cancelling is heard. Chosen by hand.
+const MAX_BATCH: usize = 64;
+
+/// The exact matrix of `scene`, whose `polygons` these are; none if `progress` breaks.
+pub(super) fn assemble(
+    scene: &Scene,
+    polygons: ScenePolygons,
+    error: f64,
+    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Option<ViewFactors> {
+    let unit = polygons.unit;
+    let assembler = Assembler::new(polygons, error);
+    let mut sums = GroupSums::new(scene.groups().len());
+    let count = assembler.fronts.len();
+    let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH);
+    for start in (0..count).step_by(batch) {
+        let end = (start + batch).min(count);
+        let rows: Vec<_> = (start..end).into_par_iter().map(|s| assembler.row(s)).collect();
+        for (s, row) in (start..end).zip(rows) {
+            sums.add(assembler.fronts[s].group as usize, row);
+        }
+        if progress(end, count).is_break() {
+            return None;
+        }
+    }
+    Some(sums.into_matrix(scene, &assembler.areas, unit))
+}
 
 /// All that it takes to find what one polygon gives to others.
 pub(super) struct Assembler {
@@ -45,7 +80,7 @@ pub(super) struct Assembler {
 }
 
 /// A₁F₁₂ from one polygon to later polygons of its own group and to later groups.
-pub(super) struct PolygonRow {
+struct PolygonRow {
     /// By ascending group, no zeros.
     fronts: Vec<(u32, Estimate)>,
     /// To the backs of all groups together.
@@ -53,32 +88,15 @@ pub(super) struct PolygonRow {
 }
 
 impl Assembler {
-    /// Prepares `scene`, all lengths divided by `unit`. Groups of index `two_sided` have two
-    /// fronts.
-    pub fn new(scene: &Scene, unit: f64, error: f64, two_sided: &[usize]) -> Assembler {
-        let fronts = Fronts::new(scene, unit, two_sided);
-        let blockers = BlockerTree::new(convex_polygons(scene, unit, Merge::AcrossGroups).polygons);
+    /// Of `polygons`, with an absolute error of every factor well below `error`.
+    pub fn new(polygons: ScenePolygons, error: f64) -> Assembler {
+        let ScenePolygons { fronts, blockers, .. } = polygons;
         let backs = blockers.backs(&BlockerTree::new(fronts.polygons.clone()));
         Assembler { fronts: fronts.polygons, backs, blockers, areas: fronts.areas, error }
     }
 
-    /// Number of rows: of polygons that give and receive.
-    pub fn row_count(&self) -> usize {
-        self.fronts.len()
-    }
-
-    /// The group of the polygon of row `s`.
-    pub fn group(&self, s: usize) -> usize {
-        self.fronts[s].group as usize
-    }
-
-    /// Radiating area of each group, in squares of the scene's unit.
-    pub fn areas(&self) -> &[f64] {
-        &self.areas
-    }
-
     /// What polygon `s` gives to later ones and to backs.
-    pub fn row(&self, s: usize) -> PolygonRow {
+    fn row(&self, s: usize) -> PolygonRow {
         let mut visibility = PointVisibility::default();
         let from = &self.fronts[s];
         let mut fronts: Vec<(u32, Estimate)> = Vec::new();
@@ -176,7 +194,7 @@ impl EstimateSum {
 }
 
 /// Sums of A_i F_ij over the polygons of groups, in squares of the scene's unit.
-pub(super) struct GroupSums {
+struct GroupSums {
     /// Per group, to itself and to later groups.
     fronts: Vec<BTreeMap<u32, EstimateSum>>,
     /// Per group, to all backs.
@@ -185,7 +203,7 @@ pub(super) struct GroupSums {
 
 impl GroupSums {
     /// Sums of nothing for so many groups.
-    pub fn new(groups: usize) -> GroupSums {
+    fn new(groups: usize) -> GroupSums {
         GroupSums {
             fronts: vec![BTreeMap::new(); groups],
             backs: vec![EstimateSum::default(); groups],
@@ -193,7 +211,7 @@ impl GroupSums {
     }
 
     /// Adds what a polygon of group `from` gives.
-    pub fn add(&mut self, from: usize, row: PolygonRow) {
+    fn add(&mut self, from: usize, row: PolygonRow) {
         for (to, flux) in row.fronts {
             // Pairs within a group are met once and count both ways.
             let factor = if to as usize == from { 2.0 } else { 1.0 };
@@ -203,7 +221,7 @@ impl GroupSums {
     }
 
     /// The matrix, of `areas` in squares of `unit`.
-    pub fn into_matrix(self, scene: &Scene, areas: &[f64], unit: f64) -> ViewFactors {
+    fn into_matrix(self, scene: &Scene, areas: &[f64], unit: f64) -> ViewFactors {
         let mut factors: Vec<Vec<Factor>> = vec![Vec::new(); areas.len()];
         for (i, row) in self.fronts.iter().enumerate() {
             for (&to, &sum) in row {

@@ -1,12 +1,9 @@
 //! Predicts how long an exact matrix takes: what stands between pairs drawn at random.
 
-use super::blocker_tree::BlockerTree;
-use super::convex_polygons::{Merge, convex_polygons};
-use super::fronts::Fronts;
 use super::pair_visibility::FacingPair;
+use super::scene_polygons::ScenePolygons;
 use super::shaft::fully_occludes;
 use crate::sampling::hash::split_mix64_nth;
-use crate::scene::Scene;
 
 /// Pairs that are looked at. Chosen by hand: what one pair in a hundred has is met 41 times, give
 /// or take a sixth.
@@ -22,16 +19,16 @@ const PAIR_COST: f64 = 0.02;
 /// 500 µs each, so one to eight minutes of one core. Chosen by hand.
 const MAX_EXACT_WORK: f64 = 1e6;
 
-/// Whether the exact matrix of `scene` would take minutes or more.
-pub(super) fn is_exact_too_long(scene: &Scene, unit: f64, two_sided: &[usize]) -> bool {
-    let fronts = Fronts::new(scene, unit, two_sided).polygons;
+/// Whether the exact matrix of `polygons` would take minutes or more.
+pub(super) fn is_exact_too_long(polygons: &ScenePolygons) -> bool {
+    let ScenePolygons { fronts, blockers, .. } = polygons;
+    let fronts = &fronts.polygons;
     let count = fronts.len() as f64;
     let all_pairs = 0.5 * count * (count - 1.0);
     // Known before any is drawn.
     if all_pairs * MAX_BLOCKERS as f64 <= MAX_EXACT_WORK {
         return false;
     }
-    let blockers = BlockerTree::new(convex_polygons(scene, unit, Merge::AcrossGroups).polygons);
     let end = |bits: u64| &fronts[(bits % fronts.len() as u64) as usize];
     let work = |k: u64| {
         let bits = split_mix64_nth(k);

@@ -91,17 +91,14 @@ impl<'a> RayCaster<'a> {
 
     /// What the first half of `rays` rays from polygon `s` meets.
     pub fn first_half(&self, s: u32, rays: u32) -> FirstHalf {
-        let (mut met, mut blockers, mut back) = (vec![], vec![], 0);
+        let (mut met, mut blockers) = (Met::default(), vec![]);
         self.cast(s, 0..rays / 2, |_, _, hit| {
-            match self.fronts.met(hit.triangle, hit.front) {
-                Some(front) => met.push(front),
-                None => back += 1,
-            }
+            met.add(self.fronts, hit);
             blockers.extend(self.blockers[hit.triangle]);
         });
         blockers.sort_unstable();
         blockers.dedup();
-        FirstHalf { fronts: counted(met), back, blockers }
+        FirstHalf { fronts: counted(met.fronts), back: met.backs, blockers }
     }
 
     /// All of `rays` rays from polygon `s`, after their first half; the `known` blockers ascend.
@@ -109,12 +106,9 @@ impl<'a> RayCaster<'a> {
         let is_known = |hit: &Hit| {
             self.blockers[hit.triangle].is_none_or(|blocker| known.binary_search(&blocker).is_ok())
         };
-        let (mut met, mut hidden, mut back, mut unknown) = (vec![], vec![], first.back, 0);
+        let (mut met, mut hidden, mut unknown) = (Met::default(), vec![], 0);
         self.cast(s, rays / 2..rays, |from, direction, hit| {
-            match self.fronts.met(hit.triangle, hit.front) {
-                Some(front) => met.push(front),
-                None => back += 1,
-            }
+            met.add(self.fronts, hit);
             unknown += u32::from(!is_known(hit));
             let mut last = *hit;
             while !is_known(&last) {
@@ -124,7 +118,8 @@ impl<'a> RayCaster<'a> {
                 last = next;
             }
         });
-        let fronts = sum_of_counts(&first.fronts, &counted(met));
+        let fronts = sum_of_counts(&first.fronts, &counted(met.fronts));
+        let back = first.back + met.backs;
         RayRow { rays, fronts, back, unknown, hidden: counted(hidden) }
     }
 
@@ -180,6 +175,23 @@ impl<'a> RayCaster<'a> {
     fn first_hit(&self, s: u32, from: DVec3, direction: DVec3, start: f64) -> Option<Hit> {
         let is_other = |hit: &Hit| !self.fronts.both_sides(hit.triangle).contains(&Some(s));
         self.rays.closest_hit_of(from, direction, start, None, is_other)
+    }
+}
+
+/// What rays have met first, in any order.
+#[derive(Default)]
+struct Met {
+    fronts: Vec<u32>,
+    /// Rays that met a back.
+    backs: u32,
+}
+
+impl Met {
+    fn add(&mut self, fronts: &Fronts, hit: &Hit) {
+        match fronts.met(hit.triangle, hit.front) {
+            Some(front) => self.fronts.push(front),
+            None => self.backs += 1,
+        }
     }
 }
 

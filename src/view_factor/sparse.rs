@@ -15,14 +15,13 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::assembler::open_shares;
-use super::blocker_tree::BlockerTree;
-use super::convex_polygons::{Merge, convex_polygons};
 use super::fronts::Fronts;
 use super::known_blockers::KnownBlockers;
 use super::matrix::{Estimate, Factor, Missing, ViewFactors};
 use super::pair_estimate::PairEstimator;
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
+use super::scene_polygons::ScenePolygons;
 use crate::scene::Scene;
 
 /// Standard errors are this share of the error asked for, so that 19 of 20 factors are within it.
@@ -51,18 +50,15 @@ struct Exchange {
     area: Estimate,
 }
 
-/// The matrix of `scene`, all lengths divided by `unit`; none if `progress` breaks.
+/// The matrix of `scene`, whose `polygons` these are; none if `progress` breaks.
 pub(super) fn assemble(
     scene: &Scene,
-    unit: f64,
+    polygons: ScenePolygons,
     error: f64,
-    two_sided: &[usize],
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Option<ViewFactors> {
-    let fronts = Fronts::new(scene, unit, two_sided);
-    let merged = convex_polygons(scene, unit, Merge::AcrossGroups);
-    let blockers = BlockerTree::new(merged.polygons);
-    let caster = RayCaster::new(scene, unit, &fronts, merged.of_triangle);
+    let ScenePolygons { unit, fronts, blockers, blocker_of_triangle } = polygons;
+    let caster = RayCaster::new(scene, unit, &fronts, blocker_of_triangle);
     let count = fronts.polygons.len();
     let rays = (RAYS_TIMES_ERROR / error).clamp(MIN_RAYS, MAX_RAYS) as u32;
     let rays = rays.next_power_of_two();
