@@ -57,7 +57,8 @@
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
-//! | [`view_factor`] | area-averaged factors between groups, for heat transfer |
+//! | [`view_factor`] | area-averaged factors between groups |
+//! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
@@ -101,6 +102,7 @@ mod error;
 pub mod form_factor;
 pub mod gather;
 mod geometry;
+pub mod heat;
 pub mod hemicube;
 pub mod io;
 pub mod mesh;
@@ -124,6 +126,7 @@ pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
 pub use form_factor::FormFactors;
 pub use gather::{Gather, GatheredMesh};
+pub use heat::HeatBalance;
 #[cfg(feature = "exr")]
 pub use io::write_exr;
 #[cfg(feature = "glb")]

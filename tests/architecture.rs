@@ -22,6 +22,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "error form_factor geometry hemicube mesh progress sampling scene vertex visibility",
     ),
     ("view_factor", "error form_factor geometry mesh progress sampling scene visibility"),
+    ("heat", "error geometry view_factor"),
     (
         "backend",
         "error form_factor gather geometry hemicube mesh progress sampling scene visibility",

@@ -1,0 +1,171 @@
+//! Radiative heat transfer between groups whose view factors are known.
+//!
+//! Groups are grey in each band of wavelengths, diffuse, and of one temperature each; what is
+//! between them takes no part. In every band the radiosity B and the irradiance H of a group are
+//!
+//! ```text
+//! B = ε M(T) + (1 − ε) H        H_i = Σ_j F_ij B_j + open_i M(T_surroundings)
+//! ```
+//!
+//! with M the black body's part in the band, σT⁴ in all (M. F. Modest, "Radiative Heat Transfer",
+//! 3rd edition 2013, equations 5.28 to 5.31). A group has a temperature, or the net flux out
+//! q = Σ ε (M − H) is given and its temperature found; an adiabatic group has q = 0.
+//!
+//! ```text
+//! ViewFactors ─→ one linear system (GMRES) where there is one band or no flux is given
+//!             └→ Newton's method around it, in the temperatures of groups with given flux, else
+//! ```
+
+mod black_body;
+mod exchange;
+mod gmres;
+mod undetermined;
+
+use std::ops::ControlFlow;
+
+use crate::error::{Error, ErrorKind, quoted};
+use crate::view_factor::{Estimate, ViewFactors};
+use exchange::Exchange;
+
+pub use black_body::{STEFAN_BOLTZMANN, share_below};
+
+/// What is known of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Boundary {
+    /// Its temperature, K.
+    Temperature(f64),
+    /// The net flux out of it, W/m²: what heats it from within or behind; 0 if it is adiabatic.
+    NetFlux(f64),
+}
+
+/// A group as heat sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Its temperature or its net flux.
+    pub boundary: Boundary,
+    /// Hemispherical emissivity in each band, in [0, 1]; reflectance is what is missing from 1.
+    pub emissivity: Vec<f64>,
+}
+
+/// What all groups share.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HeatSettings {
+    /// Wavelengths that separate the bands, µm, ascending: n of them make n + 1 bands, the first
+    /// from 0 and the last to infinity. None for one band of all wavelengths.
+    pub band_edges: Vec<f64>,
+    /// Temperature of what is seen through the open parts of the enclosure, K; it is black.
+    pub surroundings: f64,
+}
+
+/// A group's share in the exchange, all bands together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupHeat {
+    /// K; none for an adiabatic group that reflects all: nothing depends on it.
+    pub temperature: Option<f64>,
+    /// What leaves, W/m².
+    pub radiosity: f64,
+    /// What arrives, W/m².
+    pub irradiance: f64,
+    /// Net flux out, W/m²: given, or ε (M − H). Its standard error is that of the factors in the
+    /// group's own row, taken as independent: an upper bound where they sum to 1 by construction.
+    pub net_flux: Estimate,
+}
+
+/// The exchange, and how well it balances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeatBalance {
+    /// In the order of the matrix.
+    pub groups: Vec<GroupHeat>,
+    /// Net power out through the open parts of the enclosure, W.
+    pub lost_to_surroundings: f64,
+    /// Power that met the backs of surfaces and is lost there, W.
+    pub lost_to_backs: f64,
+    /// Net power out of all groups less what is lost, W: zero for factors with closure and
+    /// reciprocity.
+    pub imbalance: f64,
+    /// What is left of the linear system, norm over that of the emission.
+    pub residual: f64,
+    /// Products with the matrix that the solution took.
+    pub products: usize,
+}
+
+impl HeatBalance {
+    /// Solves for the exchange between the groups of `factors`, one of `surfaces` each.
+    ///
+    /// `progress` is told the residual after every product with the matrix, and may cancel: then
+    /// there is no balance. Reflectance may be 1. The same bits on every run.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`], with the name of the group, for a temperature that is negative or
+    /// not finite, an emissivity outside [0, 1] or not one a band, a net flux out of a group that
+    /// absorbs nothing, a net flux that would take a temperature below 0 K, groups whose
+    /// temperature nothing determines, and band edges that do not ascend.
+    pub fn of(
+        factors: &ViewFactors,
+        surfaces: &[Surface],
+        settings: &HeatSettings,
+        progress: impl FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Option<HeatBalance>, Error> {
+        check(factors, surfaces, settings)?;
+        undetermined::check(factors, surfaces, settings.band_edges.len() + 1)?;
+        Exchange::new(factors, surfaces, settings).solve(progress)
+    }
+}
+
+/// The error that something is wrong with group `name`.
+fn of_group(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Setting, format!("group {}", quoted(&[name])), found, remedy)
+}
+
+/// Whether every number is in its range.
+fn check(
+    factors: &ViewFactors,
+    surfaces: &[Surface],
+    settings: &HeatSettings,
+) -> Result<(), Error> {
+    let wrong = |place: &str, found: String, remedy: String| {
+        Err(Error::new(ErrorKind::Setting, place, found, remedy))
+    };
+    let is_temperature = |t: f64| t >= 0.0 && (STEFAN_BOLTZMANN * t.powi(4)).is_finite();
+    let edges = &settings.band_edges;
+    let ascend = edges.is_sorted_by(|a, b| a < b);
+    if !ascend || !edges.iter().all(|&edge| edge > 0.0 && edge.is_finite()) {
+        let remedy = "wavelengths must be above 0, finite, and ascend".into();
+        return wrong("band edges", format!("{edges:?}"), remedy);
+    }
+    if !is_temperature(settings.surroundings) {
+        let remedy = "it must be at least 0 K, and finite".into();
+        return wrong("temperature of the surroundings", settings.surroundings.to_string(), remedy);
+    }
+    if surfaces.len() != factors.names.len() {
+        let remedy = format!("the matrix has {} groups", factors.names.len());
+        return wrong("surfaces", surfaces.len().to_string(), remedy);
+    }
+    let bands = edges.len() + 1;
+    for (name, surface) in factors.names.iter().zip(surfaces) {
+        if surface.emissivity.len() != bands {
+            let found = format!("{} emissivities", surface.emissivity.len());
+            return Err(of_group(name, found, format!("one for each of the {bands} bands")));
+        }
+        if let Some(e) = surface.emissivity.iter().find(|e| !(0.0..=1.0).contains(*e)) {
+            return Err(of_group(name, format!("emissivity {e}"), "it must be in [0, 1]"));
+        }
+        let reflects_all = surface.emissivity.iter().all(|&e| e == 0.0);
+        match surface.boundary {
+            Boundary::Temperature(t) if !is_temperature(t) => {
+                let remedy = "it must be at least 0 K, and finite";
+                return Err(of_group(name, format!("temperature {t}"), remedy));
+            }
+            Boundary::NetFlux(q) if !q.is_finite() => {
+                return Err(of_group(name, format!("net flux {q}"), "it must be finite"));
+            }
+            Boundary::NetFlux(q) if q != 0.0 && reflects_all => {
+                let found = format!("net flux {q} with emissivity 0");
+                let remedy = "what neither emits nor absorbs has none: give it an emissivity";
+                return Err(of_group(name, found, remedy));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}

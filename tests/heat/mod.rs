@@ -1,0 +1,51 @@
+mod black_body;
+mod bounds;
+mod closed_forms;
+
+use std::ops::ControlFlow;
+
+use radiosity::heat::{Boundary, HeatSettings, Surface};
+use radiosity::view_factor::{Estimate, Factor, Missing};
+use radiosity::{Error, HeatBalance, ViewFactors};
+
+/// A matrix of these areas and factors, which are exact; what rows lack is open.
+fn matrix(areas: &[f64], factors: &[&[f64]]) -> ViewFactors {
+    let row = |row: &&[f64]| {
+        let nonzeros = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+        nonzeros.map(|(to, &value)| Factor { to: to as u32, value, error: 0.0 }).collect()
+    };
+    let open = |row: &&[f64]| Estimate { value: 1.0 - row.iter().sum::<f64>(), error: 1e-15 };
+    ViewFactors {
+        names: (0..areas.len()).map(|i| format!("group {i}")).collect(),
+        areas: areas.to_vec(),
+        factors: factors.iter().map(row).collect(),
+        open: factors.iter().map(open).collect(),
+        back: vec![Estimate::default(); areas.len()],
+        absent: Missing::Zero,
+    }
+}
+
+fn at(temperature: f64, emissivity: &[f64]) -> Surface {
+    let emissivity = emissivity.to_vec();
+    Surface { boundary: Boundary::Temperature(temperature), emissivity }
+}
+
+fn with_flux(flux: f64, emissivity: &[f64]) -> Surface {
+    Surface { boundary: Boundary::NetFlux(flux), emissivity: emissivity.to_vec() }
+}
+
+fn balance(
+    factors: &ViewFactors,
+    surfaces: &[Surface],
+    settings: &HeatSettings,
+) -> Result<HeatBalance, Error> {
+    let balance = HeatBalance::of(factors, surfaces, settings, |_| ControlFlow::Continue(()));
+    balance.map(|balance| balance.expect("nobody stopped it"))
+}
+
+/// Asserts that both are the same to `relative`.
+#[track_caller]
+fn assert_near(found: f64, expected: f64, relative: f64) {
+    let off = (found - expected).abs();
+    assert!(off <= relative * expected.abs(), "{found:e}, expected {expected:e}");
+}
