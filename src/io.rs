@@ -3,6 +3,7 @@
 //! | format | function | content |
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
+//! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -25,6 +26,7 @@ mod png;
 #[cfg(all(feature = "exr", feature = "textures"))]
 mod radiance;
 mod specular;
+mod stl;
 mod text;
 mod textures;
 mod tone;

@@ -19,6 +19,7 @@ use std::path::Path;
 use super::files::{self, FileSource};
 use super::lights;
 use super::mtl::Library;
+use super::stl;
 use super::text::{self, Line};
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Scene, WarningKind};
@@ -91,8 +92,11 @@ fn read_scene(
         let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
         Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
     })?;
-    let (text, encoding) = files::decode(bytes);
     let mut repairs = Repairs::new(settings.strict);
+    let (text, encoding) = match stl::is_stl(path) {
+        true => stl::to_obj(path, bytes, &mut repairs)?,
+        false => files::decode(bytes),
+    };
     if let Some(encoding) = encoding {
         let done = format!("read as {encoding}");
         repairs.note_at(WarningKind::Encoding, || path.display().to_string(), "", done)?;
@@ -213,7 +217,10 @@ impl<'a> ObjFile<'a> {
                 found += &format!(", {count} {}", if count == 1 { one } else { many });
             }
         }
-        let remedy = "give an OBJ file with `v` and `f` lines";
+        let remedy = match stl::is_stl(self.path) {
+            true => "give an STL file with facets",
+            false => "give an OBJ file with `v` and `f` lines",
+        };
         Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy)
     }
 

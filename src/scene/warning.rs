@@ -78,6 +78,10 @@ pub enum WarningKind {
     FreeForm,
     /// A line that is not OBJ.
     UnknownStatement,
+    /// A facet of an STL file whose normal points to the back of its corners.
+    OpposedNormal,
+    /// An STL file that ends early, or is not as long as it says.
+    BrokenOff,
     /// A text that is not UTF-8.
     Encoding,
     /// A triangle without area.
@@ -192,6 +196,11 @@ impl WarningKind {
                 ("line of free-form curves or surfaces", "lines of free-form curves or surfaces")
             }
             UnknownStatement => ("line of unknown kind", "lines of unknown kind"),
+            OpposedNormal => (
+                "facet with a normal that its corners contradict",
+                "facets with normals that their corners contradict",
+            ),
+            BrokenOff => ("file that breaks off", "files that break off"),
             Encoding => ("text that is not UTF-8", "texts that are not UTF-8"),
             Degenerate => ("triangle without area", "triangles without area"),
             RepeatedTriangle => ("triangle given again", "triangles given again"),
@@ -226,6 +235,8 @@ impl WarningKind {
             FewCorners => "a face has three corners or more",
             VertexNumbers => "a vertex is `v x y z`, with a weight or a colour at most",
             SmoothingGroup => "write `s off`, or `s` and a whole number up to 4294967295",
+            OpposedNormal => "seen from where the normal points, corners run counter-clockwise",
+            BrokenOff => "give the whole file",
             AmbientAsRadiance => "write `Ke` for emitted radiance",
             _ => return None,
         })

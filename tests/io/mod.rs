@@ -12,5 +12,6 @@ mod obj_texts;
 mod obj_textures;
 mod ply;
 mod ply_reader;
+mod stl;
 mod tone;
 mod view_factors;

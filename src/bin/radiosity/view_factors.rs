@@ -173,7 +173,9 @@ impl Options {
             format.check(groups)?;
             args::check_writable(&format.path(&stem))?;
         }
-        let of_light = |w: &&Warning| w.kind == WarningKind::NoLight;
+        let of_light = |w: &&Warning| {
+            matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
+        };
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
         }
