@@ -9,6 +9,7 @@
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
+//! | NumPy's `.npz` (feature `npz`) | `write_npz`, `read_npz` | the same, as SciPy's sparse rows |
 
 #[cfg(feature = "exr")]
 mod exr;
@@ -18,6 +19,8 @@ mod glb;
 mod lights;
 mod masks;
 mod mtl;
+#[cfg(feature = "npz")]
+mod npz;
 mod obj;
 mod ply;
 mod ply_reader;
@@ -44,6 +47,8 @@ pub use self::exr::write_exr;
 pub use self::glb::write_glb;
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
+#[cfg(feature = "npz")]
+pub use npz::{npz_from_bytes, read_npz, write_npz};
 pub use obj::{ObjSettings, load_obj, read_obj};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_reader::read_ply;

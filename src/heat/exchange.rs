@@ -91,6 +91,11 @@ impl<'a> Exchange<'a> {
             let solved = gmres::solve(product, &right, &weights, &mut radiosity, &mut progress);
             let Some(solved) = solved else { return Ok(None) };
             products += solved.products;
+            if !solved.residual.is_finite() {
+                let found = "fluxes that are too large for 64-bit floats";
+                let remedy = "view factors are at most 1";
+                return Err(Error::new(ErrorKind::Setting, "heat", found, remedy));
+            }
             let irradiance = self.irradiance(&radiosity, true);
             let moved = self.follow(&irradiance);
             let has_stalled = moved < 1e-6 && moved > STALLED * moved_before;
@@ -303,7 +308,7 @@ fn emission_of(bands: &Bands, emissivity: &[f64], emitted: f64) -> f64 {
     // It grows with M: halved to the last bit.
     loop {
         let middle = low + 0.5 * (high - low);
-        if middle <= low || middle >= high {
+        if !(middle > low && middle < high) {
             return middle;
         }
         if of(middle) < emitted { low = middle } else { high = middle }

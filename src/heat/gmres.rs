@@ -48,7 +48,8 @@ pub(super) fn solve(
             return Some(Solved { residual: length / scale, products });
         }
         // A cycle of as many products as numbers would be exact: one that gains nothing will not.
-        if length >= before {
+        // Nor one of numbers that are not finite.
+        if length >= before || !length.is_finite() {
             return Some(Solved { residual: length / scale, products });
         }
         before = length;

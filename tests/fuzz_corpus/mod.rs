@@ -2,9 +2,12 @@
 //! that once crashed, took too long or broke something. `docs/robustness.md` says how to look for
 //! more.
 
+#[cfg(feature = "npz")]
+mod npz;
 mod ply;
 mod scene;
 mod state;
+mod stl;
 mod texture;
 
 use std::fs;
@@ -50,6 +53,19 @@ fn every_image_keeps_its_promises() {
 fn every_ply_input_keeps_its_promises() {
     let (accepted, refused) = replay("ply", ply::try_ply);
     assert!(accepted > 4 && refused > 1, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+fn every_stl_input_keeps_its_promises() {
+    let (accepted, refused) = replay("stl", stl::try_stl);
+    assert!(accepted > 4 && refused > 4, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+#[cfg(feature = "npz")]
+fn every_matrix_keeps_its_promises() {
+    let (accepted, refused) = replay("npz", npz::try_npz);
+    assert!(accepted > 1 && refused > 4, "{accepted} accepted, {refused} refused");
 }
 
 /// States of today's solver are what the corpus begins with: RADIOSITY_SEEDS=FOLDER writes them

@@ -89,9 +89,9 @@ fn settings(choice: u8) -> ObjSettings {
 }
 
 /// One short line that begins with the file, and has the three parts `place: found; remedy`.
-fn check_error(e: &Error) {
+pub fn check_error(e: &Error) {
     let message = e.to_string();
-    let files = ["it.obj", NAMES[0], NAMES[2]];
+    let files = ["it.obj", "it.stl", NAMES[0], NAMES[2]];
     assert!(files.iter().any(|name| e.place().starts_with(name)), "{message}");
     assert!(matches!(e.kind(), ErrorKind::Scene | ErrorKind::File), "{message}");
     let parts = message.strip_prefix(e.place()).and_then(|m| m.strip_prefix(": "));
@@ -102,7 +102,7 @@ fn check_error(e: &Error) {
 }
 
 /// Every number is finite, and there is no more of anything than the file has `bytes`.
-fn check_scene(scene: &Scene, bytes: usize) {
+pub fn check_scene(scene: &Scene, bytes: usize) {
     assert!(!scene.triangles().is_empty());
     for t in 0..scene.triangles().len() {
         assert!((scene.normal(t).length() - 1.0).abs() < 1e-9, "normal {}", scene.normal(t));

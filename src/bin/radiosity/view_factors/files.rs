@@ -1,15 +1,14 @@
 //! The formats that a matrix of view factors is written in.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use npyz::WriterBuilder;
 use radiosity::io::view_factors::{write_csv_list, write_csv_matrix, write_matrix_market};
+use radiosity::io::write_npz;
 use radiosity::view_factor::Estimate;
 use radiosity::{Error, ErrorKind, ViewFactors};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
 use crate::args::{self, Stop};
 
@@ -92,7 +91,7 @@ impl Format {
             Format::List => write_csv_list(path, matrix),
             Format::MatrixMarket => write_matrix_market(path, matrix),
             Format::Npy => write_npy(&path, matrix).map_err(|e| not_written(&path, &e)),
-            Format::Npz => write_npz(&path, matrix).map_err(|e| not_written(&path, &e)),
+            Format::Npz => write_npz(path, matrix),
         }
     }
 }
@@ -114,69 +113,4 @@ fn write_npy(path: &Path, matrix: &ViewFactors) -> std::io::Result<()> {
         }
     }
     writer.finish()
-}
-
-/// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and beside
-/// them what it ignores: `standard_error` of each, and of each group `area`, `open` and `back` with
-/// their errors.
-fn write_npz(path: &Path, matrix: &ViewFactors) -> std::io::Result<()> {
-    let n = matrix.names.len() as i64;
-    let factors = || matrix.factors.iter().flatten();
-    let ends = matrix.factors.iter().scan(0, |end, row| {
-        *end += row.len() as i64;
-        Some(*end)
-    });
-    let row_starts: Vec<i64> = std::iter::once(0).chain(ends).collect();
-    let count = row_starts[matrix.factors.len()] as u64;
-    let mut archive = Archive(ZipWriter::new(BufWriter::new(File::create(path)?)));
-    archive.add_format("csr")?;
-    archive.add("shape", 2, [n, n].into_iter())?;
-    archive.add("indptr", row_starts.len() as u64, row_starts.iter().copied())?;
-    archive.add("indices", count, factors().map(|f| f.to as i32))?;
-    archive.add("data", count, factors().map(|f| f.value))?;
-    archive.add("standard_error", count, factors().map(|f| f.error))?;
-    archive.add("area", n as u64, matrix.areas.iter().copied())?;
-    for (name, error_name, shares) in
-        [("open", "open_error", &matrix.open), ("back", "back_error", &matrix.back)]
-    {
-        archive.add(name, n as u64, shares.iter().map(|share| share.value))?;
-        archive.add(error_name, n as u64, shares.iter().map(|share| share.error))?;
-    }
-    archive.0.finish()?.flush()
-}
-
-/// An `.npz` file: a zip archive of `.npy` files, none of them compressed.
-struct Archive(ZipWriter<BufWriter<File>>);
-
-impl Archive {
-    /// Begins the array `name`.
-    fn start(&mut self, name: &str) -> std::io::Result<()> {
-        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-        // Arrays of more than 4 GiB, too.
-        Ok(self.0.start_file(format!("{name}.npy"), options.large_file(true))?)
-    }
-
-    /// Adds a one-dimensional array of `count` numbers.
-    fn add<T: npyz::AutoSerialize>(
-        &mut self,
-        name: &str,
-        count: u64,
-        numbers: impl Iterator<Item = T>,
-    ) -> std::io::Result<()> {
-        self.start(name)?;
-        let options = npyz::WriteOptions::new().default_dtype().shape(&[count]);
-        let mut writer = options.writer(&mut self.0).begin_nd()?;
-        writer.extend(numbers)?;
-        writer.finish()
-    }
-
-    /// Adds the name of the sparse format: a string as an array of no dimensions.
-    fn add_format(&mut self, format: &str) -> std::io::Result<()> {
-        self.start("format")?;
-        let text = format!("|S{}", format.len()).parse().map_err(std::io::Error::other)?;
-        let options = npyz::WriteOptions::new().dtype(npyz::DType::Plain(text)).shape(&[]);
-        let mut writer = options.writer(&mut self.0).begin_nd()?;
-        writer.push(format.as_bytes())?;
-        writer.finish()
-    }
 }

@@ -1,0 +1,285 @@
+//! Matrices of view factors in `.npz` files: the compressed sparse rows of SciPy.
+//!
+//! | array | numbers | |
+//! |---|---|---|
+//! | `format`, `shape`, `indptr`, `indices`, `data` | | what `scipy.sparse.load_npz` reads |
+//! | `standard_error` | as many as `data` | of each |
+//! | `area`, `open`, `open_error`, `back`, `back_error` | one a group | |
+//! | `names` | bytes | of all groups, UTF-8, a line feed between |
+//! | `absent` | 1 | what it means that a pair is not there: 0, 1 or 2 as in [`Missing`] |
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Seek};
+use std::path::Path;
+
+use npyz::WriterBuilder;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use super::write_file;
+use crate::error::{Error, ErrorKind};
+use crate::view_factor::{Estimate, Factor, Missing, ViewFactors};
+
+/// Bytes of the header of an array at most; that of a plain one has 128.
+const MAX_HEADER: usize = 512;
+
+/// Digits of a number in the header of an array at most.
+const MAX_DIGITS: usize = 12;
+
+/// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and beside
+/// them what it ignores: `standard_error` of each; of each group `area`, `open` and `back` with
+/// their errors; `names`, a line feed between; `absent`.
+///
+/// # Errors
+/// [`ErrorKind::File`] when the file cannot be written.
+pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+    let n = matrix.names.len() as i64;
+    let factors = || matrix.factors.iter().flatten();
+    let ends = matrix.factors.iter().scan(0, |end, row| {
+        *end += row.len() as i64;
+        Some(*end)
+    });
+    let row_starts: Vec<i64> = std::iter::once(0).chain(ends).collect();
+    let count = row_starts[matrix.factors.len()] as u64;
+    let names: Vec<String> = matrix.names.iter().map(|n| n.replace('\n', " ")).collect();
+    let names = names.join("\n");
+    let absent = ABSENT.iter().position(|absent| *absent == matrix.absent).unwrap_or(0) as u8;
+    write_file(path.as_ref(), |out| {
+        let mut archive = Archive(ZipWriter::new(out));
+        archive.add_format("csr")?;
+        archive.add("shape", 2, [n, n].into_iter())?;
+        archive.add("indptr", row_starts.len() as u64, row_starts.iter().copied())?;
+        archive.add("indices", count, factors().map(|f| f.to as i32))?;
+        archive.add("data", count, factors().map(|f| f.value))?;
+        archive.add("standard_error", count, factors().map(|f| f.error))?;
+        archive.add("area", n as u64, matrix.areas.iter().copied())?;
+        for (name, error_name, shares) in
+            [("open", "open_error", &matrix.open), ("back", "back_error", &matrix.back)]
+        {
+            archive.add(name, n as u64, shares.iter().map(|share| share.value))?;
+            archive.add(error_name, n as u64, shares.iter().map(|share| share.error))?;
+        }
+        archive.add("names", names.len() as u64, names.bytes())?;
+        archive.add("absent", 1, std::iter::once(absent))?;
+        archive.0.finish()?;
+        Ok(())
+    })
+}
+
+/// What the numbers of `absent` mean.
+const ABSENT: [Missing; 3] = [Missing::Zero, Missing::NotSeen, Missing::Unmet];
+
+/// An `.npz` file: a zip archive of `.npy` files, none of them compressed.
+struct Archive<'a>(ZipWriter<&'a mut BufWriter<File>>);
+
+impl Archive<'_> {
+    /// Begins the array `name`.
+    fn start(&mut self, name: &str) -> std::io::Result<()> {
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        // Arrays of more than 4 GiB, too.
+        Ok(self.0.start_file(format!("{name}.npy"), options.large_file(true))?)
+    }
+
+    /// Adds a one-dimensional array of `count` numbers.
+    fn add<T: npyz::AutoSerialize>(
+        &mut self,
+        name: &str,
+        count: u64,
+        numbers: impl Iterator<Item = T>,
+    ) -> std::io::Result<()> {
+        self.start(name)?;
+        let options = npyz::WriteOptions::new().default_dtype().shape(&[count]);
+        let mut writer = options.writer(&mut self.0).begin_nd()?;
+        writer.extend(numbers)?;
+        writer.finish()
+    }
+
+    /// Adds the name of the sparse format: a string as an array of no dimensions.
+    fn add_format(&mut self, format: &str) -> std::io::Result<()> {
+        self.start("format")?;
+        let text = format!("|S{}", format.len()).parse().map_err(std::io::Error::other)?;
+        let options = npyz::WriteOptions::new().dtype(npyz::DType::Plain(text)).shape(&[]);
+        let mut writer = options.writer(&mut self.0).begin_nd()?;
+        writer.push(format.as_bytes())?;
+        writer.finish()
+    }
+}
+
+/// Reads a matrix that [`write_npz`] has written, or a program that has the same arrays; without
+/// `names`, groups are called by their numbers, from 1.
+///
+/// # Errors
+/// [`ErrorKind::File`] when the file cannot be read, or an array is missing, compressed, of another
+/// type or length than it must be, or has numbers that no matrix of view factors has.
+pub fn read_npz(path: impl AsRef<Path>) -> Result<ViewFactors, Error> {
+    let path = path.as_ref();
+    let file = File::open(path).map_err(|e| {
+        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
+        Error::new(ErrorKind::File, place, found, "give a readable .npz file").with_source(e)
+    })?;
+    read(BufReader::new(file)).map_err(|e| e.inside(path))
+}
+
+/// [`read_npz`] from memory.
+///
+/// # Errors
+/// Those of [`read_npz`].
+pub fn npz_from_bytes(bytes: &[u8]) -> Result<ViewFactors, Error> {
+    read(std::io::Cursor::new(bytes))
+}
+
+fn wrong(array: &str, found: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::new(ErrorKind::File, array, found, remedy)
+}
+
+fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
+    let mut archive = ZipArchive::new(bytes).map_err(|e| {
+        wrong("archive", e.to_string(), "give an .npz file of view factors").with_source(e)
+    })?;
+    let mut arrays = Arrays { archive: &mut archive };
+    let row_starts = arrays.integers("indptr", None)?;
+    let groups = row_starts.len().saturating_sub(1);
+    if groups == 0 || row_starts[0] != 0 || !row_starts.is_sorted() {
+        let remedy = "where each row begins: 0 first, then ascending, one more than groups";
+        return Err(wrong("indptr", "no sequence of rows", remedy));
+    }
+    let count = row_starts[groups] as usize;
+    let columns = arrays.integers("indices", Some(count))?;
+    let values: Vec<f64> = arrays.numbers("data", Some(count))?;
+    let errors: Vec<f64> = arrays.numbers("standard_error", Some(count))?;
+    let areas: Vec<f64> = arrays.numbers("area", Some(groups))?;
+    let mut shares = |name: &str, error_name: &str| -> Result<Vec<Estimate>, Error> {
+        let values: Vec<f64> = arrays.numbers(name, Some(groups))?;
+        let errors: Vec<f64> = arrays.numbers(error_name, Some(groups))?;
+        check_range(name, &values, |value| value.is_finite(), "finite")?;
+        check_range(error_name, &errors, is_size, "finite and at least 0")?;
+        let pairs = values.into_iter().zip(errors);
+        Ok(pairs.map(|(value, error)| Estimate { value, error }).collect())
+    };
+    let (open, back) = (shares("open", "open_error")?, shares("back", "back_error")?);
+    let names = match arrays.has("names") {
+        false => (1..=groups).map(|k| k.to_string()).collect(),
+        true => {
+            let bytes: Vec<u8> = arrays.numbers("names", None)?;
+            let text = String::from_utf8_lossy(&bytes);
+            let names: Vec<String> = text.split('\n').map(String::from).collect();
+            if names.len() != groups {
+                let remedy = format!("one a group, {groups}, with a line feed between");
+                return Err(wrong("names", format!("{} lines", names.len()), remedy));
+            }
+            names
+        }
+    };
+    let absent: Vec<u8> = match arrays.has("absent") {
+        false => vec![0],
+        true => arrays.numbers("absent", Some(1))?,
+    };
+    let Some(&absent) = ABSENT.get(usize::from(absent[0])) else {
+        return Err(wrong("absent", absent[0].to_string(), "it is 0, 1 or 2"));
+    };
+    check_range("data", &values, |value| value.is_finite() && value >= 0.0, "at least 0")?;
+    check_range("standard_error", &errors, is_size, "finite and at least 0")?;
+    check_range("area", &areas, is_size, "finite and at least 0")?;
+    let mut factors = Vec::with_capacity(groups);
+    for row in row_starts.windows(2) {
+        let row = row[0] as usize..row[1] as usize;
+        let to = &columns[row.clone()];
+        let is_group = |to: &i64| (0..groups as i64).contains(to);
+        if !to.iter().all(is_group) || !to.is_sorted_by(|a, b| a < b) {
+            let found = format!("{} of row {}", "columns out of order or range", factors.len());
+            return Err(wrong("indices", found, format!("ascending, from 0, below {groups}")));
+        }
+        let numbers = values[row.clone()].iter().zip(&errors[row]);
+        let row = to.iter().zip(numbers);
+        factors.push(
+            row.map(|(&to, (&value, &error))| Factor { to: to as u32, value, error }).collect(),
+        );
+    }
+    Ok(ViewFactors { names, areas, factors, open, back, absent })
+}
+
+fn is_size(value: f64) -> bool {
+    value.is_finite() && value >= 0.0
+}
+
+fn check_range(
+    name: &str,
+    numbers: &[f64],
+    is_right: impl Fn(f64) -> bool,
+    remedy: &str,
+) -> Result<(), Error> {
+    match numbers.iter().find(|number| !is_right(**number)) {
+        Some(number) => Err(wrong(name, number.to_string(), format!("it must be {remedy}"))),
+        None => Ok(()),
+    }
+}
+
+/// The arrays of an `.npz` file, by name.
+struct Arrays<'a, R> {
+    archive: &'a mut ZipArchive<R>,
+}
+
+impl<R: Read + Seek> Arrays<'_, R> {
+    fn has(&self, name: &str) -> bool {
+        self.archive.index_for_name(&format!("{name}.npy")).is_some()
+    }
+
+    /// Integers of 32 or 64 bits, as SciPy chooses.
+    fn integers(&mut self, name: &str, count: Option<usize>) -> Result<Vec<i64>, Error> {
+        if let Ok(short) = self.numbers::<i32>(name, count) {
+            return Ok(short.into_iter().map(i64::from).collect());
+        }
+        self.numbers(name, count)
+    }
+
+    /// The array `name`, of one dimension and `count` numbers if that is known.
+    fn numbers<T: npyz::Deserialize>(
+        &mut self,
+        name: &str,
+        count: Option<usize>,
+    ) -> Result<Vec<T>, Error> {
+        let missing = "the arrays of a matrix of view factors, not compressed";
+        let file = self.archive.by_name(&format!("{name}.npy"));
+        let mut file = file.map_err(|e| wrong(name, e.to_string(), missing).with_source(e))?;
+        let broken = |e: std::io::Error| {
+            wrong(name, e.to_string(), "give a whole array of numbers").with_source(e)
+        };
+        let mut start = [0; 10];
+        file.read_exact(&mut start).map_err(broken)?;
+        let length = usize::from(u16::from_le_bytes([start[8], start[9]]));
+        // Version 1 has two bytes for the length; others are for headers that are long.
+        if !start.starts_with(b"\x93NUMPY\x01") || length > MAX_HEADER {
+            return Err(wrong(name, "no plain array", "NumPy's format, version 1.0"));
+        }
+        let mut header = start.to_vec();
+        header.resize(start.len() + length, 0);
+        file.read_exact(&mut header[start.len()..]).map_err(broken)?;
+        if !is_plain(&header[start.len()..]) {
+            return Err(wrong(name, "a header of many dimensions", "one dimension"));
+        }
+        let array = npyz::NpyFile::new(header.as_slice().chain(file)).map_err(broken)?;
+        let length = match *array.shape() {
+            [length] => length,
+            ref shape => return Err(wrong(name, format!("shape {shape:?}"), "one dimension")),
+        };
+        if let Some(count) = count.filter(|&count| length != count as u64) {
+            return Err(wrong(name, format!("{length} numbers"), format!("{count} of them")));
+        }
+        let data = array.data::<T>().map_err(|e| {
+            wrong(name, e.to_string(), "the type that `write_npz` writes").with_source(e)
+        })?;
+        // The length may be a lie: memory grows with what is there.
+        let mut numbers = vec![];
+        for number in data {
+            numbers.push(number.map_err(broken)?);
+        }
+        Ok(numbers)
+    }
+}
+
+/// Whether the header of an array is that of one dimension, and has no number that is too long.
+fn is_plain(header: &[u8]) -> bool {
+    let nested = header.iter().filter(|byte| b"([{".contains(byte)).count();
+    let mut runs = header.split(|byte| !byte.is_ascii_digit());
+    nested <= 2 && runs.all(|digits| digits.len() <= MAX_DIGITS)
+}
