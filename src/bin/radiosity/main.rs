@@ -3,6 +3,7 @@
 //! ```text
 //! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, GLB, JSON, EXR, PNG
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
+//! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
 //! ```
@@ -21,6 +22,7 @@ macro_rules! say {
 
 mod args;
 mod bake;
+mod heat;
 mod interrupt;
 mod progress;
 mod report;
@@ -40,6 +42,7 @@ usage: radiosity COMMAND SCENE.obj… [options]
 
   bake          the radiosity of a scene, at the vertices of a mesh
   view-factors  view factors between the groups of scenes
+  heat          temperatures and net fluxes of groups, by their view factors
   trade-off     what a bake of a scene costs and how far it is off, over its settings
   verify        how far off a solution of a scene is, by path tracing
 
@@ -52,9 +55,10 @@ struct Command {
     run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
 }
 
-const COMMANDS: [Command; 4] = [
+const COMMANDS: [Command; 5] = [
     Command { name: "bake", usage: bake::USAGE, run: bake::run },
     Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
+    Command { name: "heat", usage: heat::USAGE, run: heat::run },
     Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
     Command { name: "verify", usage: verify::USAGE, run: verify::run },
 ];

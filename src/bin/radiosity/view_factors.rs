@@ -51,7 +51,7 @@ what leaves the scene, `back` what meets the backs of surfaces.
   --strict          refuse what would be repaired in the file";
 
 /// Groups whose factors are printed at most.
-const MAX_PRINTED: usize = 16;
+pub const MAX_PRINTED: usize = 16;
 
 /// Absolute error of a factor where none is asked for.
 const DEFAULT_ERROR: f64 = 1e-4;
@@ -72,8 +72,33 @@ struct Options {
 }
 
 enum Method {
-    ToError { error: f64, two_sided: Vec<String>, facets: bool, check: usize },
+    ToError { to_error: ToError, check: usize },
     Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
+}
+
+/// View factors to an error that is asked for.
+pub struct ToError {
+    pub error: f64,
+    /// Names of groups.
+    pub two_sided: Vec<String>,
+    /// Whether each face is a group, and `two_sided` may name those of the file.
+    pub facets: bool,
+}
+
+impl Default for ToError {
+    fn default() -> ToError {
+        ToError { error: DEFAULT_ERROR, two_sided: vec![], facets: false }
+    }
+}
+
+impl ToError {
+    pub fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
+        let groups = group_indices(scene, &self.two_sided, self.facets)?;
+        let matrix = progress::of_count("polygons", |report| {
+            ViewFactors::new(scene, self.error, &groups, report)
+        })?;
+        matrix.ok_or(Stop::Interrupted)
+    }
 }
 
 /// Runs the command: all scenes, whatever becomes of the others.
@@ -81,9 +106,13 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let options = Options::parse(parser)?;
     let mut failed = false;
     for scene in &options.scenes {
-        if let Err(e) = options.run(scene) {
-            eprintln!("error: {e}");
-            failed = true;
+        match options.run(scene) {
+            Ok(()) => {}
+            Err(Stop::Failed(e)) => {
+                eprintln!("error: {e}");
+                failed = true;
+            }
+            Err(stop) => return Err(stop),
         }
     }
     if failed { Err(Stop::Reported) } else { Ok(()) }
@@ -152,13 +181,14 @@ impl Options {
                 let needing = "--element-size, --hemicube, --adapter and --cpu need --sampled";
                 return Err(Stop::usage(needing));
             }
-            let (error, check) = (error.unwrap_or(DEFAULT_ERROR), check.unwrap_or(0));
-            Method::ToError { error, two_sided, facets, check }
+            let error = error.unwrap_or(DEFAULT_ERROR);
+            let to_error = ToError { error, two_sided, facets };
+            Method::ToError { to_error, check: check.unwrap_or(0) }
         };
         Ok(Options { scenes, reading, out, formats, enforce, method })
     }
 
-    fn run(&self, path: &Path) -> Result<(), Error> {
+    fn run(&self, path: &Path) -> Result<(), Stop> {
         let stem = match (&self.out, path.file_stem()) {
             (Some(folder), Some(name)) => folder.join(name),
             _ => path.with_extension(""),
@@ -202,14 +232,9 @@ impl Options {
 
 impl Method {
     /// The view factors between the groups of `scene`.
-    fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Error> {
+    fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
         let matrix = match self {
-            Method::ToError { error, two_sided, facets, .. } => {
-                let groups = group_indices(scene, two_sided, *facets)?;
-                progress::of_count("polygons", |report| {
-                    ViewFactors::new(scene, *error, &groups, report)
-                })?
-            }
+            Method::ToError { to_error, .. } => return to_error.matrix(scene),
             Method::Sampled { element_size, hemicube, device } => {
                 let size = element_size
                     .unwrap_or_else(|| BakeSettings::elements_only(scene).solve.element_size);
@@ -223,15 +248,15 @@ impl Method {
                 })?
             }
         };
-        Ok(matrix.expect("its progress never stops it"))
+        matrix.ok_or(Stop::Interrupted)
     }
 
     /// Holds as many rows of `matrix` as are asked for against exact ones.
-    fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Error> {
+    fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Stop> {
         match self {
-            Method::ToError { error, two_sided, facets, check: rows @ 1.. } => {
-                let groups = group_indices(scene, two_sided, *facets)?;
-                check::check(scene, matrix, *error, &groups, *rows)
+            Method::ToError { to_error, check: rows @ 1.. } => {
+                let groups = group_indices(scene, &to_error.two_sided, to_error.facets)?;
+                check::check(scene, matrix, to_error.error, &groups, *rows)
             }
             _ => Ok(()),
         }
@@ -239,7 +264,7 @@ impl Method {
 }
 
 /// Makes the matrix keep closure and reciprocity, and prints what that changed.
-fn enforce(matrix: &ViewFactors) -> ViewFactors {
+pub fn enforce(matrix: &ViewFactors) -> ViewFactors {
     let (enforced, report) = matrix.enforced();
     say!(
         "enforced: factors changed by {:.1e} RMS, {:.1e} at most; {} of {} rows closed; \
@@ -253,15 +278,17 @@ fn enforce(matrix: &ViewFactors) -> ViewFactors {
     enforced
 }
 
+/// Whether `facet` is the name of a facet that `group` was cut into.
+pub fn is_facet_of(facet: &str, group: &str) -> bool {
+    facet.rsplit_once('/').is_some_and(|(of, n)| of == group && n.parse::<u32>().is_ok())
+}
+
 /// Group numbers of names: with `facets` also those of the facets that a group was cut into.
 fn group_indices(scene: &Scene, names: &[String], facets: bool) -> Result<Vec<usize>, Error> {
     let mut indices = vec![];
     for name in names {
         let before = indices.len();
-        let is_facet = |group: &str| {
-            group.rsplit_once('/').is_some_and(|(of, n)| of == name && n.parse::<u32>().is_ok())
-        };
-        let matching = |group: &String| group == name || facets && is_facet(group);
+        let matching = |group: &String| group == name || facets && is_facet_of(group, name);
         let groups = scene.groups().iter().enumerate();
         indices.extend(groups.filter(|(_, group)| matching(group)).map(|(index, _)| index));
         if indices.len() == before {
@@ -278,7 +305,7 @@ fn group_indices(scene: &Scene, names: &[String], facets: bool) -> Result<Vec<us
 }
 
 /// Prints closure, reciprocity and bounds of the raw numbers, and which groups see out.
-fn print_checks(m: &ViewFactors) {
+pub fn print_checks(m: &ViewFactors) {
     let checks = m.checks();
     let name = |i: usize| &m.names[i];
     let (r, b) = (checks.reciprocity, checks.bounds);

@@ -1,7 +1,8 @@
 //! A matrix held against exact rows, drawn at random.
 
-use radiosity::{Error, Scene, ViewFactors};
+use radiosity::{Scene, ViewFactors};
 
+use crate::args::Stop;
 use crate::progress;
 
 /// What the comparison of some rows has found.
@@ -23,12 +24,12 @@ pub fn check(
     error: f64,
     two_sided: &[usize],
     rows: usize,
-) -> Result<(), Error> {
+) -> Result<(), Stop> {
     let drawn = draw(rows, matrix.names.len());
     let exact = progress::of_count("rows to check", |report| {
         ViewFactors::exact_rows(scene, error, two_sided, &drawn, report)
     })?;
-    let exact = exact.expect("its progress never stops it");
+    let exact = exact.ok_or(Stop::Interrupted)?;
     let mut found = Comparison::default();
     for (&i, row) in drawn.iter().zip(&exact) {
         let mut row = row.iter().peekable();

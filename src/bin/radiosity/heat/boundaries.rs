@@ -1,0 +1,108 @@
+//! What is known of groups, from a CSV file.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use radiosity::heat::{Boundary, Surface};
+use radiosity::{Error, ErrorKind};
+
+use crate::view_factors::is_facet_of;
+
+/// The name that stands for all groups that no line names.
+const ALL_OTHERS: &str = "*";
+
+/// One line.
+struct Line {
+    surface: Surface,
+    is_used: bool,
+    place: String,
+}
+
+/// What the file `path` says of each of the groups `names`, in `bands` bands.
+///
+/// # Errors
+/// [`ErrorKind::File`] where it cannot be read, with its line where something is wrong with one, and
+/// for groups that it does not name, or that are not there.
+pub fn read(path: &Path, names: &[String], bands: usize) -> Result<Vec<Surface>, Error> {
+    let wrong = |place: &str, found: String, remedy: &str| {
+        Error::new(ErrorKind::File, place, found, remedy)
+    };
+    let file = path.display().to_string();
+    let not_read = |e: csv::Error| {
+        let remedy = "give a CSV file with the columns group, temperature, flux and emissivity";
+        wrong(&file, format!("cannot be read: {e}"), remedy).with_source(e)
+    };
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path);
+    let reader = reader.as_mut().map_err(|e| {
+        let found = format!("cannot be read: {e}");
+        wrong(&file, found, "give a CSV file that can be read")
+    })?;
+    let header = reader.headers().map_err(not_read)?.clone();
+    let column = |name: &str| {
+        header.iter().position(|column| column.eq_ignore_ascii_case(name)).ok_or_else(|| {
+            let found = format!("no column '{name}'");
+            wrong(&file, found, "the first line names the columns")
+        })
+    };
+    let (group, temperature, flux) = (column("group")?, column("temperature")?, column("flux")?);
+    let emissivities: Vec<usize> = match bands {
+        1 => vec![column("emissivity")?],
+        _ => (1..=bands).map(|k| column(&format!("emissivity_{k}"))).collect::<Result<_, _>>()?,
+    };
+    let mut lines: HashMap<String, Line> = HashMap::new();
+    for record in reader.records() {
+        let record = record.map_err(not_read)?;
+        let place = format!("{file}:{}", record.position().map_or(0, csv::Position::line));
+        let number = |column: usize| -> Result<Option<f64>, Error> {
+            let text = &record[column];
+            let parsed = text.parse().map(Some);
+            if text.is_empty() { Ok(None) } else { parsed }.map_err(
+                |_: std::num::ParseFloatError| {
+                    let found = format!("{} '{text}'", &header[column]);
+                    wrong(&place, found, "give a number")
+                },
+            )
+        };
+        let boundary = match (number(temperature)?, number(flux)?) {
+            (Some(t), None) => Boundary::Temperature(t),
+            (None, Some(q)) => Boundary::NetFlux(q),
+            (both, _) => {
+                let found = if both.is_some() { "temperature and flux" } else { "neither" };
+                let remedy = "give a temperature or a flux, and leave the other empty";
+                return Err(wrong(&place, found.into(), remedy));
+            }
+        };
+        let mut emissivity = vec![];
+        for &column in &emissivities {
+            emissivity.push(number(column)?.ok_or_else(|| {
+                wrong(&place, format!("no {}", &header[column]), "give one in each band, 0 to 1")
+            })?);
+        }
+        let surface = Surface { boundary, emissivity };
+        let name = record[group].to_string();
+        if lines.contains_key(&name) {
+            let found = format!("group '{name}' a second time");
+            return Err(wrong(&place, found, "name each group once"));
+        }
+        lines.insert(name, Line { surface, is_used: false, place });
+    }
+    let mut surfaces = Vec::with_capacity(names.len());
+    for name in names {
+        let whole = name.rsplit_once('/').map(|(whole, _)| whole);
+        let whole = whole.filter(|whole| is_facet_of(name, whole));
+        let candidates = [Some(name.as_str()), whole, Some(ALL_OTHERS)];
+        let known = candidates.into_iter().flatten().find(|key| lines.contains_key(*key));
+        let Some(line) = known.and_then(|key| lines.get_mut(key)) else {
+            let remedy = "give it a line, or one for all others, *";
+            return Err(wrong(&file, format!("nothing of group '{name}'"), remedy));
+        };
+        line.is_used = true;
+        surfaces.push(line.surface.clone());
+    }
+    let is_unused = |(name, line): &(&String, &Line)| !line.is_used && *name != ALL_OTHERS;
+    if let Some((name, line)) = lines.iter().filter(is_unused).min_by_key(|(_, l)| &l.place) {
+        let found = format!("group '{name}', which is not there");
+        return Err(wrong(&line.place, found, "name groups as the scene does"));
+    }
+    Ok(surfaces)
+}
