@@ -107,6 +107,7 @@ pub mod hemicube;
 pub mod io;
 pub mod mesh;
 mod progress;
+mod ranks;
 mod sampling;
 pub mod scene;
 pub mod solver;

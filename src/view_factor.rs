@@ -39,6 +39,7 @@ mod known_blockers;
 mod matrix;
 mod pair_estimate;
 mod pair_visibility;
+mod partial_matrix;
 mod point_visibility;
 mod polygon_points;
 mod ray_rows;
@@ -46,6 +47,7 @@ mod sampled;
 mod scene_polygons;
 mod shadow_rays;
 mod shaft;
+mod shared_work;
 mod sparse;
 mod tolerances;
 mod unoccluded;
@@ -55,6 +57,7 @@ mod visual_events;
 use std::ops::ControlFlow;
 
 use self::assembler::Assembler;
+use self::partial_matrix::Method;
 use self::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
@@ -64,6 +67,8 @@ use crate::scene::Scene;
 pub use self::checks::{ErrorStats, MatrixChecks};
 pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, Missing, ViewFactors};
+pub use self::partial_matrix::PartialMatrix;
+pub use crate::ranks::{Alone, Ranks};
 
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
@@ -82,11 +87,11 @@ impl ViewFactors {
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(if effort::is_exact_too_long(&polygons) {
-            sparse::assemble(scene, polygons, error, progress)
-        } else {
-            assembler::assemble(scene, polygons, error, progress)
-        })
+        let method = match effort::is_exact_too_long(&polygons) {
+            true => Method::Sparse,
+            false => Method::Exact,
+        };
+        Ok(PartialMatrix::whole(scene, polygons, error, method, progress))
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
@@ -116,7 +121,7 @@ impl ViewFactors {
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(assembler::assemble(scene, polygons, error, progress))
+        Ok(PartialMatrix::whole(scene, polygons, error, Method::Exact, progress))
     }
 
     /// The matrix of many polygons, of which each sees few: with two absolute standard errors of at
@@ -141,7 +146,7 @@ impl ViewFactors {
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(sparse::assemble(scene, polygons, error, progress))
+        Ok(PartialMatrix::whole(scene, polygons, error, Method::Sparse, progress))
     }
 
     /// Rows of the exact matrix, those of the groups `from`: to hold another matrix against.

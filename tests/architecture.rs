@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 const MAY_KNOW: &[(&str, &str)] = &[
     ("error", ""),
     ("progress", "error"),
+    ("ranks", ""),
     ("geometry", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
@@ -21,7 +22,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "gather",
         "error form_factor geometry hemicube mesh progress sampling scene vertex visibility",
     ),
-    ("view_factor", "error form_factor geometry mesh progress sampling scene visibility"),
+    ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),
     ("heat", "error geometry view_factor"),
     (
         "backend",

@@ -1,10 +1,11 @@
-//! Writers for matrices of view factors.
+//! Files of view factors: tables out, and rows that are done out and in.
 //!
 //! | function | file | zeros | errors |
 //! |---|---|---|---|
 //! | [`write_csv_matrix`] | CSV, one row a group: for spreadsheets | `0` | no |
 //! | [`write_csv_list`] | CSV, one line a nonzero | left out | yes |
 //! | [`write_matrix_market`] | Matrix Market, one line a nonzero | left out | no |
+//! | [`write_rows`], [`read_rows`] | some of the rows, of no other use | left out | yes |
 //!
 //! In all of them the group that leaves comes first: rows leave, columns receive. Areas are in the
 //! scene's length unit squared, factors are dimensionless.
@@ -12,9 +13,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::write_file;
-use crate::error::Error;
-use crate::view_factor::{Estimate, Missing, ViewFactors};
+use super::{cannot_write, write_file};
+use crate::error::{Error, ErrorKind};
+use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 
 /// Writes the matrix as CSV: a header row and a first column of names, row leaves, column receives;
 /// then `open`, what leaves the scene, `back`, what meets the backs of surfaces, and the `area` of
@@ -75,6 +76,31 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
         }
         Ok(())
     })
+}
+
+/// Writes rows that are done, for [`read_rows`]. Whenever this is cut short, the file is either what
+/// it was or what it was to be.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written.
+pub fn write_rows(path: impl AsRef<Path>, rows: &PartialMatrix) -> Result<(), Error> {
+    let path = path.as_ref();
+    let temporary = path.with_added_extension("new");
+    write_file(&temporary, |out| out.write_all(&rows.to_bytes()))?;
+    std::fs::rename(&temporary, path).map_err(|e| cannot_write(path, e))
+}
+
+/// Reads rows that [`write_rows`] has written.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be read, is something else, or is damaged.
+pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|e| {
+        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
+        Error::new(ErrorKind::File, place, found, "give a readable file").with_source(e)
+    })?;
+    PartialMatrix::from_bytes(&bytes).map_err(|e| e.inside(path))
 }
 
 /// Writes the nonzeros in Matrix Market's coordinate format (R. F. Boisvert, R. Pozo,

@@ -12,20 +12,18 @@
 //! Later fronts only: A_i F_ij = A_j F_ji gives the other half. The tolerance of a group's error is
 //! shared between the polygons of the giving group by area, in squares.
 
-use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-
 use rayon::prelude::*;
 
 use super::blocker_tree::BlockerTree;
 use super::convex_polygons::ConvexPolygon;
 use super::cubature::integrate_adaptively;
-use super::matrix::{Estimate, Factor, Missing, ViewFactors};
+use super::matrix::{Estimate, Factor};
 use super::pair_visibility::PairVisibility;
+use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::scene_polygons::ScenePolygons;
+use super::shared_work::share_out;
 use crate::sampling::hash::split_mix64;
-use crate::scene::Scene;
 
 /// Share of the error asked for to which the error bound of every sum is brought. Its estimate is
 /// brought to a tenth of that again: rows of thousands of factors then close to a tenth of what was
@@ -41,29 +39,24 @@ const MIN_BATCH: usize = 4;
 /// Most polygons between two tellings of progress, so that cancelling is heard. Chosen by hand.
 const MAX_BATCH: usize = 64;
 
-/// The exact matrix of `scene`, whose `polygons` these are; none if `progress` breaks.
-pub(super) fn assemble(
-    scene: &Scene,
+/// Makes the rows of the polygons `wanted`; none if that is stopped.
+pub(super) fn make(
     polygons: ScenePolygons,
     error: f64,
-    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-) -> Option<ViewFactors> {
-    let unit = polygons.unit;
+    wanted: &[u32],
+    making: &mut Making,
+) -> Option<()> {
     let assembler = Assembler::new(polygons, error);
-    let mut sums = GroupSums::new(scene.groups().len());
-    let count = assembler.fronts.len();
-    let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH);
-    for start in (0..count).step_by(batch) {
-        let end = (start + batch).min(count);
-        let rows: Vec<_> = (start..end).into_par_iter().map(|s| assembler.row(s)).collect();
-        for (s, row) in (start..end).zip(rows) {
-            sums.add(assembler.fronts[s].group as usize, row);
-        }
-        if progress(end, count).is_break() {
-            return None;
-        }
+    let (count, mut done) = (wanted.len(), 0);
+    let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH) * making.ranks.size();
+    for batch in wanted.chunks(batch) {
+        let of_polygon = |&s: &u32| assembler.row(s as usize);
+        let rows = share_out(batch, making.ranks, of_polygon);
+        batch.iter().zip(rows).for_each(|(&s, row)| making.add(s, row));
+        done += batch.len();
+        making.tell_all(done, count)?;
     }
-    Some(sums.into_matrix(scene, &assembler.areas, unit))
+    Some(())
 }
 
 /// All that it takes to find what one polygon gives to others.
@@ -79,14 +72,6 @@ pub(super) struct Assembler {
     error: f64,
 }
 
-/// A₁F₁₂ from one polygon to later polygons of its own group and to later groups.
-struct PolygonRow {
-    /// By ascending group, no zeros.
-    fronts: Vec<(u32, Estimate)>,
-    /// To the backs of all groups together.
-    back: Estimate,
-}
-
 impl Assembler {
     /// Of `polygons`, with an absolute error of every factor well below `error`.
     pub fn new(polygons: ScenePolygons, error: f64) -> Assembler {
@@ -99,7 +84,7 @@ impl Assembler {
     fn row(&self, s: usize) -> PolygonRow {
         let mut visibility = PointVisibility::default();
         let from = &self.fronts[s];
-        let mut fronts: Vec<(u32, Estimate)> = Vec::new();
+        let mut fronts: Vec<Exchange> = Vec::new();
         let group_area = self.areas[from.group as usize];
         // Errors of the polygons of a group are independent: squares add up.
         let share = BOUND_SHARE * self.error * (from.area / group_area).sqrt();
@@ -111,12 +96,12 @@ impl Assembler {
             let tolerance = share * group_area.min(self.areas[to as usize]);
             let flux = self.flux(s, receivers, tolerance, &mut visibility);
             if flux.value > 0.0 || flux.error > 0.0 {
-                fronts.push((to, flux));
+                fronts.push(Exchange::new(to, flux));
             }
         }
         let receivers = self.backs.iter().zip(self.fronts.len()..);
         let back = self.flux(s, receivers, share * group_area, &mut visibility);
-        PolygonRow { fronts, back }
+        PolygonRow { fronts, back: Exchange::new(0, back) }
     }
 
     /// The factors of `group` to all groups, by ascending index, no zeros.
@@ -191,76 +176,4 @@ impl EstimateSum {
     fn over(self, area: f64) -> Estimate {
         Estimate { value: self.value, error: self.squared_error.sqrt() }.over(area)
     }
-}
-
-/// Sums of A_i F_ij over the polygons of groups, in squares of the scene's unit.
-struct GroupSums {
-    /// Per group, to itself and to later groups.
-    fronts: Vec<BTreeMap<u32, EstimateSum>>,
-    /// Per group, to all backs.
-    backs: Vec<EstimateSum>,
-}
-
-impl GroupSums {
-    /// Sums of nothing for so many groups.
-    fn new(groups: usize) -> GroupSums {
-        GroupSums {
-            fronts: vec![BTreeMap::new(); groups],
-            backs: vec![EstimateSum::default(); groups],
-        }
-    }
-
-    /// Adds what a polygon of group `from` gives.
-    fn add(&mut self, from: usize, row: PolygonRow) {
-        for (to, flux) in row.fronts {
-            // Pairs within a group are met once and count both ways.
-            let factor = if to as usize == from { 2.0 } else { 1.0 };
-            self.fronts[from].entry(to).or_default().add(flux, factor);
-        }
-        self.backs[from].add(row.back, 1.0);
-    }
-
-    /// The matrix, of `areas` in squares of `unit`.
-    fn into_matrix(self, scene: &Scene, areas: &[f64], unit: f64) -> ViewFactors {
-        let mut factors: Vec<Vec<Factor>> = vec![Vec::new(); areas.len()];
-        for (i, row) in self.fronts.iter().enumerate() {
-            for (&to, &sum) in row {
-                let Estimate { value, error } = sum.over(areas[i]);
-                factors[i].push(Factor { to, value, error });
-                if to as usize != i {
-                    let Estimate { value, error } = sum.over(areas[to as usize]);
-                    factors[to as usize].push(Factor { to: i as u32, value, error });
-                }
-            }
-        }
-        for row in &mut factors {
-            row.sort_by_key(|factor| factor.to);
-        }
-        let backs = self.backs.iter().zip(areas);
-        let back: Vec<Estimate> = backs.map(|(&sum, &area)| sum.over(area)).collect();
-        let areas: Vec<f64> = areas.iter().map(|area| area * unit * unit).collect();
-        let open = open_shares(&factors, &back, &areas);
-        let names = scene.groups().to_vec();
-        ViewFactors { names, areas, factors, open, back, absent: Missing::Zero }
-    }
-}
-
-/// What is left of each row when all that arrives anywhere is taken off.
-pub(super) fn open_shares(
-    factors: &[Vec<Factor>],
-    back: &[Estimate],
-    areas: &[f64],
-) -> Vec<Estimate> {
-    let mut open = Vec::with_capacity(areas.len());
-    for ((row, back), &area) in factors.iter().zip(back).zip(areas) {
-        if area == 0.0 {
-            open.push(Estimate::default());
-            continue;
-        }
-        let sum: f64 = row.iter().map(|f| f.value).sum();
-        let squares: f64 = row.iter().map(|f| f.error.powi(2)).sum();
-        let error = (squares + back.error.powi(2)).sqrt();
-        open.push(Estimate { value: 1.0 - sum - back.value, error });
-    }
-    open
 }

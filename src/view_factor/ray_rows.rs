@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::convex_polygons::in_units;
 use super::fronts::Fronts;
@@ -26,13 +27,14 @@ use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// A polygon, and how many rays have met it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Count {
     pub polygon: u32,
     pub rays: u32,
 }
 
 /// What the first half of the rays of a polygon has met.
+#[derive(Serialize, Deserialize)]
 pub(super) struct FirstHalf {
     /// Fronts, by ascending index.
     pub fronts: Vec<Count>,
@@ -43,6 +45,7 @@ pub(super) struct FirstHalf {
 }
 
 /// What the rays of a polygon have met.
+#[derive(Serialize, Deserialize)]
 pub(super) struct RayRow {
     /// Rays in all, met something or not.
     pub rays: u32,
@@ -102,7 +105,7 @@ impl<'a> RayCaster<'a> {
     }
 
     /// All of `rays` rays from polygon `s`, after their first half; the `known` blockers ascend.
-    pub fn row(&self, s: u32, rays: u32, first: FirstHalf, known: &[u32]) -> RayRow {
+    pub fn row(&self, s: u32, rays: u32, first: &FirstHalf, known: &[u32]) -> RayRow {
         let is_known = |hit: &Hit| {
             self.blockers[hit.triangle].is_none_or(|blocker| known.binary_search(&blocker).is_ok())
         };

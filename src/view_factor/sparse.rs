@@ -10,18 +10,20 @@
 //! Time grows with the number of polygons and of pairs that see one another, memory with the
 //! latter.
 
-use std::ops::ControlFlow;
+use std::ops::Range;
 
-use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-use super::assembler::open_shares;
 use super::fronts::Fronts;
 use super::known_blockers::KnownBlockers;
-use super::matrix::{Estimate, Factor, Missing, ViewFactors};
+use super::matrix::Estimate;
 use super::pair_estimate::PairEstimator;
+use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
 use super::scene_polygons::ScenePolygons;
+use super::shared_work::share_out;
 use crate::scene::Scene;
 
 /// Standard errors are this share of the error asked for, so that 19 of 20 factors are within it.
@@ -41,70 +43,83 @@ const BATCH: usize = 256;
 /// Pairs that one thread takes at a time. Chosen by hand.
 const PAIRS_AT_A_TIME: usize = 64;
 
-/// Rounds over all polygons: two of rays, one of pairs.
-const ROUNDS: usize = 3;
-
-/// What a polygon exchanges with a later one: A₁F₁₂, in squares of the scene's unit.
-struct Exchange {
-    to: u32,
-    area: Estimate,
-}
-
-/// The matrix of `scene`, whose `polygons` these are; none if `progress` breaks.
-pub(super) fn assemble(
+/// Makes the rows of the polygons `wanted` of `scene`; none if that is stopped.
+pub(super) fn make(
     scene: &Scene,
     polygons: ScenePolygons,
     error: f64,
-    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-) -> Option<ViewFactors> {
+    wanted: &[u32],
+    making: &mut Making,
+) -> Option<()> {
     let ScenePolygons { unit, fronts, blockers, blocker_of_triangle } = polygons;
     let caster = RayCaster::new(scene, unit, &fronts, blocker_of_triangle);
     let count = fronts.polygons.len();
     let rays = (RAYS_TIMES_ERROR / error).clamp(MIN_RAYS, MAX_RAYS) as u32;
     let rays = rays.next_power_of_two();
-    let mut round = 0;
-    let mut tell = |done: usize| {
-        let flow = progress((round * count + done) / ROUNDS, count);
-        round += usize::from(done == count);
-        flow
-    };
-    let halves: Vec<FirstHalf> =
-        in_batches((0..count).collect(), &mut tell, |s| caster.first_half(s as u32, rays))?;
+    let all: Vec<u32> = (0..count as u32).collect();
+    // Two rounds of rays over all polygons, and one of pairs.
+    let of = 2 * count + wanted.len();
+    let halves: Vec<FirstHalf> = in_batches(&all, making, 0..of, |&s| caster.first_half(s, rays))?;
     let of_fronts = caster.blockers_of_fronts();
     let known = KnownBlockers::new(&fronts, &blockers, &of_fronts, &halves);
-    let halves = halves.into_iter().enumerate().collect();
-    let rows: Vec<RayRow> = in_batches(halves, &mut tell, |(s, half)| {
-        caster.row(s as u32, rays, half, known.around(s))
+    let rows: Vec<RayRow> = in_batches(&all, making, count..of, |&s| {
+        caster.row(s, rays, &halves[s as usize], known.around(s as usize))
     })?;
+    drop(halves);
     let known: Vec<&[u32]> = (0..count).map(|s| known.around(s)).collect();
     let (blockers, caster) = (&blockers, &caster);
     let (fronts, rows, known) = (&fronts, &rows, &known);
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
-    let later = met_either_way(rows).into_iter().enumerate().collect();
-    let exchanges = in_batches(later, &mut tell, |(s, later)| {
-        exchanges_of(&estimator, s as u32, &later, error)
-    })?;
-    let backs = back_shares(fronts, rows);
-    Some(into_matrix(scene, unit, fronts, exchanges, backs))
+    let later = met_either_way(rows);
+    let mut done = 2 * count;
+    for batch in wanted.chunks(BATCH * making.ranks.size()) {
+        // Some polygons have a thousand times the pairs of others.
+        let pieces = |&s: &u32| later[s as usize].chunks(PAIRS_AT_A_TIME).map(move |c| (s, c));
+        let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
+        let of_piece = |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
+        let exchanges = share_out(&pieces, making.ranks, of_piece);
+        let mut exchanges = pieces.iter().map(|(s, _)| *s).zip(exchanges).peekable();
+        for &s in batch {
+            let mut row =
+                PolygonRow { fronts: vec![], back: to_backs(fronts, &rows[s as usize], s) };
+            while let Some((_, piece)) = exchanges.next_if(|(of, _)| *of == s) {
+                row.fronts.extend(piece);
+            }
+            row.fronts = sums_by_group(row.fronts);
+            making.add(s, row);
+        }
+        done += batch.len();
+        making.tell_all(done * count / of, count)?;
+    }
+    Some(())
 }
 
-/// What `work` makes of all `items`, in parallel; none if `tell`, which is told how many are done,
-/// breaks.
-fn in_batches<T: Send, R: Send>(
-    items: Vec<T>,
-    tell: &mut impl FnMut(usize) -> ControlFlow<()>,
-    work: impl Fn(T) -> R + Sync,
+/// What `work` makes of all `items`, in parallel; none if that is stopped. `told` is how many items
+/// were done before, and how many there are in all.
+fn in_batches<R: Send + Serialize + DeserializeOwned>(
+    items: &[u32],
+    making: &mut Making,
+    told: Range<usize>,
+    work: impl Fn(&u32) -> R + Sync,
 ) -> Option<Vec<R>> {
     let mut results = Vec::with_capacity(items.len());
-    let mut items = items.into_iter();
-    while items.len() > 0 {
-        let batch: Vec<T> = items.by_ref().take(BATCH).collect();
-        results.par_extend(batch.into_par_iter().map(&work));
-        if tell(results.len()).is_break() {
-            return None;
-        }
+    for batch in items.chunks(BATCH * making.ranks.size()) {
+        results.extend(share_out(batch, making.ranks, &work));
+        let count = items.len();
+        making.tell_all((told.start + results.len()) * count / told.end, count)?;
     }
     Some(results)
+}
+
+/// One exchange a group, from those with its polygons, which ascend.
+fn sums_by_group(exchanges: Vec<Exchange>) -> Vec<Exchange> {
+    let groups = exchanges.chunk_by(|a, b| a.to == b.to);
+    let sum = |of_group: &[Exchange]| {
+        let squares: f64 = of_group.iter().map(|e| f64::from(e.error).powi(2)).sum();
+        let value = of_group.iter().map(|e| e.value).sum();
+        Exchange::new(of_group[0].to, Estimate { value, error: squares.sqrt() })
+    };
+    groups.map(sum).collect()
 }
 
 /// Per polygon the later ones that its rays have met, or whose rays have met it, with the rays of
@@ -124,82 +139,30 @@ fn met_either_way(rows: &[RayRow]) -> Vec<Vec<Count>> {
     (0..).zip(met_by).map(union).collect()
 }
 
-/// What polygon `s` exchanges with `later` ones.
+/// What polygon `s` exchanges with `later` ones, each under the group that it is of.
 fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) -> Vec<Exchange> {
     let fronts = estimator.fronts;
     let area_share = |s: u32| {
         let group_area = fronts.areas[fronts.group(s)];
         (fronts.polygons[s as usize].area / group_area, group_area)
     };
-    let of_pairs = |counts: &[Count]| {
-        let mut visibility = PointVisibility::default();
-        let mut exchanges = Vec::with_capacity(counts.len());
-        for &Count { polygon: t, rays } in counts {
-            let ((share_s, area_s), (share_t, area_t)) = (area_share(s), area_share(t));
-            // Errors of the pairs of two groups are independent: squares add up.
-            let tolerance = ERROR_SHARE * error * area_s.min(area_t) * (share_s * share_t).sqrt();
-            let area = estimator.exchange([s, t], rays, tolerance, &mut visibility);
-            if area.value > 0.0 || area.error > 0.0 {
-                exchanges.push(Exchange { to: t, area });
-            }
-        }
-        exchanges
-    };
-    later.par_chunks(PAIRS_AT_A_TIME).flat_map_iter(of_pairs).collect()
-}
-
-/// Per group, the share of its flux that meets backs, by counts of rays.
-fn back_shares(fronts: &Fronts, rows: &[RayRow]) -> Vec<Estimate> {
-    let mut backs = vec![Estimate::default(); fronts.areas.len()];
-    for (s, row) in (0..).zip(rows) {
-        let group = fronts.group(s);
-        let per_ray = fronts.polygons[s as usize].area / fronts.areas[group] / f64::from(row.rays);
-        let error = per_ray * f64::from(row.back + 1).sqrt();
-        backs[group].value += per_ray * f64::from(row.back);
-        backs[group].error = backs[group].error.hypot(error);
-    }
-    backs
-}
-
-/// Sums over groups, both ways.
-fn into_matrix(
-    scene: &Scene,
-    unit: f64,
-    fronts: &Fronts,
-    exchanges: Vec<Vec<Exchange>>,
-    back: Vec<Estimate>,
-) -> ViewFactors {
-    let areas = &fronts.areas;
-    let mut factors: Vec<Vec<Factor>> = areas.iter().map(|_| vec![]).collect();
-    let mut exchanges = exchanges.into_iter().enumerate().peekable();
-    for i in 0..areas.len() {
-        // Of all polygons of group i: by group, value and squared error.
-        let mut sums: Vec<(u32, f64, f64)> = vec![];
-        while let Some((_, of_polygon)) = exchanges.next_if(|(s, _)| fronts.group(*s as u32) == i) {
-            for Exchange { to, area } in of_polygon {
-                let j = fronts.group(to);
-                // Pairs within a group are met once and count both ways.
-                let ways = if i == j { 2.0 } else { 1.0 };
-                sums.push((j as u32, ways * area.value, (ways * area.error).powi(2)));
-            }
-        }
-        sums.sort_by_key(|(j, ..)| *j);
-        for of_group in sums.chunk_by(|a, b| a.0 == b.0) {
-            let to = of_group[0].0;
-            let value = of_group.iter().map(|(_, value, _)| value).sum();
-            let error = of_group.iter().map(|(.., square)| square).sum::<f64>().sqrt();
-            let mut push = |from: usize, to: u32| {
-                let Estimate { value, error } = Estimate { value, error }.over(areas[from]);
-                factors[from].push(Factor { to, value, error });
-            };
-            push(i, to);
-            if to as usize != i {
-                push(to as usize, i as u32);
-            }
+    let mut visibility = PointVisibility::default();
+    let mut exchanges = Vec::with_capacity(later.len());
+    for &Count { polygon: t, rays } in later {
+        let ((share_s, area_s), (share_t, area_t)) = (area_share(s), area_share(t));
+        // Errors of the pairs of two groups are independent: squares add up.
+        let tolerance = ERROR_SHARE * error * area_s.min(area_t) * (share_s * share_t).sqrt();
+        let area = estimator.exchange([s, t], rays, tolerance, &mut visibility);
+        if area.value > 0.0 || area.error > 0.0 {
+            exchanges.push(Exchange::new(fronts.group(t) as u32, area));
         }
     }
-    let open = open_shares(&factors, &back, areas);
-    let names = scene.groups().to_vec();
-    let areas = areas.iter().map(|area| area * unit * unit).collect();
-    ViewFactors { names, areas, factors, open, back, absent: Missing::Unmet }
+    exchanges
+}
+
+/// What polygon `s` gives to backs, by counts of its rays.
+fn to_backs(fronts: &Fronts, row: &RayRow, s: u32) -> Exchange {
+    let per_ray = fronts.polygons[s as usize].area / f64::from(row.rays);
+    let value = per_ray * f64::from(row.back);
+    Exchange::new(0, Estimate { value, error: per_ray * f64::from(row.back + 1).sqrt() })
 }

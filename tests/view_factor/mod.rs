@@ -1,4 +1,5 @@
 mod checks;
 mod exact;
+mod partial;
 mod sampled;
 mod sparse;

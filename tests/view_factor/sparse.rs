@@ -14,7 +14,7 @@ fn sparse(scene: &Scene, error: f64, two_sided: &[usize]) -> ViewFactors {
 }
 
 /// Houses of unlike heights, `count` a side, on one ground and under one sky.
-fn town(count: u32) -> Scene {
+pub fn town(count: u32) -> Scene {
     let size = 3.0 * f64::from(count);
     let mut surfaces =
         vec![facing_up([0.0, size], [0.0, size], 0.0), facing_down([0.0, size], [0.0, size], 12.0)];

@@ -3,6 +3,7 @@
 //! ```text
 //! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, GLB, JSON, EXR, PNG
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
+//! radiosity merge         SCENE.…rows  the same, of their rows
 //! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
@@ -36,12 +37,14 @@ use std::process::ExitCode;
 
 use args::Stop;
 use lexopt::prelude::*;
+use view_factors::merge;
 
 const USAGE: &str = "\
 usage: radiosity COMMAND SCENE.obj… [options]
 
   bake          the radiosity of a scene, at the vertices of a mesh
   view-factors  view factors between the groups of scenes
+  merge         rows of view factors from many machines, put together
   heat          temperatures and net fluxes of groups, by their view factors
   trade-off     what a bake of a scene costs and how far it is off, over its settings
   verify        how far off a solution of a scene is, by path tracing
@@ -55,9 +58,10 @@ struct Command {
     run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
 }
 
-const COMMANDS: [Command; 5] = [
+const COMMANDS: [Command; 6] = [
     Command { name: "bake", usage: bake::USAGE, run: bake::run },
     Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
+    Command { name: "merge", usage: merge::USAGE, run: merge::run },
     Command { name: "heat", usage: heat::USAGE, run: heat::run },
     Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
     Command { name: "verify", usage: verify::USAGE, run: verify::run },

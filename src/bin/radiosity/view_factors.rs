@@ -2,8 +2,11 @@
 
 mod check;
 mod files;
+pub mod merge;
+mod rows;
 
 use std::num::NonZeroU32;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,7 +23,9 @@ use crate::scene_options::SceneOptions;
 
 pub const USAGE: &str = "\
 usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--check ROWS]
-                    [--enforce] [--format F,…] [--out DIR]
+                    [--checkpoint FILE] [--enforce] [--format F,…] [--out DIR]
+       radiosity view-factors SCENE.obj --rows A..B [--facets] [--error E] [--two-sided NAME]…
+                    [--checkpoint FILE] [--out DIR]
        radiosity view-factors SCENE.obj… --sampled [--facets] [--element-size X] [--hemicube N]
                     [--adapter NAME | --cpu] [--enforce] [--format F,…] [--out DIR]
 
@@ -36,6 +41,10 @@ what leaves the scene, `back` what meets the backs of surfaces.
   --two-sided NAME  this group gives and takes on both sides; its area is that of both
   --check ROWS      hold so many rows, drawn at random, against exact ones, and print how far off
                     they are; an exact row of a large scene takes seconds
+  --rows A..B       only rows A to B − 1, counted from 0, to SCENE.A-B.rows: for many machines;
+                    `radiosity merge` makes a matrix of all of them
+  --checkpoint FILE keep the rows that are done there, every minute and at Ctrl-C; go on from it
+                    if it is there
   --enforce         make the matrix keep closure and reciprocity, and say what that changed
   --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
                     SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
@@ -72,32 +81,25 @@ struct Options {
 }
 
 enum Method {
-    ToError { to_error: ToError, check: usize },
+    ToError { to_error: ToError, check: usize, rows: Option<Range<usize>> },
     Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
 }
 
 /// View factors to an error that is asked for.
 pub struct ToError {
+    /// Standard errors are half of it at most.
     pub error: f64,
     /// Names of groups.
     pub two_sided: Vec<String>,
     /// Whether each face is a group, and `two_sided` may name those of the file.
     pub facets: bool,
+    /// Where rows that are done are kept.
+    pub checkpoint: Option<PathBuf>,
 }
 
 impl Default for ToError {
     fn default() -> ToError {
-        ToError { error: DEFAULT_ERROR, two_sided: vec![], facets: false }
-    }
-}
-
-impl ToError {
-    pub fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
-        let groups = group_indices(scene, &self.two_sided, self.facets)?;
-        let matrix = progress::of_count("polygons", |report| {
-            ViewFactors::new(scene, self.error, &groups, report)
-        })?;
-        matrix.ok_or(Stop::Interrupted)
+        ToError { error: DEFAULT_ERROR, two_sided: vec![], facets: false, checkpoint: None }
     }
 }
 
@@ -125,6 +127,7 @@ impl Options {
         let (mut error, mut two_sided, mut check) = (None, vec![], None);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let (mut device, mut facets) = (None, false);
+        let (mut rows, mut checkpoint) = (None, None);
         let mut reading = SceneOptions::ignoring_specular();
         while let Some(arg) = parser.next()? {
             match arg {
@@ -140,6 +143,8 @@ impl Options {
                 Long("check") => {
                     check = Some(args::value(parser, "check", "a whole number of rows")?);
                 }
+                Long("rows") => rows = Some(rows::range(parser)?),
+                Long("checkpoint") => checkpoint = Some(parser.value()?.into()),
                 Long("two-sided") => {
                     two_sided.push(args::value(parser, "two-sided", "a group's name")?);
                 }
@@ -166,11 +171,20 @@ impl Options {
         if scenes.is_empty() {
             return Err(Stop::usage("no scene given: name one or more OBJ files"));
         }
-        let only_to_error = error.is_some() || !two_sided.is_empty() || check.is_some();
+        if checkpoint.is_some() && scenes.len() > 1 {
+            return Err(Stop::usage("--checkpoint keeps the rows of one scene"));
+        }
+        if rows.is_some() && (check.is_some() || enforce || formats.is_some()) {
+            let needing = "--check, --enforce and --format need all rows: `radiosity merge`";
+            return Err(Stop::usage(needing));
+        }
+        let is_kept = rows.is_some() || checkpoint.is_some();
+        let only_to_error = error.is_some() || !two_sided.is_empty() || check.is_some() || is_kept;
         let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
         let method = if sampled {
             if only_to_error {
-                let not_for = "--error, --two-sided and --check are not for --sampled";
+                let not_for = "--error, --two-sided, --check, --rows and --checkpoint are not for \
+                               --sampled";
                 return Err(Stop::usage(not_for));
             }
             let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
@@ -182,8 +196,8 @@ impl Options {
                 return Err(Stop::usage(needing));
             }
             let error = error.unwrap_or(DEFAULT_ERROR);
-            let to_error = ToError { error, two_sided, facets };
-            Method::ToError { to_error, check: check.unwrap_or(0) }
+            let to_error = ToError { error, two_sided, facets, checkpoint };
+            Method::ToError { to_error, check: check.unwrap_or(0), rows }
         };
         Ok(Options { scenes, reading, out, formats, enforce, method })
     }
@@ -209,6 +223,9 @@ impl Options {
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
         }
+        if let Method::ToError { to_error, rows: Some(rows), .. } = &self.method {
+            return to_error.write_rows(&scene, rows.clone(), &stem);
+        }
         let start = Instant::now();
         let mut matrix = self.method.matrix(&scene)?;
         let seconds = start.elapsed().as_secs_f64();
@@ -220,14 +237,19 @@ impl Options {
         if self.enforce {
             matrix = enforce(&matrix);
         }
-        if matrix.names.len() <= MAX_PRINTED {
-            print_factors(&matrix);
-        }
-        for format in &formats {
-            progress::of_writing(&format.path(&stem), |_| format.write(&stem, &matrix))?;
-        }
-        Ok(())
+        Ok(write_all(&formats, &stem, &matrix)?)
     }
+}
+
+/// Prints the factors if they are few, and writes them in all of `formats`.
+fn write_all(formats: &[Format], stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
+    if matrix.names.len() <= MAX_PRINTED {
+        print_factors(matrix);
+    }
+    for format in formats {
+        progress::of_writing(&format.path(stem), |_| format.write(stem, matrix))?;
+    }
+    Ok(())
 }
 
 impl Method {
@@ -254,7 +276,7 @@ impl Method {
     /// Holds as many rows of `matrix` as are asked for against exact ones.
     fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Stop> {
         match self {
-            Method::ToError { to_error, check: rows @ 1.. } => {
+            Method::ToError { to_error, check: rows @ 1.., .. } => {
                 let groups = group_indices(scene, &to_error.two_sided, to_error.facets)?;
                 check::check(scene, matrix, to_error.error, &groups, *rows)
             }

@@ -1,0 +1,90 @@
+//! Rows of a matrix: all or some, kept while they are made, and gone on from.
+
+use std::ops::{ControlFlow, Range};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use radiosity::io::view_factors::{read_rows, write_rows};
+use radiosity::view_factor::{Alone, PartialMatrix};
+use radiosity::{Error, Scene, ViewFactors};
+
+use super::{ToError, group_indices};
+use crate::args::{self, Stop};
+use crate::{interrupt, progress};
+
+/// Between two writings of what is done. Chosen by hand.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// The value of `--rows`.
+pub fn range(parser: &mut lexopt::Parser) -> Result<Range<usize>, Stop> {
+    let text: String = args::value(parser, "rows", "A..B")?;
+    let ends = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
+    let rising = ends.filter(|range: &Range<usize>| range.start < range.end);
+    rising.ok_or_else(|| args::wrong_value("rows", &text, "A..B, from 0, such as 0..500"))
+}
+
+impl ToError {
+    /// The whole matrix.
+    pub fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
+        let rows = self.rows(scene, 0..scene.groups().len())?;
+        Ok(rows.into_matrix()?)
+    }
+
+    /// Makes `rows` and writes them, beside others with this `stem`.
+    pub fn write_rows(&self, scene: &Scene, rows: Range<usize>, stem: &Path) -> Result<(), Stop> {
+        let path = stem.with_added_extension(format!("{}-{}.rows", rows.start, rows.end));
+        args::check_writable(&path)?;
+        let part = self.rows(scene, rows)?;
+        progress::of_writing(&path, |path| write_rows(path, &part))?;
+        say!("{}: rows of {} groups are missing", path.display(), part.missing().len());
+        Ok(())
+    }
+
+    /// Those of `rows` that are not in the checkpoint, if there is one, and all that is in it.
+    fn rows(&self, scene: &Scene, rows: Range<usize>) -> Result<PartialMatrix, Stop> {
+        let groups = group_indices(scene, &self.two_sided, self.facets)?;
+        let Some(checkpoint) = &self.checkpoint else {
+            let go = |_: &PartialMatrix| ControlFlow::Continue(());
+            return Ok(self.make(scene, &groups, rows, None, go)?);
+        };
+        args::check_writable(checkpoint)?;
+        let done = match checkpoint.exists() {
+            true => Some(progress::of_reading(checkpoint, || read_rows(checkpoint))?),
+            false => None,
+        };
+        interrupt::catch();
+        let (mut written, mut failure) = (Instant::now(), None);
+        let part = self.make(scene, &groups, rows, done, |part| {
+            if written.elapsed() > CHECKPOINT_INTERVAL {
+                failure = write_rows(checkpoint, part).err();
+                written = Instant::now();
+            }
+            match failure {
+                Some(_) => ControlFlow::Break(()),
+                None => interrupt::flow(),
+            }
+        })?;
+        if let Some(failure) = failure {
+            return Err(failure.into());
+        }
+        write_rows(checkpoint, &part)?;
+        if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(part) }
+    }
+
+    fn make(
+        &self,
+        scene: &Scene,
+        groups: &[usize],
+        rows: Range<usize>,
+        done: Option<PartialMatrix>,
+        mut keep: impl FnMut(&PartialMatrix) -> ControlFlow<()>,
+    ) -> Result<PartialMatrix, Error> {
+        progress::of_count("polygons", |report| {
+            let told = |part: &PartialMatrix, done, of| {
+                report(done, of)?;
+                keep(part)
+            };
+            PartialMatrix::make(scene, self.error, groups, rows, done, &mut Alone, told)
+        })
+    }
+}

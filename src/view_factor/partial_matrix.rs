@@ -1,0 +1,384 @@
+//! A matrix in the making: what some of its polygons exchange with later ones.
+//!
+//! Pairs are met once, in the row of the earlier polygon. So half of what a group exchanges is in
+//! its own rows and half in those of others: rows become a matrix when all are there.
+
+use std::ops::{ControlFlow, Range};
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+use super::matrix::{Estimate, Factor, Missing, ViewFactors};
+use super::scene_polygons::ScenePolygons;
+use super::{assembler, check_settings, effort, sparse};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::ranks::Ranks;
+use crate::scene::Scene;
+
+/// Begins every file; the last byte is the version.
+const MAGIC: &[u8; 8] = b"radipar\x01";
+
+/// Bytes of the checksum at the end of every file.
+const CHECKSUM_BYTES: usize = 8;
+
+/// How the numbers of a matrix are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Method {
+    Exact,
+    Sparse,
+}
+
+/// Rows of a matrix of view factors that are done, of some groups or all.
+///
+/// To share out work between processes that know nothing of one another, and to go on where a
+/// process was stopped: as bytes it can be kept, and [`PartialMatrix::merge`] puts several together.
+/// The matrix has the same bits however its rows came together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartialMatrix {
+    /// Hash of the scene and the settings.
+    input: u64,
+    method: Method,
+    names: Vec<String>,
+    /// What lengths were divided by.
+    unit: f64,
+    /// Radiating area of each group, in squares of `unit`.
+    areas: Vec<f64>,
+    /// Of each polygon, ascending.
+    groups: Vec<u32>,
+    /// Of each polygon, if it is done.
+    rows: Vec<Option<PolygonRow>>,
+}
+
+/// A₁F₁₂ from one polygon to later polygons of its own group and to later groups, in squares of the
+/// unit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct PolygonRow {
+    /// By ascending group.
+    pub fronts: Vec<Exchange>,
+    /// To the backs of all groups together.
+    pub back: Exchange,
+}
+
+/// What a polygon exchanges with a group.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Exchange {
+    /// The group.
+    pub to: u32,
+    /// Standard error.
+    pub error: f32,
+    pub value: f64,
+}
+
+impl Exchange {
+    pub fn new(to: u32, of: Estimate) -> Exchange {
+        Exchange { to, value: of.value, error: of.error as f32 }
+    }
+}
+
+/// Rows being made, and who is told of it.
+pub(super) struct Making<'a> {
+    pub part: PartialMatrix,
+    pub ranks: &'a mut dyn Ranks,
+    progress: &'a mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+}
+
+impl Making<'_> {
+    /// Tells how much is done; none where that stops the work in any process.
+    pub fn tell_all(&mut self, done: usize, of: usize) -> Option<()> {
+        let goes_on = (self.progress)(&self.part, done, of).is_continue();
+        let goes_on = match self.ranks.size() {
+            1 => goes_on,
+            _ => self.ranks.all_gather(&[u8::from(goes_on)]).iter().all(|told| *told == [1]),
+        };
+        goes_on.then_some(())
+    }
+
+    pub fn add(&mut self, polygon: u32, row: PolygonRow) {
+        self.part.rows[polygon as usize] = Some(row);
+    }
+}
+
+impl PartialMatrix {
+    /// Makes those rows of `groups` that are not `done`, of the matrix that
+    /// [`ViewFactors::new`] makes with these settings, and adds them to what is.
+    ///
+    /// `ranks` share the work out; [`Alone`](crate::view_factor::Alone) does it alone. `progress` is
+    /// told the rows that are done, polygons done and in all, and may stop the work: what is done by
+    /// then is returned.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or what is
+    /// `done` is of another scene or other settings.
+    pub fn make(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        groups: Range<usize>,
+        done: Option<PartialMatrix>,
+        ranks: &mut dyn Ranks,
+        mut progress: impl FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+    ) -> Result<PartialMatrix, Error> {
+        let count = scene.groups().len();
+        if groups.start > groups.end || groups.end > count {
+            let found = format!("{}..{}", groups.start, groups.end);
+            return Err(Error::new(
+                ErrorKind::Setting,
+                "rows",
+                found,
+                format!("the scene has {count} groups, from 0"),
+            ));
+        }
+        check_settings(scene, error, two_sided)?;
+        let polygons = ScenePolygons::new(scene, two_sided);
+        let method = match effort::is_exact_too_long(&polygons) {
+            true => Method::Sparse,
+            false => Method::Exact,
+        };
+        let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
+        if let Some(done) = done {
+            part.check_fits(&done, "rows that are done")?;
+            part = done;
+        }
+        Ok(part.with_rows(scene, polygons, error, groups, ranks, &mut progress).0)
+    }
+
+    /// The whole matrix by `method`, or none where `progress` stops it.
+    pub(super) fn whole(
+        scene: &Scene,
+        polygons: ScenePolygons,
+        error: f64,
+        method: Method,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Option<ViewFactors> {
+        let part = PartialMatrix::none(scene, error, &[], method, &polygons);
+        let groups = 0..scene.groups().len();
+        let mut told = |_: &PartialMatrix, done, of| progress(done, of);
+        let alone = &mut crate::ranks::Alone;
+        let (part, is_done) = part.with_rows(scene, polygons, error, groups, alone, &mut told);
+        if is_done { part.into_matrix().ok() } else { None }
+    }
+
+    /// No row of the matrix of `scene`.
+    fn none(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        method: Method,
+        polygons: &ScenePolygons,
+    ) -> PartialMatrix {
+        let fronts = &polygons.fronts;
+        let groups: Vec<u32> = fronts.polygons.iter().map(|polygon| polygon.group).collect();
+        PartialMatrix {
+            input: input_hash(scene, error, two_sided),
+            method,
+            names: scene.groups().to_vec(),
+            unit: polygons.unit,
+            areas: fronts.areas.clone(),
+            rows: vec![None; groups.len()],
+            groups,
+        }
+    }
+
+    /// With rows of `groups` added, and whether that was not stopped.
+    fn with_rows(
+        self,
+        scene: &Scene,
+        polygons: ScenePolygons,
+        error: f64,
+        groups: Range<usize>,
+        ranks: &mut dyn Ranks,
+        progress: &mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+    ) -> (PartialMatrix, bool) {
+        let is_wanted = |&s: &u32| {
+            groups.contains(&(self.groups[s as usize] as usize)) && self.rows[s as usize].is_none()
+        };
+        let wanted: Vec<u32> = (0..self.groups.len() as u32).filter(is_wanted).collect();
+        let mut making = Making { part: self, ranks, progress };
+        let done = match making.part.method {
+            Method::Exact => assembler::make(polygons, error, &wanted, &mut making),
+            Method::Sparse => sparse::make(scene, polygons, error, &wanted, &mut making),
+        };
+        (making.part, done.is_some())
+    }
+
+    /// Groups of which rows are missing, by their index.
+    pub fn missing(&self) -> Vec<usize> {
+        let rows = self.rows.iter().zip(&self.groups).filter(|(row, _)| row.is_none());
+        let mut missing: Vec<usize> = rows.map(|(_, &group)| group as usize).collect();
+        missing.dedup();
+        missing
+    }
+
+    /// Puts the rows of `parts` together.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when there are none, or they are of different scenes or settings.
+    pub fn merge(parts: impl IntoIterator<Item = PartialMatrix>) -> Result<PartialMatrix, Error> {
+        let mut parts = parts.into_iter();
+        let Some(mut merged) = parts.next() else {
+            let remedy = "give one or more";
+            return Err(Error::new(ErrorKind::Setting, "parts of a matrix", "none", remedy));
+        };
+        for (part, number) in parts.zip(2..) {
+            merged.check_fits(&part, &format!("part {number} of a matrix"))?;
+            for (row, other) in merged.rows.iter_mut().zip(part.rows) {
+                *row = row.take().or(other);
+            }
+        }
+        Ok(merged)
+    }
+
+    /// Whether `other` is of the same input.
+    fn check_fits(&self, other: &PartialMatrix, place: &str) -> Result<(), Error> {
+        let same = self.input == other.input
+            && self.method == other.method
+            && self.names == other.names
+            && self.areas == other.areas
+            && self.groups == other.groups;
+        if same {
+            return Ok(());
+        }
+        let (found, remedy) = ("rows of another scene, or of other settings", "make them anew");
+        Err(Error::new(ErrorKind::Setting, place, found, remedy))
+    }
+
+    /// The matrix.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when rows are missing, with some of their groups.
+    pub fn into_matrix(self) -> Result<ViewFactors, Error> {
+        let missing = self.missing();
+        if !missing.is_empty() {
+            let some: Vec<&str> = missing.iter().take(3).map(|&i| self.names[i].as_str()).collect();
+            let found = format!("rows of {} groups missing: {}", missing.len(), quoted(&some));
+            let remedy = "make them, and merge them with these";
+            return Err(Error::new(ErrorKind::Setting, "parts of a matrix", found, remedy));
+        }
+        let areas = &self.areas;
+        let mut factors: Vec<Vec<Factor>> = areas.iter().map(|_| vec![]).collect();
+        let mut back = vec![Estimate::default(); areas.len()];
+        let mut rows = self.rows.into_iter().zip(&self.groups).peekable();
+        for i in 0..areas.len() {
+            // Of all polygons of group i: by group, value and squared error.
+            let (mut sums, mut to_back) = (vec![], (0.0, 0.0));
+            while let Some((row, _)) = rows.next_if(|(_, group)| **group as usize == i) {
+                let PolygonRow { fronts, back } = row.unwrap_or_default();
+                for Exchange { to, error, value } in fronts {
+                    // Pairs within a group are met once and count both ways.
+                    let ways = if i == to as usize { 2.0 } else { 1.0 };
+                    sums.push((to, ways * value, (ways * f64::from(error)).powi(2)));
+                }
+                to_back.0 += back.value;
+                to_back.1 += f64::from(back.error).powi(2);
+            }
+            back[i] = Estimate { value: to_back.0, error: f64::sqrt(to_back.1) }.over(areas[i]);
+            sums.sort_by_key(|(j, ..)| *j);
+            for of_group in sums.chunk_by(|a, b| a.0 == b.0) {
+                let to = of_group[0].0;
+                let value = of_group.iter().map(|(_, value, _)| value).sum();
+                let error = of_group.iter().map(|(.., square)| square).sum::<f64>().sqrt();
+                let mut push = |from: usize, to: u32| {
+                    let Estimate { value, error } = Estimate { value, error }.over(areas[from]);
+                    factors[from].push(Factor { to, value, error });
+                };
+                push(i, to);
+                if to as usize != i {
+                    push(to as usize, i as u32);
+                }
+            }
+        }
+        let open = open_shares(&factors, &back, areas);
+        let areas = areas.iter().map(|area| area * self.unit * self.unit).collect();
+        let absent = match self.method {
+            Method::Exact => Missing::Zero,
+            Method::Sparse => Missing::Unmet,
+        };
+        Ok(ViewFactors { names: self.names, areas, factors, open, back, absent })
+    }
+
+    /// As bytes, for a file or another process.
+    ///
+    /// # Panics
+    /// Never: a vector takes all bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let bytes = postcard::to_extend(self, MAGIC.to_vec());
+        let mut bytes = bytes.expect("a vector takes all bytes");
+        bytes.extend(xxh3_64(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// What [`PartialMatrix::to_bytes`] has made.
+    ///
+    /// # Errors
+    /// [`ErrorKind::File`] when these bytes are something else, or damaged.
+    pub fn from_bytes(bytes: &[u8]) -> Result<PartialMatrix, Error> {
+        let refuse = |found: &str| {
+            let remedy = "give rows that this version has written";
+            Err(Error::new(ErrorKind::File, "part of a matrix", found, remedy))
+        };
+        let Some(content) = bytes.strip_prefix(MAGIC) else {
+            return refuse("not a part of a matrix, or that of another version");
+        };
+        let Some((content, checksum)) = content.split_last_chunk::<CHECKSUM_BYTES>() else {
+            return refuse("a file that breaks off");
+        };
+        if xxh3_64(&bytes[..bytes.len() - CHECKSUM_BYTES]).to_le_bytes() != *checksum {
+            return refuse("damaged, its checksum does not match");
+        }
+        match postcard::from_bytes::<PartialMatrix>(content) {
+            Ok(part) if part.is_consistent() => Ok(part),
+            _ => refuse("damaged, it has numbers that no matrix has"),
+        }
+    }
+
+    /// Whether this can be a part of a matrix; one that was read may not be.
+    fn is_consistent(&self) -> bool {
+        let is_size = |x: f64| x.is_finite() && x >= 0.0;
+        let groups = self.names.len();
+        let is_exchange = |e: &Exchange| {
+            (e.to as usize) < groups && is_size(e.value) && is_size(f64::from(e.error))
+        };
+        let is_row = |row: &PolygonRow| {
+            row.fronts.iter().chain([&row.back]).all(is_exchange)
+                && row.fronts.is_sorted_by(|a, b| a.to < b.to)
+        };
+        // The group of what meets backs is always the first.
+        self.areas.len() == groups
+            && self.areas.iter().copied().all(is_size)
+            && self.unit.is_finite()
+            && self.unit > 0.0
+            && self.groups.is_sorted()
+            && self.groups.last().is_none_or(|&last| (last as usize) < groups)
+            && self.rows.len() == self.groups.len()
+            && self.rows.iter().flatten().all(is_row)
+    }
+}
+
+/// A hash of all that the numbers of a matrix depend on.
+fn input_hash(scene: &Scene, error: f64, two_sided: &[usize]) -> u64 {
+    let mut hash = Xxh3::new();
+    hash.update(&error.to_le_bytes());
+    two_sided.iter().for_each(|&group| hash.update(&(group as u64).to_le_bytes()));
+    for (t, triangle) in scene.triangles().iter().enumerate() {
+        let corners = scene.corners(t).map(|corner| corner.to_array());
+        corners.as_flattened().iter().for_each(|x| hash.update(&x.to_le_bytes()));
+        hash.update(&triangle.group.to_le_bytes());
+    }
+    hash.digest()
+}
+
+/// What is left of each row when all that arrives anywhere is taken off.
+fn open_shares(factors: &[Vec<Factor>], back: &[Estimate], areas: &[f64]) -> Vec<Estimate> {
+    let mut open = Vec::with_capacity(areas.len());
+    for ((row, back), &area) in factors.iter().zip(back).zip(areas) {
+        if area == 0.0 {
+            open.push(Estimate::default());
+            continue;
+        }
+        let sum: f64 = row.iter().map(|f| f.value).sum();
+        let squares: f64 = row.iter().map(|f| f.error.powi(2)).sum();
+        let error = (squares + back.error.powi(2)).sqrt();
+        open.push(Estimate { value: 1.0 - sum - back.value, error });
+    }
+    open
+}

@@ -1,0 +1,176 @@
+//! Rows made by several, in one process or many: the same bits.
+
+use std::ops::{ControlFlow, Range};
+use std::sync::{Arc, Barrier, Mutex};
+
+use radiosity::view_factor::{Alone, Missing, PartialMatrix, Ranks};
+use radiosity::{ErrorKind, Scene, ViewFactors};
+
+use super::sparse::town;
+use crate::common::keep_counting;
+use crate::common::scenes::{cube, grey};
+
+const ERROR: f64 = 0.2;
+
+fn go(_: &PartialMatrix, _: usize, _: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn rows(scene: &Scene, groups: Range<usize>, done: Option<PartialMatrix>) -> PartialMatrix {
+    PartialMatrix::make(scene, ERROR, &[], groups, done, &mut Alone, go).unwrap()
+}
+
+/// An exact scene, and one that is too large for that.
+fn scenes() -> [(Scene, Missing); 2] {
+    [(cube(&grey()), Missing::Zero), (town(15), Missing::Unmet)]
+}
+
+fn whole(scene: &Scene, absent: Missing) -> ViewFactors {
+    let matrix = ViewFactors::new(scene, ERROR, &[], keep_counting).unwrap().unwrap();
+    assert_eq!(matrix.absent, absent);
+    matrix
+}
+
+#[test]
+fn rows_in_any_order_make_the_same_matrix() {
+    for (scene, absent) in scenes() {
+        let expected = whole(&scene, absent);
+        let n = scene.groups().len();
+        let parts = [4..n, 0..1, 1..4].map(|groups| rows(&scene, groups, None));
+        assert_eq!(parts[1].missing(), (1..n).collect::<Vec<_>>());
+        let error = parts[1].clone().into_matrix().unwrap_err();
+        assert!(error.to_string().contains(&format!("rows of {} groups missing", n - 1)));
+        let kept = parts.map(|part| PartialMatrix::from_bytes(&part.to_bytes()).unwrap());
+        let merged = PartialMatrix::merge(kept).unwrap();
+        assert_eq!(merged.missing(), [0; 0]);
+        assert_eq!(merged.into_matrix().unwrap(), expected);
+    }
+}
+
+#[test]
+fn what_was_stopped_goes_on() {
+    for (scene, absent) in scenes() {
+        let n = scene.groups().len();
+        let mut told = 0;
+        let stopped =
+            PartialMatrix::make(&scene, ERROR, &[], 0..n, None, &mut Alone, |part, _, _| {
+                told += 1;
+                match part.missing().len() < n {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            });
+        let stopped = stopped.unwrap();
+        let left = stopped.missing().len();
+        assert!(left > 0 && left < n && told > 0, "{left} of {n}");
+        let whole_again = rows(&scene, 0..n, Some(stopped)).into_matrix().unwrap();
+        assert_eq!(whole_again, whole(&scene, absent));
+    }
+}
+
+/// One of some threads that act as processes.
+struct Thread {
+    rank: usize,
+    given: Arc<Mutex<Vec<Vec<u8>>>>,
+    barrier: Arc<Barrier>,
+    calls: usize,
+}
+
+impl Ranks for Thread {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.given.lock().unwrap().len()
+    }
+
+    fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        self.calls += 1;
+        self.given.lock().unwrap()[self.rank] = bytes.to_vec();
+        self.barrier.wait();
+        let all = self.given.lock().unwrap().clone();
+        self.barrier.wait();
+        all
+    }
+}
+
+/// What `work` makes in each of `size` processes.
+fn in_processes<R: Send>(size: usize, work: impl Fn(&mut Thread) -> R + Sync) -> Vec<R> {
+    let given = Arc::new(Mutex::new(vec![vec![]; size]));
+    let barrier = Arc::new(Barrier::new(size));
+    std::thread::scope(|scope| {
+        let process = |rank| {
+            let (given, barrier) = (given.clone(), barrier.clone());
+            let work = &work;
+            scope.spawn(move || {
+                let mut thread = Thread { rank, given, barrier, calls: 0 };
+                let result = work(&mut thread);
+                assert!(thread.calls > 0, "nothing was shared out");
+                result
+            })
+        };
+        let threads: Vec<_> = (0..size).map(process).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    })
+}
+
+#[test]
+fn any_number_of_processes_make_the_same_matrix() {
+    for (scene, absent) in scenes() {
+        let expected = whole(&scene, absent);
+        let n = scene.groups().len();
+        for size in [2, 3] {
+            let made = in_processes(size, |ranks| {
+                let part = PartialMatrix::make(&scene, ERROR, &[], 0..n, None, ranks, go);
+                part.unwrap().into_matrix().unwrap()
+            });
+            assert!(made.iter().all(|matrix| *matrix == expected), "{size} processes");
+        }
+    }
+}
+
+#[test]
+fn one_process_stops_all() {
+    let (scene, _) = &scenes()[1];
+    let left = in_processes(2, |ranks| {
+        let stops = ranks.rank == 1;
+        let part =
+            PartialMatrix::make(scene, ERROR, &[], 0..5, None, ranks, |_, _, _| match stops {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            });
+        part.unwrap().missing().len()
+    });
+    // It is told so after the first rays, before there is a row.
+    assert_eq!(left, [scene.groups().len(); 2]);
+}
+
+#[test]
+fn other_scenes_and_settings_are_refused() {
+    let [(scene, _), (other, _)] = scenes();
+    let part = rows(&scene, 0..2, None);
+    let coarse = PartialMatrix::make(&scene, 0.5, &[], 0..6, None, &mut Alone, go).unwrap();
+    for wrong in [coarse, rows(&other, 0..1, None)] {
+        let error = PartialMatrix::merge([part.clone(), wrong.clone()]).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Setting);
+        assert!(error.to_string().contains("part 2") && error.to_string().contains("another"));
+        let error = PartialMatrix::make(&scene, ERROR, &[], 0..6, Some(wrong), &mut Alone, go);
+        assert!(error.unwrap_err().to_string().contains("another scene"));
+    }
+    assert!(PartialMatrix::merge([]).unwrap_err().to_string().contains("none"));
+    let error = PartialMatrix::make(&scene, ERROR, &[], 2..7, None, &mut Alone, go).unwrap_err();
+    assert!(error.to_string().contains("2..7; the scene has 6 groups"), "{error}");
+}
+
+#[test]
+fn bytes_that_are_damaged_are_refused() {
+    let bytes = rows(&cube(&grey()), 0..6, None).to_bytes();
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 1;
+        let error = PartialMatrix::from_bytes(&damaged).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::File, "byte {at}");
+        assert!(PartialMatrix::from_bytes(&bytes[..at]).is_err(), "cut at {at}");
+    }
+}
