@@ -174,3 +174,45 @@ fn boundaries_that_say_nothing_are_refused_with_their_line() {
         assert!(words.iter().all(|word| error.contains(word)), "{words:?}: {error}");
     }
 }
+
+#[test]
+fn rows_of_many_machines_merge_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let cornell = super::cornell();
+    let out = folder.path().to_str().unwrap();
+    let common = [cornell, "--facets", "--two-sided", "light", "--out", out];
+    let view_factors = |more: &[&str]| run("view-factors", &[&common, more].concat());
+    assert!(view_factors(&["--format", "npz"]).status.success());
+    let whole = std::fs::read(folder.path().join("cornell_box.npz")).unwrap();
+    for rows in ["0..3", "3..17"] {
+        let out = view_factors(&["--rows", rows]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    }
+    let [first, second] = ["0-3", "3-17"]
+        .map(|rows| folder.path().join(format!("cornell_box.{rows}.rows")).display().to_string());
+    let merged = run("merge", &[&second, &first, "--format", "npz"]);
+    assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
+    assert_eq!(std::fs::read(folder.path().join("cornell_box.npz")).unwrap(), whole);
+    let alone = run("merge", &[&first]);
+    assert_eq!(alone.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&alone.stderr).contains("rows of 14 groups missing"));
+    // A checkpoint is gone on from: rows are there already.
+    let out = view_factors(&["--checkpoint", &first, "--format", "npz"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(std::fs::read(folder.path().join("cornell_box.npz")).unwrap(), whole);
+    let complete = run("merge", &[&first, "--format", "npz"]);
+    assert!(complete.status.success(), "the checkpoint has all rows now");
+    let other = view_factors(&["--checkpoint", &first, "--error", "1e-3"]);
+    assert_eq!(other.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("of other settings"));
+    for (more, words) in [
+        (&["--rows", "5..5"][..], "A..B"),
+        (&["--rows", "0..2", "--enforce"], "radiosity merge"),
+        (&["--sampled", "--rows", "0..2"], "--rows"),
+        (&["--checkpoint", "x", cornell], "one scene"),
+    ] {
+        let out = view_factors(more);
+        assert_eq!(out.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&out.stderr).contains(words));
+    }
+}
