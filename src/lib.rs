@@ -59,6 +59,7 @@
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
+//! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
@@ -107,7 +108,7 @@ pub mod hemicube;
 pub mod io;
 pub mod mesh;
 mod progress;
-mod ranks;
+pub mod ranks;
 mod sampling;
 pub mod scene;
 pub mod solver;

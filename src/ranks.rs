@@ -4,7 +4,7 @@
 ///
 /// What is shared out comes back the same, whichever process made it, so that all of them have the
 /// same bits, for any number of them. Every process must make the same calls in the same order.
-pub trait Ranks {
+pub trait Ranks: std::fmt::Debug {
     /// The number of this process, from 0.
     fn rank(&self) -> usize;
 

@@ -68,7 +68,6 @@ pub use self::checks::{ErrorStats, MatrixChecks};
 pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, Missing, ViewFactors};
 pub use self::partial_matrix::PartialMatrix;
-pub use crate::ranks::{Alone, Ranks};
 
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,

@@ -15,7 +15,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("visibility", "error geometry sampling scene"),
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
-    ("form_factor", "error geometry mesh scene"),
+    ("form_factor", "error geometry mesh ranks scene"),
     ("solver", "error form_factor geometry mesh progress scene visibility"),
     ("vertex", "error form_factor geometry mesh scene"),
     (

@@ -11,6 +11,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::{Error, ErrorKind};
 use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
@@ -20,7 +22,7 @@ use crate::scene::Rgb;
 ///
 /// F_ij is the fraction of the flux leaving patch i that arrives at the front of element j. Shares
 /// are whole numbers in units of 1/[`Row::TOTAL`], so that they add up exactly, in any order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Row {
     /// Elements that receive, by ascending index, each with its share.
     pub entries: Vec<Entry>,
@@ -35,7 +37,7 @@ pub struct Row {
 }
 
 /// One nonzero of a [`Row`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
     /// Receiving element.
     pub element: u32,

@@ -151,7 +151,7 @@ fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
     let mut shares = |name: &str, error_name: &str| -> Result<Vec<Estimate>, Error> {
         let values: Vec<f64> = arrays.numbers(name, Some(groups))?;
         let errors: Vec<f64> = arrays.numbers(error_name, Some(groups))?;
-        check_range(name, &values, |value| value.is_finite(), "finite")?;
+        check_range(name, &values, f64::is_finite, "finite")?;
         check_range(error_name, &errors, is_size, "finite and at least 0")?;
         let pairs = values.into_iter().zip(errors);
         Ok(pairs.map(|(value, error)| Estimate { value, error }).collect())

@@ -138,7 +138,7 @@ fn of_binary(
     let there = bytes.len() / TRIANGLE;
     // Writers that cannot go back leave the count at 0.
     let count = if said == 0 { there } else { said.min(there) };
-    if said != there || bytes.len() % TRIANGLE != 0 {
+    if said != there || !bytes.len().is_multiple_of(TRIANGLE) {
         let done =
             format!("its header says {said} triangles, {there} are there, and {count} are read");
         repairs.note_at(WarningKind::BrokenOff, || path.display().to_string(), "", done)?;

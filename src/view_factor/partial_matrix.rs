@@ -102,7 +102,7 @@ impl PartialMatrix {
     /// Makes those rows of `groups` that are not `done`, of the matrix that
     /// [`ViewFactors::new`] makes with these settings, and adds them to what is.
     ///
-    /// `ranks` share the work out; [`Alone`](crate::view_factor::Alone) does it alone. `progress` is
+    /// `ranks` share the work out; [`Alone`](crate::ranks::Alone) does it alone. `progress` is
     /// told the rows that are done, polygons done and in all, and may stop the work: what is done by
     /// then is returned.
     ///

@@ -9,6 +9,7 @@ pub mod files;
 pub mod framed;
 pub mod hemicubes;
 pub mod measures;
+pub mod processes;
 pub mod scenes;
 pub mod surface;
 pub mod textured;

@@ -2,4 +2,5 @@ mod batches;
 mod proximity;
 pub mod resolution_policy;
 mod row_check;
+mod shared;
 mod viewpoints;

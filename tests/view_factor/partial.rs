@@ -1,13 +1,14 @@
 //! Rows made by several, in one process or many: the same bits.
 
 use std::ops::{ControlFlow, Range};
-use std::sync::{Arc, Barrier, Mutex};
 
-use radiosity::view_factor::{Alone, Missing, PartialMatrix, Ranks};
+use radiosity::ranks::{Alone, Ranks};
+use radiosity::view_factor::{Missing, PartialMatrix};
 use radiosity::{ErrorKind, Scene, ViewFactors};
 
 use super::sparse::town;
 use crate::common::keep_counting;
+use crate::common::processes::in_processes;
 use crate::common::scenes::{cube, grey};
 
 const ERROR: f64 = 0.2;
@@ -68,53 +69,6 @@ fn what_was_stopped_goes_on() {
     }
 }
 
-/// One of some threads that act as processes.
-struct Thread {
-    rank: usize,
-    given: Arc<Mutex<Vec<Vec<u8>>>>,
-    barrier: Arc<Barrier>,
-    calls: usize,
-}
-
-impl Ranks for Thread {
-    fn rank(&self) -> usize {
-        self.rank
-    }
-
-    fn size(&self) -> usize {
-        self.given.lock().unwrap().len()
-    }
-
-    fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
-        self.calls += 1;
-        self.given.lock().unwrap()[self.rank] = bytes.to_vec();
-        self.barrier.wait();
-        let all = self.given.lock().unwrap().clone();
-        self.barrier.wait();
-        all
-    }
-}
-
-/// What `work` makes in each of `size` processes.
-fn in_processes<R: Send>(size: usize, work: impl Fn(&mut Thread) -> R + Sync) -> Vec<R> {
-    let given = Arc::new(Mutex::new(vec![vec![]; size]));
-    let barrier = Arc::new(Barrier::new(size));
-    std::thread::scope(|scope| {
-        let process = |rank| {
-            let (given, barrier) = (given.clone(), barrier.clone());
-            let work = &work;
-            scope.spawn(move || {
-                let mut thread = Thread { rank, given, barrier, calls: 0 };
-                let result = work(&mut thread);
-                assert!(thread.calls > 0, "nothing was shared out");
-                result
-            })
-        };
-        let threads: Vec<_> = (0..size).map(process).collect();
-        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-    })
-}
-
 #[test]
 fn any_number_of_processes_make_the_same_matrix() {
     for (scene, absent) in scenes() {
@@ -134,7 +88,7 @@ fn any_number_of_processes_make_the_same_matrix() {
 fn one_process_stops_all() {
     let (scene, _) = &scenes()[1];
     let left = in_processes(2, |ranks| {
-        let stops = ranks.rank == 1;
+        let stops = ranks.rank() == 1;
         let part =
             PartialMatrix::make(scene, ERROR, &[], 0..5, None, ranks, |_, _, _| match stops {
                 true => ControlFlow::Break(()),

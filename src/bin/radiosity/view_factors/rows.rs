@@ -5,15 +5,18 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use radiosity::io::view_factors::{read_rows, write_rows};
-use radiosity::view_factor::{Alone, PartialMatrix};
+use radiosity::ranks::Alone;
+use radiosity::view_factor::PartialMatrix;
 use radiosity::{Error, Scene, ViewFactors};
 
 use super::{ToError, group_indices};
 use crate::args::{self, Stop};
 use crate::{interrupt, progress};
 
-/// Between two writings of what is done. Chosen by hand.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+/// Between two writings of what is done: at least, and in times of what the last one took, so that
+/// it takes a twentieth of the time at most. Chosen by hand.
+const MIN_INTERVAL: Duration = Duration::from_secs(1);
+const WRITINGS: u32 = 20;
 
 /// The value of `--rows`.
 pub fn range(parser: &mut lexopt::Parser) -> Result<Range<usize>, Stop> {
@@ -53,10 +56,12 @@ impl ToError {
             false => None,
         };
         interrupt::catch();
-        let (mut written, mut failure) = (Instant::now(), None);
+        let (mut written, mut interval, mut failure) = (Instant::now(), MIN_INTERVAL, None);
         let part = self.make(scene, &groups, rows, done, |part| {
-            if written.elapsed() > CHECKPOINT_INTERVAL {
+            if written.elapsed() > interval {
+                let start = Instant::now();
                 failure = write_rows(checkpoint, part).err();
+                interval = MIN_INTERVAL.max(WRITINGS * start.elapsed());
                 written = Instant::now();
             }
             match failure {
