@@ -16,78 +16,23 @@
 //!             └→ Newton's method around it, in the temperatures of groups with given flux, else
 //! ```
 
+mod balance;
 mod black_body;
 mod exchange;
 mod gmres;
+mod surface;
 mod undetermined;
 
 use std::ops::ControlFlow;
 
-use crate::error::{Error, ErrorKind, quoted};
-use crate::view_factor::{Estimate, ViewFactors};
+use crate::error::{Error, ErrorKind};
+use crate::view_factor::ViewFactors;
 use exchange::Exchange;
+use surface::of_group;
 
+pub use balance::{GroupHeat, HeatBalance};
 pub use black_body::{STEFAN_BOLTZMANN, share_below};
-
-/// What is known of a group.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Boundary {
-    /// Its temperature, K.
-    Temperature(f64),
-    /// The net flux out of it, W/m²: what heats it from within or behind; 0 if it is adiabatic.
-    NetFlux(f64),
-}
-
-/// A group as heat sees it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Surface {
-    /// Its temperature or its net flux.
-    pub boundary: Boundary,
-    /// Hemispherical emissivity in each band, in [0, 1]; reflectance is what is missing from 1.
-    pub emissivity: Vec<f64>,
-}
-
-/// What all groups share.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct HeatSettings {
-    /// Wavelengths that separate the bands, µm, ascending: n of them make n + 1 bands, the first
-    /// from 0 and the last to infinity. None for one band of all wavelengths.
-    pub band_edges: Vec<f64>,
-    /// Temperature of what is seen through the open parts of the enclosure, K; it is black.
-    pub surroundings: f64,
-}
-
-/// A group's share in the exchange, all bands together.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GroupHeat {
-    /// K; none for an adiabatic group that reflects all: nothing depends on it.
-    pub temperature: Option<f64>,
-    /// What leaves, W/m².
-    pub radiosity: f64,
-    /// What arrives, W/m².
-    pub irradiance: f64,
-    /// Net flux out, W/m²: given, or ε (M − H). Its standard error is that of the factors in the
-    /// group's own row, taken as independent: an upper bound where they sum to 1 by construction.
-    pub net_flux: Estimate,
-}
-
-/// The exchange, and how well it balances.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeatBalance {
-    /// In the order of the matrix.
-    pub groups: Vec<GroupHeat>,
-    /// Net power out through the open parts of the enclosure, W.
-    pub lost_to_surroundings: f64,
-    /// Power that met the backs of surfaces and is lost there, W.
-    pub lost_to_backs: f64,
-    /// Net power out of all groups less what is lost, W: zero for factors with closure and
-    /// reciprocity.
-    pub imbalance: f64,
-    /// What is left of the linear system, norm over that of the emission.
-    pub residual: f64,
-    /// Products with the matrix that the solution took.
-    pub products: usize,
-}
+pub use surface::{Boundary, HeatSettings, Surface};
 
 impl HeatBalance {
     /// Solves for the exchange between the groups of `factors`, one of `surfaces` each.
@@ -110,11 +55,6 @@ impl HeatBalance {
         undetermined::check(factors, surfaces, settings.band_edges.len() + 1)?;
         Exchange::new(factors, surfaces, settings).solve(progress)
     }
-}
-
-/// The error that something is wrong with group `name`.
-fn of_group(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Error {
-    Error::new(ErrorKind::Setting, format!("group {}", quoted(&[name])), found, remedy)
 }
 
 /// Whether every number is in its range.

@@ -54,14 +54,15 @@ mod unoccluded;
 mod visible_mean;
 mod visual_events;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use self::assembler::Assembler;
-use self::partial_matrix::Method;
+use self::partial_matrix::{Making, Method};
 use self::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
+use crate::ranks::{Alone, Ranks};
 use crate::scene::Scene;
 
 pub use self::checks::{ErrorStats, MatrixChecks};
@@ -90,7 +91,7 @@ impl ViewFactors {
             true => Method::Sparse,
             false => Method::Exact,
         };
-        Ok(PartialMatrix::whole(scene, polygons, error, method, progress))
+        Ok(whole(scene, polygons, error, method, progress))
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
@@ -120,7 +121,7 @@ impl ViewFactors {
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(PartialMatrix::whole(scene, polygons, error, Method::Exact, progress))
+        Ok(whole(scene, polygons, error, Method::Exact, progress))
     }
 
     /// The matrix of many polygons, of which each sees few: with two absolute standard errors of at
@@ -145,7 +146,7 @@ impl ViewFactors {
     ) -> Result<Option<ViewFactors>, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(PartialMatrix::whole(scene, polygons, error, Method::Sparse, progress))
+        Ok(whole(scene, polygons, error, Method::Sparse, progress))
     }
 
     /// Rows of the exact matrix, those of the groups `from`: to hold another matrix against.
@@ -223,6 +224,86 @@ impl ViewFactors {
     pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
         enforcement::enforce(self)
     }
+}
+
+impl PartialMatrix {
+    /// Makes those rows of `groups` that are not `done`, of the matrix that
+    /// [`ViewFactors::new`] makes with these settings, and adds them to what is.
+    ///
+    /// `ranks` share the work out; [`Alone`](crate::ranks::Alone) does it alone. `progress` is
+    /// told the rows that are done, polygons done and in all, and may stop the work: what is done
+    /// by then is returned.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or what is
+    /// `done` is of another scene or other settings.
+    pub fn make(
+        scene: &Scene,
+        error: f64,
+        two_sided: &[usize],
+        groups: Range<usize>,
+        done: Option<PartialMatrix>,
+        ranks: &mut dyn Ranks,
+        mut progress: impl FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+    ) -> Result<PartialMatrix, Error> {
+        let count = scene.groups().len();
+        if groups.start > groups.end || groups.end > count {
+            let found = format!("{}..{}", groups.start, groups.end);
+            return Err(Error::new(
+                ErrorKind::Setting,
+                "rows",
+                found,
+                format!("the scene has {count} groups, from 0"),
+            ));
+        }
+        check_settings(scene, error, two_sided)?;
+        let polygons = ScenePolygons::new(scene, two_sided);
+        let method = match effort::is_exact_too_long(&polygons) {
+            true => Method::Sparse,
+            false => Method::Exact,
+        };
+        let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
+        if let Some(done) = done {
+            part.check_fits(&done, "rows that are done")?;
+            part = done;
+        }
+        Ok(with_rows(part, scene, polygons, error, groups, ranks, &mut progress).0)
+    }
+}
+
+/// The whole matrix by `method`, or none where `progress` stops it.
+fn whole(
+    scene: &Scene,
+    polygons: ScenePolygons,
+    error: f64,
+    method: Method,
+    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Option<ViewFactors> {
+    let part = PartialMatrix::none(scene, error, &[], method, &polygons);
+    let groups = 0..scene.groups().len();
+    let mut told = |_: &PartialMatrix, done, of| progress(done, of);
+    let alone = &mut Alone;
+    let (part, is_done) = with_rows(part, scene, polygons, error, groups, alone, &mut told);
+    if is_done { part.into_matrix().ok() } else { None }
+}
+
+/// `part` with rows of `groups` added, and whether that was not stopped.
+fn with_rows(
+    part: PartialMatrix,
+    scene: &Scene,
+    polygons: ScenePolygons,
+    error: f64,
+    groups: Range<usize>,
+    ranks: &mut dyn Ranks,
+    progress: &mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+) -> (PartialMatrix, bool) {
+    let wanted = part.polygons_without_rows(groups);
+    let mut making = Making { part, ranks, progress };
+    let done = match making.part.method() {
+        Method::Exact => assembler::make(polygons, error, &wanted, &mut making),
+        Method::Sparse => sparse::make(scene, polygons, error, &wanted, &mut making),
+    };
+    (making.part, done.is_some())
 }
 
 /// Whether `error` and `two_sided` are settings of [`ViewFactors::new`].

@@ -1,17 +1,18 @@
 //! The balance of all groups and bands, solved for.
 //!
 //! Unknown is the radiosity B of each group in each band. One sweep takes B to irradiance
-//! H = F B + open M, band by band, and H to B = ε M + (1 − ε) H; where the flux q is given, M is the
-//! one that makes Σ ε (M − H) = q, linear in H with one band. With several it is made linear around
-//! the last emission, until that no longer moves.
+//! H = F B + open M, band by band, and H to B = ε M + (1 − ε) H; where the flux q is given, M is
+//! the one that makes Σ ε (M − H) = q, linear in H with one band. With several it is made linear
+//! around the last emission, until that no longer moves.
 
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::balance::{GroupHeat, HeatBalance};
 use super::black_body::{Bands, emission, temperature};
 use super::gmres;
-use super::{Boundary, GroupHeat, HeatBalance, HeatSettings, Surface, of_group};
+use super::surface::{Boundary, HeatSettings, Surface, of_group};
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, ViewFactors};
 

@@ -1,6 +1,6 @@
 //! Groups whose temperature nothing determines.
 
-use super::{Boundary, Surface, of_group};
+use super::surface::{Boundary, Surface, of_group};
 use crate::error::Error;
 use crate::geometry::union_find::UnionFind;
 use crate::view_factor::ViewFactors;

@@ -78,8 +78,8 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
     })
 }
 
-/// Writes rows that are done, for [`read_rows`]. Whenever this is cut short, the file is either what
-/// it was or what it was to be.
+/// Writes rows that are done, for [`read_rows`]. Whenever this is cut short, the file is either
+/// what it was or what it was to be.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.

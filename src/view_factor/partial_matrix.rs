@@ -10,7 +10,6 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use super::matrix::{Estimate, Factor, Missing, ViewFactors};
 use super::scene_polygons::ScenePolygons;
-use super::{assembler, check_settings, effort, sparse};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::ranks::Ranks;
 use crate::scene::Scene;
@@ -31,8 +30,8 @@ pub(super) enum Method {
 /// Rows of a matrix of view factors that are done, of some groups or all.
 ///
 /// To share out work between processes that know nothing of one another, and to go on where a
-/// process was stopped: as bytes it can be kept, and [`PartialMatrix::merge`] puts several together.
-/// The matrix has the same bits however its rows came together.
+/// process was stopped: as bytes it can be kept, and [`PartialMatrix::merge`] puts several
+/// together. The matrix has the same bits however its rows came together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartialMatrix {
     /// Hash of the scene and the settings.
@@ -79,7 +78,7 @@ impl Exchange {
 pub(super) struct Making<'a> {
     pub part: PartialMatrix,
     pub ranks: &'a mut dyn Ranks,
-    progress: &'a mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
+    pub progress: &'a mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
 }
 
 impl Making<'_> {
@@ -99,67 +98,8 @@ impl Making<'_> {
 }
 
 impl PartialMatrix {
-    /// Makes those rows of `groups` that are not `done`, of the matrix that
-    /// [`ViewFactors::new`] makes with these settings, and adds them to what is.
-    ///
-    /// `ranks` share the work out; [`Alone`](crate::ranks::Alone) does it alone. `progress` is
-    /// told the rows that are done, polygons done and in all, and may stop the work: what is done by
-    /// then is returned.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or what is
-    /// `done` is of another scene or other settings.
-    pub fn make(
-        scene: &Scene,
-        error: f64,
-        two_sided: &[usize],
-        groups: Range<usize>,
-        done: Option<PartialMatrix>,
-        ranks: &mut dyn Ranks,
-        mut progress: impl FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
-    ) -> Result<PartialMatrix, Error> {
-        let count = scene.groups().len();
-        if groups.start > groups.end || groups.end > count {
-            let found = format!("{}..{}", groups.start, groups.end);
-            return Err(Error::new(
-                ErrorKind::Setting,
-                "rows",
-                found,
-                format!("the scene has {count} groups, from 0"),
-            ));
-        }
-        check_settings(scene, error, two_sided)?;
-        let polygons = ScenePolygons::new(scene, two_sided);
-        let method = match effort::is_exact_too_long(&polygons) {
-            true => Method::Sparse,
-            false => Method::Exact,
-        };
-        let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
-        if let Some(done) = done {
-            part.check_fits(&done, "rows that are done")?;
-            part = done;
-        }
-        Ok(part.with_rows(scene, polygons, error, groups, ranks, &mut progress).0)
-    }
-
-    /// The whole matrix by `method`, or none where `progress` stops it.
-    pub(super) fn whole(
-        scene: &Scene,
-        polygons: ScenePolygons,
-        error: f64,
-        method: Method,
-        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> Option<ViewFactors> {
-        let part = PartialMatrix::none(scene, error, &[], method, &polygons);
-        let groups = 0..scene.groups().len();
-        let mut told = |_: &PartialMatrix, done, of| progress(done, of);
-        let alone = &mut crate::ranks::Alone;
-        let (part, is_done) = part.with_rows(scene, polygons, error, groups, alone, &mut told);
-        if is_done { part.into_matrix().ok() } else { None }
-    }
-
     /// No row of the matrix of `scene`.
-    fn none(
+    pub(super) fn none(
         scene: &Scene,
         error: f64,
         two_sided: &[usize],
@@ -177,28 +117,6 @@ impl PartialMatrix {
             rows: vec![None; groups.len()],
             groups,
         }
-    }
-
-    /// With rows of `groups` added, and whether that was not stopped.
-    fn with_rows(
-        self,
-        scene: &Scene,
-        polygons: ScenePolygons,
-        error: f64,
-        groups: Range<usize>,
-        ranks: &mut dyn Ranks,
-        progress: &mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
-    ) -> (PartialMatrix, bool) {
-        let is_wanted = |&s: &u32| {
-            groups.contains(&(self.groups[s as usize] as usize)) && self.rows[s as usize].is_none()
-        };
-        let wanted: Vec<u32> = (0..self.groups.len() as u32).filter(is_wanted).collect();
-        let mut making = Making { part: self, ranks, progress };
-        let done = match making.part.method {
-            Method::Exact => assembler::make(polygons, error, &wanted, &mut making),
-            Method::Sparse => sparse::make(scene, polygons, error, &wanted, &mut making),
-        };
-        (making.part, done.is_some())
     }
 
     /// Groups of which rows are missing, by their index.
@@ -228,8 +146,21 @@ impl PartialMatrix {
         Ok(merged)
     }
 
+    /// How its numbers are found.
+    pub(super) fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The polygons of `groups` that have no row.
+    pub(super) fn polygons_without_rows(&self, groups: Range<usize>) -> Vec<u32> {
+        let is_wanted = |&s: &u32| {
+            groups.contains(&(self.groups[s as usize] as usize)) && self.rows[s as usize].is_none()
+        };
+        (0..self.groups.len() as u32).filter(is_wanted).collect()
+    }
+
     /// Whether `other` is of the same input.
-    fn check_fits(&self, other: &PartialMatrix, place: &str) -> Result<(), Error> {
+    pub(super) fn check_fits(&self, other: &PartialMatrix, place: &str) -> Result<(), Error> {
         let same = self.input == other.input
             && self.method == other.method
             && self.names == other.names

@@ -1,7 +1,8 @@
 use super::assert_near;
 use radiosity::heat::share_below;
 
-/// 15/π⁴ ∫ t³/(e^t − 1) dt from `z` on, by Simpson's rule over [z, z + 60]: the rest is below e^−60.
+/// 15/π⁴ ∫ t³/(e^t − 1) dt from `z` on, by Simpson's rule over [z, z + 60]: what is
+/// left out is below e^−60.
 fn integral(z: f64) -> f64 {
     let intervals = 200_000;
     let step = 60.0 / f64::from(intervals);

@@ -1,4 +1,5 @@
-//! Exchange that is known in closed form: Modest, "Radiative Heat Transfer", 3rd edition, chapter 5.
+//! Exchange that is known in closed form: Modest, "Radiative Heat Transfer", 3rd edition,
+//! chapter 5.
 
 use radiosity::ViewFactors;
 use radiosity::heat::{HeatSettings, STEFAN_BOLTZMANN, share_below};
@@ -131,7 +132,8 @@ fn shield_between_plates_by_bands() {
         [below, 1.0 - below][band] * black(t)
     };
     let hot = [0.7, 0.7];
-    // A shield's sides share their radiosity here: it absorbs and reflects the mean of what arrives.
+    // A shield's sides share their radiosity here: it absorbs and reflects the mean of what
+    // arrives.
     // B_1 = ε M + (1 − ε) B_s, B_s = ε M + (1 − ε) (B_1 + B_2)/2, solved by hand for each band.
     let flux = |band: usize| {
         let (e1, e2, es) = (hot[band], 0.5, shield[band]);

@@ -26,8 +26,8 @@ openings is black and has one temperature; groups are grey in each band, and dif
 W where lengths are in m.
 
   --boundaries FILE   what is known of the groups, as CSV with the columns
-                        group        its name; with --facets that of a face (GROUP/1) or of all faces
-                                     of a group; * for all that no line names
+                        group        its name; with --facets that of a face (GROUP/1) or of all
+                                     faces of a group; * for all that no line names
                         temperature  K, or empty where the flux is given
                         flux         net flux out, W/m²: what heats the group otherwise; 0 if it is
                                      adiabatic; empty where the temperature is given

@@ -43,8 +43,8 @@ what leaves the scene, `back` what meets the backs of surfaces.
                     they are; an exact row of a large scene takes seconds
   --rows A..B       only rows A to B − 1, counted from 0, to SCENE.A-B.rows: for many machines;
                     `radiosity merge` makes a matrix of all of them
-  --checkpoint FILE keep the rows that are done there, every few seconds and at Ctrl-C; go on from it
-                    if it is there
+  --checkpoint FILE keep the rows that are done there, every few seconds and at Ctrl-C; go on from
+                    it if it is there
   --enforce         make the matrix keep closure and reciprocity, and say what that changed
   --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
                     SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of

@@ -21,8 +21,8 @@ struct Line {
 /// What the file `path` says of each of the groups `names`, in `bands` bands.
 ///
 /// # Errors
-/// [`ErrorKind::File`] where it cannot be read, with its line where something is wrong with one, and
-/// for groups that it does not name, or that are not there.
+/// [`ErrorKind::File`] where it cannot be read, with its line where something is wrong with one,
+/// and for groups that it does not name, or that are not there.
 pub fn read(path: &Path, names: &[String], bands: usize) -> Result<Vec<Surface>, Error> {
     let wrong = |place: &str, found: String, remedy: &str| {
         Error::new(ErrorKind::File, place, found, remedy)
