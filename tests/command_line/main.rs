@@ -320,7 +320,10 @@ fn help_and_version_succeed() {
 #[test]
 fn wrong_usage_has_status_2_and_says_what_would_be_right() {
     for (args, words) in [
-        (&["fry"][..], &["'fry'", "bake, view-factors, trade-off, verify", "radiosity --help"][..]),
+        (
+            &["fry"][..],
+            &["'fry'", "bake, view-factors, merge, heat, trade-off, verify", "radiosity --help"][..],
+        ),
         (&["--what"], &["--what"]),
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
         (&["bake", "a.obj", "b.obj"], &["b.obj", "one at a time"]),
@@ -331,6 +334,9 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy, npz"]),
         (&["view-factors", "a.obj", "--cpu"], &["--cpu need --sampled"]),
         (&["view-factors", "a.obj", "--sampled", "--error", "1"], &["not for --sampled"]),
+        (&["heat", "a.obj"], &["no --boundaries"]),
+        (&["heat", "a.obj", "--boundaries", "b", "--bands", "1,x"], &["'1,x'", "µm"]),
+        (&["merge"], &["no rows given"]),
         (&["verify", "a.obj"], &["PLY file of its solution", "usage: radiosity verify"]),
         (&["verify", "a.obj", "b.ply", "c.ply"], &["'c.ply'", "one at a time"]),
         (&["verify", "a.obj", "b.ply", "--time", "soon"], &["--time", "'soon'", "inf"]),
