@@ -322,7 +322,7 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
     for (args, words) in [
         (
             &["fry"][..],
-            &["'fry'", "bake, view-factors, merge, heat, trade-off, verify", "radiosity --help"][..],
+            &["'fry'", "bake, view-factors, merge, heat, trade-off", "radiosity --help"][..],
         ),
         (&["--what"], &["--what"]),
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
