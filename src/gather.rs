@@ -18,12 +18,14 @@ mod gathered_mesh;
 mod interpolated_refinement;
 pub(crate) mod light_projection;
 pub(crate) mod lights;
+pub(crate) mod point_row;
 mod progress;
 pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
 mod surplus;
 pub(crate) mod two_sided;
+pub(crate) mod vertex_rows;
 
 use glam::DVec3;
 

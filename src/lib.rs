@@ -57,6 +57,7 @@
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
+//! | [`bands`] | light in any number of bands on the mesh of a bake; spectra to colours |
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
 //! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
@@ -98,6 +99,7 @@
 
 pub mod backend;
 pub mod bake;
+pub mod bands;
 pub mod camera;
 mod error;
 pub mod form_factor;
@@ -124,6 +126,7 @@ pub use backend::cpu::RayRows;
 #[cfg(feature = "gpu")]
 pub use backend::gpu::{Gpu, HemicubeRows};
 pub use bake::{BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate};
+pub use bands::{BandLight, Bands};
 pub use camera::{Camera, RadianceImage};
 pub use error::{Error, ErrorKind};
 pub use form_factor::FormFactors;

@@ -11,6 +11,7 @@
 mod api;
 mod backend;
 mod bake;
+mod bands;
 mod camera;
 mod common;
 mod form_factor;

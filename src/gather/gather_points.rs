@@ -76,8 +76,24 @@ impl<'a> VertexGatherPoints<'a> {
 
     /// Albedo of the surface that vertex `v` is on; 0 where holes are all around it.
     pub fn albedo(&self, v: u32) -> Rgb {
+        if self.is_solid(v) { self.material(v).albedo() } else { Rgb::ZERO }
+    }
+
+    /// Index of the material of the surface that vertex `v` is on; none where holes are all around.
+    pub fn material_index(&self, v: u32) -> Option<u32> {
+        let element = self.mesh.element(self.around(v)[0] as usize);
+        let material = self.mesh.scene().triangles()[self.mesh.triangle(element)].material;
+        self.is_solid(v).then_some(material)
+    }
+
+    /// Whether light comes through the surface that vertex `v` is on.
+    pub fn is_translucent(&self, v: u32) -> bool {
+        self.material(v).is_translucent()
+    }
+
+    fn is_solid(&self, v: u32) -> bool {
         let is_solid = |&e: &u32| self.mesh.solid_share(self.mesh.element(e as usize)) > 0.0;
-        if self.around(v).iter().any(is_solid) { self.material(v).albedo() } else { Rgb::ZERO }
+        self.around(v).iter().any(is_solid)
     }
 
     fn material(&self, v: u32) -> &Material {
@@ -104,7 +120,13 @@ impl<'a> VertexGatherPoints<'a> {
 
     /// Whether `sample`, gathered for vertex `v`, is that of a buried point.
     pub fn is_buried(&self, v: u32, sample: &IrradianceSample) -> bool {
-        is_buried(sample, self.sizes[v as usize].min(self.touching))
+        self.sees_inside(v, sample.backface, sample.inverse_distance)
+    }
+
+    /// The same by the form factor of the backs that were seen, and the mean of 1/distance.
+    pub fn sees_inside(&self, v: u32, backface: f64, inverse_distance: f64) -> bool {
+        let sample = IrradianceSample { backface, inverse_distance, ..Default::default() };
+        is_buried(&sample, self.sizes[v as usize].min(self.touching))
     }
 }
 

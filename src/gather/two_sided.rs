@@ -38,7 +38,7 @@ impl TwoSidedPoint {
     }
 
     /// The point on the other side of the surface, as far below it as this is above.
-    fn other_side(&self) -> GatherPoint {
+    pub fn other_side(&self) -> GatherPoint {
         let GatherPoint { position, normal, near } = self.point;
         let height = near / offset::NEAR_OF_LIFT;
         GatherPoint { position: position - 2.0 * height * normal, normal: -normal, near }

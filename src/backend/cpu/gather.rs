@@ -15,10 +15,14 @@
 //! E_first and E_second being those of the two halves of the rays, and c_max the largest
 //! contribution of one ray: both halves may miss the same small source.
 
+mod point_rows;
+mod sums;
+
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use sums::{RaySums, Visible};
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_projection::LightProjection;
@@ -28,7 +32,7 @@ use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Rgb, Scene, Sun};
+use crate::scene::{Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -111,15 +115,7 @@ impl RayGather {
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
         let scene = fields[0].mesh.scene();
-        let mut lights = self.lights.importance_ranked(point);
-        // A light without a closed form that reaches far around is sampled better by rays over the
-        // hemisphere than by points spread over its area.
-        lights.retain(|&(light, _)| {
-            let light = &self.lights.lights[light as usize];
-            let corner = |&t: &u32| scene.corners(t as usize);
-            light.convex
-                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
-        });
+        let lights = self.sampled_lights(scene, point);
         let sun = scene.sky().sun();
         let trace = |range| self.trace(fields, point, &lights, range);
         let sample =
@@ -139,6 +135,20 @@ impl RayGather {
             }
             count *= 2;
         }
+    }
+
+    /// The lights that rays are sent to from `point`, each with its unoccluded form factor. A light
+    /// without a closed form that reaches far around is not among them: it is sampled better by
+    /// rays over the hemisphere than by points spread over its area.
+    fn sampled_lights(&self, scene: &Scene, point: &GatherPoint) -> Vec<(u32, f64)> {
+        let mut lights = self.lights.importance_ranked(point);
+        lights.retain(|&(light, _)| {
+            let light = &self.lights.lights[light as usize];
+            let corner = |&t: &u32| scene.corners(t as usize);
+            light.convex
+                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
+        });
+        lights
     }
 
     /// Sums over the rays of `range`.
@@ -184,7 +194,7 @@ impl RayGather {
                 out.irradiance += self.lights.lights[light as usize].exitance * passed;
             }
         }
-        let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
+        let range = shadow_range(range);
         let visible = |&(light, _): &(u32, f64)| {
             self.shadow_rays(scene, point, light, range.clone(), rotation)
         };
@@ -209,11 +219,7 @@ impl RayGather {
         out.inverse_distance *= share;
         for (&(light, factor), visible) in lights.iter().zip(&sums.lights) {
             let light = &self.lights.lights[light as usize];
-            let share = if light.convex {
-                factor / visible.all.max(1e-300)
-            } else {
-                1.0 / visible.points.max(1.0)
-            };
+            let share = visible.share_of(light.convex.then_some(factor));
             out.direct += light.exitance * visible.seen * share;
         }
         if let Some(sun) = sun {
@@ -300,6 +306,11 @@ impl RayGather {
     }
 }
 
+/// The shadow rays that go with the rays of `range`.
+fn shadow_range(range: Range<u32>) -> Range<u32> {
+    range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY)
+}
+
 /// Directions of `max_rays` rays in `scene`, of which `min_rays` are cast at least. Under a sky
 /// that is brighter above than at its sides all places would be off alike by rays that are nearer
 /// to the normal than they should.
@@ -307,68 +318,6 @@ fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
     match scene.sky().uniform_radiance() {
         Some(_) => HemisphereSamples::progressive(max_rays),
         None => HemisphereSamples::centred(max_rays, min_rays),
-    }
-}
-
-/// Sums over rays.
-#[derive(Debug)]
-struct RaySums<const FIELDS: usize> {
-    /// Without what surfaces reflect.
-    hemisphere: IrradianceSample,
-    /// What surfaces reflect, by field.
-    reflected: [Rgb; FIELDS],
-    /// The largest radiosity that one ray found, reflected by the first field or the sky's, W/m².
-    max_contribution: f64,
-    lights: Vec<Visible>,
-    /// Cosines instead of form factors.
-    sun: Visible,
-}
-
-/// Sums of form factors over points on a light.
-#[derive(Debug, Default)]
-struct Visible {
-    points: f64,
-    /// To those that are visible; per channel, what panes let through.
-    seen: Rgb,
-    /// To all that are above the horizon and face the point.
-    all: f64,
-}
-
-impl<const FIELDS: usize> Default for RaySums<FIELDS> {
-    fn default() -> RaySums<FIELDS> {
-        RaySums {
-            hemisphere: IrradianceSample::default(),
-            reflected: [Rgb::ZERO; FIELDS],
-            max_contribution: 0.0,
-            lights: vec![],
-            sun: Visible::default(),
-        }
-    }
-}
-
-impl<const FIELDS: usize> RaySums<FIELDS> {
-    fn add(&mut self, other: &RaySums<FIELDS>) {
-        let (sum, term) = (&mut self.hemisphere, &other.hemisphere);
-        sum.irradiance += term.irradiance;
-        sum.escaped += term.escaped;
-        sum.backface += term.backface;
-        sum.inverse_distance += term.inverse_distance;
-        for (sum, term) in self.reflected.iter_mut().zip(other.reflected) {
-            *sum += term;
-        }
-        self.max_contribution = self.max_contribution.max(other.max_contribution);
-        for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
-            sum.add(term);
-        }
-        self.sun.add(&other.sun);
-    }
-}
-
-impl Visible {
-    fn add(&mut self, other: &Visible) {
-        self.points += other.points;
-        self.seen += other.seen;
-        self.all += other.all;
     }
 }
 

@@ -1,0 +1,80 @@
+//! Rows of points by the rays of a gather.
+
+use std::ops::Range;
+
+use super::RayGather;
+use crate::gather::GatherPoint;
+use crate::gather::lights::NO_LIGHT;
+use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
+use crate::mesh::Mesh;
+use crate::scene::Rgb;
+
+impl PointRows for RayGather {
+    fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow> {
+        let lights = self.sampled_lights(mesh.scene(), point);
+        let count = (self.min_rays / parts.max(1)).max(1);
+        let parts = (0..parts).map(|part| part * count..(part + 1) * count);
+        parts.map(|range| self.row(mesh, point, &lights, range)).collect()
+    }
+}
+
+impl RayGather {
+    /// The row of `point` by the rays of `range`, with rays to these `lights`, each of which has
+    /// this form factor if nothing hides it.
+    fn row(
+        &self,
+        mesh: &Mesh,
+        point: &GatherPoint,
+        lights: &[(u32, f64)],
+        range: Range<u32>,
+    ) -> PointRow {
+        let scene = mesh.scene();
+        let rotation = self.rotations.at(point.position, point.near);
+        let share = 1.0 / f64::from(range.end - range.start);
+        let mut row = PointRow { share, ..PointRow::default() };
+        row.hits.reserve_exact((range.end - range.start) as usize);
+        for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
+            let passed = |end: f64| {
+                let reach = point.near..end;
+                mean(self.panes.transmittance(point.position, direction, reach))
+            };
+            let hit = self.scene.closest_hit(point.position, direction, point.near, None);
+            let Some(hit) = hit else {
+                row.sky += share * passed(f64::INFINITY);
+                continue;
+            };
+            row.inverse_distance += share / hit.distance;
+            if !hit.front {
+                row.backface += share;
+                continue;
+            }
+            let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
+            let light = self.lights.of_triangle[hit.triangle];
+            row.hits.push(SurfaceHit {
+                element: element as u32,
+                barycentric,
+                passed: passed(hit.distance),
+                emits: light == NO_LIGHT || !lights.iter().any(|&(sampled, _)| sampled == light),
+            });
+        }
+        let range = super::shadow_range(range);
+        for &(light, unoccluded) in lights {
+            let visible = self.shadow_rays(scene, point, light, range.clone(), rotation);
+            let light = &self.lights.lights[light as usize];
+            let factor = mean(visible.seen) * visible.share_of(light.convex.then_some(unoccluded));
+            row.emitters.push((scene.triangles()[light.triangles[0] as usize].material, factor));
+        }
+        if let Some(sun) = scene.sky().sun() {
+            let visible = self.rays_to_sun(point, sun, range, rotation);
+            let cosine = point.normal.dot(sun.direction);
+            let unoccluded = sun.unoccluded(cosine).map(|_| cosine);
+            row.sun = mean(visible.seen) * visible.share_of(unoccluded);
+        }
+        row
+    }
+}
+
+/// The mean over the channels.
+fn mean(share: Rgb) -> f64 {
+    share.element_sum() / 3.0
+}

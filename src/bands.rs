@@ -1,0 +1,52 @@
+//! Light in any number of bands: wavelengths of a spectrum, or whatever a plant, a sensor or a
+//! heater asks for.
+//!
+//! A bake in red, green and blue decides the mesh, its vertices and how many rays each casts. What
+//! these rays meet is made into rows once, and all bands are looked up along the same rows:
+//!
+//! ```text
+//!   BakeResult ── vertices ──┬── few rays: rows kept ──► Jacobi sweeps, each band to its own end
+//!                            │                                  │ reflected light of vertices
+//!   Bands ───────────────────┴── many rays: looked up once ◄────┘
+//!   ρ, τ, E by material and band          │
+//!                                         └──► BandLight: radiosity, irradiance, error by band
+//! ```
+//!
+//! Arithmetic is band by band, and so are the rules when to stop: a band has the same bits in any
+//! order of the bands and whichever others there are.
+//!
+//! Bands with wavelengths add up to colours: [`cie`].
+//!
+//! ```
+//! # use std::ops::ControlFlow;
+//! # use radiosity::bands::{Band, BandMaterial, Bands};
+//! # use radiosity::{Backend, BakeTarget, Error, load_obj};
+//! # fn main() -> Result<(), Error> {
+//! let baked = BakeTarget::Error(0.3).bake(load_obj("scenes/cornell_box.obj")?, &Backend::Cpu, |_| {
+//!     ControlFlow::Continue(())
+//! })?;
+//! let names = ["near", "far"].map(|name| Band { name: name.into(), wavelength: None });
+//! // The materials of baked.mesh.scene(), one for one: white, red, green and light.
+//! let wall = |reflectance: [f64; 2]| BandMaterial::opaque(reflectance.into());
+//! let lamp = BandMaterial { exitance: vec![10.0, 20.0], ..wall([0.0, 0.0]) };
+//! let materials = vec![wall([0.9, 0.8]), wall([0.7, 0.6]), wall([0.4, 0.9]), lamp];
+//! let bands = Bands { materials, ..Bands::dark(names.into()) };
+//! let light = bands.light(&baked, |_, _| ControlFlow::Continue(()))?.expect("nothing stops it");
+//! let [near, far] = light.radiosity_at(0) else { unreachable!("two bands") };
+//! # assert!(near.is_finite() && far.is_finite());
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod cie;
+mod error;
+mod final_gather;
+mod light;
+mod lookup;
+mod spectra;
+mod surface_vertices;
+mod vertex_system;
+
+pub use error::BandError;
+pub use light::BandLight;
+pub use spectra::{Band, BandMaterial, Bands};

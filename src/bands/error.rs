@@ -1,0 +1,49 @@
+//! How far the light of a band may be off.
+
+use crate::mesh::Mesh;
+
+/// Estimated error of the reflected radiosity of a band: shares of it, root mean squares over the
+/// area that reflects in the band.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct BandError {
+    /// The root of the sum of the squares of all parts.
+    pub total: f64,
+    /// What two halves of the rays of a vertex disagree by.
+    pub noise: f64,
+    /// Upper bound of the light of further bounces that is left out.
+    pub unsettled: f64,
+    /// What the bake in red, green and blue told of itself: its mesh, above all, is that of the
+    /// bands too. It knows nothing of light that only bands have.
+    pub of_bake: f64,
+}
+
+impl BandError {
+    pub(super) fn new(noise: f64, unsettled: f64, of_bake: f64) -> BandError {
+        let total = noise.hypot(unsettled).hypot(of_bake);
+        BandError { total, noise, unsettled, of_bake }
+    }
+}
+
+/// The root mean square of `noise` over that of `reflected`, by band: values of the vertices at the
+/// `corners` of the elements of `mesh`, bands side by side, weighted by area.
+pub(super) fn relative_noise(
+    mesh: &Mesh,
+    corners: &[[u32; 3]],
+    (reflected, noise): (&[f64], &[f64]),
+    count: usize,
+) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); count];
+    for (e, corners) in corners.iter().enumerate() {
+        let area = mesh.solid_area(mesh.element(e));
+        for v in corners.map(|v| v as usize) {
+            for (b, sum) in sums.iter_mut().enumerate() {
+                sum.0 += area * noise[v * count + b].powi(2);
+                sum.1 += area * reflected[v * count + b].powi(2);
+            }
+        }
+    }
+    sums.into_iter()
+        .map(|(noise, all)| if all > 0.0 { (noise / all).sqrt() } else { 0.0 })
+        .collect()
+}

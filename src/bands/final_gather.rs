@@ -1,0 +1,56 @@
+//! The light that a vertex gathers in every band, and how far it may be off.
+
+use super::lookup::Lookup;
+use super::spectra::Bands;
+use crate::gather::vertex_rows::VertexRow;
+
+/// Parts of the rays that are compared with each other.
+pub(super) const HALVES: u32 = 2;
+
+/// What one vertex reflects, W/m² by band.
+pub(super) struct GatheredVertex {
+    pub reflected: Vec<f64>,
+    /// Standard error of that by the rays: half of what two halves of them differ by.
+    pub noise: Vec<f64>,
+}
+
+impl GatheredVertex {
+    /// A vertex of `material` whose row was made by two halves of the rays; `reflected` is what all
+    /// vertices reflect, W/m², bands side by side.
+    pub fn new(
+        (lookup, bands): (&Lookup, &Bands),
+        material: u32,
+        row: &VertexRow,
+        reflected: &[f64],
+    ) -> GatheredVertex {
+        let (material, count) = (&bands.materials[material as usize], bands.bands.len());
+        let halves = [0, 1].map(|half| {
+            let mut leaving = vec![0.0; count];
+            for (rows, albedo) in
+                [(&row.front, &material.reflectance), (&row.behind, &material.transmittance)]
+            {
+                let Some(row) = rows.get(half) else { continue };
+                let mut irradiance = vec![0.0; count];
+                lookup.add_emitted(row, &mut irradiance);
+                lookup.add_reflected(row, reflected, &mut irradiance);
+                for (leaving, (albedo, irradiance)) in
+                    leaving.iter_mut().zip(albedo.iter().zip(&irradiance))
+                {
+                    *leaving += albedo * irradiance;
+                }
+            }
+            leaving
+        });
+        let both = || halves[0].iter().zip(&halves[1]);
+        GatheredVertex {
+            reflected: both().map(|(a, b)| (a + b) / 2.0).collect(),
+            noise: both().map(|(a, b)| (a - b).abs() / 2.0).collect(),
+        }
+    }
+
+    /// A vertex that reflects nothing.
+    pub fn dark(bands: &Bands) -> GatheredVertex {
+        let nothing = vec![0.0; bands.bands.len()];
+        GatheredVertex { reflected: nothing.clone(), noise: nothing }
+    }
+}

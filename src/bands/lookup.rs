@@ -1,0 +1,80 @@
+//! Light of all bands, looked up along the row of a point.
+//!
+//! Values of all bands lie side by side, place by place: a hit of a ray costs one look at the mesh,
+//! whatever the number of bands.
+
+use std::f64::consts::PI;
+
+use super::spectra::Bands;
+use crate::gather::point_row::PointRow;
+use crate::mesh::Mesh;
+
+/// In the place of a material's index, for elements that do not emit in any band.
+const NO_EMISSION: u32 = u32::MAX;
+
+/// What rows are looked up in.
+pub(super) struct Lookup<'a> {
+    bands: &'a Bands,
+    /// The vertices at the corners of each element.
+    corners: &'a [[u32; 3]],
+    /// The material of each element that emits, else [`NO_EMISSION`].
+    emission: Vec<u32>,
+}
+
+impl<'a> Lookup<'a> {
+    pub fn new(bands: &'a Bands, mesh: &Mesh, corners: &'a [[u32; 3]]) -> Lookup<'a> {
+        let emits: Vec<bool> =
+            bands.materials.iter().map(|m| m.exitance.iter().any(|&e| e > 0.0)).collect();
+        let emission = |e: usize| {
+            let material = mesh.scene().triangles()[mesh.triangle(mesh.element(e))].material;
+            if emits[material as usize] { material } else { NO_EMISSION }
+        };
+        Lookup { bands, corners, emission: (0..mesh.element_count()).map(emission).collect() }
+    }
+
+    /// Adds to `irradiance` (W/m² by band) what emitters, the sky and the sun send along `row`.
+    pub fn add_emitted(&self, row: &PointRow, irradiance: &mut [f64]) {
+        for &(material, factor) in &row.emitters {
+            add(irradiance, factor, &self.bands.materials[material as usize].exitance);
+        }
+        for hit in row.hits.iter().filter(|hit| hit.emits) {
+            let material = self.emission[hit.element as usize];
+            if material != NO_EMISSION {
+                let exitance = &self.bands.materials[material as usize].exitance;
+                add(irradiance, row.share * hit.passed, exitance);
+            }
+        }
+        add(irradiance, PI * row.sky, &self.bands.sky);
+        add(irradiance, row.sun, &self.bands.sun);
+    }
+
+    /// Adds what surfaces reflect along `row`: `reflected` has that of all vertices, W/m², bands
+    /// side by side.
+    pub fn add_reflected(&self, row: &PointRow, reflected: &[f64], irradiance: &mut [f64]) {
+        let count = irradiance.len();
+        let of_vertex = |v: u32| &reflected[v as usize * count..][..count];
+        for (corners, weights) in self.weights(row) {
+            let [a, b, c] = corners.map(of_vertex);
+            let values = a.iter().zip(b).zip(c);
+            for (sum, ((a, b), c)) in irradiance.iter_mut().zip(values) {
+                *sum += weights[0] * a + weights[1] * b + weights[2] * c;
+            }
+        }
+    }
+
+    /// The vertices around each hit of `row`, and the form factor that each stands for.
+    pub fn weights(&self, row: &PointRow) -> impl Iterator<Item = ([u32; 3], [f64; 3])> {
+        row.hits.iter().map(move |hit| {
+            let ([u, v], factor) = (hit.barycentric, row.share * hit.passed);
+            let weights = [(1.0 - u - v) * factor, u * factor, v * factor];
+            (self.corners[hit.element as usize], weights)
+        })
+    }
+}
+
+/// Adds `factor` times `values` to `sums`, band by band.
+pub(super) fn add(sums: &mut [f64], factor: f64, values: &[f64]) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += factor * value;
+    }
+}

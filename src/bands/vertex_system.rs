@@ -1,0 +1,197 @@
+//! The radiosity equation at the vertices, for all bands by the same rows.
+//!
+//! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, by few rays, and
+//! s is what emitters, the sky and the sun cause. Jacobi's iteration adds one bounce a sweep. Rows
+//! sum to at most 1, so that with c = max (ρ + τ) in a band what is left after a sweep that changed
+//! R by δ is at most δ c / (1 − c), in the maximum norm: a band ends where that is small.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use super::lookup::{Lookup, add};
+use super::spectra::Bands;
+use crate::gather::point_row::PointRow;
+use crate::gather::vertex_rows::VertexRow;
+
+/// A band is settled where the light that is left is at most this share of the mean of what
+/// vertices reflect.
+const UNSETTLED: f64 = 1e-4;
+
+/// Sweeps at most: with a reflectance of 0.98 a band takes some 600. What is left is told.
+const MAX_SWEEPS: u32 = 2000;
+
+/// The equation of one vertex.
+pub(super) struct VertexEquation {
+    /// What it reflects of what is emitted, W/m² by band.
+    source: Vec<f64>,
+    front: Vec<(u32, f32)>,
+    behind: Vec<(u32, f32)>,
+}
+
+/// The equations of all vertices.
+pub(super) struct VertexSystem<'a> {
+    bands: &'a Bands,
+    /// Material of each vertex; none where nothing reflects.
+    materials: &'a [Option<u32>],
+    equations: Vec<VertexEquation>,
+}
+
+/// What vertices reflect, and how far the sweeps got.
+pub(super) struct Settled {
+    /// Reflected radiosity of all vertices, W/m², bands side by side.
+    pub reflected: Vec<f64>,
+    /// Sweeps that each band took.
+    pub sweeps: Vec<u32>,
+    /// Upper bound of the reflected radiosity that is left out at any vertex, over the mean.
+    pub unsettled: Vec<f64>,
+}
+
+impl VertexEquation {
+    /// Of a vertex of `material` with this row.
+    pub fn new(lookup: &Lookup, bands: &Bands, material: u32, row: &VertexRow) -> VertexEquation {
+        let material = &bands.materials[material as usize];
+        let mut source = vec![0.0; bands.bands.len()];
+        let mut emitted = vec![0.0; bands.bands.len()];
+        for (rows, albedo) in
+            [(&row.front, &material.reflectance), (&row.behind, &material.transmittance)]
+        {
+            emitted.fill(0.0);
+            rows.iter().for_each(|row| lookup.add_emitted(row, &mut emitted));
+            for (source, (albedo, emitted)) in source.iter_mut().zip(albedo.iter().zip(&emitted)) {
+                *source += albedo * emitted;
+            }
+        }
+        let [front, behind] = [&row.front, &row.behind].map(|rows| merged(lookup, rows));
+        VertexEquation { source, front, behind }
+    }
+
+    /// Of a vertex that reflects nothing.
+    pub fn dark(bands: &Bands) -> VertexEquation {
+        let source = vec![0.0; bands.bands.len()];
+        VertexEquation { source, front: vec![], behind: vec![] }
+    }
+
+    /// The mean of `others` by weights that sum to 1.
+    pub fn mean(others: &[(&VertexEquation, f64)]) -> VertexEquation {
+        let mut source = vec![0.0; others.first().map_or(0, |(first, _)| first.source.len())];
+        let (mut front, mut behind) = (vec![], vec![]);
+        for &(other, weight) in others {
+            add(&mut source, weight, &other.source);
+            let weighted = |&(v, factor): &(u32, f32)| (v, factor * weight as f32);
+            front.extend(other.front.iter().map(weighted));
+            behind.extend(other.behind.iter().map(weighted));
+        }
+        VertexEquation { source, front, behind }
+    }
+}
+
+/// The rows of a point as one over the vertices.
+fn merged(lookup: &Lookup, rows: &[PointRow]) -> Vec<(u32, f32)> {
+    let corners = |(vertices, weights): ([u32; 3], [f64; 3])| vertices.into_iter().zip(weights);
+    let mut entries: Vec<(u32, f64)> =
+        rows.iter().flat_map(|row| lookup.weights(row)).flat_map(corners).collect();
+    entries.sort_by_key(|&(v, _)| v);
+    let runs = entries.chunk_by(|a, b| a.0 == b.0);
+    runs.map(|run| (run[0].0, run.iter().map(|&(_, weight)| weight).sum::<f64>() as f32)).collect()
+}
+
+impl<'a> VertexSystem<'a> {
+    pub fn new(
+        bands: &'a Bands,
+        materials: &'a [Option<u32>],
+        equations: Vec<VertexEquation>,
+    ) -> VertexSystem<'a> {
+        VertexSystem { bands, materials, equations }
+    }
+
+    /// Sweeps until every band is settled; none where `progress` breaks, which is called after each
+    /// sweep.
+    pub fn solve(&self, mut progress: impl FnMut() -> ControlFlow<()>) -> Option<Settled> {
+        let count = self.bands.bands.len();
+        let contraction: Vec<f64> = (0..count)
+            .map(|b| self.bands.materials.iter().map(|m| m.albedo(b)).fold(0.0, f64::max))
+            .collect();
+        let mut now: Vec<f64> =
+            self.equations.iter().flat_map(|equation| equation.source.iter().copied()).collect();
+        let mut settled = Settled {
+            reflected: now.clone(),
+            sweeps: vec![0; count],
+            unsettled: vec![f64::INFINITY; count],
+        };
+        let mut next = vec![0.0; now.len()];
+        for sweep in 1..=MAX_SWEEPS {
+            self.sweep(&now, &mut next);
+            let (change, mean) = (largest_change(&now, &next, count), means(&next, count));
+            std::mem::swap(&mut now, &mut next);
+            for b in 0..count {
+                if settled.unsettled[b] <= UNSETTLED {
+                    continue;
+                }
+                let left = change[b] * contraction[b] / (1.0 - contraction[b]);
+                settled.unsettled[b] = if left > 0.0 { left / mean[b] } else { 0.0 };
+                settled.sweeps[b] = sweep;
+                let values = now.iter().skip(b).step_by(count);
+                for (kept, &value) in
+                    settled.reflected.iter_mut().skip(b).step_by(count).zip(values)
+                {
+                    *kept = value;
+                }
+            }
+            if progress().is_break() {
+                return None;
+            }
+            if settled.unsettled.iter().all(|&left| left <= UNSETTLED) {
+                break;
+            }
+        }
+        Some(settled)
+    }
+
+    /// One more bounce of what vertices reflect `now`.
+    fn sweep(&self, now: &[f64], next: &mut [f64]) {
+        let count = self.bands.bands.len();
+        let vertices = next.par_chunks_mut(count).zip(&self.equations).zip(self.materials);
+        vertices.for_each_init(
+            || vec![0.0; count],
+            |irradiance, ((next, equation), material)| {
+                next.copy_from_slice(&equation.source);
+                let Some(material) = material.map(|m| &self.bands.materials[m as usize]) else {
+                    return;
+                };
+                for (row, albedo) in [
+                    (&equation.front, &material.reflectance),
+                    (&equation.behind, &material.transmittance),
+                ] {
+                    irradiance.fill(0.0);
+                    for &(v, factor) in row {
+                        add(irradiance, f64::from(factor), &now[v as usize * count..][..count]);
+                    }
+                    let received = albedo.iter().zip(&*irradiance);
+                    for (next, (albedo, received)) in next.iter_mut().zip(received) {
+                        *next += albedo * received;
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// The largest difference at any vertex, by band.
+fn largest_change(before: &[f64], after: &[f64], count: usize) -> Vec<f64> {
+    let mut largest = vec![0.0; count];
+    for (before, after) in before.chunks(count).zip(after.chunks(count)) {
+        for (largest, (a, b)) in largest.iter_mut().zip(before.iter().zip(after)) {
+            *largest = f64::max(*largest, (a - b).abs());
+        }
+    }
+    largest
+}
+
+/// The mean over the vertices, by band.
+fn means(values: &[f64], count: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; count];
+    values.chunks(count).for_each(|values| add(&mut sums, 1.0, values));
+    let vertices = (values.len() / count).max(1) as f64;
+    sums.into_iter().map(|sum| sum / vertices).collect()
+}

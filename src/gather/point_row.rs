@@ -1,0 +1,50 @@
+//! Where the light that arrives at a point comes from: a row of form factors from the point.
+//!
+//! ```text
+//!   irradiance = share · Σ_hits passed · B_reflected + Σ_emitters F · E + F_sky · π L + F_sun · S
+//! ```
+//!
+//! A row is of the geometry alone, so light of any number of bands is looked up along it.
+
+use super::GatherPoint;
+use crate::mesh::Mesh;
+
+/// Where the light that arrives at a point comes from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PointRow {
+    /// The fronts that rays met, in the order of the rays.
+    pub hits: Vec<SurfaceHit>,
+    /// Form factor that each hit stands for.
+    pub share: f64,
+    /// Material, by its index, and form factor of what is visible of each light that was sampled
+    /// explicitly.
+    pub emitters: Vec<(u32, f64)>,
+    /// Form factor of the open part of the hemisphere.
+    pub sky: f64,
+    /// Irradiance from the sun over that of a surface that faces it, all of it seen.
+    pub sun: f64,
+    /// Form factor of backs.
+    pub backface: f64,
+    /// Mean of 1/distance over the hemisphere, 1/scene unit.
+    pub inverse_distance: f64,
+}
+
+/// A place on the front of a surface that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfaceHit {
+    /// The element there.
+    pub element: u32,
+    /// Weights of its second and third corner.
+    pub barycentric: [f64; 2],
+    /// Share that panes on the way let through: the mean of the channels.
+    pub passed: f64,
+    /// Whether what the element emits is in no entry of [`PointRow::emitters`].
+    pub emits: bool,
+}
+
+/// Makes rows of points: the same bits for the same point, whatever else was asked for.
+pub(crate) trait PointRows: Sync {
+    /// The rows of `point` by each of so many equal `parts` of the rays, over the elements of
+    /// `mesh`. Their mean is the row by all of them.
+    fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow>;
+}
