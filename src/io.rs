@@ -23,6 +23,7 @@ mod mtl;
 mod npz;
 mod obj;
 mod ply;
+mod ply_bands;
 mod ply_reader;
 #[cfg(feature = "png")]
 mod png;
@@ -51,6 +52,7 @@ pub use self::png::{write_png, write_png_with_tone};
 pub use npz::{npz_from_bytes, read_npz, write_npz};
 pub use obj::{ObjSettings, load_obj, read_obj};
 pub use ply::{write_ply, write_ply_with_tone};
+pub use ply_bands::write_ply_bands;
 pub use ply_reader::read_ply;
 #[cfg(all(feature = "exr", feature = "textures"))]
 pub use radiance::read_radiance;

@@ -41,20 +41,11 @@ pub fn write_ply_with_tone(
     tone: &ToneCurve,
 ) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-        writeln!(out, "comment radiosity in W/m2 per channel, linear BT.709")?;
-        for comment in &surface.comments {
-            // A header is ASCII, a line an entry.
-            let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
-            writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
-        }
-        writeln!(out, "element vertex {}", surface.positions.len())?;
         let irradiances = surface.irradiance.len() == surface.positions.len();
         let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
         let (place, light) = (Width::of_positions(surface), Width::of_light(surface, errors));
+        write_header(out, surface, place, "radiosity in W/m2 per channel, linear BT.709")?;
         for (width, names, known) in [
-            (place, ["x", "y", "z"], true),
-            (Width::Float, ["nx", "ny", "nz"], true),
             (light, ["radiosity_r", "radiosity_g", "radiosity_b"], true),
             (light, ["irradiance_r", "irradiance_g", "irradiance_b"], irradiances),
         ] {
@@ -86,26 +77,54 @@ pub fn write_ply_with_tone(
                 light.write(out, surface.error[v])?;
             }
         }
-        for face in &surface.faces {
-            out.write_all(&[3])?;
-            for v in face {
-                out.write_all(&v.to_le_bytes())?;
-            }
-        }
-        Ok(())
+        write_faces(out, surface)
     })
+}
+
+/// Begins a file of `surface`: its comments after that of the `units`, and the vertices' positions,
+/// of this width, and normals.
+pub(super) fn write_header(
+    out: &mut dyn Write,
+    surface: &VertexMesh,
+    place: Width,
+    units: &str,
+) -> std::io::Result<()> {
+    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+    writeln!(out, "comment {units}")?;
+    for comment in &surface.comments {
+        // A header is ASCII, a line an entry.
+        let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
+        writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
+    }
+    writeln!(out, "element vertex {}", surface.positions.len())?;
+    for (width, names) in [(place, ["x", "y", "z"]), (Width::Float, ["nx", "ny", "nz"])] {
+        for name in names {
+            writeln!(out, "property {width} {name}")?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn write_faces(out: &mut dyn Write, surface: &VertexMesh) -> std::io::Result<()> {
+    for face in &surface.faces {
+        out.write_all(&[3])?;
+        for v in face {
+            out.write_all(&v.to_le_bytes())?;
+        }
+    }
+    Ok(())
 }
 
 /// Numbers of 32 or 64 bits.
 #[derive(Clone, Copy)]
-enum Width {
+pub(super) enum Width {
     Float,
     Double,
 }
 
 impl Width {
     /// Floats, where their steps are below a millionth of the mesh's size.
-    fn of_positions(surface: &VertexMesh) -> Width {
+    pub fn of_positions(surface: &VertexMesh) -> Width {
         let bounds = Aabb::from_points(surface.positions.iter().copied());
         let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
         Width::of(largest, largest <= 16.0 * bounds.longest_side())
@@ -118,7 +137,7 @@ impl Width {
         Width::of(brightest.chain(told).fold(0.0, f64::max), true)
     }
 
-    fn of(largest: f64, fine: bool) -> Width {
+    pub fn of(largest: f64, fine: bool) -> Width {
         let holds = largest == 0.0 || (1e-30..=f64::from(f32::MAX)).contains(&largest);
         if fine && holds { Width::Float } else { Width::Double }
     }
@@ -131,7 +150,7 @@ impl Width {
         }
     }
 
-    fn write(self, out: &mut dyn Write, x: f64) -> std::io::Result<()> {
+    pub fn write(self, out: &mut dyn Write, x: f64) -> std::io::Result<()> {
         match self {
             Width::Float => out.write_all(&(x as f32).to_le_bytes()),
             Width::Double => out.write_all(&x.to_le_bytes()),

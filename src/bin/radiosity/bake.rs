@@ -1,5 +1,6 @@
 //! `radiosity bake`: from a scene file to radiosity at vertices, a report and a picture.
 
+pub mod bands;
 pub mod files;
 pub mod settings;
 
@@ -21,7 +22,7 @@ pub const USAGE: &str = "\
 usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
             [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
             [--exposure X] [--image W,H] [--pixel-gather] [--write FORMATS]
-            [--elements] [--adapter NAME | --cpu]
+            [--elements] [--bands FILE.json] [--adapter NAME | --cpu]
 
 Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.glb (the same for viewers
 of glTF), STEM.json (a report) and a picture, STEM.exr (linear radiance) and STEM.png. STEM is the
@@ -70,6 +71,8 @@ Of vertices that gather:
 Files and devices:
   --strict          refuse what would be repaired in the file
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
+  --bands FILE.json the light in these bands too, at the same vertices: STEM.bands.ply and, where
+                    bands have wavelengths, .exr and .png in the colours that they add up to
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
   --transmit MATERIAL=r,g,b  this material is translucent: of the light on either side, this share
                     leaves diffusely from the other, instead of being reflected; may be repeated
@@ -92,7 +95,8 @@ Files and devices:
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
   --out STEM        where the files go, and how they begin [the scene without its ending]
-  --write FORMATS   only these: some of ply, glb, json, exr, png, with commas between them [all]
+  --write FORMATS   only these: some of ply, glb, json, exr, png and csv, which is of --bands
+                    alone, with commas between them [all but csv]
   --camera ...      eye, target, vertical field of view in degrees; three more numbers are the
                     direction up [0,1,0]; the report names the camera that is chosen otherwise
   --exposure X      what radiance is multiplied with for the colours of PNG, GLB and PLY, before
@@ -128,6 +132,8 @@ pub struct Bake {
     pub target: Target,
     /// Settings made by hand, in their order.
     adjustments: Vec<Adjustment>,
+    /// What materials are in bands.
+    bands: Option<PathBuf>,
     files: Files,
     device: Device,
 }
@@ -169,6 +175,7 @@ impl Bake {
             reading: SceneOptions::default(),
             target: Target::Settings(Gather::None),
             adjustments: vec![],
+            bands: None,
             files: Files::new(),
             device: Device::Gpu(None),
         };
@@ -194,6 +201,7 @@ impl Bake {
                     bake.adjustments
                         .push(Box::new(move |s| s.solve.checkpoint = Some(path.clone())));
                 }
+                Long("bands") => bake.bands = Some(parser.value()?.into()),
                 Long("adapter") => bake.device = Device::named(parser)?,
                 Long("cpu") => bake.device = Device::Cpu,
                 Long(name) => {
@@ -244,6 +252,8 @@ impl Bake {
         })?;
         args::print_warnings(&scene);
         let mut warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
+        let bands = bands.transpose()?;
         let triangles = scene.triangles().len();
         let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
@@ -255,6 +265,10 @@ impl Bake {
             || unshot_goal.get(),
             |report| self.bake(scene, &device, &unshot_goal, report),
         )?;
+        let band_light = match &bands {
+            Some(bands) => bands::light(bands, &baked)?,
+            None => None,
+        };
         let stopped = interrupt::stopped();
         if let Some(error) = &baked.device_failure {
             warnings.push(format!("rays on the CPU took the place of the device: {error}"));
@@ -274,6 +288,9 @@ impl Bake {
         }
         let writing = Instant::now();
         let picture = self.files.write(&baked, &device)?;
+        if let Some(light) = &band_light {
+            self.files.write_bands(light, picture)?;
+        }
         let report = Report {
             scene: name,
             sky,
@@ -287,6 +304,7 @@ impl Bake {
             warnings,
             picture,
             stopped,
+            bands: band_light,
             baked,
         };
         self.files.write_report(&report.to_json())?;

@@ -4,11 +4,11 @@
 use radiosity::backend::{AdapterInfo, RowMaker};
 use radiosity::bake::{GroupError, Obstacle, Outcome};
 use radiosity::solver::Ledger;
-use radiosity::{BakeResult, ErrorEstimate, Rgb};
+use radiosity::{BakeResult, BandLight, ErrorEstimate, Rgb};
 use serde_json::{Map, Value, json};
 
 use crate::bake::files::{Picture, camera_value};
-use crate::bake::{Target, settings};
+use crate::bake::{Target, bands, settings};
 
 /// What the report tells of.
 pub struct Report {
@@ -36,6 +36,8 @@ pub struct Report {
     pub picture: Option<Picture>,
     /// Whether Ctrl-C stopped the bake.
     pub stopped: bool,
+    /// The light in bands, if it was asked for.
+    pub bands: Option<BandLight>,
     pub baked: BakeResult,
 }
 
@@ -49,7 +51,7 @@ impl Report {
         let by_resolution = baked.hemicubes_by_resolution.iter();
         let by_resolution: Map<String, Value> =
             by_resolution.map(|(pixels, count)| (pixels.to_string(), json!(count))).collect();
-        json!({
+        let mut report = json!({
             "scene": self.scene,
             "adapter": { "name": name, "type": kind.to_string(), "driver": driver },
             "goal": match self.target {
@@ -95,7 +97,11 @@ impl Report {
             "exposure": self.picture.map(|picture| picture.exposure),
             "stopped": self.stopped,
             "warnings": self.warnings,
-        })
+        });
+        if let Some(light) = &self.bands {
+            report["bands"] = bands::report(light);
+        }
+        report
     }
 
     /// The estimated error, of the whole and of each group.
@@ -256,6 +262,7 @@ impl Report {
             lines.push(format!("picture    --camera {camera} --exposure {exposure}"));
         }
         lines.extend(self.verdict());
+        lines.extend(self.bands.as_ref().map(bands::words));
         lines.join("\n")
     }
 }

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use lexopt::prelude::*;
 use radiosity::glam::DVec3;
-use radiosity::io::{ToneCurve, write_ply_with_tone, write_png_with_tone};
+use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
-    Backend, BakeResult, Camera, Error, ErrorEstimate, ErrorKind, RadianceImage, VertexMesh,
-    write_exr, write_glb,
+    Backend, BakeResult, BandLight, Camera, Error, ErrorEstimate, ErrorKind, RadianceImage,
+    VertexMesh, write_exr, write_glb,
 };
 
 use crate::args::{self, Stop};
+use crate::bake::bands;
 use crate::progress;
 
 /// Rays along a pixel's side.
@@ -27,14 +28,17 @@ enum Format {
     Json,
     Exr,
     Png,
+    /// Of bands alone.
+    Csv,
 }
 
-const FORMATS: [(&str, Format); 5] = [
+const FORMATS: [(&str, Format); 6] = [
     ("ply", Format::Ply),
     ("glb", Format::Glb),
     ("json", Format::Json),
     ("exr", Format::Exr),
     ("png", Format::Png),
+    ("csv", Format::Csv),
 ];
 
 /// What to write, and where.
@@ -63,11 +67,13 @@ pub struct Picture {
 }
 
 impl Files {
-    /// All formats, at the place that is named after the scene later.
+    /// All formats but the table of bands, which is large, at the place that is named after the
+    /// scene later.
     pub fn new() -> Files {
+        let formats = FORMATS.map(|(_, format)| format).into_iter();
         Files {
             stem: PathBuf::new(),
-            formats: FORMATS.map(|(_, format)| format).to_vec(),
+            formats: formats.filter(|&format| format != Format::Csv).collect(),
             camera: None,
             exposure: None,
             image: (512, 512),
@@ -142,7 +148,7 @@ impl Files {
             } else if baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0) {
                 eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
-            self.write_picture(&image, &shown)?;
+            self.write_picture("", &image, &shown)?;
             picture = Some(Picture { camera, exposure: shown.exposure() });
         }
         let tone = match tone {
@@ -161,12 +167,19 @@ impl Files {
         })
     }
 
-    fn write_picture(&self, image: &RadianceImage, tone: &ToneCurve) -> Result<(), Error> {
+    /// Writes a picture to files whose endings begin with `of`.
+    fn write_picture(
+        &self,
+        of: &str,
+        image: &RadianceImage,
+        tone: &ToneCurve,
+    ) -> Result<(), Error> {
+        let path = |ending| self.path(&format!("{of}{ending}"));
         if self.writes(Format::Exr) {
-            progress::of_writing(&self.path("exr"), |path| write_exr(path, image))?;
+            progress::of_writing(&path("exr"), |path| write_exr(path, image))?;
         }
         if self.writes(Format::Png) {
-            progress::of_writing(&self.path("png"), |path| write_png_with_tone(path, image, tone))?;
+            progress::of_writing(&path("png"), |path| write_png_with_tone(path, image, tone))?;
         }
         Ok(())
     }
@@ -188,6 +201,30 @@ impl Files {
                 let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
                 write_ply_with_tone(path, &flat, tone)
             })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the light of bands and, if they have colours, a picture of these: from the camera of
+    /// the other `picture`, if there is one.
+    pub fn write_bands(&self, light: &BandLight, picture: Option<Picture>) -> Result<(), Error> {
+        let mut tone = self.exposure.map(ToneCurve::with_exposure);
+        // Bands that are no spectrum have no colours.
+        if let (Some(Picture { camera, .. }), Ok(colours)) = (picture, light.colours()) {
+            let (width, height) = self.image;
+            let image = camera.image(&colours, width, height, SAMPLES)?;
+            let shown = tone.unwrap_or_else(|| ToneCurve::fit_image(&image));
+            self.write_picture("bands.", &image, &shown)?;
+            tone = Some(shown);
+        }
+        if self.writes(Format::Ply) {
+            let tone = tone.map(ToneCurve::of_radiosity);
+            progress::of_writing(&self.path("bands.ply"), |path| {
+                write_ply_bands(path, light, tone.as_ref())
+            })?;
+        }
+        if self.writes(Format::Csv) {
+            progress::of_writing(&self.path("bands.csv"), |path| bands::write_table(path, light))?;
         }
         Ok(())
     }

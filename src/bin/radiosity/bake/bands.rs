@@ -1,0 +1,243 @@
+//! Light in bands: what materials are in each, from a JSON file, and the files of that light.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::path::Path;
+
+use radiosity::bands::{Band, BandError, BandMaterial};
+use radiosity::{BakeResult, BandLight, Bands, Error, ErrorKind, Scene};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::{interrupt, progress};
+
+/// The name that stands for all materials that the file does not name.
+const ALL_OTHERS: &str = "*";
+
+/// A file of bands.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BandFile {
+    /// Where its numbers are from; for the reader.
+    #[serde(rename = "source")]
+    _source: Option<String>,
+    bands: Vec<BandEntry>,
+    materials: BTreeMap<String, MaterialEntry>,
+    #[serde(default)]
+    sky: Spectrum,
+    #[serde(default)]
+    sun: Spectrum,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a band is a wavelength in nm, a name, or {name, wavelength}")]
+enum BandEntry {
+    Wavelength(f64),
+    Name(String),
+    Both { name: String, wavelength: f64 },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MaterialEntry {
+    reflectance: Spectrum,
+    #[serde(default)]
+    transmittance: Spectrum,
+    /// Radiance.
+    #[serde(default)]
+    emission: Spectrum,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "give a number for all bands, a list of one a band, or {nm: value}")]
+enum Spectrum {
+    Same(f64),
+    Each(Vec<f64>),
+    /// By wavelengths in nm; linear in between.
+    Table(BTreeMap<String, f64>),
+}
+
+impl Default for Spectrum {
+    fn default() -> Spectrum {
+        Spectrum::Same(0.0)
+    }
+}
+
+impl From<&BandEntry> for Band {
+    fn from(entry: &BandEntry) -> Band {
+        match entry {
+            BandEntry::Wavelength(nm) => Band { name: nm.to_string(), wavelength: Some(*nm) },
+            BandEntry::Name(name) => Band { name: name.clone(), wavelength: None },
+            BandEntry::Both { name, wavelength } => {
+                Band { name: name.clone(), wavelength: Some(*wavelength) }
+            }
+        }
+    }
+}
+
+impl Spectrum {
+    /// Its value in each band, or what is wrong with it and what would be right.
+    fn values(&self, bands: &[Band]) -> Result<Vec<f64>, (String, &'static str)> {
+        match self {
+            Spectrum::Same(value) => Ok(vec![*value; bands.len()]),
+            Spectrum::Each(values) if values.len() == bands.len() => Ok(values.clone()),
+            Spectrum::Each(values) => {
+                let found = format!("{} values for {} bands", values.len(), bands.len());
+                Err((found, "give one for each band"))
+            }
+            Spectrum::Table(table) => {
+                let mut points = vec![];
+                for (nm, &value) in table {
+                    let bad = |_| (format!("'{nm}'"), "name wavelengths by numbers, in nm");
+                    points.push((nm.parse::<f64>().map_err(bad)?, value));
+                }
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                bands.iter().map(|band| interpolated(&points, band)).collect()
+            }
+        }
+    }
+}
+
+/// The value of a table, by ascending wavelength, in `band`.
+fn interpolated(points: &[(f64, f64)], band: &Band) -> Result<f64, (String, &'static str)> {
+    let missing = |what: &str| format!("nothing for band {}{what}", band.name);
+    let Some(nm) = band.wavelength else {
+        let remedy = "give bands wavelengths, or a list of values";
+        return Err((missing(", which has no wavelength"), remedy));
+    };
+    let after = points.partition_point(|&(at, _)| at < nm);
+    match (points.get(after.wrapping_sub(1)), points.get(after)) {
+        (_, Some(&(at, value))) if at == nm => Ok(value),
+        (Some(&(low, a)), Some(&(high, b))) => Ok(a + (b - a) * (nm - low) / (high - low)),
+        _ => Err((missing(""), "give wavelengths on both sides of each band's")),
+    }
+}
+
+/// What the file `path` says of the materials of `scene`.
+///
+/// # Errors
+/// [`ErrorKind::File`] where it cannot be read or is not understood; those of [`Bands::check`].
+pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
+    let file = path.display().to_string();
+    let wrong = |place: String, found: String, remedy: &str| {
+        Error::new(ErrorKind::File, place, found, remedy)
+    };
+    let bytes = std::fs::read(path).map_err(|e| {
+        let found = format!("cannot be read: {e}");
+        wrong(file.clone(), found, "give a JSON file that can be read").with_source(e)
+    })?;
+    let BandFile { bands, materials, sky, sun, .. } =
+        serde_json::from_slice(&bytes).map_err(|e| {
+            let place = format!("{file}:{}", e.line());
+            let remedy = "give bands, and materials with their reflectance: see docs/bands.md";
+            wrong(place, e.to_string(), remedy).with_source(e)
+        })?;
+    let bands: Vec<Band> = bands.iter().map(Band::from).collect();
+    let values = |spectrum: &Spectrum, what: &str| {
+        let place = || format!("{file}: {what}");
+        spectrum.values(&bands).map_err(|(found, remedy)| wrong(place(), found, remedy))
+    };
+    let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
+    if let Some(name) = materials.keys().find(|name| *name != ALL_OTHERS && !known(name)) {
+        let found = format!("material '{name}', which is not there");
+        return Err(wrong(file, found, "name materials as the scene does"));
+    }
+    let mut of_bands = vec![];
+    for material in scene.materials() {
+        let name = &material.name;
+        let entry = materials.get(name).or_else(|| materials.get(ALL_OTHERS)).ok_or_else(|| {
+            let remedy = "give it an entry, or one for all others, *";
+            wrong(file.clone(), format!("nothing of material '{name}'"), remedy)
+        })?;
+        let of = |what: &str| format!("{what} of '{name}'");
+        let emission = values(&entry.emission, &of("emission"))?;
+        of_bands.push(BandMaterial {
+            reflectance: values(&entry.reflectance, &of("reflectance"))?,
+            transmittance: values(&entry.transmittance, &of("transmittance"))?,
+            exitance: emission.into_iter().map(|radiance| PI * radiance).collect(),
+        });
+    }
+    let (sky, sun) = (values(&sky, "sky")?, values(&sun, "sun")?);
+    let bands = Bands { bands, materials: of_bands, sky, sun };
+    bands.check(scene)?;
+    Ok(bands)
+}
+
+/// The bands of the file `path`, told what the bake does not see of them.
+pub fn read_and_warn(path: &Path, scene: &Scene) -> Result<Bands, Error> {
+    let bands = progress::of_reading(path, || read(path, scene))?;
+    let unseen = bands.unseen_by(scene);
+    if !unseen.is_empty() {
+        eprintln!(
+            "warning: {}: the mesh is not refined by their light in bands, which red, green and \
+             blue do not have; give them some, by Kd, Ke or --emit",
+            unseen.join(", ")
+        );
+    }
+    Ok(bands)
+}
+
+/// The light of `bands`; none where Ctrl-C stopped it.
+pub fn light(bands: &Bands, baked: &BakeResult) -> Result<Option<BandLight>, Error> {
+    if interrupt::stopped() {
+        return Ok(None);
+    }
+    progress::of_count("rows of vertices, for all bands", |report| {
+        bands.light(baked, |done, of| {
+            // The bar never stops it.
+            let _ = report(done, of);
+            interrupt::flow()
+        })
+    })
+}
+
+/// Writes a line a vertex: its position, then radiosity, irradiance and error by band.
+pub fn write_table(path: &Path, light: &BandLight) -> Result<(), Error> {
+    let count = light.bands.len();
+    let columns = [
+        ("radiosity", &light.radiosity),
+        ("irradiance", &light.irradiance),
+        ("error", &light.noise),
+    ];
+    let table = || -> csv::Result<()> {
+        let mut table = csv::Writer::from_path(path)?;
+        let names = columns.iter().flat_map(|(what, _)| {
+            light.bands.iter().map(move |band| format!("{what}_{}", band.name))
+        });
+        table.write_record(["x", "y", "z"].map(String::from).into_iter().chain(names))?;
+        for (v, position) in light.surface.positions.iter().enumerate() {
+            let values = columns.iter().flat_map(|(_, values)| &values[v * count..][..count]);
+            let numbers = position.to_array().into_iter().chain(values.copied());
+            table.write_record(numbers.map(|number| number.to_string()))?;
+        }
+        Ok(table.flush()?)
+    };
+    table().map_err(|e| {
+        let remedy = "choose a folder that exists, can be written and has room";
+        let found = format!("cannot be written: {e}");
+        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
+    })
+}
+
+/// What the report tells of each band: its error and its sweeps, by name.
+pub fn report(light: &BandLight) -> Value {
+    let bands = light.bands.iter().zip(&light.errors).zip(&light.sweeps);
+    let entry = |((band, error), sweeps): ((&Band, &BandError), &u32)| {
+        let BandError { total, noise, unsettled, of_bake, .. } = *error;
+        json!({
+            "band": band.name, "wavelength": band.wavelength, "error": total, "noise": noise,
+            "unsettled": unsettled, "of_bake": of_bake, "sweeps": sweeps,
+        })
+    };
+    bands.map(entry).collect()
+}
+
+/// A line for the table at the end.
+pub fn words(light: &BandLight) -> String {
+    let worst =
+        light.bands.iter().zip(&light.errors).max_by(|a, b| a.1.total.total_cmp(&b.1.total));
+    let worst = worst.map(|(band, error)| {
+        format!("error at most about {:.2} %, in band {}", 100.0 * error.total, band.name)
+    });
+    format!("bands      {}, {}", light.bands.len(), worst.unwrap_or_default())
+}
