@@ -170,10 +170,11 @@ impl<'a> Gathering<'a> {
         Ok(Some((settled, reflected, noise)))
     }
 
-    /// Whether anything of `material` leaves again in any band.
+    /// Whether anything that meets `material` leaves again in any band. Rays pass clear panes.
     fn scatters(&self, material: u32) -> bool {
-        let material = &self.bands.materials[material as usize];
-        (0..self.bands.bands.len()).any(|b| material.albedo(b) > 0.0)
+        let of_bands = &self.bands.materials[material as usize];
+        let is_clear = self.mesh.scene().materials()[material as usize].clear_transmittance();
+        is_clear.is_none() && (0..self.bands.bands.len()).any(|b| of_bands.albedo(b) > 0.0)
     }
 
     /// The light that has settled by these `rows`.

@@ -28,7 +28,8 @@ pub struct BandMaterial {
 /// The bands of a scene, and what its materials and its sky are in each.
 ///
 /// Textures of reflectance and emission are left out: a material is the same everywhere, and only
-/// holes stay. A clear pane lets through what it does in red, green and blue in the mean.
+/// holes stay. A clear pane lets through what it does in red, green and blue in the mean, and
+/// reflects nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bands {
     /// The bands, in any order.
@@ -158,7 +159,8 @@ impl Bands {
     pub fn unseen_by(&self, scene: &Scene) -> Vec<String> {
         let some = |values: &[f64]| values.iter().any(|&x| x > 0.0);
         let unseen = |(of_bands, material): &(&BandMaterial, &Material)| {
-            some(&of_bands.reflectance) && material.albedo() == Rgb::ZERO
+            let scatters = material.scatters() || material.clear_transmittance().is_some();
+            some(&of_bands.reflectance) && !scatters
                 || some(&of_bands.exitance) && material.exitance == Rgb::ZERO
         };
         let both = self.materials.iter().zip(scene.materials());

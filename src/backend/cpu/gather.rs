@@ -16,13 +16,11 @@
 //! contribution of one ray: both halves may miss the same small source.
 
 mod point_rows;
-mod sums;
 
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use rayon::prelude::*;
-use sums::{RaySums, Visible};
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_projection::LightProjection;
@@ -32,7 +30,7 @@ use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Scene, Sun};
+use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -306,11 +304,6 @@ impl RayGather {
     }
 }
 
-/// The shadow rays that go with the rays of `range`.
-fn shadow_range(range: Range<u32>) -> Range<u32> {
-    range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY)
-}
-
 /// Directions of `max_rays` rays in `scene`, of which `min_rays` are cast at least. Under a sky
 /// that is brighter above than at its sides all places would be off alike by rays that are nearer
 /// to the normal than they should.
@@ -318,6 +311,82 @@ fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
     match scene.sky().uniform_radiance() {
         Some(_) => HemisphereSamples::progressive(max_rays),
         None => HemisphereSamples::centred(max_rays, min_rays),
+    }
+}
+
+/// Sums over rays.
+#[derive(Debug)]
+struct RaySums<const FIELDS: usize> {
+    /// Without what surfaces reflect.
+    hemisphere: IrradianceSample,
+    /// What surfaces reflect, by field.
+    reflected: [Rgb; FIELDS],
+    /// The largest radiosity that one ray found, reflected by the first field or the sky's, W/m².
+    max_contribution: f64,
+    lights: Vec<Visible>,
+    /// Cosines instead of form factors.
+    sun: Visible,
+}
+
+/// Sums of form factors over points on a light.
+#[derive(Debug, Default)]
+struct Visible {
+    points: f64,
+    /// To those that are visible; per channel, what panes let through.
+    seen: Rgb,
+    /// To all that are above the horizon and face the point.
+    all: f64,
+}
+
+impl<const FIELDS: usize> Default for RaySums<FIELDS> {
+    fn default() -> RaySums<FIELDS> {
+        RaySums {
+            hemisphere: IrradianceSample::default(),
+            reflected: [Rgb::ZERO; FIELDS],
+            max_contribution: 0.0,
+            lights: vec![],
+            sun: Visible::default(),
+        }
+    }
+}
+
+impl<const FIELDS: usize> RaySums<FIELDS> {
+    fn add(&mut self, other: &RaySums<FIELDS>) {
+        let (sum, term) = (&mut self.hemisphere, &other.hemisphere);
+        sum.irradiance += term.irradiance;
+        sum.escaped += term.escaped;
+        sum.backface += term.backface;
+        sum.inverse_distance += term.inverse_distance;
+        for (sum, term) in self.reflected.iter_mut().zip(other.reflected) {
+            *sum += term;
+        }
+        self.max_contribution = self.max_contribution.max(other.max_contribution);
+        for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
+            sum.add(term);
+        }
+        self.sun.add(&other.sun);
+    }
+}
+
+/// The shadow rays that go with the rays of `range`.
+fn shadow_range(range: Range<u32>) -> Range<u32> {
+    range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY)
+}
+
+impl Visible {
+    /// What one unit of `seen` counts: a share of the form factor of all of the light where that is
+    /// known by closed form, else of the points.
+    fn share_of(&self, unoccluded: Option<f64>) -> f64 {
+        match unoccluded {
+            Some(factor) => factor / self.all.max(1e-300),
+            None => 1.0 / self.points.max(1.0),
+        }
+    }
+
+    fn add(&mut self, other: &Visible) {
+        self.points += other.points;
+        self.seen += other.seen;
+        self.all += other.all;
     }
 }
 

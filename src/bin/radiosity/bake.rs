@@ -289,7 +289,7 @@ impl Bake {
         let writing = Instant::now();
         let picture = self.files.write(&baked, &device)?;
         if let Some(light) = &band_light {
-            self.files.write_bands(light, picture)?;
+            self.files.write_bands(light, &baked, picture)?;
         }
         let report = Report {
             scene: name,

@@ -6,8 +6,8 @@ use lexopt::prelude::*;
 use radiosity::glam::DVec3;
 use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
-    Backend, BakeResult, BandLight, Camera, Error, ErrorEstimate, ErrorKind, RadianceImage,
-    VertexMesh, write_exr, write_glb,
+    Backend, BakeResult, BandLight, Camera, Error, ErrorEstimate, ErrorKind, GatheredMesh,
+    RadianceImage, VertexMesh, write_exr, write_glb,
 };
 
 use crate::args::{self, Stop};
@@ -207,12 +207,18 @@ impl Files {
 
     /// Writes the light of bands and, if they have colours, a picture of these: from the camera of
     /// the other `picture`, if there is one.
-    pub fn write_bands(&self, light: &BandLight, picture: Option<Picture>) -> Result<(), Error> {
+    pub fn write_bands(
+        &self,
+        light: &BandLight,
+        baked: &BakeResult,
+        picture: Option<Picture>,
+    ) -> Result<(), Error> {
         let mut tone = self.exposure.map(ToneCurve::with_exposure);
         // Bands that are no spectrum have no colours.
         if let (Some(Picture { camera, .. }), Ok(colours)) = (picture, light.colours()) {
-            let (width, height) = self.image;
-            let image = camera.image(&colours, width, height, SAMPLES)?;
+            let mut coloured = baked.light.clone();
+            coloured.surface = colours;
+            let image = self.interpolated(&camera, &coloured)?;
             let shown = tone.unwrap_or_else(|| ToneCurve::fit_image(&image));
             self.write_picture("bands.", &image, &shown)?;
             tone = Some(shown);
@@ -247,18 +253,24 @@ impl Files {
         device: &Backend,
     ) -> Result<RadianceImage, Error> {
         let (width, height) = self.image;
-        let image = if self.pixel_gather {
-            let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
-            let mut gather =
-                progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
-            progress::of_count("pixels gathered for the picture", |report| {
-                camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
-            })?
-        } else {
-            progress::of_count("pixels of the picture", |report| {
-                camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
-            })?
-        };
+        if !self.pixel_gather {
+            return self.interpolated(camera, &baked.light);
+        }
+        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
+        let mut gather =
+            progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
+        let image = progress::of_count("pixels gathered for the picture", |report| {
+            camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
+        })?;
+        Ok(image.expect("its progress never stops it"))
+    }
+
+    /// The picture by the light between vertices.
+    fn interpolated(&self, camera: &Camera, light: &GatheredMesh) -> Result<RadianceImage, Error> {
+        let (width, height) = self.image;
+        let image = progress::of_count("pixels of the picture", |report| {
+            camera.interpolated_image(light, width, height, SAMPLES, report)
+        })?;
         Ok(image.expect("its progress never stops it"))
     }
 }
