@@ -13,6 +13,7 @@
 pub(crate) mod adaptive;
 mod batch;
 mod buried;
+pub(crate) mod exchange;
 pub(crate) mod gather_points;
 mod gathered_mesh;
 mod interpolated_refinement;

@@ -11,17 +11,21 @@
 //!    ▏              ▕
 //! ```
 //!
-//! Elements that see what is nearer than light is resolved on them gather, at their viewpoints:
-//! first all; then, by what has changed, those that changed themselves, until none does by much.
+//! Elements that see what is nearer than light is resolved on them gather, at their viewpoints,
+//! and [exchange](crate::gather::exchange) light by what they see of each other.
 
 use std::ops::ControlFlow;
 
-use crate::bake::fallback::ResilientBackend;
+use rayon::prelude::*;
+
+use crate::backend::cpu::RayGather;
 use crate::bake::model;
 use crate::error::Error;
+use crate::gather::exchange::{Place, SeenPlace, is_in_gap, settle};
 use crate::gather::gather_points::SurfaceOffset;
-use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
-use crate::gather::{Gather, Progress, RadiosityField};
+use crate::gather::point_row::{PointRows, SurfaceHit};
+use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
+use crate::gather::{Progress, RadiosityField};
 use crate::mesh::Mesh;
 use crate::progress::BatchSizer;
 use crate::scene::Rgb;
@@ -31,137 +35,137 @@ use crate::vertex::irradiance;
 /// on it.
 const FIRST_BATCH: usize = 1024;
 
+/// Share of the light that an element gathers, below which what is left of it without that of
+/// others is rounding: of shares in 32 bits.
+const ROUNDING: f64 = 1e-6;
+
+/// In the place of an element's number among those in gaps: it is in none.
+const IN_NO_GAP: u32 = u32::MAX;
+
 /// The `radiosity` of the elements of `mesh`, W/m², where light is resolved down to `footprint`
-/// (scene unit): gathered instead by those for which the mean of 1/distance to what they see, times
-/// the larger of their size and the footprint, is above 1.
+/// (scene unit): gathered instead, by rays on every backend, by those for which the mean of
+/// 1/distance to what they see, times the larger of their size and the footprint, is above 1.
 ///
 /// None where `progress` broke.
 pub(super) fn light_in_gaps(
     mesh: &Mesh,
     radiosity: &[Rgb],
     footprint: f64,
-    backend: &ResilientBackend,
     progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Option<Vec<Rgb>>, Error> {
-    let mut gaps = GapGather {
-        mesh,
-        above: SurfaceOffset::new(mesh.scene()),
-        gatherer: backend.gather(mesh, model::GAP_RAYS, f64::INFINITY, 0.0)?,
-        progress,
-    };
-    let corners: Vec<[u32; 3]> = (0..mesh.element_count() as u32).map(|e| [e; 3]).collect();
     let shot: Vec<Rgb> = (0..mesh.element_count())
-        .map(|e| {
-            let irradiance = irradiance(radiosity[e] - mesh.exitance(e), mesh.albedo(e));
-            gaps.albedo(e) * irradiance
-        })
+        .map(|e| albedo(mesh, e) * irradiance(radiosity[e] - mesh.exitance(e), mesh.albedo(e)))
         .collect();
-    let floor = field(mesh, &corners, &shot).radiosity_floor();
-    let scatters = |e: &usize| mesh.scatters(mesh.element(*e));
-    let all: Vec<usize> = (0..mesh.element_count()).filter(scatters).collect();
-    let Some(mut changed) = gaps.gather_narrow(&all, &field(mesh, &corners, &shot), footprint)?
-    else {
-        return Ok(None);
-    };
-    let mut reflected = shot.clone();
-    for _ in 0..model::MAX_GAP_BOUNCES {
-        let before = reflected.clone();
-        for &(e, value) in &changed {
-            reflected[e] = value;
-        }
-        changed.retain(|&(e, value)| {
-            before[e].distance(value) > model::GAP_CHANGE * value.length().max(floor)
-        });
-        if changed.is_empty() {
-            break;
-        }
-        let fields = [&reflected, &before].map(|light| field(mesh, &corners, light));
-        if gaps.add_change(&mut changed, [&fields[0], &fields[1]])?.is_break() {
-            return Ok(None);
-        }
+    let corners: Vec<[u32; 3]> = (0..mesh.element_count() as u32).map(|e| [e; 3]).collect();
+    let field = RadiosityField { mesh, corners: &corners, reflected: &shot };
+    let floor = field.radiosity_floor();
+    let mut elements =
+        GatheringElements { mesh, above: SurfaceOffset::new(mesh.scene()), progress };
+    let mut rays = RayGather::new(mesh, model::GAP_RAYS)?;
+    let Some(gaps) = elements.in_gaps(&mut rays, &field, footprint)? else { return Ok(None) };
+    let Some(places) = elements.exchange(&rays, &gaps, &shot)? else { return Ok(None) };
+    let mut radiosity = radiosity.to_vec();
+    for (&(e, _), reflected) in gaps.iter().zip(settle(&places, floor)) {
+        let irradiance = irradiance(reflected, albedo(mesh, e));
+        radiosity[e] = mesh.exitance(e) + mesh.albedo(e) * irradiance;
     }
-    let gathered = |e: usize| {
-        let irradiance = irradiance(reflected[e], gaps.albedo(e));
-        mesh.exitance(e) + mesh.albedo(e) * irradiance
-    };
-    let elements = (0..radiosity.len()).zip(radiosity);
-    let radiosity =
-        elements.map(|(e, &b)| if reflected[e] == shot[e] { b } else { gathered(e) }).collect();
     Ok(Some(radiosity))
 }
 
-fn field<'a>(mesh: &'a Mesh, corners: &'a [[u32; 3]], reflected: &'a [Rgb]) -> RadiosityField<'a> {
-    RadiosityField { mesh, corners, reflected }
+/// Albedo of the material of element `e`, whatever its texture.
+fn albedo(mesh: &Mesh, e: usize) -> Rgb {
+    mesh.material(mesh.element(e)).albedo()
 }
 
 /// Elements that gather at their viewpoints.
-struct GapGather<'a> {
+struct GatheringElements<'a> {
     mesh: &'a Mesh,
     above: SurfaceOffset,
-    gatherer: Box<dyn Gather + 'a>,
     progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-impl GapGather<'_> {
-    fn albedo(&self, e: usize) -> Rgb {
-        self.mesh.material(self.mesh.element(e)).albedo()
-    }
-
-    fn size(&self, e: usize) -> f64 {
-        self.mesh.area(self.mesh.element(e)).sqrt()
-    }
-
+impl GatheringElements<'_> {
     fn point(&self, e: usize) -> TwoSidedPoint {
         let node = self.mesh.element(e);
         TwoSidedPoint::new(self.above.above_element(self.mesh, node), self.mesh.material(node))
     }
 
-    /// Those of `elements` that are in gaps, and what they reflect of the light of `field`, W/m²;
-    /// none if cancelled.
-    fn gather_narrow(
+    /// The elements in gaps, each with what it reflects of `field`, W/m²; none if cancelled.
+    fn in_gaps(
         &mut self,
-        elements: &[usize],
+        rays: &mut RayGather,
         field: &RadiosityField,
         footprint: f64,
     ) -> Result<Option<Vec<(usize, Rgb)>>, Error> {
-        let mut narrow = vec![];
-        let flow = self.in_batches(elements, |gaps, batch, points| {
-            let samples = gather_two_sided(&mut *gaps.gatherer, field, points)?;
+        let mesh = self.mesh;
+        let scatters = |e: &usize| mesh.scatters(mesh.element(*e));
+        let elements: Vec<usize> = (0..mesh.element_count()).filter(scatters).collect();
+        let mut gaps = vec![];
+        let flow = self.in_batches(&elements, |batch, points| {
+            let samples = gather_two_sided(rays, field, points)?;
             for (&e, sample) in batch.iter().zip(samples) {
-                if sample.inverse_distance * gaps.size(e).max(footprint) > 1.0 {
-                    narrow.push((e, gaps.albedo(e) * sample.irradiance));
+                let size = mesh.area(mesh.element(e)).sqrt();
+                if is_in_gap(sample.inverse_distance, size.max(footprint)) {
+                    gaps.push((e, albedo(mesh, e) * sample.irradiance));
                 }
             }
             Ok(())
         })?;
-        Ok(flow.is_continue().then_some(narrow))
+        Ok(flow.is_continue().then_some(gaps))
     }
 
-    /// Adds to what `elements` reflect, W/m², what they gather more of the first field than of the
-    /// second.
-    fn add_change(
+    /// The elements of `gaps` as places that exchange light, where all elements reflect `shot`
+    /// (W/m²) and by that these reflect what stands beside them, as `rays` found; none if
+    /// cancelled.
+    fn exchange(
         &mut self,
-        elements: &mut [(usize, Rgb)],
-        fields: [&RadiosityField; 2],
-    ) -> Result<ControlFlow<()>, Error> {
-        let numbers: Vec<usize> = elements.iter().map(|&(e, _)| e).collect();
-        let mut remaining = elements.iter_mut();
-        self.in_batches(&numbers, |gaps, _, points| {
-            let [now, before] = gather_both_two_sided(&mut *gaps.gatherer, fields, points)?;
-            let changes = now.iter().zip(before);
-            for ((now, before), (e, value)) in changes.zip(remaining.by_ref()) {
-                let change = gaps.albedo(*e) * (now.irradiance - before.irradiance);
-                *value = (*value + change).max(Rgb::ZERO);
+        rays: &RayGather,
+        gaps: &[(usize, Rgb)],
+        shot: &[Rgb],
+    ) -> Result<Option<Vec<Place>>, Error> {
+        let mesh = self.mesh;
+        let mut number = vec![IN_NO_GAP; mesh.element_count()];
+        (0..).zip(gaps).for_each(|(k, &(e, _))| number[e] = k);
+        // By the rays that gathered, what they found of each other's light is taken off exactly.
+        let seen_from = |point: &TwoSidedPoint| {
+            let mut seen = vec![];
+            for (point, share) in point.sides() {
+                for row in rays.rows(mesh, &point, 1) {
+                    let in_gap = |hit: &&SurfaceHit| number[hit.element as usize] != IN_NO_GAP;
+                    seen.extend(row.hits.iter().filter(in_gap).map(|hit| {
+                        let e = hit.element as usize;
+                        let factor = row.share * hit.passed * mesh.relative_reflectance(e);
+                        (number[e], share * factor)
+                    }));
+                }
             }
+            SeenPlace::merged(seen)
+        };
+        let elements: Vec<usize> = gaps.iter().map(|&(e, _)| e).collect();
+        let mut seen: Vec<Vec<SeenPlace>> = vec![];
+        let flow = self.in_batches(&elements, |_, points| {
+            seen.par_extend(points.par_iter().map(seen_from));
             Ok(())
-        })
+        })?;
+        if flow.is_break() {
+            return Ok(None);
+        }
+        let place = |(&(e, reflected), seen): (&(usize, Rgb), Vec<SeenPlace>)| {
+            let light = |seen: &SeenPlace| seen.share() * shot[gaps[seen.place as usize].0];
+            let albedo = albedo(mesh, e);
+            let constant = reflected - albedo * seen.iter().map(light).sum::<Rgb>();
+            // Where they see nothing else, rounding would be left.
+            let constant = Rgb::select(constant.cmpgt(reflected * ROUNDING), constant, Rgb::ZERO);
+            Place { albedo, constant, seen }
+        };
+        Ok(Some(gaps.iter().zip(seen).map(place).collect()))
     }
 
     /// Has `work` done on batches of `elements` and their points, until it is done or cancelled.
     fn in_batches(
         &mut self,
         elements: &[usize],
-        mut work: impl FnMut(&mut Self, &[usize], &[TwoSidedPoint]) -> Result<(), Error>,
+        mut work: impl FnMut(&[usize], &[TwoSidedPoint]) -> Result<(), Error>,
     ) -> Result<ControlFlow<()>, Error> {
         let total = elements.len();
         let mut remaining = elements;
@@ -169,7 +173,7 @@ impl GapGather<'_> {
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
                 let points: Vec<TwoSidedPoint> = batch.iter().map(|&e| self.point(e)).collect();
-                work(self, batch, &points)
+                work(batch, &points)
             })?;
             let (elements, gathered) = (self.mesh.element_count(), total - remaining.len());
             let report = Progress { pass: 0, refinements: 0, elements, gathered, total };
@@ -188,7 +192,6 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::backend::Backend;
     use crate::scene::{Material, Scene, Triangle};
 
     /// A floor of 8 × 8 under a white sky, and on it, 0.01 above, a lid of 2 × 2 that is 0.1 high,
@@ -221,8 +224,7 @@ mod tests {
         let mesh = lid();
         // As if all had got the light of the open floor.
         let before = vec![Rgb::splat(0.5); mesh.element_count()];
-        let backend = ResilientBackend::new(&Backend::Cpu);
-        let after = light_in_gaps(&mesh, &before, 0.0, &backend, &mut progress).unwrap().unwrap();
+        let after = light_in_gaps(&mesh, &before, 0.0, &mut progress).unwrap().unwrap();
         let (mut open, mut inside) = (0, vec![]);
         for e in 0..mesh.element_count() {
             let centre = mesh.centroid(mesh.element(e));
@@ -249,11 +251,10 @@ mod tests {
     fn a_break_ends_it() {
         let mesh = lid();
         let before = vec![Rgb::splat(0.5); mesh.element_count()];
-        let backend = ResilientBackend::new(&Backend::Cpu);
         let mut calls = 0;
         let stop_at = |last: u32, calls: &mut u32| {
             *calls = 0;
-            light_in_gaps(&mesh, &before, 0.0, &backend, &mut |p: &Progress| {
+            light_in_gaps(&mesh, &before, 0.0, &mut |p: &Progress| {
                 assert!(p.gathered <= p.total && p.elements == mesh.element_count());
                 *calls += 1;
                 if *calls == last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

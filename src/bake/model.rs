@@ -155,14 +155,6 @@ pub const RECEIVED_RAYS: u32 = 128;
 /// Rays with which elements gather in gaps: what they give is averaged by those that gather next.
 pub const GAP_RAYS: u32 = 32;
 
-/// An element in a gap gathers again as long as its radiosity changes by more than this share.
-/// Chosen by hand: half of what is asked for at 10 %.
-pub const GAP_CHANGE: f64 = 0.05;
-
-/// Times that elements gather in gaps, at most: where an albedo of 0.8 keeps light in, a hundredth
-/// of it is left after twenty.
-pub const MAX_GAP_BOUNCES: u32 = 20;
-
 /// Pixels along an edge of a hemicube's top face for `error`.
 pub(super) fn hemicube_resolution(error: f64) -> u32 {
     let [.., (_, finest)] = HEMICUBE_RESOLUTIONS;

@@ -60,7 +60,7 @@ pub(super) fn run(
     let scene = &cut_at_contacts(scene, finest);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
     let source = match &settings.gather {
-        Some(_) => light_to_gather(&settings.solve, &shot, backend, &mut reporter)?,
+        Some(_) => light_to_gather(&settings.solve, &shot, &mut reporter)?,
         None => None,
     };
     let baked = match (&settings.gather, &source) {
@@ -101,7 +101,6 @@ pub(super) fn run(
 fn light_to_gather(
     solve: &SolveSettings,
     shot: &ShotLight,
-    backend: &ResilientBackend,
     reporter: &mut Reporter,
 ) -> Result<Option<GatheredMesh>, Error> {
     if shot.solution.stop == StopReason::Cancelled {
@@ -111,7 +110,7 @@ fn light_to_gather(
     let footprint = model::pixel_footprint(solve.hemicube_resolution) * diagonal;
     let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Gathering(*p));
-    match light_in_gaps(&shot.mesh, &resolved, footprint, backend, &mut progress)? {
+    match light_in_gaps(&shot.mesh, &resolved, footprint, &mut progress)? {
         Some(light) => Ok(Some(GatheredMesh::from_elements(&shot.mesh, &light)?)),
         None => Ok(None),
     }

@@ -37,6 +37,12 @@ impl TwoSidedPoint {
         TwoSidedPoint { point, ..self }
     }
 
+    /// The sides from which light counts, each as a point and its share per channel.
+    pub fn sides(&self) -> impl Iterator<Item = (GatherPoint, Rgb)> {
+        let other = (self.behind != Rgb::ZERO).then(|| (self.other_side(), self.behind));
+        [(self.point, Rgb::ONE - self.behind)].into_iter().chain(other)
+    }
+
     /// The point on the other side of the surface, as far below it as this is above.
     pub fn other_side(&self) -> GatherPoint {
         let GatherPoint { position, normal, near } = self.point;
