@@ -1,9 +1,15 @@
 //! What a ray meets first, and whether anything is in between.
 
 pub(crate) mod buried;
+mod collapse;
 pub(crate) mod cut_outs;
 pub(crate) mod lit_sides;
 pub(crate) mod offset;
 pub(crate) mod panes;
+mod ray32;
 pub(crate) mod ray_scene;
+mod ray_stream;
+mod sah_tree;
+mod triangle_pack;
+mod triangle_plane;
 mod wide_bvh;

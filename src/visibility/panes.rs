@@ -23,7 +23,7 @@ pub(crate) struct Panes {
 }
 
 /// Barycentric weights below this are on the side between two triangles, both of which rays meet
-/// there: above the tolerance of the hits, [`super::ray_scene::BARYCENTRIC_TOLERANCE`].
+/// there: above the tolerance of the hits, [`super::triangle_plane::BARYCENTRIC_TOLERANCE`].
 const SEAM: f64 = 1e-11;
 
 /// Of what is met on such sides, this share of the distance apart, is one place: rounding of the

@@ -1,9 +1,9 @@
 //! Rays against triangles on the CPU: the closest hit, and whether a segment is occluded.
 //!
 //! ```text
-//!  ray ──► hierarchy of 32-bit boxes ──► candidate triangles ──► exact test in 64 bits ──► hit
-//!          (scaled to a fixed size,       in any order            ties: lower index
-//!           boxes grown by a margin)
+//!  ray ──► hierarchy of boxes ──► four triangles ──► exact test ──► hit
+//!          in 32 bits, wider      in 32 bits,         in 64 bits    ties: lower index
+//!          by a margin            within a margin
 //! ```
 //!
 //! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
@@ -11,61 +11,38 @@
 //! nor holes, [`CutOuts`], which are looked up where a triangle is hit. Whether there are any is
 //! asked once a ray.
 //!
-//! The hierarchy only prunes: its boxes are grown by more than 32-bit rounding, so that no hit is
-//! lost between it and the exact test. Of hits at equal distances the lowest triangle index wins,
-//! whatever the order of traversal, so that results do not depend on the hierarchy.
+//! The hierarchy only prunes: its margins are above 32-bit rounding, so that no hit is lost between
+//! it and the exact test. Of hits at equal distances the lowest triangle index wins, whatever the
+//! order of traversal, so that results do not depend on the hierarchy.
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3, Vec3A};
-use obvhs::aabb::Aabb as Aabb32;
-use obvhs::cwbvh::CwBvh;
-use obvhs::ray::{Ray, RayHit};
+use arrayvec::ArrayVec;
+use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 use super::cut_outs::CutOuts;
-use super::wide_bvh::hierarchy;
+use super::ray_stream::MAX_STREAM;
+use super::ray32::{LocalUnit, rounded_up};
+use super::sah_tree::{Aabb32, SahTree};
+use super::triangle_plane::TrianglePlane;
+use super::wide_bvh::{Child, WideBvh};
+
+pub(crate) use super::triangle_plane::Hit;
 
 /// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
 /// intersections are in 64.
 #[derive(Debug)]
 pub(crate) struct RayScene {
-    bvh: CwBvh,
+    bvh: WideBvh,
+    /// In the order of the hierarchy.
     triangles: Vec<TrianglePlane>,
-    /// Middle of the scene: the hierarchy's origin.
-    origin: DVec3,
-    /// From the scene's unit to the hierarchy's.
-    scale: f64,
+    unit: LocalUnit,
     /// None where nothing has holes.
     cut_outs: Option<CutOuts>,
 }
-
-/// Where a ray first met a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Hit {
-    pub triangle: usize,
-    /// Distance in units of the ray's direction.
-    pub distance: f64,
-    /// Barycentric weights of the second and third corner.
-    pub u: f64,
-    pub v: f64,
-    /// Whether the triangle's front was met.
-    pub front: bool,
-}
-
-/// Longest side of the scene in the hierarchy's own unit. The traversal of `obvhs` skips boxes that
-/// end nearer than 1e-4 units: 1e-9 of the scene at this size.
-const HIERARCHY_SCENE_SIZE: f64 = 1e5;
-
-/// Boxes grow by this much on every side, in the hierarchy's unit: 1e-6 of the scene, several
-/// roundings of a 32-bit coordinate (6e-8 each).
-const BOX_MARGIN: f32 = 1e-6 * HIERARCHY_SCENE_SIZE as f32;
-
-/// Barycentric weights down to minus this count as inside, which closes the seam between
-/// neighbours: far above the rounding of the test (some 1e-15), far below anything visible.
-pub(super) const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
 
 impl RayScene {
     /// For triangles by their corners.
@@ -76,34 +53,21 @@ impl RayScene {
     }
 
     /// For those of the triangles whose numbers are `met`; nothing meets the others.
-    fn of_some(mut corners: Vec<[DVec3; 3]>, mut met: Vec<u32>) -> RayScene {
-        let bounds = Aabb::from_points(corners.iter().flatten().copied());
-        let origin = bounds.centre();
-        let scale = HIERARCHY_SCENE_SIZE / bounds.longest_side().max(f64::MIN_POSITIVE);
-        let local = |p: DVec3| Vec3A::from(((p - origin) * scale).as_vec3());
-        if met.is_empty() {
-            // A hierarchy has something in it; this has no area, and nothing meets it.
-            met.push(corners.len() as u32);
-            corners.push([origin; 3]);
-        }
-        let boxes: Vec<Aabb32> = met
-            .iter()
-            .map(|&t| {
-                let [a, b, c] = corners[t as usize].map(local);
-                let margin = Vec3A::splat(BOX_MARGIN);
-                Aabb32 { min: a.min(b).min(c) - margin, max: a.max(b).max(c) + margin }
-            })
-            .collect();
-        let mut bvh = hierarchy(&boxes);
-        bvh.primitive_indices.iter_mut().for_each(|k| *k = met[*k as usize]);
-        let triangles = corners.into_iter().map(TrianglePlane::new).collect();
-        RayScene { bvh, triangles, origin, scale, cut_outs: None }
+    fn of_some(corners: Vec<[DVec3; 3]>, met: Vec<u32>) -> RayScene {
+        let unit = LocalUnit::new(&Aabb::from_points(corners.iter().flatten().copied()));
+        let corners = |k: u32| corners[met[k as usize] as usize];
+        let boxes: Vec<Aabb32> = (0..met.len() as u32).map(|k| unit.bounds(corners(k))).collect();
+        let tree = SahTree::new(&boxes);
+        let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.place(corner)));
+        let plane = |&k: &u32| TrianglePlane::new(met[k as usize], corners(k));
+        let triangles = tree.order.iter().map(plane).collect();
+        RayScene { bvh, triangles, unit, cut_outs: None }
     }
 
     /// The same, where nothing meets the backs of triangles that are `covered`.
     pub fn with_covered_backs(mut self, covered: impl Fn(usize) -> bool) -> RayScene {
-        for (t, plane) in self.triangles.iter_mut().enumerate() {
-            plane.back_is_covered = covered(t);
+        for plane in &mut self.triangles {
+            plane.back_is_covered = covered(plane.triangle as usize);
         }
         self
     }
@@ -158,25 +122,63 @@ impl RayScene {
         counts: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        let (ray, reach) = self.ray(from, direction);
-        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
-            let triangle = self.bvh.primitive_indices[id] as usize;
-            if Some(triangle) == ignored {
-                return f32::INFINITY;
-            }
-            // Rounded up, so that an equal is still looked at.
-            let end = best.map_or(f64::INFINITY, |b| b.distance * (1.0 + 4.0 * f64::EPSILON));
-            let hit = self.intersect(triangle, from, direction, start..end);
-            let Some(hit) = hit.filter(|hit| counts(hit)) else {
-                return f32::INFINITY;
-            };
-            // Between equals the lower index wins, whatever the order of the visit.
-            if best.is_some_and(|b| (b.distance, b.triangle) < (hit.distance, triangle)) {
-                return f32::INFINITY;
+        let (mut ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
+        self.bvh.trace(Child::ROOT, &mut ray, |k| {
+            let plane = &self.triangles[k];
+            let hit = plane.nearer((from, direction), start, ignored, best)?;
+            if !counts(&hit) {
+                return None;
             }
             best = Some(hit);
-            // Only prunes: rounded up, so that an equal in 32 bits is still looked at.
-            (hit.distance * reach) as f32 * (1.0 + 4.0 * f32::EPSILON) + BOX_MARGIN
+            Some(rounded_up(hit.distance * length))
+        });
+        best
+    }
+
+    /// The same for many `directions` from one place, which takes less time: `met` is told each
+    /// direction and what it meets, in their order.
+    pub fn closest_hits(
+        &self,
+        from: DVec3,
+        directions: impl Iterator<Item = DVec3>,
+        start: f64,
+        ignored: Option<usize>,
+        mut met: impl FnMut(DVec3, Option<Hit>),
+    ) {
+        let mut directions = directions.peekable();
+        while directions.peek().is_some() {
+            let stream: ArrayVec<DVec3, MAX_STREAM> =
+                directions.by_ref().take(MAX_STREAM).collect();
+            let hits = match &self.cut_outs {
+                None => self.nearest_of_stream(from, &stream, start, ignored, |_| true),
+                Some(holes) => {
+                    let counts = solid_hits(holes, |_| true);
+                    self.nearest_of_stream(from, &stream, start, ignored, counts)
+                }
+            };
+            stream.into_iter().zip(hits).for_each(|(direction, hit)| met(direction, hit));
+        }
+    }
+
+    fn nearest_of_stream(
+        &self,
+        from: DVec3,
+        directions: &[DVec3],
+        start: f64,
+        ignored: Option<usize>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> ArrayVec<Option<Hit>, MAX_STREAM> {
+        let mut best: ArrayVec<Option<Hit>, MAX_STREAM> = directions.iter().map(|_| None).collect();
+        let local = |&d: &DVec3| self.unit.ray(from, d, start..f64::INFINITY);
+        let (mut rays, lengths): (Vec<_>, Vec<f64>) = directions.iter().map(local).unzip();
+        self.bvh.trace_stream(&mut rays, |ray, k| {
+            let plane = &self.triangles[k];
+            let hit = plane.nearer((from, directions[ray]), start, ignored, best[ray])?;
+            if !counts(&hit) {
+                return None;
+            }
+            best[ray] = Some(hit);
+            Some(rounded_up(hit.distance * lengths[ray]))
         });
         best
     }
@@ -203,90 +205,21 @@ impl RayScene {
         reach: Range<f64>,
         counts: impl Fn(&Hit) -> bool,
     ) -> bool {
-        let (mut ray, length) = self.ray(from, direction);
-        ray.tmax = (reach.end * length) as f32 * (1.0 + 4.0 * f32::EPSILON) + BOX_MARGIN;
+        let (mut ray, _) = self.unit.ray(from, direction, reach.clone());
         let mut blocked = false;
-        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, id| {
-            let triangle = self.bvh.primitive_indices[id] as usize;
-            let hit = self.intersect(triangle, from, direction, reach.clone());
+        self.bvh.trace(Child::ROOT, &mut ray, |k| {
+            let hit = self.triangles[k].intersect(from, direction, reach.clone());
             blocked |= hit.is_some_and(|h| counts(&h));
             // Nothing is nearer than that: the rest is left out.
-            if blocked { f32::NEG_INFINITY } else { f32::INFINITY }
+            blocked.then_some(f32::NEG_INFINITY)
         });
         blocked
-    }
-
-    /// A ray in the hierarchy's own unit, and the length of `direction` in it.
-    fn ray(&self, from: DVec3, direction: DVec3) -> (Ray, f64) {
-        let local = ((from - self.origin) * self.scale).as_vec3();
-        let (unit, length) = direction.normalize_and_length();
-        // Adding zero turns -0 into 0: the traversal takes its octant and its inverse from the
-        // sign.
-        let ray = Ray::new_inf(local.into(), (unit.as_vec3() + Vec3::ZERO).into());
-        (ray, length * self.scale)
-    }
-
-    /// Where the line meets a triangle, within `reach` in units of `direction`, in 64 bits: its
-    /// plane first (Badouel 1990), because most are met too far off or not at all.
-    #[inline(always)]
-    fn intersect(
-        &self,
-        triangle: usize,
-        from: DVec3,
-        direction: DVec3,
-        reach: Range<f64>,
-    ) -> Option<Hit> {
-        let TrianglePlane { corner, normal, gradients, back_is_covered } = self.triangles[triangle];
-        let (facing, to) = (normal.dot(direction), corner - from);
-        // Most are too far off or behind, which is told without a division. Written so that NaN is
-        // no hit, as of a line in the plane.
-        let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
-        if !(rise > reach.start * steep && rise <= reach.end * steep) || steep == 0.0 {
-            return None;
-        }
-        if back_is_covered && facing > 0.0 {
-            return None;
-        }
-        let distance = rise / steep;
-        let at = direction * distance - to;
-        let (u, v) = (at.dot(gradients[0]), at.dot(gradients[1]));
-        let inside = u >= -BARYCENTRIC_TOLERANCE
-            && v >= -BARYCENTRIC_TOLERANCE
-            && u + v <= 1.0 + BARYCENTRIC_TOLERANCE;
-        inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
     }
 }
 
 /// Of the hits that `counts`, those that are in none of the `holes`.
 fn solid_hits(holes: &CutOuts, counts: impl Fn(&Hit) -> bool) -> impl Fn(&Hit) -> bool {
     move |hit| holes.is_solid(hit.triangle, [hit.u, hit.v]) && counts(hit)
-}
-
-/// A triangle, prepared for intersection.
-#[derive(Clone, Copy, Debug)]
-struct TrianglePlane {
-    corner: DVec3,
-    /// On the front; of any length.
-    normal: DVec3,
-    /// Gradients of the barycentric weights of the second and third corner.
-    gradients: [DVec3; 2],
-    /// Whether nothing meets its back.
-    back_is_covered: bool,
-}
-
-impl TrianglePlane {
-    fn new([a, b, c]: [DVec3; 3]) -> TrianglePlane {
-        let (u, v) = (b - a, c - a);
-        // A length of the order of one keeps squares of tiny and of huge triangles within range.
-        let size = u.length().max(v.length()).max(f64::MIN_POSITIVE);
-        let (u, v) = (u / size, v / size);
-        let normal = u.cross(v);
-        let square = normal.length_squared();
-        let gradient =
-            |edge: DVec3| if square > 0.0 { edge / (square * size) } else { DVec3::ZERO };
-        let gradients = [gradient(v.cross(normal)), gradient(normal.cross(u))];
-        TrianglePlane { corner: a, normal, gradients, back_is_covered: false }
-    }
 }
 
 #[cfg(test)]
@@ -323,5 +256,84 @@ mod tests {
                 assert!(rays.closest_hit(eye, rim(k) * r - eye, 0.0, None).is_some(), "{k} {r}");
             }
         }
+    }
+
+    /// Triangles that are hard on a hierarchy: edges 1e-6 to 1 of the scene, slivers, a grid with
+    /// shared sides, one in the other down to 1e-30, all in the same place.
+    fn hard_triangles() -> Vec<[DVec3; 3]> {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut place = || DVec3::from_array([(); 3].map(|_| random.f64()));
+        let mut triangles = vec![];
+        for k in 0..60 {
+            let (corner, size) = (place(), 0.1f64.powi(k % 7));
+            let [a, b] = [place(), place()].map(|p| corner + size * (p - 0.5));
+            triangles.extend([[corner, a, b], [corner, a, a.lerp(b, 1e-7)]]);
+        }
+        let grid = |x: usize, y: usize| DVec3::new(x as f64 / 6.0, y as f64 / 6.0, 0.5);
+        for (x, y) in (0..36).map(|k| (k % 6, k / 6)) {
+            let [a, b, c, d] = [grid(x, y), grid(x + 1, y), grid(x + 1, y + 1), grid(x, y + 1)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 0.3)];
+        triangles.extend((0..100).map(|k| corners.map(|corner| corner * 0.5f64.powi(k))));
+        triangles.extend([corners; 20]);
+        triangles
+    }
+
+    #[test]
+    fn the_hierarchy_changes_no_hit() {
+        let hard = hard_triangles();
+        for (scale, offset) in [(1.0, DVec3::ZERO), (1e-30, DVec3::ZERO), (1e3, DVec3::splat(1e7))]
+        {
+            let at = |p: DVec3| scale * p + offset;
+            let rays = RayScene::new(hard.iter().map(|corners| corners.map(at)));
+            let mut random = fastrand::Rng::with_seed(2);
+            let mut met = 0;
+            for k in 0..200 {
+                let mut on_triangle = |k: usize| {
+                    // Corners, places on sides, and anywhere.
+                    let [a, b, c] = hard[random.usize(..hard.len())];
+                    let (u, v) = (random.f64(), random.f64());
+                    [a, a.lerp(b, u), a + (b - a) * u + (c - a) * v * (1.0 - u)][k % 3]
+                };
+                let from = at(on_triangle(k) + DVec3::Z * [0.0, 0.25, 2.0][k / 3 % 3]);
+                let mut directions: Vec<DVec3> =
+                    (0..70).map(|k| at(on_triangle(k)) - from).collect();
+                directions.extend(DVec3::AXES.map(|axis| -axis));
+                let start = [0.0, 1e-9, -1e-3][k % 3];
+                let brute = |&direction: &DVec3| {
+                    let nearer = |best, plane: &TrianglePlane| {
+                        plane.nearer((from, direction), start, None, best).or(best)
+                    };
+                    rays.triangles.iter().fold(None, nearer)
+                };
+                let mut each = directions.iter();
+                rays.closest_hits(from, directions.iter().copied(), start, None, |d, hit| {
+                    let wanted = brute(&d);
+                    assert_eq!((Some(&d), hit), (each.next(), wanted), "{from} {d} {start}");
+                    assert_eq!(rays.closest_hit(from, d, start, None), wanted, "{from} {d}");
+                    met += usize::from(hit.is_some());
+                    let end = wanted.map_or(0.5, |hit| hit.distance);
+                    for reach in [start..end, start..0.999 * end, end..1.0] {
+                        let blocks =
+                            |plane: &TrianglePlane| plane.intersect(from, d, reach.clone());
+                        let blocked = rays.triangles.iter().any(|plane| blocks(plane).is_some());
+                        assert_eq!(rays.occluded(from, d, reach, |_| true), blocked, "{from} {d}");
+                    }
+                });
+                assert!(each.next().is_none());
+            }
+            println!("{met} hits");
+            assert!(met > 10_000);
+        }
+    }
+
+    #[test]
+    fn nothing_is_met_where_nothing_is() {
+        let rays = RayScene::new(std::iter::empty());
+        assert_eq!(rays.closest_hit(DVec3::ZERO, DVec3::X, 0.0, None), None);
+        rays.closest_hits(DVec3::ZERO, [DVec3::X, DVec3::Y].into_iter(), 0.0, None, |_, hit| {
+            assert_eq!(hit, None);
+        });
     }
 }

@@ -1,191 +1,186 @@
-//! The hierarchy of boxes for rays: eight-wide, and shallow whatever the boxes are.
+//! The hierarchy of boxes for rays: eight-wide, with four triangles a leaf.
 //!
 //! ```text
-//! boxes ──► binary tree by the surface area heuristic ──► eight-wide, compressed (obvhs' CwBvh)
-//!           at most 31 levels; halves where the heuristic
-//!           tells nothing apart or levels run out
+//! triangles ──► binary tree of boxes ──► nodes of eight boxes ──► leaves of four triangles
+//!               (sah_tree)               met at once (ray32)      met at once (triangle_pack)
 //! ```
 //!
-//! Merging neighbours from below takes quadratic time, and ends in a chain deeper than the stack,
-//! where thousands of boxes are the same or lie one in the other; so the binary tree is built here.
+//! A step down costs a wait for the one before and a branch that is hard to foresee, far more than
+//! its arithmetic; so nodes are wide and few (Dammertz, Hanika, Keller 2008; Wald, Benthin, Boulos
+//! 2008). Both tests are in 32 bits and miss nothing: what they let through is for the exact test.
 
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, node::Bvh2Node};
-use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
+use arrayvec::ArrayVec;
+use glam::{DVec3, Vec4};
 
-/// Levels below the root, at most. The traversal's stack has 32 entries, one a level, and drops
-/// further ones silently.
-const MAX_LEVELS: u32 = 31;
+use super::collapse::Collapse;
+use super::ray32::{BoxPlanes, Ray32, splat};
+use super::sah_tree::{MAX_LEVELS, SahTree};
+use super::triangle_pack::TrianglePack;
 
-/// Bins along an axis, between which a split may lie. Chosen by hand; no measurement was kept.
-const SAH_BINS: usize = 32;
+/// Boxes in a node.
+pub(super) const WIDTH: usize = 8;
 
-/// Boxes in a wide leaf, at most: what the format of `CwBvh` holds.
-const MAX_LEAF_SIZE: u32 = 3;
+/// Open boxes at most: on each level all of a node but the one that is entered.
+const MAX_OPEN: usize = (WIDTH - 1) * MAX_LEVELS as usize + WIDTH;
 
-/// A hierarchy of `boxes`.
-pub(super) fn hierarchy(boxes: &[Aabb]) -> CwBvh {
-    bvh2_to_cwbvh(&binary(boxes), MAX_LEAF_SIZE, true, false)
+#[derive(Debug)]
+pub(super) struct WideBvh {
+    /// The root first.
+    pub nodes: Vec<WideNode>,
+    pub packs: Vec<TrianglePack>,
 }
 
-/// Parts boxes where rays are expected to meet the fewest of them (Wald 2007, "On fast Construction
-/// of SAH-based Bounding Volume Hierarchies", sections 3.1 to 3.3), and into halves where nothing
-/// tells them apart, or levels run out. That takes n log n time even if all boxes are the same, or
-/// lie one in the other; merging neighbours from below takes n² then, and ends in a chain.
-fn binary(boxes: &[Aabb]) -> Bvh2 {
-    let mut tree = Bvh2::zeroed(boxes.len());
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let mut open = vec![(0, 0..boxes.len(), MAX_LEVELS)];
-    let mut next = 1;
-    while let Some((node, range, levels)) = open.pop() {
-        let part = &mut order[range.clone()];
-        let Some((&first, others)) = part.split_first() else { continue };
-        let first = boxes[first as usize];
-        let bounds = others.iter().fold(first, |all, &k| all.union(&boxes[k as usize]));
-        if others.is_empty() {
-            tree.nodes[node] = Bvh2Node::new(bounds, 1, range.start as u32);
-            continue;
+#[derive(Debug)]
+pub(super) struct WideNode {
+    pub planes: BoxPlanes,
+    /// Where there are fewer than eight, the others are packs without triangles in boxes that no
+    /// ray meets.
+    pub children: [Child; WIDTH],
+}
+
+/// The number of a node, or of a pack with the highest bit set.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Child(u32);
+
+pub(super) enum ChildKind {
+    Node(usize),
+    Pack(usize),
+}
+
+impl Child {
+    const PACK: u32 = 1 << 31;
+
+    pub const ROOT: Child = Child(0);
+
+    const NOTHING: Child = Child(Child::PACK);
+
+    #[inline(always)]
+    pub fn kind(self) -> ChildKind {
+        match self.0 & Child::PACK {
+            0 => ChildKind::Node(self.0 as usize),
+            _ => ChildKind::Pack((self.0 & !Child::PACK) as usize),
         }
-        let middle = range.start + split(boxes, part, levels - 1);
-        tree.nodes[node] = Bvh2Node::new(bounds, 0, next as u32);
-        open.push((next, range.start..middle, levels - 1));
-        open.push((next + 1, middle..range.end, levels - 1));
-        next += 2;
     }
-    tree.primitive_indices = order;
-    tree
 }
 
-/// Reorders `part` of the boxes into two, neither of which needs more than `levels`; the first ends
-/// at the number returned.
-fn split(boxes: &[Aabb], part: &mut [u32], levels: u32) -> usize {
-    let half = part.len() / 2;
-    if part.len() == 2 {
-        return half;
+impl WideBvh {
+    /// Of the tree's boxes, which are those of triangles by their corners in the hierarchy's unit.
+    pub fn new(tree: &SahTree, corners: impl Fn(u32) -> [DVec3; 3]) -> WideBvh {
+        let nothing = TrianglePack::new(0, std::iter::empty());
+        let mut bvh = WideBvh { nodes: vec![], packs: vec![nothing] };
+        bvh.add(tree, &Collapse::new(tree), 0, &corners);
+        bvh
     }
-    let centre = |k: u32| boxes[k as usize].center();
-    let mut centres = Aabb::empty();
-    part.iter().for_each(|&k| _ = centres.extend(centre(k)));
-    let scale = SAH_BINS as f32 / centres.diagonal();
-    // Where all centres are at one place of an axis, NaN makes that bin 0.
-    let bin = |k: u32| ((centre(k) - centres.min) * scale).to_array().map(|x| x as usize);
-    let bin = |k: u32, axis: usize| bin(k)[axis].min(SAH_BINS - 1);
-    match best_sah_split(boxes, part, bin, levels) {
-        Some((axis, end)) => {
-            let mut middle = 0;
-            for i in 0..part.len() {
-                if bin(part[i], axis) < end {
-                    part.swap(i, middle);
-                    middle += 1;
+
+    /// Adds the node at the tree's `root` and all below; gives its number. As deep as the tree at
+    /// most.
+    fn add(
+        &mut self,
+        tree: &SahTree,
+        collapse: &Collapse,
+        root: usize,
+        corners: &impl Fn(u32) -> [DVec3; 3],
+    ) -> Child {
+        let number = self.nodes.len();
+        let nothing = [[[Vec4::INFINITY; 2]; 3], [[Vec4::NEG_INFINITY; 2]; 3]];
+        self.nodes.push(WideNode { planes: nothing, children: [Child::NOTHING; WIDTH] });
+        for (k, child) in collapse.children(tree, root).into_iter().enumerate() {
+            let node = &tree.nodes[child];
+            for axis in 0..3 {
+                let planes = &mut self.nodes[number].planes;
+                planes[0][axis][k / 4][k % 4] = node.bounds.low[axis];
+                planes[1][axis][k / 4][k % 4] = node.bounds.high[axis];
+            }
+            self.nodes[number].children[k] = if node.children.is_some() {
+                self.add(tree, collapse, child, corners)
+            } else {
+                let triangles = tree.order[node.items.clone()].iter().map(|&k| corners(k));
+                self.packs.push(TrianglePack::new(node.items.start, triangles));
+                Child(Child::PACK | (self.packs.len() - 1) as u32)
+            };
+        }
+        Child(number as u32)
+    }
+
+    /// Calls `may_meet` with each triangle below `root` that `ray` may meet before its end, by
+    /// their numbers in the order of the tree, the nearer ones first by and large. It may give a
+    /// new end.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        root: Child,
+        ray: &mut Ray32,
+        mut may_meet: impl FnMut(usize) -> Option<f32>,
+    ) {
+        let origin = splat(ray.origin);
+        let mut open: ArrayVec<OpenBox, MAX_OPEN> = ArrayVec::new();
+        let mut child = root;
+        loop {
+            match child.kind() {
+                ChildKind::Node(node) => {
+                    let node = &self.nodes[node];
+                    let seen = |side: usize, axis: usize, half: usize| {
+                        node.planes[side][axis][half] - origin[axis]
+                    };
+                    let (mut met, entries) = ray.meets(seen);
+                    let mut next = || {
+                        let k = met.trailing_zeros() as usize;
+                        met &= met.wrapping_sub(1);
+                        let entry = entries.as_flattened().get(k)?;
+                        Some(OpenBox::new(*entry, node.children[k]))
+                    };
+                    if let Some(mut nearest) = next() {
+                        while let Some(other) = next() {
+                            open.push(nearest.max(other));
+                            nearest = nearest.min(other);
+                        }
+                        child = nearest.child();
+                        continue;
+                    }
+                }
+                ChildKind::Pack(pack) => {
+                    let pack = &self.packs[pack];
+                    let mut met = pack.seen_from(ray.origin).may_meet(ray);
+                    while met != 0 {
+                        let lane = met.trailing_zeros() as usize;
+                        if let Some(end) = may_meet(pack.first as usize + lane) {
+                            ray.end = end;
+                        }
+                        met &= met - 1;
+                    }
                 }
             }
-            middle
-        }
-        None => {
-            let axis = centres.largest_axis();
-            let along = |&k: &u32| centre(k)[axis];
-            part.select_nth_unstable_by(half, |a, b| along(a).total_cmp(&along(b)));
-            half
-        }
-    }
-}
-
-/// The axis, and the first bin of the second part, for which a ray is expected to meet the fewest
-/// boxes.
-fn best_sah_split(
-    boxes: &[Aabb],
-    part: &[u32],
-    bin: impl Fn(u32, usize) -> usize,
-    levels: u32,
-) -> Option<(usize, usize)> {
-    let mut best = (f32::INFINITY, None);
-    for axis in 0..3 {
-        let mut bins = [SahBin::default(); SAH_BINS];
-        part.iter().for_each(|&k| bins[bin(k, axis)].add(1, &boxes[k as usize]));
-        let mut behind = bins;
-        for k in (1..SAH_BINS).rev() {
-            let SahBin { count, bounds } = behind[k];
-            behind[k - 1].add(count, &bounds);
-        }
-        let mut before = SahBin::default();
-        for end in 1..SAH_BINS {
-            before.add(bins[end - 1].count, &bins[end - 1].bounds);
-            let cost = before.cost() + behind[end].cost();
-            let within = |part: &SahBin| part.count > 0 && part.levels() <= levels;
-            if within(&before) && within(&behind[end]) && cost < best.0 {
-                best = (cost, Some((axis, end)));
+            // What begins behind the end of the ray is left out.
+            child = loop {
+                match open.pop() {
+                    None => return,
+                    Some(nearest) if nearest.entry() <= ray.end => break nearest.child(),
+                    Some(_) => {}
+                }
             }
         }
     }
-    best.1
 }
 
-/// How many boxes, and the one around them.
-#[derive(Clone, Copy)]
-struct SahBin {
-    count: usize,
-    bounds: Aabb,
-}
+/// A box that is met and not entered yet; the order is that of entry.
+#[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
+struct OpenBox(u64);
 
-impl Default for SahBin {
-    fn default() -> SahBin {
-        SahBin { count: 0, bounds: Aabb::empty() }
-    }
-}
-
-impl SahBin {
-    fn add(&mut self, count: usize, bounds: &Aabb) {
-        self.count += count;
-        self.bounds = self.bounds.union(bounds);
+impl OpenBox {
+    /// Bits of floats that are not negative have the order of the floats. (Negative entries come
+    /// last; the order is for speed alone.)
+    #[inline(always)]
+    fn new(entry: f32, child: Child) -> OpenBox {
+        OpenBox(u64::from(entry.to_bits()) << 32 | u64::from(child.0))
     }
 
-    /// In proportion to the boxes that a ray is expected to meet.
-    fn cost(&self) -> f32 {
-        self.count as f32 * self.bounds.half_area()
+    #[inline(always)]
+    fn entry(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
     }
 
-    /// Levels that halving it over and over takes.
-    fn levels(&self) -> u32 {
-        self.count.next_power_of_two().ilog2()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::{Vec3A, vec3a};
-
-    /// Levels below the root. Parents come before their children.
-    fn depth(tree: &Bvh2) -> u32 {
-        let mut depths = vec![0; tree.nodes.len()];
-        for (k, node) in tree.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
-            let below = depths[k] + 1;
-            depths[node.first_index as usize..][..2].fill(below);
-        }
-        depths.into_iter().max().unwrap_or(0)
-    }
-
-    #[test]
-    fn crowds_give_shallow_trees() {
-        const N: usize = 100_000;
-        let at = |low: Vec3A, size: f32| Aabb { min: low, max: low + size };
-        let turned = |k: usize| vec3a((k as f32).cos(), (k as f32).sin(), 0.0);
-        let crowds: [(&str, &dyn Fn(usize) -> Aabb); 5] = [
-            ("the same", &|_| at(Vec3A::ZERO, 1.0)),
-            ("one in the other", &|k| at(Vec3A::ZERO, 1.0 - k as f32 / N as f32)),
-            ("halved again and again", &|k| at(Vec3A::ZERO, 0.5f32.powi(k as i32 % 100))),
-            ("a fan", &|k| Aabb::from_points(&[Vec3A::ZERO, turned(k)])),
-            ("a row", &|k| at(Vec3A::X * k as f32, 1.0)),
-        ];
-        for (what, crowd) in crowds {
-            let boxes: Vec<Aabb> = (0..N).map(crowd).collect();
-            let tree = binary(&boxes);
-            let mut there = tree.primitive_indices.clone();
-            there.sort_unstable();
-            assert!(there.iter().copied().eq(0..N as u32), "{what}");
-            let depth = depth(&tree);
-            println!("{what}: {depth}");
-            assert!(depth <= MAX_LEVELS, "{what}: {depth} levels");
-        }
+    #[inline(always)]
+    fn child(self) -> Child {
+        Child(self.0 as u32)
     }
 }

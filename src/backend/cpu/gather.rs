@@ -175,21 +175,21 @@ impl RayGather {
         let mut sums = RaySums::default();
         let sky = scene.sky();
         let out = &mut sums.hemisphere;
-        for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
-            let Some(hit) = self.scene.closest_hit(point.position, direction, point.near, None)
-            else {
+        let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
+        self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+            let Some(hit) = hit else {
                 out.escaped += 1.0;
                 let reach = point.near..f64::INFINITY;
                 let passed = self.panes.transmittance(point.position, direction, reach);
                 let radiosity = PI * sky.radiance(direction) * passed;
                 out.irradiance += radiosity;
                 sums.max_contribution = sums.max_contribution.max(radiosity.length());
-                continue;
+                return;
             };
             out.inverse_distance += 1.0 / hit.distance;
             if !hit.front {
                 out.backface += 1.0;
-                continue;
+                return;
             }
             let reach = point.near..hit.distance;
             let passed = self.panes.transmittance(point.position, direction, reach);
@@ -203,7 +203,7 @@ impl RayGather {
             if light != NO_LIGHT && !has_shadow_rays(light) {
                 out.irradiance += self.lights.lights[light as usize].exitance * passed;
             }
-        }
+        });
         let range = shadow_range(range);
         let visible = |&(light, _): &(u32, f64)| {
             self.shadow_rays(scene, point, light, range.clone(), rotation)

@@ -64,12 +64,14 @@ impl RayRows {
         let (eye, own) = (mesh.viewpoint(patch), mesh.triangle(patch));
         let start = offset::RAY_START * mesh.area(patch).sqrt();
         let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
-        let meets = |direction| item(mesh, self.rays.closest_hit(eye, direction, start, Some(own)));
         let directions = samples.directions(mesh.normal(patch), rotation);
         if !self.panes.is_none() {
             return self.row_through_panes(mesh, patch, directions, start);
         }
-        let mut hits: Vec<u32> = directions.map(meets).collect();
+        let mut hits: Vec<u32> = vec![];
+        self.rays.closest_hits(eye, directions, start, Some(own), |_, hit| {
+            hits.push(item(mesh, hit));
+        });
         hits.sort_unstable();
         row_of(&hits)
     }
@@ -83,12 +85,11 @@ impl RayRows {
         start: f64,
     ) -> Row {
         let (eye, own) = (mesh.viewpoint(patch), mesh.triangle(patch));
-        let meets = |direction| {
-            let hit = self.rays.closest_hit(eye, direction, start, Some(own));
+        let mut hits: Vec<(u32, Rgb)> = vec![];
+        self.rays.closest_hits(eye, directions, start, Some(own), |direction, hit| {
             let end = hit.map_or(f64::INFINITY, |hit| hit.distance);
-            (item(mesh, hit), self.panes.transmittance(eye, direction, start..end))
-        };
-        let mut hits: Vec<(u32, Rgb)> = directions.map(meets).collect();
+            hits.push((item(mesh, hit), self.panes.transmittance(eye, direction, start..end)));
+        });
         // Those of one item stay in their order, so that their sum is the same on every run.
         hits.sort_by_key(|&(item, _)| item);
         let items: Vec<u32> = hits.iter().map(|&(item, _)| item).collect();

@@ -53,11 +53,11 @@ impl Openness {
     }
 
     fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
-        let meets_back = |&direction: &DVec3| {
-            let hit = self.rays.closest_hit(place, direction, 0.0, None);
-            hit.is_some_and(|hit| !hit.front)
-        };
-        let backs = self.directions.directions(normal, 0.5).filter(meets_back).count();
-        (backs as f64) < buried::BURIED * f64::from(OPENNESS_RAYS)
+        let mut backs = 0;
+        let directions = self.directions.directions(normal, 0.5);
+        self.rays.closest_hits(place, directions, 0.0, None, |_, hit| {
+            backs += u32::from(hit.is_some_and(|hit| !hit.front));
+        });
+        f64::from(backs) < buried::BURIED * f64::from(OPENNESS_RAYS)
     }
 }

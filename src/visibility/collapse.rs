@@ -1,0 +1,80 @@
+//! Which nodes of a binary tree become the children of wide ones.
+//!
+//! ```text
+//!        ●                        ●            A ray pays for each wide node that it meets, in
+//!      ╱   ╲                  ╱ ╱ │ ╲          proportion to its area. With C(n, i) for what the
+//!     ●     ●       ──►     a  b  c  ●         tree below n costs as i roots at most:
+//!    ╱ ╲   ╱ ╲                      ╱ ╲
+//!   a   b c   ●                    d   e       C(n, i) = least of C(left, k) + C(right, i − k),
+//!            ╱ ╲                                         C(n, i − 1)
+//!           d   e                              C(n, 1) = C(n, 8) + area(n)
+//! ```
+//!
+//! Ylitie, Karras, Laine 2017, "Efficient incoherent ray traversal on GPUs through compressed wide
+//! BVHs", section 3.1. Leaves are as they are, and cost the same anyway.
+
+use arrayvec::ArrayVec;
+
+use super::sah_tree::SahTree;
+use super::wide_bvh::WIDTH;
+
+/// How the tree is cut below each of its nodes.
+pub(super) struct Collapse {
+    cuts: Vec<Cut>,
+}
+
+/// The subtree of one node, by the number of roots less one.
+#[derive(Clone, Copy)]
+struct Cut {
+    cost: [f32; WIDTH],
+    /// Roots that the left child's part has, at most; 0 where the node itself is the root.
+    left: [usize; WIDTH],
+}
+
+impl Collapse {
+    pub fn new(tree: &SahTree) -> Collapse {
+        let mut cuts = vec![Cut { cost: [0.0; WIDTH], left: [0; WIDTH] }; tree.nodes.len()];
+        // Children come behind their parents.
+        for (number, node) in tree.nodes.iter().enumerate().rev() {
+            if let Some(first) = node.children {
+                cuts[number] = Cut::of(node.bounds.half_area(), &cuts[first], &cuts[first + 1]);
+            }
+        }
+        Collapse { cuts }
+    }
+
+    /// The children of a wide node in the place of `root`; of a leaf the leaf alone.
+    pub fn children(&self, tree: &SahTree, root: usize) -> ArrayVec<usize, WIDTH> {
+        let mut children = ArrayVec::new();
+        let mut open = vec![(root, WIDTH)];
+        while let Some((node, roots)) = open.pop() {
+            match (tree.nodes[node].children, self.cuts[node].left[roots - 1]) {
+                (Some(first), left) if left > 0 => {
+                    open.extend([(first + 1, roots - left), (first, left)]);
+                }
+                _ => children.push(node),
+            }
+        }
+        children
+    }
+}
+
+impl Cut {
+    fn of(area: f32, left: &Cut, right: &Cut) -> Cut {
+        // Parted into `roots`, at least 2: cost and roots of the left.
+        let parted = |roots: usize| {
+            let cost = |k: usize| (left.cost[k - 1] + right.cost[roots - k - 1], k);
+            (1..roots).map(cost).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 1))
+        };
+        let whole = parted(WIDTH).0 + area;
+        let mut cut = Cut { cost: [whole; WIDTH], left: [0; WIDTH] };
+        for roots in 2..=WIDTH {
+            let (cost, k) = parted(roots);
+            let before = cut.cost[roots - 2];
+            let is_better = cost <= before;
+            cut.cost[roots - 1] = if is_better { cost } else { before };
+            cut.left[roots - 1] = if is_better { k } else { cut.left[roots - 2] };
+        }
+        cut
+    }
+}

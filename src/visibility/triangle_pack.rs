@@ -1,0 +1,111 @@
+//! Four triangles side by side, and which of them a ray may meet: 32 bits before the exact test.
+//!
+//! ```text
+//!            c             The ray meets the plane at o + t d. With the edges a and b, and s from
+//!           ╱ ╲            the corner to o, Cramer's rule says where (Möller, Trumbore 1997):
+//!        b ╱ · ╲
+//!         ╱     ╲            D = d·(b×a)    u D = d·(b×s)    v D = d·(s×a)    t D = b·(s×a)
+//!        ●───────
+//!      corner  a             met where u ≥ 0, v ≥ 0, u + v ≤ 1, start ≤ t ≤ end
+//! ```
+//!
+//! Here these hold within a margin above all rounding, and nothing is divided by D, which may be 0.
+//! With h = 2⁻²⁴ for one rounding, r for the scene's size and the largest coordinate of o, and e
+//! for the longer edge: places are off by 2√3 h r, products of three factors by some 6 h of them
+//! and the direction and s are no longer than √3 and √3 r; so u D and v D are off by 24 h r e, and
+//! D by 14 h e². A wrong sign of D, if it is smaller than that, turns up to 25 h r e over:
+//! within 64 h r e all in all. t D is off by 14 h r e², and by D's error times t, which no hit in
+//! the scene has above 2 r: within twice 64 h r e².
+
+use glam::{DVec3, Vec3A, Vec4};
+
+use super::ray32::{Ray32, SCENE_SIZE, splat};
+use super::sah_tree::MAX_LEAF_SIZE;
+
+/// The margin, as a share of places times edges: 64 roundings.
+const MARGIN: f32 = 32.0 * f32::EPSILON;
+
+/// Up to four triangles in the hierarchy's unit; the rest are NaN and never met.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TrianglePack {
+    corner: [Vec4; 3],
+    edges: [[Vec4; 3]; 2],
+    /// Length of the longest edge at a corner.
+    longest: f32,
+    /// The first of them in the order of the tree.
+    pub first: u32,
+}
+
+/// What all rays from one origin share.
+pub(super) struct PackSeen {
+    /// By the direction: D, u D and v D.
+    normal: [Vec4; 3],
+    u: [Vec4; 3],
+    v: [Vec4; 3],
+    /// t D.
+    rise: Vec4,
+    /// Margins of u D and v D, and of t D.
+    margins: [Vec4; 2],
+}
+
+impl TrianglePack {
+    /// Of `triangles` by their corners, four at most.
+    pub fn new(first: usize, triangles: impl Iterator<Item = [DVec3; 3]>) -> TrianglePack {
+        let nothing = [Vec4::NAN; 3];
+        let (mut corner, mut edges, mut longest) = (nothing, [nothing; 2], 0.0_f32);
+        for (lane, [a, b, c]) in triangles.take(MAX_LEAF_SIZE).enumerate() {
+            // In 64 bits, so that edges far shorter than the scene are exact to their own length.
+            let [a, u, v] = [a, b - a, c - a].map(|v| v.as_vec3a());
+            longest = longest.max(u.length()).max(v.length());
+            for axis in 0..3 {
+                corner[axis][lane] = a[axis];
+                edges[0][axis][lane] = u[axis];
+                edges[1][axis][lane] = v[axis];
+            }
+        }
+        TrianglePack { corner, edges, longest, first: first as u32 }
+    }
+
+    #[inline(always)]
+    pub fn seen_from(&self, origin: Vec3A) -> PackSeen {
+        let o = splat(origin);
+        let s = [0, 1, 2].map(|axis| o[axis] - self.corner[axis]);
+        let [a, b] = &self.edges;
+        let v = cross(&s, a);
+        let margin = MARGIN * (SCENE_SIZE + origin.abs().max_element()) * self.longest;
+        PackSeen {
+            normal: cross(b, a),
+            u: cross(b, &s),
+            rise: dot(b, &v),
+            v,
+            margins: [margin, 2.0 * margin * self.longest].map(Vec4::splat),
+        }
+    }
+}
+
+impl PackSeen {
+    /// Those that `ray` may meet, a bit each.
+    #[inline(always)]
+    pub fn may_meet(&self, ray: &Ray32) -> u32 {
+        let d = splat(ray.direction);
+        let (facing, u, v) = (dot(&d, &self.normal), dot(&d, &self.u), dot(&d, &self.v));
+        let front = facing.cmpge(Vec4::ZERO);
+        let turned = |x: Vec4| Vec4::select(front, x, -x);
+        let (u, v, rise, steep) = (turned(u), turned(v), turned(self.rise), turned(facing));
+        let [margin, rise_margin] = self.margins;
+        let inside = u.min(v).cmpge(-margin) & (u + v).cmple(steep + margin + margin);
+        let within =
+            rise.cmpge(steep * ray.start - rise_margin) & rise.cmple(steep * ray.end + rise_margin);
+        (inside & within).bitmask()
+    }
+}
+
+#[inline(always)]
+fn cross(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
