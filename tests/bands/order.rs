@@ -50,7 +50,7 @@ fn bands_have_the_same_bits_in_any_order_and_company() {
     for chosen in [&[8, 3, 5, 0, 7, 1, 6, 2, 4][..], &[4, 2, 8], &[0], &[6], &[1, 7]] {
         let some = light(&selection(&bands, chosen), &baked);
         for (b, &of_all) in chosen.iter().enumerate() {
-            assert_eq!(bits(&some, b), bits(&all, of_all), "band {of_all} among {chosen:?}");
+            assert!(bits(&some, b) == bits(&all, of_all), "band {of_all} among {chosen:?}");
         }
     }
     let one_thread = on_one_thread(|| light(&bands, &baked));
