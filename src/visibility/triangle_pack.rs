@@ -55,7 +55,7 @@ impl TrianglePack {
         let (mut corner, mut edges, mut longest) = (nothing, [nothing; 2], 0.0_f32);
         for (lane, [a, b, c]) in triangles.take(MAX_LEAF_SIZE).enumerate() {
             // In 64 bits, so that edges far shorter than the scene are exact to their own length.
-            let [a, u, v] = [a, b - a, c - a].map(|v| v.as_vec3a());
+            let [a, u, v] = [a, b - a, c - a].map(DVec3::as_vec3a);
             longest = longest.max(u.length()).max(v.length());
             for axis in 0..3 {
                 corner[axis][lane] = a[axis];

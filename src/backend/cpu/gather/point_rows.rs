@@ -33,20 +33,20 @@ impl RayGather {
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
         row.hits.reserve_exact((range.end - range.start) as usize);
-        for direction in self.samples.directions_in(range.clone(), point.normal, rotation) {
+        let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
+        self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let passed = |end: f64| {
                 let reach = point.near..end;
                 mean(self.panes.transmittance(point.position, direction, reach))
             };
-            let hit = self.scene.closest_hit(point.position, direction, point.near, None);
             let Some(hit) = hit else {
                 row.sky += share * passed(f64::INFINITY);
-                continue;
+                return;
             };
             row.inverse_distance += share / hit.distance;
             if !hit.front {
                 row.backface += share;
-                continue;
+                return;
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
             let light = self.lights.of_triangle[hit.triangle];
@@ -56,7 +56,7 @@ impl RayGather {
                 passed: passed(hit.distance),
                 emits: light == NO_LIGHT || !lights.iter().any(|&(sampled, _)| sampled == light),
             });
-        }
+        });
         let range = super::shadow_range(range);
         for &(light, unoccluded) in lights {
             let visible = self.shadow_rays(scene, point, light, range.clone(), rotation);
