@@ -15,6 +15,7 @@ mod camera;
 mod common;
 mod form_factor;
 mod fuzz_corpus;
+mod gather;
 mod heat;
 mod io;
 mod mesh;
