@@ -55,6 +55,7 @@
 //! | [`hemicube`] | faces, frames and pixel weights of a hemicube |
 //! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
+//! | [`grid`], [`probe`] | light on measuring grids; spherical harmonics at points in the air |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`view_factor`] | area-averaged factors between groups |
@@ -103,10 +104,12 @@ mod error;
 pub mod form_factor;
 pub mod gather;
 mod geometry;
+pub mod grid;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
 pub mod mesh;
+pub mod probe;
 mod progress;
 pub mod ranks;
 mod sampling;
@@ -150,6 +153,8 @@ pub use view_factor::ViewFactors;
 mod pages {
     #[doc = include_str!("../README.md")]
     struct Readme;
+    #[doc = include_str!("../docs/grids_and_probes.md")]
+    struct GridsAndProbes;
     #[doc = include_str!("../docs/incremental.md")]
     struct Incremental;
     #[doc = include_str!("../docs/robustness.md")]

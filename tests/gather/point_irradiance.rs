@@ -36,15 +36,15 @@ fn points_in_the_air_see_a_lamp_by_its_closed_form() {
     let quad = facing_down([0.2, 0.9], [0.1, 0.6], 2.0);
     let light = light(quads(&[(quad, lamp([3.0, 2.0, 1.0]))]), Rgb::ZERO);
     let normal = DVec3::new(0.36, -0.48, 0.8);
-    let places: Vec<DVec3> = (0..40).map(|k| DVec3::new(0.1 * f64::from(k), 0.5, 1.0)).collect();
+    let places: Vec<DVec3> = (0..30).map(|k| DVec3::new(0.1 * f64::from(k), 0.5, 1.0)).collect();
     let above = |&p: &DVec3| GatherPoint::above(light.mesh.scene(), p, normal, 0.001);
     let points: Vec<GatherPoint> = places.iter().map(above).collect();
     for (place, found) in places.iter().zip(gathered(&light, 0.1, &points)) {
         let truth = Rgb::new(3.0, 2.0, 1.0) * point_to_polygon(*place, normal, &corners(quad));
-        // Up to 1.7e-6 above the place, 1.7e-3 of its size: where it ends, 1 unit off, the lamp is
-        // 0.01 units high as seen from there.
+        // Up to 1.7e-6 above the place, 1.7e-3 of its size. The last ones see but a corner of the
+        // lamp, 0.2 units above the horizon: 1e-5 of its light.
         let off = (found.irradiance - truth).abs() / truth;
-        assert!(truth == Rgb::ZERO || off.max_element() < 1e-3, "{place}: {found:?} {truth}");
+        assert!(off.max_element() < 1e-3, "{place}: {found:?} {truth}");
         assert!(found.standard_error.max_element() < 1e-3 * truth.x);
         assert!(!found.is_buried());
     }
