@@ -1,6 +1,7 @@
 //! The program: what its commands write, and how they refuse wrong usage and bad scenes.
 #![cfg(feature = "cli")]
 
+mod light;
 mod sky;
 mod view_factors;
 
@@ -308,6 +309,8 @@ fn help_and_version_succeed() {
         &["view-factors", "--help"],
         &["trade-off", "-h"],
         &["verify", "--help"],
+        &["grid", "--help"],
+        &["probes", "--help"],
     ] {
         let out = run(args[0], &args[1..]);
         let text = String::from_utf8_lossy(&out.stdout);
@@ -322,7 +325,11 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
     for (args, words) in [
         (
             &["fry"][..],
-            &["'fry'", "bake, view-factors, merge, heat, trade-off", "radiosity --help"][..],
+            &[
+                "'fry'",
+                "bake, view-factors, merge, heat, grid, probes, trade-off",
+                "radiosity --help",
+            ][..],
         ),
         (&["--what"], &["--what"]),
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
@@ -343,6 +350,9 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["verify", "a.obj", "b.ply", "--time", "-1"], &["--time", "'-1'"]),
         (&["verify", "a.obj", "b.ply", "--paths", "1"], &["--paths is for --points"]),
         (&["verify", "a.obj", "--points", "p", "--places", "9"], &["--places", "a solution"]),
+        (&["grid", "a.obj", "--plane", "1,2,3"], &["'1,2,3'", "nine numbers", "two edges"]),
+        (&["probes", "a.obj"], &["--spacing or --counts"]),
+        (&["probes", "a.obj", "--counts", "2,2"], &["'2,2'", "three whole numbers"]),
         (&["trade-off", "--slow"], &["--slow", "usage: radiosity trade-off"]),
     ] {
         let out = run(args[0], &args[1..]);

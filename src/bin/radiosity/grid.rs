@@ -68,6 +68,9 @@ struct Options {
     stem: PathBuf,
 }
 
+/// A grid, and where it is, in words.
+type Placed = (String, MeasuringGrid);
+
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let options = Options::parse(parser)?;
@@ -77,7 +80,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let grids = options.grids(&scene)?;
     let light = options.light.bake(scene)?;
     let measured = options.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
-    options.write(&measured)?;
+    options.write(&grids, &measured)?;
     args::end()
 }
 
@@ -146,7 +149,7 @@ impl Options {
     }
 
     /// Where it is measured.
-    fn grids(&self, scene: &Scene) -> Result<Vec<MeasuringGrid>, Error> {
+    fn grids(&self, scene: &Scene) -> Result<Vec<Placed>, Error> {
         let up = self.light.reading.sky.up().unwrap_or_else(|| up_axis(scene));
         let (task, floor) = (self.settings(0.0), self.settings(GridSettings::default().strip));
         if self.groups.is_empty() && self.planes.is_empty() {
@@ -157,26 +160,27 @@ impl Options {
                 let remedy = "name a --group or give a --plane; --metre tells the scene's unit";
                 return Err(Error::new(ErrorKind::Setting, "floors of the scene", found, remedy));
             }
-            return Ok(grids);
+            return Ok(grids.into_iter().map(|grid| raised(grid, height)).collect());
         }
         let height = self.height.unwrap_or(0.0);
-        let above_group =
-            |group: &String| MeasuringGrid::above_group(scene, group, up, height, &task);
-        let on_plane = |plane: &GridPlane| MeasuringGrid::on_plane("plane", *plane, &task);
+        let above_group = |group: &String| {
+            let grid = MeasuringGrid::above_group(scene, group, up, height, &task)?;
+            Ok(raised(grid, height))
+        };
+        let on_plane = |plane: &GridPlane| {
+            let place = format!("plane at {}", plane.origin);
+            Ok((place, MeasuringGrid::on_plane("plane", *plane, &task)?))
+        };
         let groups = self.groups.iter().map(above_group);
         groups.chain(self.planes.iter().map(on_plane)).collect()
     }
 
     /// What is measured; none where Ctrl-C stopped it.
-    fn measure(
-        &self,
-        grids: &[MeasuringGrid],
-        light: &Light,
-    ) -> Result<Option<Vec<MeasuredGrid>>, Error> {
+    fn measure(&self, grids: &[Placed], light: &Light) -> Result<Option<Vec<MeasuredGrid>>, Error> {
         let lit = &light.baked.light;
         let mut gatherer = light.device.gather_to_noise(lit, self.light.noise())?;
         progress::of_count("points", |report| {
-            let measure = |grid: &MeasuringGrid| {
+            let measure = |(_, grid): &Placed| {
                 let measured = grid.measure(lit, &mut *gatherer, |done, of| {
                     report(done, of)?;
                     interrupt::flow()
@@ -189,8 +193,8 @@ impl Options {
         })
     }
 
-    fn write(&self, grids: &[MeasuredGrid]) -> Result<(), Error> {
-        for (k, measured) in grids.iter().enumerate() {
+    fn write(&self, grids: &[Placed], measured: &[MeasuredGrid]) -> Result<(), Error> {
+        for (k, ((place, _), measured)) in grids.iter().zip(measured).enumerate() {
             let name = format!("{} {}", k + 1, measured.grid.name);
             let Some(statistics) = measured.statistics(self.quantity) else {
                 say!("{name}: all points are inside of solids");
@@ -198,11 +202,11 @@ impl Options {
             };
             say!("{}", self.line(&name, measured, &statistics));
             let number = if grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
-            self.draw(measured, &statistics, &self.file(&format!("{number}.png")))?;
+            self.draw(measured, &statistics, place, &self.file(&format!("{number}.png")))?;
         }
         progress::of_writing(&self.file(".csv"), |path| {
-            let bytes =
-                table::csv(grids, self.quantity).map_err(|e| cannot_make(path, e.to_string()))?;
+            let bytes = table::csv(measured, self.quantity)
+                .map_err(|e| cannot_make(path, e.to_string()))?;
             args::write_file(path, &bytes)
         })
     }
@@ -211,9 +215,9 @@ impl Options {
         &self,
         measured: &MeasuredGrid,
         statistics: &GridStatistics,
+        place: &str,
         file: &Path,
     ) -> Result<(), Error> {
-        let place = measured.grid.name.clone();
         let (quantity, metre) = (self.quantity, self.metre);
         let picture = Picture { measured, statistics, quantity, place, metre };
         progress::of_writing(file, |path| {
@@ -227,14 +231,19 @@ impl Options {
         let [a, b] = measured.grid.cell().map(|edge| edge / self.metre);
         let inside = measured.values.iter().flatten().count() - points;
         let unit = self.quantity.unit();
-        let [mean, error, minimum, maximum] =
-            [mean, mean_error, minimum, maximum].map(|value| three_digits(*value));
+        let error = if *mean > 0.0 { 100.0 * mean_error / mean } else { 0.0 };
+        let [mean, minimum, maximum] = [mean, minimum, maximum].map(|value| three_digits(*value));
         let left_out = if inside > 0 { format!(", {inside} inside of solids") } else { "".into() };
         format!(
-            "{name}: mean {mean} ± {error} {unit}, minimum {minimum}, maximum {maximum}, \
+            "{name}: mean {mean} {unit} ± {error:.2} %, minimum {minimum}, maximum {maximum}, \
              uniformity {uniformity:.3}; {points} points{left_out}, {a:.2} m by {b:.2} m apart"
         )
     }
+}
+
+/// A grid this many metres above what it is named after.
+fn raised(grid: MeasuringGrid, height: f64) -> Placed {
+    (format!("{height} m above {}", grid.name), grid)
 }
 
 fn cannot_make(file: &Path, found: impl Into<String>) -> Error {

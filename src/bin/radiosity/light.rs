@@ -13,7 +13,8 @@ use crate::{interrupt, progress};
 macro_rules! light_usage {
     () => {
         "\
-  --error X         how far off the light may be, as a share: 0.05 for 5 % [0.05]
+  --error X         how far off what is measured may be, root mean square, as a share: 0.05 for 5 %
+                    [0.05]
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes
   --sky, --sun, --emit, --transmit, --sides, --specular, --max-reflectance, --strict, …
@@ -22,7 +23,14 @@ macro_rules! light_usage {
 }
 pub(crate) use light_usage;
 
-/// Rounds of the bake leave half of the error to what is measured.
+/// Error of the light over that of what is measured in it: what vertices are off by is averaged
+/// over all that a point sees. That of a gather pass over the next one's, as in a bake.
+const LIGHT_COARSENING: f64 = 3.0;
+
+/// Error of the light at most: what is missed altogether is not averaged. Chosen by hand.
+const MAX_LIGHT_ERROR: f64 = 0.3;
+
+/// Noise of what is measured over its error. Chosen by hand.
 const NOISE_SHARE: f64 = 0.5;
 
 /// What is said of the light.
@@ -54,7 +62,7 @@ impl LightOptions {
         Ok(true)
     }
 
-    /// How far off the light may be, as a share.
+    /// How far off what is measured may be, as a share.
     pub fn error(&self) -> f64 {
         self.error
     }
@@ -73,10 +81,11 @@ impl LightOptions {
         Ok(scene)
     }
 
-    /// Bakes `scene` to the error. Ctrl-C stops it with what there is.
+    /// Bakes `scene` as far as it takes. Ctrl-C stops it with what there is.
     pub fn bake(&self, scene: Scene) -> Result<Light, Error> {
         let device = progress::of_stage("opening the device", || self.device.open())?;
         interrupt::catch();
+        let error = (LIGHT_COARSENING * self.error).min(MAX_LIGHT_ERROR.max(self.error));
         let unshot = Cell::new(Solver::default().unshot);
         let baked = progress::of_bake(
             || unshot.get(),
@@ -84,7 +93,7 @@ impl LightOptions {
                 let look = |settings: &mut radiosity::BakeSettings| {
                     unshot.set(settings.solve.solver.unshot);
                 };
-                BakeTarget::Error(self.error).bake_with(scene, &device, look, report)
+                BakeTarget::Error(error).bake_with(scene, &device, look, report)
             },
         )?;
         match &baked.device_failure {

@@ -1,7 +1,7 @@
 //! A smooth field through the values of a grid, and lines of equal value in it.
 //!
 //! Values stand in the middles of cells; between them the field is cubic in both directions
-//! (Catmull and Rom 1974). Cells without a value get one from their neighbours first, so that the
+//! (Catmull and Rom 1974), and before the outermost ones it goes on straight. Cells without a value get one from their neighbours first, so that the
 //! field goes on to their edge; nothing is shown in them.
 
 /// A line's straight piece, in cells from the grid's corner.
@@ -40,21 +40,29 @@ impl Field {
     /// The value at a place, in cells from the grid's corner: not beyond that of any cell.
     pub fn at(&self, place: [f64; 2]) -> f64 {
         let along = |axis: usize| {
-            let x = (place[axis] - 0.5).clamp(0.0, self.counts[axis] as f64 - 1.0);
-            (x as usize, catmull_rom(x.fract()))
+            let x = place[axis] - 0.5;
+            let first = x.floor().clamp(0.0, (self.counts[axis] as f64 - 2.0).max(0.0));
+            (first as usize, cubic_weights(x - first))
         };
         let ((column, across), (row, up)) = (along(0), along(1));
-        let near = |k: usize, step: usize, axis: usize| {
-            (k + step).saturating_sub(1).min(self.counts[axis] - 1)
-        };
         let mut sum = 0.0;
         for (j, weight) in up.iter().enumerate() {
-            let start = near(row, j, 1) * self.counts[0];
             for (i, share) in across.iter().enumerate() {
-                sum += weight * share * self.values[start + near(column, i, 0)];
+                sum += weight * share * self.value(column + i, row + j);
             }
         }
         sum.clamp(self.range[0], self.range[1])
+    }
+
+    /// The value of a cell, counted from 1 on; one before the first and behind the last go on
+    /// straight.
+    fn value(&self, column: usize, row: usize) -> f64 {
+        let [columns, rows] = self.counts;
+        let in_row = |column: usize, row: usize| {
+            let at = |k: usize| self.values[row * columns + k];
+            straight(column, columns, at)
+        };
+        straight(row, rows, |row| in_row(column, row))
     }
 
     /// Pieces of the line where the field is `level`, found on `steps` squares a cell by linear
@@ -94,8 +102,22 @@ impl Field {
     }
 }
 
-/// Weights of four values in a row at a share of the way from the second to the third.
-fn catmull_rom(t: f64) -> [f64; 4] {
+/// Of values of `count` cells, that of cell `k`, counted from 1 on: straight on beyond both ends.
+fn straight(k: usize, count: usize, at: impl Fn(usize) -> f64) -> f64 {
+    let second = |k: usize| if count > 1 { at(k) } else { at(0) };
+    match k {
+        0 => 2.0 * at(0) - second(1),
+        k if k > count => 2.0 * at(count - 1) - second(count.saturating_sub(2)),
+        k => at(k - 1),
+    }
+}
+
+/// Weights of four values in a row at a share `t` of the way from the second to the third; straight
+/// through these two where it is off the way.
+fn cubic_weights(t: f64) -> [f64; 4] {
+    if !(0.0..=1.0).contains(&t) {
+        return [0.0, 1.0 - t, t, 0.0];
+    }
     let (t2, t3) = (t * t, t * t * t);
     [
         0.5 * (-t + 2.0 * t2 - t3),
@@ -145,8 +167,13 @@ mod tests {
             assert!((field.at([column + 0.5, row + 0.5]) - column - 2.0 * row).abs() < 1e-12);
             assert_eq!(field.is_shown([column + 0.9, row + 0.1]), k != 10);
         }
-        // Cubics give linear fields again, but where they reach over the edge.
-        assert!((field.at([3.2, 2.7]) - (2.7 + 2.0 * 2.2)).abs() < 1e-12);
+        // Cubics give linear fields again, to the edge but for what is beyond all values.
+        for [x, y] in [[3.2, 2.7], [0.1, 2.6], [6.9, 0.2], [3.3, 4.9]] {
+            assert!((field.at([x, y]) - (x - 0.5) - 2.0 * (y - 0.5)).abs() < 1e-12, "{x} {y}");
+        }
+        assert_eq!(field.at([0.0, 0.0]), 0.0);
+        let row = Field::new([3, 1], &[Some(1.0), Some(2.0), Some(4.0)]).unwrap();
+        assert_eq!([row.at([1.5, 0.1]), row.at([1.5, 0.9])], [2.0; 2]);
         assert!(Field::new([2, 1], &[None, None]).is_none());
     }
 
@@ -157,10 +184,10 @@ mod tests {
         assert!(!line.is_empty());
         let mut length = 0.0;
         for [a, b] in line {
-            assert!((field.at(a) - 6.3).abs() < 0.05 && (field.at(b) - 6.3).abs() < 0.05);
+            assert!((field.at(a) - 6.3).abs() < 1e-12 && (field.at(b) - 6.3).abs() < 1e-12);
             length += (a[0] - b[0]).hypot(a[1] - b[1]);
         }
-        // x + 2 y = 6.3 from y = 3.15 at the left to 0.15 at x = 6 on the right.
-        assert!((length - 6.0 * 1.25f64.sqrt()).abs() < 1.0, "{length}");
+        // x + 2 y = 7.8 from x = 0 to x = 7, without the gap: it crosses that from x = 3.8 to 4.
+        assert!((length - 6.8 * 1.25f64.sqrt()).abs() < 1e-9, "{length}");
     }
 }

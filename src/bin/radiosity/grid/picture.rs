@@ -20,8 +20,8 @@ const NARROWEST: f64 = 120.0;
 /// Width for the lines of text at the least.
 const TEXT: f64 = 560.0;
 
-/// Lines of equal value, about.
-const LINES: f64 = 8.0;
+/// Lines of equal value, at most.
+const LINES: f64 = 12.0;
 
 /// Shades between two lines.
 const SHADES: f64 = 4.0;
@@ -50,7 +50,7 @@ pub struct Picture<'a> {
     pub statistics: &'a GridStatistics,
     pub quantity: Quantity,
     /// What is said below the title.
-    pub place: String,
+    pub place: &'a str,
     /// Length of a metre in the scene's unit.
     pub metre: f64,
 }
