@@ -2,6 +2,7 @@
 
 mod field;
 mod picture;
+mod scale;
 mod table;
 
 use std::path::{Path, PathBuf};

@@ -5,6 +5,7 @@ use plotters::style::text_anchor::HPos;
 use radiosity::grid::{GridStatistics, MeasuredGrid, Quantity};
 
 use super::field::{Field, Segment};
+use super::scale::{Scale, round, round_step};
 use crate::canvas::{self, At, BLACK, Canvas, Drawn, Font, GREY, Mark};
 
 /// Longest side of the map, and what is around it, in pixels.
@@ -20,29 +21,15 @@ const NARROWEST: f64 = 120.0;
 /// Width for the lines of text at the least.
 const TEXT: f64 = 560.0;
 
-/// Lines of equal value, at most.
-const LINES: f64 = 12.0;
-
-/// Shades between two lines.
-const SHADES: f64 = 4.0;
-
 /// Pixels between labels of one line, at the least.
 const LABELS_APART: f64 = 260.0;
 
+/// Pixels that a label takes from its middle, and from which on there is no need for more.
+const ROOM: f64 = 24.0;
+const FAR: f64 = 200.0;
+
 /// What has no value.
 const NOTHING: RGBColor = RGBColor(226, 226, 226);
-
-/// Viridis (S. van der Walt and N. Smith 2015) at eight even places, from dark to bright.
-const COLOURS: [[f64; 3]; 8] = [
-    [68.0, 1.0, 84.0],
-    [70.0, 50.0, 127.0],
-    [54.0, 92.0, 141.0],
-    [39.0, 127.0, 142.0],
-    [31.0, 161.0, 135.0],
-    [74.0, 194.0, 109.0],
-    [159.0, 218.0, 58.0],
-    [253.0, 231.0, 37.0],
-];
 
 /// A grid as it is drawn.
 pub struct Picture<'a> {
@@ -61,10 +48,7 @@ struct Layout {
     size: [f64; 2],
     /// Pixels a cell.
     cell: [f64; 2],
-    /// Between lines of equal value.
-    step: f64,
-    /// Of the scale.
-    range: [f64; 2],
+    scale: Scale,
 }
 
 impl Picture<'_> {
@@ -107,7 +91,11 @@ impl Picture<'_> {
         for y in 0..height {
             let colour_at = |x: usize| {
                 let place = layout.place((x as f64 + 0.5, y as f64 + 0.5));
-                if field.is_shown(place) { layout.colour(field.at(place)) } else { NOTHING }
+                if field.is_shown(place) {
+                    layout.scale.colour(layout.scale.share(field.at(place)))
+                } else {
+                    NOTHING
+                }
             };
             let mut start = 0;
             while start < width {
@@ -129,12 +117,13 @@ impl Picture<'_> {
         let steps = (layout.cell[0].max(layout.cell[1]) / 6.0).ceil().max(1.0) as usize;
         let mut labels: Vec<At> = vec![];
         let mut texts = vec![];
-        for level in layout.levels() {
-            let lines = field.line(level, steps);
+        let levels = layout.scale.values();
+        for k in 1..levels.len() - 1 {
+            let lines = field.line(levels[k], steps);
             for [a, b] in &lines {
                 canvas.line(&[layout.at(*a), layout.at(*b)], BLACK, 1.2)?;
             }
-            let text = round(level, layout.step);
+            let text = layout.scale.text(k);
             for at in layout.labels(&lines, &mut labels) {
                 texts.push((text.clone(), at));
             }
@@ -180,13 +169,7 @@ impl Layout {
         let longest = edges[0].max(edges[1]);
         let size = edges.map(|edge| (MAP * edge / longest).max(NARROWEST).round());
         let cell = [0, 1].map(|axis| size[axis] / counts[axis] as f64);
-        let [low, high] = field.range();
-        // Where all is alike the scale still has a width.
-        let span = (high - low).max(1e-3 * high.abs()).max(f64::MIN_POSITIVE);
-        let step = round_step(span / LINES);
-        let range = [(low / step).floor() * step, (high / step).ceil() * step];
-        let high = if range[1] > range[0] { range[1] } else { range[0] + step };
-        Layout { size, cell, step, range: [range[0], high] }
+        Layout { size, cell, scale: Scale::over(field.range()) }
     }
 
     /// Pixels of a place in cells; the second axis goes up.
@@ -199,92 +182,55 @@ impl Layout {
         [x / self.cell[0], (self.size[1] - y) / self.cell[1]]
     }
 
-    /// Round values between both ends of the scale.
-    fn levels(&self) -> impl Iterator<Item = f64> {
-        let [low, high] = self.range;
-        let count = ((high - low) / self.step).round() as u32;
-        (1..count).map(move |k| low + f64::from(k) * self.step)
-    }
-
-    /// That of the shade that a value is in.
-    fn colour(&self, value: f64) -> RGBColor {
-        let [low, high] = self.range;
-        let shades = ((high - low) / self.step).round().max(1.0) * SHADES;
-        let shade = ((value - low) / (high - low) * shades).floor().clamp(0.0, shades - 1.0);
-        let place = shade / (shades - 1.0).max(1.0) * (COLOURS.len() - 1) as f64;
-        let first = (place as usize).min(COLOURS.len() - 2);
-        let share = place - first as f64;
-        let [r, g, b] = [0, 1, 2].map(|c| {
-            (COLOURS[first][c] + share * (COLOURS[first + 1][c] - COLOURS[first][c])).round() as u8
-        });
-        RGBColor(r, g, b)
-    }
-
-    /// Where the labels of a line go: far from other labels and from the edges. They are added to
-    /// `taken`.
+    /// Where the labels of a line go: far from other labels and from the edges, and nowhere if there
+    /// is no room. They are added to `taken`.
     fn labels(&self, lines: &[Segment], taken: &mut Vec<At>) -> Vec<At> {
         let mut own: Vec<At> = vec![];
         loop {
             let room = |&(x, y): &At| {
                 let edges = [x - LEFT, LEFT + self.size[0] - x, y - TOP, TOP + self.size[1] - y];
                 let edge = edges.into_iter().fold(f64::INFINITY, f64::min);
-                let to = |others: &[At]| {
-                    others.iter().map(|o| (o.0 - x).hypot(o.1 - y)).fold(f64::INFINITY, f64::min)
-                };
-                // Twice from an edge is as good as once from another label.
-                (2.0 * edge).min(to(taken)).min(200.0) + 0.01 * to(&own).min(LABELS_APART)
+                // Labels are wider than high. As far from an edge as half of that from another.
+                let others = taken.iter().map(|other| ((other.0 - x) / 2.0).hypot(other.1 - y));
+                others.fold(2.0 * edge, f64::min).min(FAR)
             };
             let middles = lines.iter().map(|[a, b]| self.at([0, 1].map(|k| (a[k] + b[k]) / 2.0)));
             let apart =
                 |at: &At| own.iter().all(|o| (o.0 - at.0).hypot(o.1 - at.1) >= LABELS_APART);
             let free = middles.filter(apart).map(|at| (room(&at), at));
-            let Some((best, at)) = free.max_by(|a, b| a.0.total_cmp(&b.0)) else { return own };
-            if best < 24.0 {
-                return own;
+            match free.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((found, at)) if found >= ROOM => {
+                    own.push(at);
+                    taken.push(at);
+                }
+                _ => return own,
             }
-            own.push(at);
-            taken.push(at);
         }
     }
 
     /// The scale beside the map, with the values of the lines.
     fn legend<B: DrawingBackend>(&self, canvas: &Canvas<B>, unit: &str) -> Drawn {
-        let [low, high] = self.range;
         let (left, right) = (LEFT + self.size[0] + 28.0, LEFT + self.size[0] + 50.0);
-        let height = self.size[1];
-        let intervals = ((high - low) / self.step).round();
-        let shades = intervals * SHADES;
-        let y = |value: f64| TOP + height * (high - value) / (high - low);
+        let y = |share: f64| TOP + self.size[1] * (1.0 - share);
+        let shades = self.scale.shades();
         for k in 0..shades as u32 {
-            let [from, to] = [k, k + 1].map(|k| low + (high - low) * f64::from(k) / shades);
-            canvas.fill([left, y(to), right, y(from)], self.colour((from + to) / 2.0))?;
+            let [low, high] = [k, k + 1].map(|k| f64::from(k) / shades);
+            let colour = self.scale.colour((low + high) / 2.0);
+            canvas.fill([left, y(high), right, y(low)], colour)?;
         }
+        let intervals = self.scale.values().len() - 1;
         // Where there is no room for all numbers, every second, fifth, …
-        let every = round_step(16.0 * intervals / height).max(1.0) as u32;
-        for k in 0..=intervals as u32 {
-            let value = low + f64::from(k) * self.step;
-            canvas.line(&[(left, y(value)), (right, y(value))], BLACK, 1.0)?;
+        let every = round_step(16.0 * intervals as f64 / self.size[1]).max(1.0) as usize;
+        for k in 0..=intervals {
+            let at = y(k as f64 / intervals as f64);
+            canvas.line(&[(left, at), (right, at)], BLACK, 1.0)?;
             if k % every == 0 {
-                let at = (right + 8.0, y(value));
-                canvas.text(&round(value, self.step), at, Font::new(14.0, BLACK))?;
+                let text = self.scale.text(k);
+                canvas.text(&text, (right + 8.0, at), Font::new(14.0, BLACK))?;
             }
         }
         canvas.text(unit, (left, TOP - 16.0), Font::new(14.0, BLACK).bold())
     }
-}
-
-/// The next of 1, 2 and 5 times powers of ten that is no less than `step`.
-fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
-    let all = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power);
-    all.into_iter().find(|round| *round >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
-}
-
-/// A multiple of `step` with the digits that it takes.
-fn round(value: f64, step: f64) -> String {
-    let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
-    let value = if value.abs() < step / 2.0 { 0.0 } else { value };
-    format!("{value:.digits$}")
 }
 
 /// A value with three digits, or all before the point.
@@ -298,14 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_and_numbers_are_round() {
-        for (step, want) in [(0.7, 1.0), (1.0, 1.0), (1.1, 2.0), (33.0, 50.0), (0.0021, 0.005)] {
-            assert!((round_step(step) / want - 1.0).abs() < 1e-12, "{step}");
-        }
-        assert_eq!(
-            [round(0.30000001, 0.1), round(-1e-17, 0.1), round(150.0, 50.0)],
-            ["0.3", "0.0", "150"]
-        );
+    fn numbers_have_three_digits() {
         assert_eq!([123.4, 12.34, 0.01234, 0.0].map(three_digits), ["123", "12.3", "0.0123", "0"]);
     }
 }
