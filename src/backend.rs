@@ -149,10 +149,10 @@ impl Backend {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
     }
 
-    /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many samples that the standard error of
-    /// a point is about `noise` of its irradiance. Rays are doubled where they disagree, up to 16
-    /// times; hemicubes are the same everywhere. What is darker than a twentieth of the mean
-    /// reflected radiosity has that share of this instead.
+    /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
+    /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
+    /// doubled where they disagree, up to 16 times; hemicubes are the same everywhere. What is
+    /// darker than a twentieth of the mean reflected radiosity has that share of this instead.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a noise that is not above 0 and at most 1; those of

@@ -26,12 +26,11 @@ use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, PointIrradiance, irradiance_at};
+use crate::scene::{Rgb, Scene};
 pub use quantity::Quantity;
 pub use settings::GridSettings;
 pub use statistics::GridStatistics;
 use surface::LevelSurface;
-
-use crate::scene::{Rgb, Scene};
 
 /// A parallelogram in space. Light arrives at it from where the cross product of its edges points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,8 +87,7 @@ impl GridPlane {
 }
 
 impl MeasuringGrid {
-    /// The grid of a plane given by the user, wherever it is, without a strip that the settings
-    /// name.
+    /// The grid of a plane anywhere, less the strip along its edges.
     ///
     /// # Errors
     /// Those of [`GridPlane::normal`] and [`GridSettings::counts`]; [`ErrorKind::Setting`] where
@@ -154,7 +152,7 @@ impl MeasuringGrid {
         settings: &GridSettings,
         inside: impl Fn(DVec3) -> bool,
     ) -> Result<MeasuringGrid, Error> {
-        let counts = settings.counts(plane.edges.map(|edge| edge.length()))?;
+        let counts = settings.counts(plane.edges.map(DVec3::length))?;
         let middle = |k: usize, axis: usize| (k as f64 + 0.5) / counts[axis] as f64;
         let cells = (0..counts[1]).flat_map(|row| (0..counts[0]).map(move |column| (row, column)));
         let points = cells

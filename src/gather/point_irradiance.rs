@@ -22,9 +22,9 @@ use crate::sampling::rotation::CellRotation;
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// Gathers of one point: few, and their standard error is yet seldom far too small. With three degrees
-/// of freedom it is below a tenth of the true one once in 700 times; of two gathers, with one
-/// degree, it is so once in twelve.
+/// Gathers of one point: few, and their standard error is yet seldom far too small. With three
+/// degrees of freedom it is below a tenth of the true one once in 700 times; of two gathers, with
+/// one degree, it is so once in twelve.
 const GATHERS: usize = 4;
 
 /// Least rays of one gather, and most before more are cast where they disagree. Chosen by hand.

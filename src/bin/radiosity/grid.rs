@@ -39,7 +39,7 @@ Where:
                     product of the edges points; may be repeated
   --height H        of grids above floors and groups [0.8; above groups 0]
   --strip W         what is left out along edges [above floors 0.5, along the walls; else 0]
-  --spacing P       between points, at most [0.2 * 5^log10(d), 10 at most, as in EN 12464-1: d is the
+  --spacing P       between points, at most [0.2 * 5^log10(d), and 10, as in EN 12464-1: d is the
                     longer side, or the shorter one where the other is at least twice as long]
   --metre X         length of a metre in the scene's unit: 1000 where that is a millimetre [1]
   --up x,y,z        which way is up [+y or +z, whichever seems to be]

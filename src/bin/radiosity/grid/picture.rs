@@ -2,6 +2,7 @@
 
 use plotters::prelude::{DrawingBackend, RGBColor};
 use plotters::style::text_anchor::HPos;
+use radiosity::glam::DVec3;
 use radiosity::grid::{GridStatistics, MeasuredGrid, Quantity};
 
 use super::field::{Field, Segment};
@@ -59,7 +60,7 @@ impl Picture<'_> {
         let counts = self.measured.grid.counts;
         let field = Field::new(counts, &values).ok_or("no point outside of solids")?;
         let layout =
-            Layout::new(&self.measured.grid.plane.edges.map(|e| e.length()), counts, &field);
+            Layout::new(&self.measured.grid.plane.edges.map(DVec3::length), counts, &field);
         let width = LEFT + layout.size[0].max(TEXT - LEFT) + RIGHT;
         let height = TOP + layout.size[1] + BOTTOM;
         canvas::png((width as u32, height as u32), |canvas| self.draw(canvas, &field, &layout))
@@ -182,8 +183,8 @@ impl Layout {
         [x / self.cell[0], (self.size[1] - y) / self.cell[1]]
     }
 
-    /// Where the labels of a line go: far from other labels and from the edges, and nowhere if there
-    /// is no room. They are added to `taken`.
+    /// Where the labels of a line go: far from other labels and from the edges, and nowhere where
+    /// there is no room. They are added to `taken`.
     fn labels(&self, lines: &[Segment], taken: &mut Vec<At>) -> Vec<At> {
         let mut own: Vec<At> = vec![];
         loop {
