@@ -171,7 +171,7 @@ fn csv(probes: &[Probe]) -> Vec<u8> {
         let [x, y, z] = probe.position.to_array();
         let inside = u8::from(probe.is_inside());
         let start = format!("{x},{y},{z},{inside},{},{}", probe.backface, probe.escaped);
-        let numbers = probe.irradiance.coefficients.iter().flat_map(|c| c.to_array());
+        let numbers = probe.irradiance.coefficients.iter().flat_map(DVec3::to_array);
         let line: String = numbers.map(|number| format!(",{number}")).collect();
         out.extend(format!("{start}{line}\n").bytes());
     }

@@ -119,8 +119,8 @@ impl Picture<'_> {
         let mut labels: Vec<At> = vec![];
         let mut texts = vec![];
         let levels = layout.scale.values();
-        for k in 1..levels.len() - 1 {
-            let lines = field.line(levels[k], steps);
+        for (k, &level) in levels.iter().enumerate().skip(1).take(levels.len() - 2) {
+            let lines = field.line(level, steps);
             for [a, b] in &lines {
                 canvas.line(&[layout.at(*a), layout.at(*b)], BLACK, 1.2)?;
             }
