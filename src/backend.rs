@@ -28,8 +28,9 @@ pub use fallback::Fallback;
 pub use row_maker::RowMaker;
 pub use rows::BackendRows;
 
-use crate::error::Error;
-use crate::gather::Gather;
+use crate::error::{Error, ErrorKind};
+use crate::gather::point_irradiance::rays_for_noise;
+use crate::gather::{Gather, GatheredMesh};
 use crate::mesh::Mesh;
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
@@ -146,6 +147,27 @@ impl Backend {
     /// [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
+    }
+
+    /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
+    /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
+    /// doubled where they disagree, up to 16 times; hemicubes are the same everywhere. What is
+    /// darker than a twentieth of the mean reflected radiosity has that share of this instead.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a noise that is not above 0 and at most 1; those of
+    /// [`Backend::gather`].
+    pub fn gather_to_noise(
+        &self,
+        light: &GatheredMesh,
+        noise: f64,
+    ) -> Result<Box<dyn Gather>, Error> {
+        if !(noise > 0.0 && noise <= 1.0) {
+            let remedy = "give a share above 0 and at most 1";
+            return Err(Error::new(ErrorKind::Setting, "noise", noise.to_string(), remedy));
+        }
+        let (rays, noise) = rays_for_noise(noise);
+        self.gather_evenly(&light.mesh, rays, noise, light.radiosity_field().radiosity_floor())
     }
 
     /// As [`Backend::gather`], with more rays where they disagree: see [`RayGather::with_noise`].

@@ -8,7 +8,8 @@
 //!
 //! The contract is [`Gather`]; hemicubes on a GPU and rays on the CPU implement it, and callers
 //! differ only in their list of points: vertices, pixels of an image, or places at which the error
-//! of a result is estimated. [`gather_at_vertices`] is the first of these, with refinement.
+//! of a result is estimated. [`gather_at_vertices`] is the first of these, with refinement;
+//! [`irradiance_at`] takes points anywhere, and gives each a standard error.
 
 pub(crate) mod adaptive;
 mod batch;
@@ -19,6 +20,7 @@ mod gathered_mesh;
 mod interpolated_refinement;
 pub(crate) mod light_projection;
 pub(crate) mod lights;
+pub(crate) mod point_irradiance;
 pub(crate) mod point_row;
 mod progress;
 pub(crate) mod refinement_indicator;
@@ -35,14 +37,15 @@ use crate::mesh::Mesh;
 use crate::scene::Rgb;
 pub use adaptive::gather_at_vertices;
 pub use gathered_mesh::GatheredMesh;
+pub use point_irradiance::{PointIrradiance, irradiance_at};
 pub use progress::Progress;
 pub use refinement_settings::RefinementSettings;
 
-/// A point on a surface at which light is gathered.
+/// A point at which light is gathered, on a surface or in the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherPoint {
-    /// Position, scene unit: a little above the surface, so that the surface does not hide
-    /// anything from it.
+    /// Position, scene unit: a little above the surface if there is one, so that it does not hide
+    /// anything from the point.
     pub position: DVec3,
     /// Unit normal; light arrives from the hemisphere around it.
     pub normal: DVec3,

@@ -55,6 +55,7 @@
 //! | [`hemicube`] | faces, frames and pixel weights of a hemicube |
 //! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
+//! | [`grid`], [`probe`] | light on measuring grids; spherical harmonics at points in the air |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`bands`] | light in any number of bands on the mesh of a bake; spectra to colours |
@@ -105,10 +106,12 @@ mod error;
 pub mod form_factor;
 pub mod gather;
 mod geometry;
+pub mod grid;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
 pub mod mesh;
+pub mod probe;
 mod progress;
 pub mod ranks;
 mod sampling;
@@ -153,6 +156,8 @@ pub use view_factor::ViewFactors;
 mod pages {
     #[doc = include_str!("../README.md")]
     struct Readme;
+    #[doc = include_str!("../docs/grids_and_probes.md")]
+    struct GridsAndProbes;
     #[doc = include_str!("../docs/incremental.md")]
     struct Incremental;
     #[doc = include_str!("../docs/robustness.md")]

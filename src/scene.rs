@@ -37,6 +37,7 @@ use covers::Covers;
 pub(crate) use cut::Piece;
 pub use material::Material;
 pub use rgb::Rgb;
+pub(crate) use rgb::luminance;
 use scene_textures::SceneTextures;
 pub use sides::Sides;
 pub(crate) use sides::Treatment;

@@ -22,6 +22,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "gather",
         "error form_factor geometry hemicube mesh progress sampling scene vertex visibility",
     ),
+    ("grid", "error gather geometry scene visibility"),
+    ("probe", "error gather progress scene visibility"),
     ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),
     ("heat", "error geometry view_factor"),
     (

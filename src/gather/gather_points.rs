@@ -130,6 +130,15 @@ impl<'a> VertexGatherPoints<'a> {
     }
 }
 
+impl GatherPoint {
+    /// The gather point at `position`, on a surface of `scene` or in the air, that sees what is
+    /// above unit `normal`. It is raised a little, by 1e-4 of `size`: the length across what it
+    /// stands for, as an edge of a texel or the distance between points (scene unit).
+    pub fn above(scene: &Scene, position: DVec3, normal: DVec3, size: f64) -> GatherPoint {
+        SurfaceOffset::new(scene).gather_point(position, normal, size)
+    }
+}
+
 impl SurfaceOffset {
     pub fn new(scene: &Scene) -> SurfaceOffset {
         SurfaceOffset { min_offset: offset::MIN_LIFT_ULPS * scene.coordinate_ulp() }

@@ -14,6 +14,8 @@ use crate::visibility::offset;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TwoSidedPoint {
     pub point: GatherPoint,
+    /// Of the point above the surface, scene unit.
+    height: f64,
     /// τ / (ρ + τ) per channel, in [0, 1].
     behind: Rgb,
 }
@@ -23,12 +25,14 @@ impl TwoSidedPoint {
     pub fn new(point: GatherPoint, material: &Material) -> TwoSidedPoint {
         let albedo = material.albedo();
         let share = material.transmittance / albedo;
-        TwoSidedPoint { point, behind: Rgb::select(albedo.cmpgt(Rgb::ZERO), share, Rgb::ZERO) }
+        let behind = Rgb::select(albedo.cmpgt(Rgb::ZERO), share, Rgb::ZERO);
+        TwoSidedPoint { behind, ..TwoSidedPoint::one_sided(point) }
     }
 
     /// `point`, on a surface whose other side does not count.
     pub fn one_sided(point: GatherPoint) -> TwoSidedPoint {
-        TwoSidedPoint { point, behind: Rgb::ZERO }
+        let height = point.near / offset::NEAR_OF_LIFT;
+        TwoSidedPoint { point, height, behind: Rgb::ZERO }
     }
 
     /// The same a `step` further on.
@@ -43,11 +47,16 @@ impl TwoSidedPoint {
         [(self.point, Rgb::ONE - self.behind)].into_iter().chain(other)
     }
 
+    /// The same a `step` higher above the surface, scene unit.
+    pub fn raised_by(self, step: f64) -> TwoSidedPoint {
+        let raised = self.moved_by(step * self.point.normal);
+        TwoSidedPoint { height: self.height + step, ..raised }
+    }
+
     /// The point on the other side of the surface, as far below it as this is above.
     pub fn other_side(&self) -> GatherPoint {
         let GatherPoint { position, normal, near } = self.point;
-        let height = near / offset::NEAR_OF_LIFT;
-        GatherPoint { position: position - 2.0 * height * normal, normal: -normal, near }
+        GatherPoint { position: position - 2.0 * self.height * normal, normal: -normal, near }
     }
 }
 

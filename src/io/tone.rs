@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::camera::RadianceImage;
-use crate::scene::Rgb;
+use crate::scene::{Rgb, luminance};
 
 /// A tone curve: exposure from the light's own histogram, highlights rolled off.
 ///
@@ -69,11 +69,6 @@ impl ToneCurve {
     pub fn display(&self, colour: Rgb) -> [u8; 3] {
         self.linear(colour).to_array().map(srgb)
     }
-}
-
-/// Luminance of a linear BT.709 colour.
-fn luminance(c: Rgb) -> f64 {
-    c.dot(Rgb::new(0.2126, 0.7152, 0.0722))
 }
 
 /// IEC 61966-2-1, to 8 bits, of a value in [0, 1].

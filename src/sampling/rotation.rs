@@ -36,6 +36,9 @@ const DOUBLING_PHASE: f64 = 0.377;
 const SMALLEST_CELL_LOG2: f64 = -40.0;
 
 impl CellRotation {
+    /// Edge of a cell at most, in units of a point's near distance: 2^(3 + [`DOUBLING_PHASE`]).
+    pub const LARGEST_CELL: f64 = 10.39;
+
     /// For points within `bounds`.
     pub fn new(bounds: &Aabb) -> CellRotation {
         CellRotation { low: bounds.low, size: bounds.longest_side() }
@@ -88,6 +91,7 @@ mod tests {
         let mut values: Vec<f64> = (0..1000).map(at).collect();
         values.dedup();
         assert_eq!(values.len(), 129);
+        assert!((3.0 + DOUBLING_PHASE).exp2() < CellRotation::LARGEST_CELL);
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         // Three standard errors of a mean of 129 values that are even in [0, 1).
         assert!((mean - 0.5).abs() < 3.0 / (12.0f64 * 129.0).sqrt(), "{mean}");

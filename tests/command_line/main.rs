@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod bands;
+mod light;
 mod sky;
 mod view_factors;
 
@@ -309,6 +310,8 @@ fn help_and_version_succeed() {
         &["view-factors", "--help"],
         &["trade-off", "-h"],
         &["verify", "--help"],
+        &["grid", "--help"],
+        &["probes", "--help"],
     ] {
         let out = run(args[0], &args[1..]);
         let text = String::from_utf8_lossy(&out.stdout);
@@ -323,7 +326,11 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
     for (args, words) in [
         (
             &["fry"][..],
-            &["'fry'", "bake, view-factors, merge, heat, trade-off", "radiosity --help"][..],
+            &[
+                "'fry'",
+                "bake, view-factors, merge, heat, grid, probes, trade-off",
+                "radiosity --help",
+            ][..],
         ),
         (&["--what"], &["--what"]),
         (&["bake"], &["no scene", "usage: radiosity bake", "radiosity bake --help"]),
@@ -344,6 +351,9 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["verify", "a.obj", "b.ply", "--time", "-1"], &["--time", "'-1'"]),
         (&["verify", "a.obj", "b.ply", "--paths", "1"], &["--paths is for --points"]),
         (&["verify", "a.obj", "--points", "p", "--places", "9"], &["--places", "a solution"]),
+        (&["grid", "a.obj", "--plane", "1,2,3"], &["'1,2,3'", "nine numbers", "two edges"]),
+        (&["probes", "a.obj"], &["--spacing or --counts"]),
+        (&["probes", "a.obj", "--counts", "2,2"], &["'2,2'", "three whole numbers"]),
         (&["trade-off", "--slow"], &["--slow", "usage: radiosity trade-off"]),
     ] {
         let out = run(args[0], &args[1..]);

@@ -5,6 +5,8 @@
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
 //! radiosity merge         SCENE.…rows  the same, of their rows
 //! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
+//! radiosity grid          SCENE.obj    light on measuring grids  -> CSV, PNG
+//! radiosity probes        SCENE.obj    spherical harmonics       -> JSON, CSV
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
 //! ```
@@ -23,8 +25,12 @@ macro_rules! say {
 
 mod args;
 mod bake;
+mod canvas;
+mod grid;
 mod heat;
 mod interrupt;
+mod light;
+mod probes;
 mod progress;
 mod report;
 mod scene_options;
@@ -46,6 +52,8 @@ usage: radiosity COMMAND SCENE.obj… [options]
   view-factors  view factors between the groups of scenes
   merge         rows of view factors from many machines, put together
   heat          temperatures and net fluxes of groups, by their view factors
+  grid          irradiance or illuminance on measuring grids
+  probes        irradiance at points in the air as spherical harmonics, for games
   trade-off     what a bake of a scene costs and how far it is off, over its settings
   verify        how far off a solution of a scene is, by path tracing
 
@@ -58,11 +66,13 @@ struct Command {
     run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
 }
 
-const COMMANDS: [Command; 6] = [
+const COMMANDS: [Command; 8] = [
     Command { name: "bake", usage: bake::USAGE, run: bake::run },
     Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
     Command { name: "merge", usage: merge::USAGE, run: merge::run },
     Command { name: "heat", usage: heat::USAGE, run: heat::run },
+    Command { name: "grid", usage: grid::USAGE, run: grid::run },
+    Command { name: "probes", usage: probes::USAGE, run: probes::run },
     Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
     Command { name: "verify", usage: verify::USAGE, run: verify::run },
 ];

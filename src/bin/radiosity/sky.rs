@@ -77,6 +77,11 @@ impl SkyOptions {
         Ok(true)
     }
 
+    /// Which way is up, if that was said.
+    pub fn up(&self) -> Option<DVec3> {
+        self.up
+    }
+
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
     pub fn is_default(&self) -> bool {
         self.kind == Kind::Default && self.sun.is_none()

@@ -1,65 +1,28 @@
 //! The chart: error over time of all runs in one panel, then of each setting's runs by themselves.
 
-use std::io::Cursor;
-
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{RgbImage, imageops};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::Results;
 use super::grid::{Panel, Target, percent};
-use super::plot::{Axes, BLACK, Canvas, Font, GREY, LIGHT, Mark, range};
+use super::plot::{Axes, range};
 use super::reference::Reference;
+use crate::canvas::{self, BLACK, Canvas, Drawn, Font, GREY, LIGHT, Mark};
 
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 1700;
-
-/// The bitmap is drawn so many times larger, and then made smaller: smooth edges.
-const FINER: u32 = 3;
 
 const FRONT: RGBColor = RGBColor(31, 95, 168);
 const TARGET: RGBColor = RGBColor(205, 72, 20);
 const SERIES: [RGBColor; 3] = [FRONT, RGBColor(150, 60, 140), RGBColor(30, 130, 70)];
 
 pub fn svg(results: &Results) -> Result<String, String> {
-    fonts()?;
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, (WIDTH, HEIGHT)).into_drawing_area();
-    results.draw(&Canvas::new(&area, 1.0, 0.04)?)?;
-    area.present().map_err(|e| e.to_string())?;
-    drop(area);
-    Ok(text)
+    canvas::svg((WIDTH, HEIGHT), |canvas| results.draw(canvas))
 }
 
 pub fn png(results: &Results) -> Result<Vec<u8>, String> {
-    fonts()?;
-    let (width, height) = (FINER * WIDTH, FINER * HEIGHT);
-    let mut pixels = vec![0; 3 * (width * height) as usize];
-    let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-    results.draw(&Canvas::new(&area, f64::from(FINER), 0.17)?)?;
-    area.present().map_err(|e| e.to_string())?;
-    drop(area);
-    let large = RgbImage::from_raw(width, height, pixels).expect("as many pixels");
-    let image = imageops::resize(&large, WIDTH, HEIGHT, imageops::FilterType::Triangle);
-    let mut bytes = Cursor::new(vec![]);
-    let small =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter);
-    image.write_with_encoder(small).map_err(|e| e.to_string())?;
-    Ok(bytes.into_inner())
+    canvas::png((WIDTH, HEIGHT), |canvas| results.draw(canvas))
 }
-
-/// Fonts that come along: there may be none on the system.
-fn fonts() -> Result<(), String> {
-    for (style, bytes) in
-        [(FontStyle::Normal, dejavu::sans::regular()), (FontStyle::Bold, dejavu::sans::bold())]
-    {
-        plotters::style::register_font("sans-serif", style, bytes).map_err(|_| "no font")?;
-    }
-    Ok(())
-}
-
-type Drawn = Result<(), String>;
 
 impl Results {
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {

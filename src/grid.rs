@@ -1,0 +1,206 @@
+//! Measuring grids: irradiance or illuminance at the points of a plane, and what they say together.
+//!
+//! ```text
+//!   plane given, above a group, or above each floor
+//!    ┌───────────────────────────┐  strip along the walls, left out
+//!    │  ┌───┬───┬───┬───┬───┐    │
+//!    │  │ · │ · │ · │ · │ · │    │  points in the middles of cells no longer than p
+//!    │  ├───┼───┼───┼───┼───┤    │
+//!    │  │ · │ · │ · │ · │ · │    │  mean, minimum, maximum, uniformity U_0 = minimum / mean
+//!    │  └───┴───┴───┴───┴───┘    │
+//!    └───────────────────────────┘
+//! ```
+//!
+//! [`MeasuringGrid`] is where the points are: geometry of the scene alone. It is
+//! [measured](MeasuringGrid::measure) in the light of a bake. Strip and spacing are those of EN
+//! 12464-1 unless [`GridSettings`] say otherwise.
+
+mod quantity;
+mod settings;
+mod statistics;
+mod surface;
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use crate::error::{Error, ErrorKind};
+use crate::gather::{Gather, GatherPoint, GatheredMesh, PointIrradiance, irradiance_at};
+use crate::scene::{Rgb, Scene};
+pub use quantity::Quantity;
+pub use settings::GridSettings;
+pub use statistics::GridStatistics;
+use surface::LevelSurface;
+
+/// A parallelogram in space. Light arrives at it from where the cross product of its edges points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridPlane {
+    /// A corner, scene unit.
+    pub origin: DVec3,
+    /// The two edges from there, scene unit.
+    pub edges: [DVec3; 2],
+}
+
+/// The points of a plane at which light is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuringGrid {
+    /// What it is called: after the group below it, if there is one.
+    pub name: String,
+    /// What the cells fill: without the strip along the walls.
+    pub plane: GridPlane,
+    /// Points along each edge.
+    pub counts: [usize; 2],
+    /// Positions, scene unit, row by row: those along the first edge follow one another. `None`
+    /// where the surface below ends, or is nearer to its end than the strip is wide.
+    pub points: Vec<Option<DVec3>>,
+}
+
+/// A grid, and what was measured at its points.
+#[derive(Clone, Debug)]
+pub struct MeasuredGrid {
+    /// Where.
+    pub grid: MeasuringGrid,
+    /// What arrives, in the order of [`MeasuringGrid::points`]; `None` where there is none.
+    pub values: Vec<Option<PointIrradiance>>,
+}
+
+impl GridPlane {
+    /// Unit normal.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a plane without area, or one that is not finite.
+    pub fn normal(&self) -> Result<DVec3, Error> {
+        let [u, v] = self.edges;
+        let normal = u.normalize_or_zero().cross(v.normalize_or_zero());
+        let normal = normal.try_normalize().filter(|_| self.origin.is_finite());
+        normal.ok_or_else(|| {
+            let found = format!("from {} along {u} and {v}", self.origin);
+            let remedy = "give a finite corner and two edges that are not parallel";
+            Error::new(ErrorKind::Setting, "measuring plane", found, remedy)
+        })
+    }
+
+    /// The point at these shares of both edges.
+    fn at(&self, [x, y]: [f64; 2]) -> DVec3 {
+        self.origin + self.edges[0] * x + self.edges[1] * y
+    }
+}
+
+impl MeasuringGrid {
+    /// The grid of a plane anywhere, less the strip along its edges.
+    ///
+    /// # Errors
+    /// Those of [`GridPlane::normal`] and [`GridSettings::counts`]; [`ErrorKind::Setting`] where
+    /// the strip leaves nothing.
+    pub fn on_plane(
+        name: impl Into<String>,
+        plane: GridPlane,
+        settings: &GridSettings,
+    ) -> Result<MeasuringGrid, Error> {
+        plane.normal()?;
+        let name = name.into();
+        let inner = plane.without(settings.strip_in_scene()?).ok_or_else(|| {
+            let found = format!("a strip of {} m leaves nothing", settings.strip);
+            Error::new(ErrorKind::Setting, format!("grid '{name}'"), found, "give a narrower one")
+        })?;
+        MeasuringGrid::filling(name, inner, settings, |_| true)
+    }
+
+    /// Grids `height` metres above each floor of `scene`, the lowest first: above what faces `up`,
+    /// hangs together, has at least four square metres and is wider than both strips.
+    ///
+    /// # Errors
+    /// Those of [`GridSettings::counts`].
+    pub fn above_floors(
+        scene: &Scene,
+        up: DVec3,
+        height: f64,
+        settings: &GridSettings,
+    ) -> Result<Vec<MeasuringGrid>, Error> {
+        let metre = settings.checked()?.metre;
+        let floors = LevelSurface::floors(scene, up.normalize_or_zero(), metre);
+        let grids = floors.iter().map(|floor| floor.grid(scene, height * metre, settings));
+        grids.filter_map(Result::transpose).collect()
+    }
+
+    /// The grid `height` metres above the group of this name: above its highest side that faces
+    /// `up` or, if none does, before the side that most of it shows.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when there is no such group, or it is not flat, or too small for the
+    /// strip; those of [`GridSettings::counts`].
+    pub fn above_group(
+        scene: &Scene,
+        group: &str,
+        up: DVec3,
+        height: f64,
+        settings: &GridSettings,
+    ) -> Result<MeasuringGrid, Error> {
+        let metre = settings.checked()?.metre;
+        let surface = LevelSurface::of_group(scene, group, up.normalize_or_zero(), metre)?;
+        surface.grid(scene, height * metre, settings)?.ok_or_else(|| {
+            let found = format!("a strip of {} m leaves nothing", settings.strip);
+            let place = format!("grid above group '{group}'");
+            Error::new(ErrorKind::Setting, place, found, "give a narrower strip, or 0")
+        })
+    }
+
+    /// The grid whose cells fill `plane`, with the points that are `inside`.
+    fn filling(
+        name: String,
+        plane: GridPlane,
+        settings: &GridSettings,
+        inside: impl Fn(DVec3) -> bool,
+    ) -> Result<MeasuringGrid, Error> {
+        let counts = settings.counts(plane.edges.map(DVec3::length))?;
+        let middle = |k: usize, axis: usize| (k as f64 + 0.5) / counts[axis] as f64;
+        let cells = (0..counts[1]).flat_map(|row| (0..counts[0]).map(move |column| (row, column)));
+        let points = cells
+            .map(|(row, column)| plane.at([middle(column, 0), middle(row, 1)]))
+            .map(|p| inside(p).then_some(p));
+        Ok(MeasuringGrid { name, plane, counts, points: points.collect() })
+    }
+
+    /// Edges of a cell, scene unit.
+    pub fn cell(&self) -> [f64; 2] {
+        [0, 1].map(|axis| self.plane.edges[axis].length() / self.counts[axis] as f64)
+    }
+
+    /// Measures the irradiance that `light` causes at the points: see [`irradiance_at`], which says
+    /// what `gatherer`, `progress` and `None` are.
+    ///
+    /// # Errors
+    /// Those of [`GridPlane::normal`] and [`irradiance_at`].
+    pub fn measure(
+        &self,
+        light: &GatheredMesh,
+        gatherer: &mut dyn Gather,
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<MeasuredGrid>, Error> {
+        let (scene, normal) = (light.mesh.scene(), self.plane.normal()?);
+        let [a, b] = self.cell();
+        let above = |&p: &DVec3| GatherPoint::above(scene, p, normal, a.min(b));
+        let points: Vec<GatherPoint> = self.points.iter().flatten().map(above).collect();
+        let Some(found) = irradiance_at(light, &points, gatherer, progress)? else {
+            return Ok(None);
+        };
+        let mut found = found.into_iter();
+        let values = self.points.iter().map(|p| p.and_then(|_| found.next())).collect();
+        Ok(Some(MeasuredGrid { grid: self.clone(), values }))
+    }
+}
+
+impl MeasuredGrid {
+    /// What `quantity` the points outside of solids have, in their order, with its standard error.
+    pub fn measured(&self, quantity: Quantity) -> impl Iterator<Item = Option<[f64; 2]>> {
+        self.values.iter().map(move |value| {
+            let value = value.filter(|value| !value.is_buried())?;
+            Some([value.irradiance, value.standard_error].map(|rgb: Rgb| quantity.of(rgb)))
+        })
+    }
+
+    /// Mean, minimum and the like of `quantity`; `None` where there is no point outside of solids.
+    pub fn statistics(&self, quantity: Quantity) -> Option<GridStatistics> {
+        GridStatistics::of(self.measured(quantity).flatten())
+    }
+}

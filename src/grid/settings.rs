@@ -1,0 +1,102 @@
+//! How far apart points are, and how far off the walls: EN 12464-1.
+
+use super::GridPlane;
+use crate::error::{Error, ErrorKind};
+
+/// How a grid is laid out. Its lengths are in metres, as those of the norm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridSettings {
+    /// Length of a metre in the scene's unit: 1000 where that is a millimetre.
+    pub metre: f64,
+    /// Width of what is left out along the edges, m. EN 12464-1: 0.5 along walls, none where the
+    /// task reaches to the edge.
+    pub strip: f64,
+    /// Largest edge of a cell, m; by EN 12464-1 if `None`.
+    pub spacing: Option<f64>,
+}
+
+/// The longest cell of EN 12464-1, m.
+const LONGEST_CELL: f64 = 10.0;
+
+/// From this ratio of its sides on a plane's cells follow the shorter side (EN 12464-1:2011, 4.4).
+const LONG_PLANE: f64 = 2.0;
+
+/// Points of a grid, at most. Chosen by hand.
+const MAX_POINTS: f64 = 1e6;
+
+impl Default for GridSettings {
+    /// Metres, the norm's spacing, and its strip along walls.
+    fn default() -> GridSettings {
+        GridSettings { metre: 1.0, strip: 0.5, spacing: None }
+    }
+}
+
+impl GridSettings {
+    /// Points along the two edges of a plane, given their lengths in the scene's unit: the least
+    /// odd numbers by which no cell is longer than
+    ///
+    /// ```text
+    /// p = 0.2 · 5^(log10 d) m,  at most 10 m                       (EN 12464-1:2011, 4.4)
+    /// ```
+    ///
+    /// or the spacing set instead. d is the longer edge in metres, or the shorter one where the
+    /// other is at least twice as long. Odd numbers have a point in the middle.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for settings out of range, or more than a million points.
+    pub fn counts(&self, edges: [f64; 2]) -> Result<[usize; 2], Error> {
+        let [a, b] = edges.map(|edge| edge / self.metre);
+        self.checked()?;
+        let (long, short) = (a.max(b), a.min(b));
+        let d = if long >= LONG_PLANE * short { short } else { long };
+        let by_norm = (0.2 * 5f64.powf(d.log10())).min(LONGEST_CELL);
+        let p = self.spacing.unwrap_or(by_norm);
+        // The next odd number; rounding of a whole number of cells does not make one more.
+        let counts = [a, b].map(|edge| (edge / p * (1.0 - 1e-9) / 2.0 - 0.5).ceil() * 2.0 + 1.0);
+        let counts = counts.map(|n| n.max(1.0));
+        if counts[0] * counts[1] <= MAX_POINTS {
+            return Ok(counts.map(|n| n as usize));
+        }
+        let found = format!("a plane of {a} m by {b} m with {p} m between its points");
+        let remedy = "give a larger spacing, or the metre as it is in the scene's unit";
+        Err(Error::new(ErrorKind::Setting, "measuring grid", found, remedy))
+    }
+
+    /// The strip in the scene's unit.
+    pub(super) fn strip_in_scene(&self) -> Result<f64, Error> {
+        self.checked().map(|settings| settings.strip * settings.metre)
+    }
+
+    /// The same settings, if they are in range.
+    pub(super) fn checked(&self) -> Result<&GridSettings, Error> {
+        let is_length = |x: f64| x.is_finite() && x > 0.0;
+        let checks = [
+            ("length of a metre", self.metre, is_length(self.metre)),
+            ("strip", self.strip, self.strip == 0.0 || is_length(self.strip)),
+            ("spacing", self.spacing.unwrap_or(1.0), is_length(self.spacing.unwrap_or(1.0))),
+        ];
+        match checks.iter().find(|check| !check.2) {
+            None => Ok(self),
+            Some((name, value, _)) => {
+                let place = format!("{name} of a measuring grid");
+                let remedy = "give a finite length above 0";
+                Err(Error::new(ErrorKind::Setting, place, value.to_string(), remedy))
+            }
+        }
+    }
+}
+
+impl GridPlane {
+    /// The plane without a strip of this width along its edges, scene unit; none where nothing is
+    /// left.
+    pub(super) fn without(&self, strip: f64) -> Option<GridPlane> {
+        let [u, v] = self.edges;
+        // Of a parallelogram, along each edge: the strip is measured across the other one.
+        let sine = u.normalize_or_zero().cross(v.normalize_or_zero()).length();
+        let shares = [u, v].map(|edge| strip / (sine * edge.length()));
+        shares.iter().all(|share| *share < 0.5).then(|| GridPlane {
+            origin: self.at(shares),
+            edges: [u * (1.0 - 2.0 * shares[0]), v * (1.0 - 2.0 * shares[1])],
+        })
+    }
+}

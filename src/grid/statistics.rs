@@ -1,0 +1,46 @@
+//! What the points of a grid say together.
+
+/// Mean, extremes and uniformity over the points of a grid, in the unit of what was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct GridStatistics {
+    /// Points that were measured.
+    pub points: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Its standard error by sampling: that the points are no more than so many is not in it.
+    pub mean_error: f64,
+    /// The least value of a point.
+    pub minimum: f64,
+    /// The largest one.
+    pub maximum: f64,
+    /// U₀ = minimum / mean (EN 12464-1), in [0, 1]; 0 in the dark.
+    pub uniformity: f64,
+}
+
+impl GridStatistics {
+    /// Of values with their standard errors; `None` if there are none.
+    pub fn of(values: impl Iterator<Item = [f64; 2]>) -> Option<GridStatistics> {
+        let (mut points, mut sum, mut squares) = (0, 0.0, 0.0);
+        let (mut minimum, mut maximum) = (f64::INFINITY, f64::NEG_INFINITY);
+        for [value, error] in values {
+            points += 1;
+            sum += value;
+            squares += error * error;
+            minimum = value.min(minimum);
+            maximum = value.max(maximum);
+        }
+        let count = f64::from(points);
+        let (mean, mean_error) = (sum / count, squares.sqrt() / count);
+        let uniformity = if mean > 0.0 { minimum / mean } else { 0.0 };
+        let points = points as usize;
+        (points > 0).then_some(GridStatistics {
+            points,
+            mean,
+            mean_error,
+            minimum,
+            maximum,
+            uniformity,
+        })
+    }
+}

@@ -1,0 +1,179 @@
+//! What a grid is laid out above: floors, and flat groups.
+
+use glam::{DVec2, DVec3};
+use rustc_hash::FxHashMap;
+
+use super::{GridPlane, GridSettings, MeasuringGrid};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::geometry::rectangle::Rectangle;
+use crate::geometry::union_find::UnionFind;
+use crate::geometry::weld::position_key;
+use crate::scene::Scene;
+use crate::visibility::ray_scene::RayScene;
+
+/// Cosine of the angle up to which a surface counts as level: 5 degrees. Chosen by hand.
+const LEVEL_COSINE: f64 = 0.996;
+
+/// Area of a floor at least, m²: more than that of tables. Chosen by hand.
+const MIN_FLOOR_AREA: f64 = 4.0;
+
+/// How far below its highest corner a group is still its highest side, m. Chosen by hand.
+const SAME_LEVEL: f64 = 0.01;
+
+/// Directions in which it is looked whether a surface goes on, from each point.
+const AROUND: usize = 8;
+
+/// Triangles that face alike, and lie in one plane or nearly so.
+pub(super) struct LevelSurface {
+    name: String,
+    triangles: Vec<usize>,
+    /// Unit length.
+    normal: DVec3,
+    /// Of the highest corner along the normal, scene unit.
+    level: f64,
+}
+
+impl LevelSurface {
+    /// Of triangles of `scene`, at least one.
+    fn new(scene: &Scene, triangles: Vec<usize>, normal: DVec3) -> LevelSurface {
+        let level =
+            triangles.iter().map(|&t| level(scene, t, normal)).fold(f64::NEG_INFINITY, f64::max);
+        let area = |t: &&usize| scene.area(**t);
+        let largest = triangles.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
+        let group = largest.map(|&t| scene.triangles()[t].group as usize);
+        let name = group.and_then(|g| scene.groups().get(g)).cloned().unwrap_or_default();
+        LevelSurface { name, triangles, normal, level }
+    }
+
+    /// The floors of `scene`, the lowest first: what faces unit `up`, is joined by shared corners
+    /// and large. A metre has `metre` scene units.
+    pub fn floors(scene: &Scene, up: DVec3, metre: f64) -> Vec<LevelSurface> {
+        let all = 0..scene.triangles().len();
+        let facing: Vec<usize> =
+            all.filter(|&t| !scene.is_clear(t) && scene.normal(t).dot(up) > LEVEL_COSINE).collect();
+        let mut joined = UnionFind::new(facing.len());
+        let mut first: FxHashMap<[u64; 3], usize> = FxHashMap::default();
+        for (k, &t) in facing.iter().enumerate() {
+            for corner in scene.corners(t) {
+                joined.join(k, *first.entry(position_key(corner)).or_insert(k));
+            }
+        }
+        let mut parts: Vec<Vec<usize>> = vec![vec![]; facing.len()];
+        for (k, &t) in facing.iter().enumerate() {
+            parts[joined.find(k)].push(t);
+        }
+        let is_large = |part: &Vec<usize>| {
+            part.iter().map(|&t| scene.area(t)).sum::<f64>() >= MIN_FLOOR_AREA * metre * metre
+        };
+        let large = parts.into_iter().filter(is_large);
+        let mut floors: Vec<LevelSurface> =
+            large.map(|part| LevelSurface::new(scene, part, up)).collect();
+        floors.sort_by(|a, b| a.level.total_cmp(&b.level));
+        floors
+    }
+
+    /// The highest side of a group that faces unit `up` or, if none does, the side that most of it
+    /// shows.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when there is no such group, or it shows no side more than others.
+    pub fn of_group(
+        scene: &Scene,
+        group: &str,
+        up: DVec3,
+        metre: f64,
+    ) -> Result<LevelSurface, Error> {
+        let wrong = |found: String, remedy| {
+            Err(Error::new(ErrorKind::Setting, format!("group '{group}'"), found, remedy))
+        };
+        let Some(number) = scene.groups().iter().position(|name| name == group) else {
+            let found = format!("not among {}", quoted(scene.groups()));
+            return wrong(found, "name a group of the scene");
+        };
+        let triangles = scene.triangles().iter().enumerate();
+        let of_group = triangles.filter(|(_, triangle)| triangle.group as usize == number);
+        let of_group: Vec<usize> = of_group.map(|(t, _)| t).collect();
+        let facing = |normal: DVec3| -> Vec<usize> {
+            let faces = |t: &&usize| scene.normal(**t).dot(normal) > LEVEL_COSINE;
+            of_group.iter().filter(faces).copied().collect()
+        };
+        let mut normal = up;
+        let mut side = facing(normal);
+        if side.is_empty() {
+            let sum: DVec3 = of_group.iter().map(|&t| scene.area(t) * scene.normal(t)).sum();
+            normal = sum.normalize_or_zero();
+            side = facing(normal);
+        }
+        if side.is_empty() {
+            return wrong("no flat side".into(), "name one that is flat, or give a plane");
+        }
+        let top = LevelSurface::new(scene, side, normal);
+        let is_top = |&t: &usize| level(scene, t, normal) > top.level - SAME_LEVEL * metre;
+        let triangles = top.triangles.into_iter().filter(is_top).collect();
+        Ok(LevelSurface { triangles, name: group.into(), ..top })
+    }
+
+    /// The grid `height` above it, scene unit: over the smallest rectangle around it, where the
+    /// surface reaches beyond the strip in all directions. None where nothing of it is left.
+    pub fn grid(
+        &self,
+        scene: &Scene,
+        height: f64,
+        settings: &GridSettings,
+    ) -> Result<Option<MeasuringGrid>, Error> {
+        let strip = settings.strip_in_scene()?;
+        let Some(inner) = self.plane(scene, height).and_then(|plane| plane.without(strip)) else {
+            return Ok(None);
+        };
+        let surface = RayScene::new(self.triangles.iter().map(|&t| scene.corners(t)));
+        let size = scene.bounds().longest_side() + height.abs();
+        let is_over = |p: DVec3| {
+            let (above, reach) = (p + self.normal * size, 0.0..2.0 * size);
+            surface.occluded(above, -self.normal, reach, |_| true)
+        };
+        let axes = self.axes(&inner);
+        let around = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+            strip * (cos * axes[0] + sin * axes[1])
+        };
+        let inside = |p: DVec3| is_over(p) && (0..AROUND).all(|k| is_over(p + around(k)));
+        let grid = MeasuringGrid::filling(self.name.clone(), inner, settings, inside)?;
+        Ok(grid.points.iter().any(Option::is_some).then_some(grid))
+    }
+
+    /// Unit vectors along the first edge of `plane`, and across it.
+    fn axes(&self, plane: &GridPlane) -> [DVec3; 2] {
+        let along = plane.edges[0].normalize_or_zero();
+        [along, self.normal.cross(along)]
+    }
+
+    /// The smallest rectangle around it, `height` above: its longer edge is the first, and points
+    /// to where an axis of the scene does.
+    fn plane(&self, scene: &Scene, height: f64) -> Option<GridPlane> {
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let corners = self.triangles.iter().flat_map(|&t| scene.corners(t));
+        let flat: Vec<DVec2> = corners.map(|p| DVec2::new(p.dot(x), p.dot(y))).collect();
+        let Rectangle { corner, axis, size } = Rectangle::around(&flat)?;
+        let in_space = |p: DVec2| x * p.x + y * p.y;
+        let mut edges = [in_space(axis * size.x), in_space(axis.perp() * size.y)];
+        let mut origin = in_space(corner) + self.normal * (self.level + height);
+        // Turned by a right angle as often as it takes; from a corner to the next, the other way
+        // round the same.
+        let is_wrong = |[u, v]: [DVec3; 2]| {
+            let largest = u.to_array().into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            u.length() < v.length() * (1.0 - 1e-9) || largest < Some(0.0)
+        };
+        for _ in 0..3 {
+            if is_wrong(edges) {
+                origin += edges[0];
+                edges = [edges[1], -edges[0]];
+            }
+        }
+        Some(GridPlane { origin, edges })
+    }
+}
+
+/// Height of the highest corner of triangle `t` along unit `normal`, scene unit.
+fn level(scene: &Scene, t: usize, normal: DVec3) -> f64 {
+    scene.corners(t).map(|p| p.dot(normal)).into_iter().fold(f64::NEG_INFINITY, f64::max)
+}

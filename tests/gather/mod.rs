@@ -1,0 +1,1 @@
+mod point_irradiance;

@@ -1,0 +1,2 @@
+mod light;
+mod places;
