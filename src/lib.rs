@@ -106,6 +106,8 @@ mod geometry;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
+#[cfg(feature = "light-map")]
+pub mod light_map;
 pub mod mesh;
 mod progress;
 pub mod ranks;

@@ -35,7 +35,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "backend error form_factor gather geometry mesh progress sampling scene solver verify \
          vertex visibility",
     ),
-    ("io", "camera error gather geometry mesh scene vertex view_factor"),
+    ("light_map", "backend bake error gather mesh progress scene vertex"),
+    ("io", "camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 
 /// Files below `folder`, the program's left out: it is a user of the library.

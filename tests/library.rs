@@ -17,6 +17,8 @@ mod form_factor;
 mod fuzz_corpus;
 mod heat;
 mod io;
+#[cfg(feature = "light-map")]
+mod light_map;
 mod mesh;
 mod scene;
 mod solver;

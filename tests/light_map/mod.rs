@@ -1,0 +1,2 @@
+mod atlas;
+mod light;
