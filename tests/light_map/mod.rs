@@ -1,2 +1,3 @@
 mod atlas;
+mod files;
 mod light;
