@@ -7,7 +7,7 @@
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
-//! | the two above (feature `light-map`) | `write_light_map_exr`, `write_light_map_glb` | a light map |
+//! | both (feature `light-map`) | `write_light_map_exr`, `write_light_map_glb` | a light map |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
 //! | NumPy's `.npz` (feature `npz`) | `write_npz`, `read_npz` | the same, as SciPy's sparse rows |

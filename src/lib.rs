@@ -60,6 +60,7 @@
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
 //! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
+//! | [`light_map`] | irradiance at the texels of a texture |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!

@@ -100,12 +100,8 @@ impl Atlas {
     }
 
     /// The scene whose triangles have places.
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
-    }
-
-    pub(super) fn shared_scene(&self) -> Arc<Scene> {
-        self.scene.clone()
     }
 
     /// Texels in a row.
@@ -144,8 +140,8 @@ impl Atlas {
         self.unusable.as_ref()
     }
 
-    /// Unit normals at the corners of each triangle: of the smooth surface that it is a part of, the
-    /// mean around a corner, weighted by area.
+    /// Unit normals at the corners of each triangle: of the smooth surface that it is a part of,
+    /// the mean around a corner, weighted by area.
     pub(crate) fn corner_normals(&self) -> Vec<[DVec3; 3]> {
         let (scene, topology) = (&self.scene, SurfaceTopology::new(&self.scene));
         let mut sums = vec![DVec3::ZERO; 3 * topology.corners.len()];

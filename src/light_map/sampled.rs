@@ -57,7 +57,7 @@ impl LightMap {
     /// # Errors
     /// Those of [`Mesh::new`] where there would be too many.
     pub fn surface(&self) -> Result<VertexMesh, Error> {
-        let mesh = Mesh::new(self.atlas.shared_scene(), self.atlas.texel_size())?;
+        let mesh = Mesh::new(self.atlas.scene().clone(), self.atlas.texel_size())?;
         let mut surface = VertexMesh { sky: mesh.scene().sky().clone(), ..Default::default() };
         for e in 0..mesh.element_count() {
             let node = mesh.element(e);

@@ -134,11 +134,10 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
     };
     let (width, height) = (atlas.width(), atlas.height());
     let gathered = map.gathered.iter().filter(|&&gathered| gathered).count();
+    let (covered, texel) = (100.0 * map.coverage(), atlas.texel_size());
     say!(
-        "light map  {width} × {height} texels of about {:.4}, {charts}, {:.1} % covered, {gathered} \
-         gathered",
-        atlas.texel_size(),
-        100.0 * map.coverage()
+        "light map  {width} × {height} texels of about {texel:.4}, {charts}, {covered:.1} % \
+         covered, {gathered} gathered"
     );
     let total = 100.0 * baked.estimate.total;
     say!(

@@ -34,7 +34,7 @@ use crate::mesh::SurfaceTopology;
 
 /// Writes the scene of a light map as glTF 2.0 binary, `.glb`: its own triangles with `POSITION`,
 /// `NORMAL` (of smooth surfaces), `TEXCOORD_1`, their places in the light map, and `TEXCOORD_0`,
-/// those of the scene's file, on materials all of whose faces have some.
+/// those of the scene's file on materials all of whose faces have some, else the same again.
 ///
 /// A node for each group and a primitive for each of its materials, by their names; their `extras`
 /// have reflectance and exitance. The file has the map's radiosity, without textures, as an image
@@ -334,7 +334,7 @@ impl Primitive {
             (Semantic::Normals, at(VECTOR_BYTES, Type::Vec3)),
             (Semantic::TexCoords(1), at(2 * VECTOR_BYTES, Type::Vec2)),
         ];
-        // glTF numbers sets of coordinates from 0 on: without those of the file, the map's are both.
+        // glTF numbers sets of coordinates from 0 on: without the file's, the map's are both.
         let given = if self.has_given_places() { PLACE_BYTES } else { 0 };
         let first = at(2 * VECTOR_BYTES + given, Type::Vec2);
         attributes.push((Semantic::TexCoords(0), first));
