@@ -180,19 +180,23 @@ impl Resolution {
                 let place = format!("texels of {size}");
                 Err(Error::new(ErrorKind::Setting, place, "not above 0", remedy))
             }
-            Resolution::Pixels(side) if side == 0 || side > MAX_SIDE => Err(too_large(self, side)),
+            Resolution::Pixels(side) if side == 0 || side > MAX_SIDE => {
+                Err(bad_size(self, "out of range".into()))
+            }
             _ => Ok(()),
         }
     }
 }
 
-/// The error of a map that would have so many texels along a side.
-pub(super) fn too_large(resolution: Resolution, side: impl std::fmt::Display) -> Error {
+/// The error of a map that is too large, or too small for its surfaces: `found` says how.
+pub(super) fn bad_size(resolution: Resolution, found: String) -> Error {
     let place = match resolution {
         Resolution::TexelSize(size) => format!("texels of {size}"),
         Resolution::Pixels(pixels) => format!("{pixels} texels along a side"),
     };
-    let found = format!("a light map {side} texels wide");
-    let remedy = format!("ask for 1 to {MAX_SIDE}: larger texels make fewer");
+    let remedy = match resolution {
+        Resolution::TexelSize(_) => format!("ask for larger ones: up to {MAX_SIDE} along a side"),
+        Resolution::Pixels(_) => format!("ask for 1 to {MAX_SIDE}, and enough for all surfaces"),
+    };
     Error::new(ErrorKind::Setting, place, found, remedy)
 }

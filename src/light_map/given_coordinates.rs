@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec2;
 
-use super::atlas::{Layout, MAX_SIDE, Resolution, in_texels, too_large};
+use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size, in_texels};
 use super::coverage::{NO_TRIANGLE, depth_inside, for_each_texel_around};
 use crate::error::Error;
 use crate::scene::Scene;
@@ -59,7 +59,7 @@ pub(super) fn layout(
             let on_surfaces: f64 = (0..coordinates.len()).map(|t| scene.area(t)).sum();
             let side = (on_surfaces / coordinates.iter().map(area).sum::<f64>()).sqrt() / size;
             if side > f64::from(MAX_SIDE) {
-                return Err(too_large(resolution, side.ceil()));
+                return Err(bad_size(resolution, format!("{} along a side", side.ceil())));
             }
             side.ceil() as u32
         }

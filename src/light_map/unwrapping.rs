@@ -9,7 +9,7 @@ use glam::DVec2;
 use rustc_hash::FxHashMap;
 use uvunwrap::{Density, MeshInput, Options, OutputMesh, Packing};
 
-use super::atlas::{Layout, MAX_SIDE, Resolution, too_large};
+use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size};
 use crate::error::Error;
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
@@ -43,7 +43,7 @@ pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Er
             let area: f64 = (0..scene.triangles().len()).map(|t| scene.area(t)).sum();
             let side = area.sqrt() / size;
             if side > f64::from(MAX_SIDE) {
-                return Err(too_large(resolution, format!("at least {:.0}", side.ceil())));
+                return Err(bad_size(resolution, format!("at least {} along a side", side.ceil())));
             }
             Density::Fixed { texels_per_unit: (unit / size) as f32, page_size: None }
         }
@@ -54,13 +54,16 @@ pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Er
     let inputs: Vec<MeshInput<'_>> =
         surfaces.iter().map(|s| MeshInput::new(&s.positions, &s.indices)).collect();
     let atlas = uvunwrap::generate(&inputs, &options)
-        .map_err(|e| too_large(resolution, format!("too many ({e})")).with_source(e))?;
+        .map_err(|e| bad_size(resolution, format!("no room: {e}")).with_source(e))?;
+    let side = atlas.width.max(atlas.height);
     if atlas.page_count > 1 {
-        let found = format!("{} maps of so many", atlas.page_count);
-        return Err(too_large(resolution, found));
+        return Err(bad_size(
+            resolution,
+            format!("no room: charts take {} maps", atlas.page_count),
+        ));
     }
-    if atlas.width.max(atlas.height) > MAX_SIDE {
-        return Err(too_large(resolution, atlas.width.max(atlas.height)));
+    if side > MAX_SIDE {
+        return Err(bad_size(resolution, format!("{side} along a side")));
     }
     let mut coordinates = vec![[DVec2::ZERO; 3]; scene.triangles().len()];
     for (surface, OutputMesh { vertices, indices, .. }) in surfaces.iter().zip(&atlas.meshes) {
