@@ -7,6 +7,7 @@
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
+//! | both (feature `light-map`) | `write_light_map_exr`, `write_light_map_glb` | a light map |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
 //! | NumPy's `.npz` (feature `npz`) | `write_npz`, `read_npz` | the same, as SciPy's sparse rows |
@@ -44,8 +45,12 @@ use crate::error::{Error, ErrorKind};
 
 #[cfg(feature = "exr")]
 pub use self::exr::write_exr;
+#[cfg(all(feature = "exr", feature = "light-map"))]
+pub use self::exr::{write_light_map_exr, write_light_map_radiosity};
 #[cfg(feature = "glb")]
 pub use self::glb::write_glb;
+#[cfg(all(feature = "glb", feature = "light-map"))]
+pub use self::glb::write_light_map_glb;
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
 #[cfg(feature = "npz")]

@@ -62,6 +62,7 @@
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
 //! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
+//! | [`light_map`] | irradiance at the texels of a texture |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
@@ -110,6 +111,8 @@ pub mod grid;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
+#[cfg(feature = "light-map")]
+pub mod light_map;
 pub mod mesh;
 pub mod probe;
 mod progress;

@@ -199,13 +199,13 @@ impl Scene {
             coordinate_ulp,
             warnings,
             sky,
-            textures: Arc::default(),
+            textures: SceneTextures::of_coordinates(texture_coordinates).into(),
             cut_sides: vec![],
             covered_backs: OnceLock::new(),
             clear_panes: OnceLock::new(),
         };
         if !textures.is_empty() {
-            scene.lay_textures(texture_coordinates, textures);
+            scene.lay_textures(textures);
             scene.materials.iter().try_for_each(Material::check)?;
         }
         if degenerate > 0 {

@@ -38,7 +38,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
          vertex visibility",
     ),
     ("bands", "backend bake error gather mesh scene vertex visibility"),
-    ("io", "bands camera error gather geometry mesh scene vertex view_factor"),
+    ("light_map", "backend bake error gather mesh progress scene vertex"),
+    ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 
 /// Files below `folder`, the program's left out: it is a user of the library.

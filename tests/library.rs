@@ -20,6 +20,8 @@ mod gather;
 mod grid;
 mod heat;
 mod io;
+#[cfg(feature = "light-map")]
+mod light_map;
 mod mesh;
 mod probe;
 mod scene;

@@ -17,6 +17,8 @@ mod slow {
     mod hemicubes;
     #[cfg(feature = "cli")]
     mod kill_and_resume;
+    #[cfg(feature = "light-map")]
+    mod light_maps;
     mod many_triangles;
     mod open_scenes;
     mod properties;

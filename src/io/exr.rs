@@ -1,12 +1,14 @@
-//! OpenEXR out: linear radiance, one 32-bit float a channel.
+//! OpenEXR out: linear light, one 32-bit float a channel.
 
 use std::path::Path;
 
-use exr::prelude::WritableImage;
+use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage};
 
 use super::{cannot_write, write_file};
 use crate::camera::RadianceImage;
 use crate::error::{Error, ErrorKind};
+#[cfg(feature = "light-map")]
+use crate::light_map::LightMap;
 use crate::scene::Rgb;
 
 /// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
@@ -15,25 +17,66 @@ use crate::scene::Rgb;
 /// [`crate::ErrorKind::File`] when the file cannot be written, or does not hold a radiance: above
 /// 3.4e38. What is below 1e-38 becomes 0, or keeps few digits.
 pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    let (width, height) = (image.width as usize, image.height as usize);
+    let size = [image.width, image.height];
+    let channels = rgb(path.as_ref(), size, &image.pixels, ["radiance", "W/(m² sr)"])?;
+    write(path.as_ref(), size, channels.into())
+}
+
+/// Writes the irradiance of a light map, W/m², as a 32-bit float OpenEXR. Its channels are R, G, B
+/// and `coverage`, 1 where a texel gathered and 0 where it is empty or has values of its
+/// neighbours. At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
+///
+/// # Errors
+/// Those of [`write_exr`].
+#[cfg(feature = "light-map")]
+pub fn write_light_map_exr(path: impl AsRef<Path>, map: &LightMap) -> Result<(), Error> {
+    let size = [map.atlas.width(), map.atlas.height()];
+    let [r, g, b] = rgb(path.as_ref(), size, &map.irradiance, ["irradiance", "W/m²"])?;
+    let coverage = map.gathered.iter().map(|&gathered| f32::from(u8::from(gathered))).collect();
+    write(path.as_ref(), size, vec![r, g, b, ("coverage", coverage)])
+}
+
+/// Writes the radiosity of a light map, W/m², as a 32-bit float OpenEXR with channels R, G, B:
+/// emitted and reflected, by materials without their textures
+/// ([`LightMap::radiosity`]).
+///
+/// # Errors
+/// Those of [`write_exr`].
+#[cfg(feature = "light-map")]
+pub fn write_light_map_radiosity(path: impl AsRef<Path>, map: &LightMap) -> Result<(), Error> {
+    let size = [map.atlas.width(), map.atlas.height()];
+    let channels = rgb(path.as_ref(), size, &map.radiosity(), ["radiosity", "W/m²"])?;
+    write(path.as_ref(), size, channels.into())
+}
+
+/// Name and samples of a channel, row by row from the top.
+type Channel = (&'static str, Vec<f32>);
+
+/// The channels of `pixels`, a quantity in a unit, if 32-bit floats hold all of them.
+fn rgb(
+    path: &Path,
+    [width, _]: [u32; 2],
+    pixels: &[Rgb],
+    [quantity, unit]: [&str; 2],
+) -> Result<[Channel; 3], Error> {
     let fits = |c: &Rgb| c.abs().max_element() <= f64::from(f32::MAX);
-    if let Some(k) = image.pixels.iter().position(|c| !fits(c)) {
-        let place = format!("{}: pixel {}, {}", path.as_ref().display(), k % width, k / width);
-        let found = format!("radiance {} W/(m² sr)", image.pixels[k]);
+    if let Some(k) = pixels.iter().position(|c| !fits(c)) {
+        let (column, row) = (k % width as usize, k / width as usize);
+        let place = format!("{}: pixel {column}, {row}", path.display());
+        let found = format!("{quantity} {} {unit}", pixels[k]);
         let remedy = "OpenEXR holds up to 3.4e38 a channel: scale exitances down";
         return Err(Error::new(ErrorKind::File, place, found, remedy));
     }
-    let pixel = |at: exr::math::Vec2<usize>| {
-        let [r, g, b] = image.pixels[at.y() * width + at.x()].as_vec3().to_array();
-        (r, g, b)
-    };
-    let channels = exr::image::SpecificChannels::rgb(pixel);
-    let encoded = exr::image::Image::from_encoded_channels(
-        (width, height),
-        exr::image::Encoding::FAST_LOSSLESS,
-        channels,
-    );
+    let samples = |k: usize| pixels.iter().map(|c| c[k] as f32).collect();
+    Ok([("R", samples(0)), ("G", samples(1)), ("B", samples(2))])
+}
+
+fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Result<(), Error> {
+    let channel = |(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples));
+    let channels = AnyChannels::sort(channels.into_iter().map(channel).collect());
+    let size = (width as usize, height as usize);
+    let image = Image::from_encoded_channels(size, Encoding::FAST_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(vec![]);
-    encoded.write().to_buffered(&mut bytes).map_err(|e| cannot_write(path.as_ref(), e))?;
-    write_file(path.as_ref(), |out| std::io::Write::write_all(out, bytes.get_ref()))
+    image.write().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;
+    write_file(path, |out| std::io::Write::write_all(out, bytes.get_ref()))
 }

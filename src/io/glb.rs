@@ -10,8 +10,11 @@
 //! The numbers are written as they are computed; the JSON, which comes first, needs but counts and
 //! the box of each primitive. (Khronos, "glTF 2.0 Specification", 2021.)
 
+mod container;
 mod document;
 mod images;
+#[cfg(feature = "light-map")]
+mod light_map;
 mod primitives;
 
 use std::io::{self, Write};
@@ -19,13 +22,15 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::{cannot_write, write_file};
+use super::cannot_write;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
 use images::{Images, irradiance, mean_radiosity};
+#[cfg(feature = "light-map")]
+pub use light_map::write_light_map_glb;
 use primitives::{Primitive, primitives};
 
 /// Writes `light` as glTF 2.0 binary, `.glb`: the same bytes for the same light.
@@ -57,31 +62,8 @@ pub fn write_glb(
 ) -> Result<(), Error> {
     let path = path.as_ref();
     let model = Model::new(light, tone).map_err(|e| cannot_write(path, io::Error::other(e)))?;
-    let mut json = model.document().to_vec().map_err(|e| cannot_write(path, e))?;
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let binary = model.binary_length();
-    let total = 12 + 8 + json.len() as u64 + 8 + binary;
-    let Ok(total) = u32::try_from(total) else {
-        let found = format!("{total} bytes, where glTF binary has room for 4 GiB");
-        return Err(cannot_write(path, io::Error::new(io::ErrorKind::FileTooLarge, found)));
-    };
-    write_file(path, |out| {
-        for word in [MAGIC, VERSION, total, json.len() as u32, JSON_CHUNK] {
-            out.write_all(&word.to_le_bytes())?;
-        }
-        out.write_all(&json)?;
-        for word in [binary as u32, BINARY_CHUNK] {
-            out.write_all(&word.to_le_bytes())?;
-        }
-        model.write_binary(out)
-    })
+    container::write(path, &model.document(), model.binary_length(), |out| model.write_binary(out))
 }
-
-/// "glTF", the version of the container, and the kinds of its chunks, "JSON" and "BIN".
-const MAGIC: u32 = 0x4654_6C67;
-const VERSION: u32 = 2;
-const JSON_CHUNK: u32 = 0x4E4F_534A;
-const BINARY_CHUNK: u32 = 0x004E_4942;
 
 /// Bytes of three floats.
 const VECTOR_BYTES: u64 = 12;
@@ -94,6 +76,13 @@ const INDEX_BYTES: u64 = 4;
 
 /// Sizes of a scene between it and the origin from which on it is moved: see [`write_glb`].
 const FAR_AWAY: f64 = 16.0;
+
+/// The place that positions within `bounds` are best written relative to, scene unit.
+fn origin(bounds: Aabb) -> Vec3 {
+    let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
+    let far = reach > FAR_AWAY * bounds.longest_side();
+    if far { bounds.centre().as_vec3() } else { Vec3::ZERO }
+}
 
 /// What is written: the surface, cut up by groups and materials.
 struct Model<'a> {
@@ -141,10 +130,7 @@ impl Attribute {
 
 impl Model<'_> {
     fn new<'a>(light: &'a GatheredMesh, tone: &'a ToneCurve) -> image::ImageResult<Model<'a>> {
-        let bounds = Aabb::from_points(light.surface.positions.iter().copied());
-        let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
-        let far = reach > FAR_AWAY * bounds.longest_side();
-        let origin = if far { bounds.centre().as_vec3() } else { Vec3::ZERO };
+        let origin = origin(Aabb::from_points(light.surface.positions.iter().copied()));
         let primitives = primitives(light);
         let images = Images::new(light, tone, &primitives)?;
         Ok(Model { light, tone, primitives, images, origin })

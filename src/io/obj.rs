@@ -177,12 +177,12 @@ impl<'a> ObjFile<'a> {
             self.statements.make_each_face_a_group();
         }
         let models = std::mem::take(&mut self.models);
-        let mut geometry = self.geometry(models, &named)?;
+        let mut geometry = self.geometry(models, &named, settings.texture_coordinates)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
         self.library.warn(&used, settings.specular, &mut self.repairs);
         let mut materials = self.materials(&used, settings)?;
         let textures = self.textures(&used, &mut materials, settings)?;
-        if textures.is_empty() {
+        if textures.is_empty() && !settings.texture_coordinates {
             geometry.texture_coordinates = vec![];
         }
         let groups = std::mem::take(&mut self.statements.groups.list);

@@ -10,7 +10,8 @@ use super::texture::MaterialTextures;
 /// Textures of materials, and where they lie on triangles.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SceneTextures {
-    /// Of the corners of each triangle; empty where no material has textures, as are those.
+    /// Of the corners of each triangle; empty where no material has textures and nobody asked for
+    /// them.
     pub coordinates: Vec<[DVec2; 3]>,
     /// Of the materials that have some, by their indices.
     pub of_materials: BTreeMap<u32, MaterialTextures>,
@@ -18,4 +19,11 @@ pub(super) struct SceneTextures {
     pub relative_exitance: Vec<Rgb>,
     /// The share of each triangle that is solid; empty where no material has a mask.
     pub solid_shares: Vec<f64>,
+}
+
+impl SceneTextures {
+    /// No textures, and these texture coordinates.
+    pub fn of_coordinates(coordinates: Vec<[DVec2; 3]>) -> SceneTextures {
+        SceneTextures { coordinates, ..SceneTextures::default() }
+    }
 }

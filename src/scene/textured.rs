@@ -36,7 +36,8 @@ impl Scene {
     pub(crate) const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
     /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
-    /// where the scene has no textures. Not finite for a corner that has none.
+    /// where the scene has no textures, unless they were
+    /// [kept](crate::ObjSettings::texture_coordinates). Not finite for a corner that has none.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
         self.textures.coordinates.get(t).copied()
     }
@@ -126,14 +127,10 @@ impl Scene {
         pieces.iter().zip(means).map(scaled).collect()
     }
 
-    /// Lays textures of materials, by their indices, onto the triangles.
-    pub(super) fn lay_textures(
-        &mut self,
-        coordinates: Vec<[DVec2; 3]>,
-        of_materials: BTreeMap<u32, MaterialTextures>,
-    ) {
+    /// Lays textures of materials, by their indices, onto the triangles, which have coordinates.
+    pub(super) fn lay_textures(&mut self, of_materials: BTreeMap<u32, MaterialTextures>) {
         let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
-        self.textures = SceneTextures { coordinates, of_materials, ..Default::default() }.into();
+        self.textures = SceneTextures { of_materials, ..(*self.textures).clone() }.into();
         let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
         if has_masks {
             self.find_solid_shares();

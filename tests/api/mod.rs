@@ -17,6 +17,14 @@ use radiosity::view_factor::{
 };
 use radiosity::*;
 
+#[cfg(feature = "light-map")]
+#[test]
+fn light_maps_are_send_and_sync() {
+    fn check<T: Send + Sync>() {}
+    check::<light_map::Atlas>();
+    check::<light_map::LightMap>();
+}
+
 #[test]
 fn public_types_are_send_and_sync() {
     fn check<T: Send + Sync>() {}

@@ -3,6 +3,7 @@
 
 mod bands;
 mod light;
+mod light_map;
 mod sky;
 mod view_factors;
 

@@ -85,6 +85,18 @@ pub fn numbers<T: FromStr, const N: usize>(
     array.ok_or_else(|| wrong_value(option, &text, expected))
 }
 
+/// The formats of files that `--write` names, of those that there are.
+pub fn formats<F: Copy>(parser: &mut lexopt::Parser, all: &[(&str, F)]) -> Result<Vec<F>, Stop> {
+    let text = parser.value()?.string()?;
+    let format = |name: &str| all.iter().find(|(n, _)| *n == name).map(|(_, format)| *format);
+    let named: Option<Vec<F>> = text.split(',').map(format).collect();
+    named.ok_or_else(|| {
+        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+        let expected = format!("some of {}, with commas between them", names.join(", "));
+        wrong_value("write", &text, &expected)
+    })
+}
+
 /// How a command ends whose results are written.
 pub fn end() -> Result<(), Stop> {
     if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(()) }

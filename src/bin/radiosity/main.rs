@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! radiosity bake          SCENE.obj    radiosity at vertices   -> PLY, GLB, JSON, EXR, PNG
+//! radiosity light-map     SCENE.obj    irradiance in a texture -> EXR, GLB
 //! radiosity view-factors  SCENE.obj…   factors between groups  -> CSV, Matrix Market, NPY
 //! radiosity merge         SCENE.…rows  the same, of their rows
 //! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
@@ -30,6 +31,7 @@ mod grid;
 mod heat;
 mod interrupt;
 mod light;
+mod light_map;
 mod probes;
 mod progress;
 mod report;
@@ -49,6 +51,7 @@ const USAGE: &str = "\
 usage: radiosity COMMAND SCENE.obj… [options]
 
   bake          the radiosity of a scene, at the vertices of a mesh
+  light-map     the irradiance of a scene's surfaces, in a texture
   view-factors  view factors between the groups of scenes
   merge         rows of view factors from many machines, put together
   heat          temperatures and net fluxes of groups, by their view factors
@@ -66,8 +69,9 @@ struct Command {
     run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
 }
 
-const COMMANDS: [Command; 8] = [
+const COMMANDS: [Command; 9] = [
     Command { name: "bake", usage: bake::USAGE, run: bake::run },
+    Command { name: "light-map", usage: light_map::USAGE, run: light_map::run },
     Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
     Command { name: "merge", usage: merge::USAGE, run: merge::run },
     Command { name: "heat", usage: heat::USAGE, run: heat::run },

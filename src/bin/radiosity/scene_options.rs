@@ -29,6 +29,11 @@ impl SceneOptions {
         self.obj.facets = true;
     }
 
+    /// Keeps texture coordinates, whether or not there are textures.
+    pub fn with_texture_coordinates(&mut self) {
+        self.obj.texture_coordinates = true;
+    }
+
     /// Takes option `name` with its value, if it is one of these.
     pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
         match name {

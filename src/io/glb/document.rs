@@ -277,7 +277,7 @@ impl Written {
 }
 
 /// Vectors of floats in a view, from an offset in bytes on.
-fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
+pub(super) fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
     Accessor {
         buffer_view: Some(Index::new(view as u32)),
         byte_offset: Some(offset.into()),
@@ -294,12 +294,12 @@ fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
     }
 }
 
-fn numbers(v: Vec3) -> Value {
+pub(super) fn numbers(v: Vec3) -> Value {
     Value::from(v.to_array().to_vec())
 }
 
 /// `extras` with these entries.
-fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
+pub(super) fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
     let text = gltf_json::serialize::to_string(notes).ok()?;
     RawValue::from_string(text).ok()
 }

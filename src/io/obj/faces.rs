@@ -18,23 +18,26 @@ use crate::scene::{Material, Triangle, Warning, WarningKind};
 pub(super) struct Geometry {
     pub positions: Vec<DVec3>,
     pub triangles: Vec<Triangle>,
-    /// Of the triangles' corners, where some material has a texture.
+    /// Of the triangles' corners, where they are asked for or some material has a texture.
     pub texture_coordinates: Vec<[DVec2; 3]>,
 }
 
 impl ObjFile<'_> {
-    /// The vertices that faces use, in the order of the file, and the faces as triangles.
+    /// The vertices that faces use, in the order of the file, and the faces as triangles; with
+    /// texture coordinates where these are asked for or some material has a texture.
     pub(super) fn geometry(
         &mut self,
         models: Vec<tobj::Model>,
         named: &[u32],
+        with_coordinates: bool,
     ) -> Result<Geometry, Error> {
         let mut geometry = Geometry {
             positions: vec![DVec3::NAN; self.statements.vertices as usize],
             triangles: Vec::with_capacity(self.statements.faces.len()),
             texture_coordinates: vec![],
         };
-        let textured = self.library.materials.iter().any(MtlMaterial::has_images);
+        let textured =
+            with_coordinates || self.library.materials.iter().any(MtlMaterial::has_images);
         let (mut face, mut bare) = (0, 0);
         for tobj::Model { mesh, name } in models {
             // A model that has no face has no number either.

@@ -44,6 +44,8 @@ pub struct ObjSettings {
     /// Each face is a group of its own, in the order of the file, named `group/n` for the n-th face
     /// of a group: for view factors between facets.
     pub facets: bool,
+    /// Texture coordinates are kept where no material has a texture too: light maps can have them.
+    pub texture_coordinates: bool,
 }
 
 impl ObjSettings {
@@ -126,6 +128,7 @@ impl Default for ObjSettings {
             sides,
             specular,
             facets: false,
+            texture_coordinates: false,
         }
     }
 }

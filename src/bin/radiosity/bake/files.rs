@@ -86,7 +86,7 @@ impl Files {
     pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
         match name {
             "out" => self.stem = PathBuf::from(parser.value()?),
-            "write" => self.formats = formats(parser)?,
+            "write" => self.formats = args::formats(parser, &FORMATS)?,
             "camera" => self.camera = Some(camera(parser)?),
             "exposure" => self.exposure = Some(args::value(parser, "exposure", "a number")?),
             "image" => {
@@ -275,19 +275,8 @@ impl Files {
     }
 }
 
-/// The formats that `--write` names.
-fn formats(parser: &mut lexopt::Parser) -> Result<Vec<Format>, Stop> {
-    let text = parser.value()?.string()?;
-    let format = |name: &str| FORMATS.iter().find(|(n, _)| *n == name).map(|(_, format)| *format);
-    let named: Option<Vec<Format>> = text.split(',').map(format).collect();
-    named.ok_or_else(|| {
-        let names = FORMATS.map(|(name, _)| name).join(", ");
-        args::wrong_value("write", &text, &format!("some of {names}, with commas between them"))
-    })
-}
-
 /// Eye, target, degrees and, if there are three more numbers, the direction up.
-fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
+pub fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
     let text = parser.value()?.string()?;
     let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
     let (numbers, up) = match numbers.as_deref() {

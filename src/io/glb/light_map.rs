@@ -1,0 +1,375 @@
+//! A scene with its light map as glTF binary: the scene's own triangles, and one image for all.
+//!
+//! ```text
+//! binary chunk │ vertices, one after the other               │ indices │ PNG
+//!              │ position normal place in map place of file  │         │
+//! ```
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::{DVec2, Vec2, Vec3};
+use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf_json::buffer::{Stride, Target, View};
+use gltf_json::image::MimeType;
+use gltf_json::material::PbrMetallicRoughness;
+use gltf_json::mesh::Semantic;
+use gltf_json::scene::Node;
+use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
+use gltf_json::validation::Checked::Valid;
+use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rustc_hash::FxHashMap;
+
+use super::document::{accessor, notes_of, numbers};
+use super::primitives::Shown;
+use super::{INDEX_BYTES, PLACE_BYTES, VECTOR_BYTES, container, origin};
+use crate::error::Error;
+use crate::io::cannot_write;
+use crate::io::tone::ToneCurve;
+use crate::light_map::LightMap;
+use crate::mesh::SurfaceTopology;
+
+/// Writes the scene of a light map as glTF 2.0 binary, `.glb`: its own triangles with `POSITION`,
+/// `NORMAL` (of smooth surfaces), `TEXCOORD_1`, their places in the light map, and `TEXCOORD_0`,
+/// those of the scene's file on materials all of whose faces have some, else the same again.
+///
+/// A node for each group and a primitive for each of its materials, by their names; their `extras`
+/// have reflectance and exitance. The file has the map's radiosity, without textures, as an image
+/// (PNG): as `tone` shows it, a curve of radiosity. Materials are unlit and have it as their
+/// colour, so that viewers show the light as it is. A program that has textures of its own takes
+/// the irradiance of [`write_light_map_exr`](crate::io::write_light_map_exr) instead.
+///
+/// Lengths and axes are those of the scene's file, as with [`write_glb`](crate::write_glb).
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
+pub fn write_light_map_glb(
+    path: impl AsRef<Path>,
+    map: &LightMap,
+    tone: &ToneCurve,
+) -> Result<(), Error> {
+    let path = path.as_ref();
+    let png = png(map, tone).map_err(|e| cannot_write(path, io::Error::other(e)))?;
+    let model = Model::new(map, png);
+    container::write(path, &model.document(tone), model.binary_length(), |out| {
+        model.write_binary(out)
+    })
+}
+
+/// The radiosity of a map as it is shown.
+fn png(map: &LightMap, tone: &ToneCurve) -> image::ImageResult<Vec<u8>> {
+    let bytes: Vec<u8> = map.radiosity().into_iter().flat_map(|c| tone.display(c)).collect();
+    let (mut png, [width, height]) = (vec![], [map.atlas.width(), map.atlas.height()]);
+    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
+        .write_image(&bytes, width, height, ExtendedColorType::Rgb8)?;
+    Ok(png)
+}
+
+/// What is written.
+struct Model<'a> {
+    map: &'a LightMap,
+    primitives: Vec<Primitive>,
+    /// The place that positions are relative to, scene unit.
+    origin: Vec3,
+    png: Vec<u8>,
+}
+
+/// The triangles of one group and one material.
+#[derive(Default)]
+struct Primitive {
+    group: u32,
+    material: u32,
+    vertices: Vec<Vertex>,
+    faces: Vec<[u32; 3]>,
+}
+
+/// As it is written, but for the place in the file's texture where not all vertices of a primitive
+/// have one.
+struct Vertex {
+    position: Vec3,
+    normal: Vec3,
+    place: Vec2,
+    given: Vec2,
+}
+
+/// Bytes of a vertex.
+const VERTEX_BYTES: u64 = 2 * VECTOR_BYTES + 2 * PLACE_BYTES;
+
+/// Views of the binary chunk: vertices, indices, image.
+const VERTICES: usize = 0;
+const INDICES: usize = 1;
+const IMAGE: u32 = 2;
+
+impl Model<'_> {
+    fn new(map: &LightMap, png: Vec<u8>) -> Model<'_> {
+        let scene = map.atlas.scene();
+        let (topology, normals) = (SurfaceTopology::new(scene), scene_normals(map));
+        let origin = origin(scene.bounds());
+        let mut primitives: BTreeMap<(u32, u32), Primitive> = BTreeMap::new();
+        // Corners of one smooth surface are one vertex where they have the same places.
+        let mut numbers: FxHashMap<(u32, [u32; 4]), u32> = FxHashMap::default();
+        for (t, triangle) in scene.triangles().iter().enumerate() {
+            let primitive =
+                primitives.entry((triangle.group, triangle.material)).or_insert_with(|| {
+                    Primitive {
+                        group: triangle.group,
+                        material: triangle.material,
+                        ..Primitive::default()
+                    }
+                });
+            let corners = scene.corners(t);
+            let (places, given) = (map.atlas.coordinates(t), given_places(map, t));
+            let face = [0, 1, 2].map(|k| {
+                let (place, given) = (places[k].as_vec2(), given[k].as_vec2());
+                let bits = [place.x, place.y, given.x, given.y].map(f32::to_bits);
+                // No smooth surface goes on in another group or material.
+                *numbers.entry((topology.corners[t][k], bits)).or_insert_with(|| {
+                    let position = (corners[k] - origin.as_dvec3()).as_vec3();
+                    let normal = normals[t][k];
+                    primitive.vertices.push(Vertex { position, normal, place, given });
+                    primitive.vertices.len() as u32 - 1
+                })
+            });
+            primitive.faces.push(face);
+        }
+        Model { map, primitives: primitives.into_values().collect(), origin, png }
+    }
+
+    fn vertex_bytes(&self) -> u64 {
+        self.primitives.iter().map(|p| p.vertices.len() as u64).sum::<u64>() * VERTEX_BYTES
+    }
+
+    fn index_bytes(&self) -> u64 {
+        3 * self.primitives.iter().map(|p| p.faces.len() as u64).sum::<u64>() * INDEX_BYTES
+    }
+
+    fn binary_length(&self) -> u64 {
+        (self.vertex_bytes() + self.index_bytes() + self.png.len() as u64).next_multiple_of(4)
+    }
+
+    fn write_binary(&self, out: &mut impl Write) -> io::Result<()> {
+        for primitive in &self.primitives {
+            let has_given = primitive.has_given_places();
+            for vertex in &primitive.vertices {
+                let Vertex { position, normal, place, given } = vertex;
+                // Numbers that nobody reads are none of those that glTF forbids.
+                let given = if has_given { *given } else { Vec2::ZERO };
+                let vectors = [position.to_array(), normal.to_array()];
+                let places = [place.to_array(), given.to_array()];
+                for x in vectors.as_flattened().iter().chain(places.as_flattened()) {
+                    out.write_all(&x.to_le_bytes())?;
+                }
+            }
+        }
+        for &v in self.primitives.iter().flat_map(|primitive| primitive.faces.as_flattened()) {
+            out.write_all(&v.to_le_bytes())?;
+        }
+        out.write_all(&self.png)?;
+        let written = self.vertex_bytes() + self.index_bytes() + self.png.len() as u64;
+        out.write_all(&[0; 4][..(self.binary_length() - written) as usize])
+    }
+
+    fn document(&self, tone: &ToneCurve) -> Root {
+        let mut root = Root { asset: asset(tone), ..Default::default() };
+        root.extensions_used.push("KHR_materials_unlit".into());
+        root.push(Buffer {
+            byte_length: self.binary_length().into(),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: None,
+        });
+        self.add_views(&mut root);
+        let texture = self.add_texture(&mut root);
+        let groups = self.add_groups(&mut root, texture);
+        let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
+        let name = Some("scene".into());
+        let top = Node { name, children: Some(groups), translation, ..Default::default() };
+        let nodes = vec![root.push(top)];
+        let scene = Scene { nodes, name: None, extensions: None, extras: None };
+        root.scene = Some(root.push(scene));
+        root
+    }
+
+    fn add_views(&self, root: &mut Root) {
+        let mut offset = 0;
+        let stride = Some(Stride(VERTEX_BYTES as usize));
+        for (length, stride, target) in [
+            (self.vertex_bytes(), stride, Some(Target::ArrayBuffer)),
+            (self.index_bytes(), None, Some(Target::ElementArrayBuffer)),
+            (self.png.len() as u64, None, None),
+        ] {
+            root.push(View {
+                buffer: Index::new(0),
+                byte_length: length.into(),
+                byte_offset: Some(offset.into()),
+                byte_stride: stride,
+                name: None,
+                target: target.map(Valid),
+                extensions: None,
+                extras: None,
+            });
+            offset += length;
+        }
+    }
+
+    /// The map as a texture, smoothly filtered and not repeated.
+    fn add_texture(&self, root: &mut Root) -> Index<Texture> {
+        let source = root.push(Image {
+            buffer_view: Some(Index::new(IMAGE)),
+            mime_type: Some(MimeType("image/png".into())),
+            name: Some("light map".into()),
+            uri: None,
+            extensions: None,
+            extras: None,
+        });
+        let sampler = root.push(Sampler {
+            mag_filter: Some(Valid(MagFilter::Linear)),
+            // Without smaller images, in which charts would run together.
+            min_filter: Some(Valid(MinFilter::Linear)),
+            wrap_s: Valid(WrappingMode::ClampToEdge),
+            wrap_t: Valid(WrappingMode::ClampToEdge),
+            ..Default::default()
+        });
+        let sampler = Some(sampler);
+        root.push(Texture { sampler, source, name: None, extensions: None, extras: None })
+    }
+
+    /// A node and a mesh for each group that has triangles.
+    fn add_groups(&self, root: &mut Root, texture: Index<Texture>) -> Vec<Index<Node>> {
+        let mut materials = BTreeMap::new();
+        let (mut vertices, mut faces, mut nodes) = (0, 0, vec![]);
+        for of_group in self.primitives.chunk_by(|a, b| a.group == b.group) {
+            let mut primitives = vec![];
+            for primitive in of_group {
+                let material = *materials.entry(primitive.material).or_insert_with(|| {
+                    let material = self.material(primitive.material, texture);
+                    root.push(material)
+                });
+                primitives.push(gltf_json::mesh::Primitive {
+                    attributes: primitive.attributes(root, vertices * VERTEX_BYTES),
+                    indices: Some(root.push(Accessor {
+                        component_type: Valid(GenericComponentType(ComponentType::U32)),
+                        type_: Valid(Type::Scalar),
+                        ..accessor(INDICES, 3 * faces * INDEX_BYTES, 3 * primitive.faces.len())
+                    })),
+                    material: Some(material),
+                    mode: Valid(gltf_json::mesh::Mode::Triangles),
+                    targets: None,
+                    extensions: None,
+                    extras: None,
+                });
+                vertices += primitive.vertices.len() as u64;
+                faces += primitive.faces.len() as u64;
+            }
+            let name = self.map.atlas.scene().groups()[of_group[0].group as usize].clone();
+            let mesh = root.push(Mesh {
+                primitives,
+                name: Some(name.clone()),
+                weights: None,
+                extensions: None,
+                extras: None,
+            });
+            let node = Node { mesh: Some(mesh), name: Some(name), ..Default::default() };
+            nodes.push(root.push(node));
+        }
+        nodes
+    }
+
+    fn material(&self, number: u32, index: Index<Texture>) -> Material {
+        let material = &self.map.atlas.scene().materials()[number as usize];
+        let channels = |c: crate::scene::Rgb| Value::from(c.to_array().to_vec());
+        let notes = BTreeMap::from([
+            ("reflectance", channels(material.reflectance)),
+            ("exitance", channels(material.exitance)),
+        ]);
+        let unlit = gltf_json::extensions::material::Unlit {};
+        Material {
+            name: Some(material.name.clone()),
+            pbr_metallic_roughness: PbrMetallicRoughness {
+                base_color_texture: Some(Info {
+                    index,
+                    tex_coord: 1,
+                    extensions: None,
+                    extras: None,
+                }),
+                metallic_factor: gltf_json::material::StrengthFactor(0.0),
+                ..Default::default()
+            },
+            extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
+            extras: notes_of(&notes),
+            ..Default::default()
+        }
+    }
+}
+
+impl Primitive {
+    /// Whether all vertices have a place in the file's textures.
+    fn has_given_places(&self) -> bool {
+        self.vertices.iter().all(|vertex| vertex.given.is_finite())
+    }
+
+    /// Its attributes, whose numbers begin at an offset in bytes of the vertices.
+    fn attributes(
+        &self,
+        root: &mut Root,
+        offset: u64,
+    ) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
+        let positions = || self.vertices.iter().map(|vertex| vertex.position);
+        let count = self.vertices.len();
+        let at = |bytes: u64, type_: Type| Accessor {
+            type_: Valid(type_),
+            ..accessor(VERTICES, offset + bytes, count)
+        };
+        let position = Accessor {
+            min: Some(numbers(positions().fold(Vec3::INFINITY, Vec3::min))),
+            max: Some(numbers(positions().fold(Vec3::NEG_INFINITY, Vec3::max))),
+            ..at(0, Type::Vec3)
+        };
+        let mut attributes = vec![
+            (Semantic::Positions, position),
+            (Semantic::Normals, at(VECTOR_BYTES, Type::Vec3)),
+            (Semantic::TexCoords(1), at(2 * VECTOR_BYTES, Type::Vec2)),
+        ];
+        // glTF numbers sets of coordinates from 0 on: without the file's, the map's are both.
+        let given = if self.has_given_places() { PLACE_BYTES } else { 0 };
+        let first = at(2 * VECTOR_BYTES + given, Type::Vec2);
+        attributes.push((Semantic::TexCoords(0), first));
+        attributes.into_iter().map(|(name, numbers)| (Valid(name), root.push(numbers))).collect()
+    }
+}
+
+/// Unit normals at the corners of each triangle, as glTF has them.
+fn scene_normals(map: &LightMap) -> Vec<[Vec3; 3]> {
+    let unit = |corners: [glam::DVec3; 3]| corners.map(|n| n.as_vec3().normalize_or(Vec3::Y));
+    map.atlas.corner_normals().into_iter().map(unit).collect()
+}
+
+/// Places of the corners of triangle `t` in the textures of its file, v downwards; not finite where
+/// it has none.
+fn given_places(map: &LightMap, t: usize) -> [DVec2; 3] {
+    let scene = map.atlas.scene();
+    let frame = scene.textures(t).and_then(Shown::of).and_then(|shown| shown.frame());
+    scene.texture_coordinates(t).unwrap_or([DVec2::NAN; 3]).map(|place| {
+        let place = frame.map_or(place, |map| place * map.scale + map.offset);
+        DVec2::new(place.x, 1.0 - place.y)
+    })
+}
+
+fn asset(tone: &ToneCurve) -> Asset {
+    let notes = BTreeMap::from([
+        ("axes", Value::from("those of the scene's file")),
+        ("unit", Value::from("that of the scene's file")),
+        ("TEXCOORD_1", Value::from("places in the light map")),
+        ("light map", Value::from("radiosity times exposure, highlights rolled off")),
+        ("exposure", Value::from(tone.exposure())),
+    ]);
+    Asset {
+        generator: Some(concat!("radiosity ", env!("CARGO_PKG_VERSION")).into()),
+        extras: notes_of(&notes),
+        ..Default::default()
+    }
+}

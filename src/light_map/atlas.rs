@@ -1,0 +1,202 @@
+//! Where the surfaces of a scene lie in a light map.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::given_coordinates::{self, Unusable};
+use super::unwrapping;
+use crate::error::{Error, ErrorKind};
+use crate::mesh::SurfaceTopology;
+use crate::scene::Scene;
+
+/// How large the texels of a light map are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// Edge of a texel on the surface, scene unit, above 0: the mean of all where the texture
+    /// coordinates are those of the file.
+    TexelSize(f64),
+    /// Texels along a side of the map; where surfaces are laid out anew its height may be less.
+    Pixels(u32),
+}
+
+/// Which texture coordinates a light map has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Those of the scene's file where a light map can have them, else new ones.
+    #[default]
+    Auto,
+    /// Those of the scene's file.
+    Given,
+    /// New ones.
+    Unwrapped,
+}
+
+/// Texture coordinates of all triangles of a scene, in one texture and without overlap.
+#[derive(Clone, Debug)]
+pub struct Atlas {
+    scene: Arc<Scene>,
+    pub(super) size: [u32; 2],
+    pub(super) coordinates: Vec<[DVec2; 3]>,
+    charts: Option<usize>,
+    unusable: Option<Unusable>,
+}
+
+/// Places of triangles in a map, before it is known for which scene.
+pub(super) struct Layout {
+    /// Texels in a row, and rows.
+    pub size: [u32; 2],
+    /// Of the corners of each triangle, as [`Atlas::coordinates`] has them.
+    pub coordinates: Vec<[DVec2; 3]>,
+    /// Connected parts of surfaces that were laid out, if they were.
+    pub charts: Option<usize>,
+}
+
+/// Texels along a side of a map at most: what any graphics device takes (WebGPU's
+/// `maxTextureDimension2D`).
+pub(super) const MAX_SIDE: u32 = 8192;
+
+impl Atlas {
+    /// Lays out all triangles of `scene`. Which sides of surfaces reflect must be settled
+    /// ([`Scene::resolve_sides`]), so that each side has a triangle.
+    ///
+    /// Coordinates that the file gives ([`ObjSettings::texture_coordinates`]) can be used where all
+    /// triangles have them, within [0, 1], and none overlap by more than a quarter of a texel. New
+    /// ones have a chart, or several, for each smooth surface: none goes across a crease. Charts
+    /// lie six texels apart: one that only points at their outline are shown with, and two of
+    /// dilation, on either side.
+    ///
+    /// [`ObjSettings::texture_coordinates`]: crate::ObjSettings::texture_coordinates
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a resolution that is not above 0, or that makes more than 8192
+    /// texels along a side; [`ErrorKind::Scene`] for [`Coordinates::Given`] that cannot be used.
+    pub fn new(
+        scene: impl Into<Arc<Scene>>,
+        resolution: Resolution,
+        coordinates: Coordinates,
+    ) -> Result<Atlas, Error> {
+        resolution.check()?;
+        let scene = scene.into();
+        let given = match coordinates {
+            Coordinates::Unwrapped => None,
+            _ => Some(given_coordinates::layout(&scene, resolution)?),
+        };
+        let (layout, unusable) = match given {
+            Some(Ok(layout)) => (layout, None),
+            Some(Err(unusable)) if coordinates == Coordinates::Given => {
+                let remedy = "give each triangle a place of its own in the texture, or have \
+                              surfaces laid out anew";
+                let found = unusable.to_string();
+                return Err(Error::new(ErrorKind::Scene, "texture coordinates", found, remedy));
+            }
+            given => {
+                let unusable = given.and_then(Result::err);
+                (unwrapping::layout(&scene, resolution)?, unusable)
+            }
+        };
+        let Layout { size, coordinates, charts } = layout;
+        Ok(Atlas { scene, size, coordinates, charts, unusable })
+    }
+
+    /// The scene whose triangles have places.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Texels in a row.
+    pub fn width(&self) -> u32 {
+        self.size[0]
+    }
+
+    /// Rows of texels.
+    pub fn height(&self) -> u32 {
+        self.size[1]
+    }
+
+    /// Texture coordinates of the corners of triangle `t`: (0, 0) is the upper left corner of the
+    /// map, (1, 1) the lower right one, as glTF has it. What is too thin for 32-bit coordinates
+    /// lies on one point.
+    pub fn coordinates(&self, t: usize) -> [DVec2; 3] {
+        self.coordinates[t]
+    }
+
+    /// Edge of a texel on the surfaces, scene unit: the mean of all.
+    pub fn texel_size(&self) -> f64 {
+        let triangles = 0..self.coordinates.len();
+        let on_surfaces: f64 = triangles.clone().map(|t| self.scene.area(t)).sum();
+        let area = |[a, b, c]: [DVec2; 3]| (b - a).perp_dot(c - a).abs() / 2.0;
+        let texels: f64 = triangles.map(|t| area(self.corners(t))).sum();
+        (on_surfaces / texels).sqrt()
+    }
+
+    /// How many connected parts were laid out; none where the coordinates are those of the file.
+    pub fn charts(&self) -> Option<usize> {
+        self.charts
+    }
+
+    /// Why the coordinates of the file are not used, where they would have been.
+    pub fn unusable(&self) -> Option<&Unusable> {
+        self.unusable.as_ref()
+    }
+
+    /// Unit normals at the corners of each triangle: of the smooth surface that it is a part of,
+    /// the mean around a corner, weighted by area.
+    pub(crate) fn corner_normals(&self) -> Vec<[DVec3; 3]> {
+        let (scene, topology) = (&self.scene, SurfaceTopology::new(&self.scene));
+        let mut sums = vec![DVec3::ZERO; 3 * topology.corners.len()];
+        for (t, corners) in topology.corners.iter().enumerate() {
+            corners.iter().for_each(|&k| sums[k as usize] += scene.normal(t) * scene.area(t));
+        }
+        let of_triangle = |(t, corners): (usize, &[u32; 3])| {
+            corners.map(|k| sums[k as usize].normalize_or(scene.normal(t)))
+        };
+        topology.corners.iter().enumerate().map(of_triangle).collect()
+    }
+
+    /// Where the corners of triangle `t` lie in units of texels, the centre of the upper left one
+    /// being (0, 0).
+    pub(super) fn corners(&self, t: usize) -> [DVec2; 3] {
+        in_texels(self.coordinates[t], self.size)
+    }
+
+    /// The same of the point where the second and third corner have these weights.
+    pub(super) fn place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+        let [a, b, c] = self.corners(t);
+        a * (1.0 - u - v) + b * u + c * v
+    }
+}
+
+/// Texture coordinates in units of texels, from the centre of the upper left one.
+pub(super) fn in_texels(coordinates: [DVec2; 3], [width, height]: [u32; 2]) -> [DVec2; 3] {
+    coordinates.map(|p| p * DVec2::new(width.into(), height.into()) - 0.5)
+}
+
+impl Resolution {
+    fn check(self) -> Result<(), Error> {
+        match self {
+            Resolution::TexelSize(size) if !(size > 0.0 && size.is_finite()) => {
+                let remedy = "give a length above 0, in the scene's unit";
+                let place = format!("texels of {size}");
+                Err(Error::new(ErrorKind::Setting, place, "not above 0", remedy))
+            }
+            Resolution::Pixels(side) if side == 0 || side > MAX_SIDE => {
+                Err(bad_size(self, "out of range".into()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The error of a map that is too large, or too small for its surfaces: `found` says how.
+pub(super) fn bad_size(resolution: Resolution, found: String) -> Error {
+    let place = match resolution {
+        Resolution::TexelSize(size) => format!("texels of {size}"),
+        Resolution::Pixels(pixels) => format!("{pixels} texels along a side"),
+    };
+    let remedy = match resolution {
+        Resolution::TexelSize(_) => format!("ask for larger ones: up to {MAX_SIDE} along a side"),
+        Resolution::Pixels(_) => format!("ask for 1 to {MAX_SIDE}, and enough for all surfaces"),
+    };
+    Error::new(ErrorKind::Setting, place, found, remedy)
+}

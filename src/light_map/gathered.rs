@@ -1,0 +1,160 @@
+//! Texels that gather the light of a bake.
+
+use std::ops::ControlFlow;
+
+use super::atlas::Atlas;
+use super::coverage::{NO_TRIANGLE, triangles_of_texels};
+use super::dilation::fill_from_neighbours;
+use super::seams;
+use super::texel_points::TexelPoints;
+use crate::backend::Backend;
+use crate::bake::BakeResult;
+use crate::error::{Error, ErrorKind};
+use crate::gather::gather_points::is_buried;
+use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
+use crate::gather::{Gather, GatheredMesh};
+use crate::progress::BatchSizer;
+use crate::scene::Rgb;
+
+/// The irradiance of all surfaces of a scene in one texture.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct LightMap {
+    /// Where its surfaces lie.
+    pub atlas: Atlas,
+    /// Irradiance of each texel, row by row from the top, W/m² per channel, linear: to be
+    /// multiplied with a surface's reflectance, texture and all, for what it reflects. On a
+    /// translucent surface it is the mean of both sides, as that of
+    /// [`VertexMesh::irradiance`](crate::VertexMesh::irradiance).
+    pub irradiance: Vec<Rgb>,
+    /// Whether a texel gathered. Others are empty, or have values of their neighbours.
+    pub gathered: Vec<bool>,
+    /// The triangle of each texel's place, or none.
+    triangles: Vec<u32>,
+}
+
+/// Rings of empty texels around charts that get values, for the filters of renderers.
+const DILATION: usize = 2;
+
+/// Texels in the first batch; later ones follow the clock. Chosen by hand: results do not depend on
+/// it.
+const FIRST_BATCH: usize = 256;
+
+/// Rays of a texel where the vertices of a bake did not gather: those of an error of 2 % or so.
+const RAYS: u32 = 1024;
+
+impl LightMap {
+    /// The light of a bake, gathered at the texels of `atlas`: with as many rays as its vertices
+    /// took in the end, so that a texel is as exact as what was asked for.
+    ///
+    /// Texels inside of solids, and under what stands on their surface, get values of their
+    /// neighbours. `progress` is called with the texels done and all of them, several times a
+    /// second; where it stops the work, the result is `None`. The same bake and atlas give the same
+    /// bits, on any number of threads.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for the bake of another scene than that of `atlas`; those of
+    /// [`Backend::gather`].
+    pub fn of_bake(
+        atlas: Atlas,
+        baked: &BakeResult,
+        backend: &Backend,
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<LightMap>, Error> {
+        let light = &baked.light;
+        let dim = light.radiosity_field().radiosity_floor();
+        let (rays, noise) = match &baked.settings.gather {
+            Some(settings) => (settings.rays, settings.noise_tolerance),
+            None => (RAYS, f64::INFINITY),
+        };
+        let mut gatherer = backend.gather_evenly(&light.mesh, rays, noise, dim)?;
+        LightMap::gather(atlas, light, &mut *gatherer, progress)
+    }
+
+    /// The same by a `gatherer` of the caller's, of the scene of `light`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for light of another scene than that of `atlas`; those of `gatherer`.
+    pub fn gather(
+        atlas: Atlas,
+        light: &GatheredMesh,
+        gatherer: &mut dyn Gather,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<LightMap>, Error> {
+        check_scene(&atlas, light)?;
+        let triangles = triangles_of_texels(&atlas);
+        let covered: Vec<u32> = (0..triangles.len() as u32)
+            .filter(|&texel| triangles[texel as usize] != NO_TRIANGLE)
+            .collect();
+        let mut irradiance = vec![Rgb::ZERO; triangles.len()];
+        let mut gathered = vec![false; triangles.len()];
+        let mut buried = vec![];
+        let (field, points) = (light.radiosity_field(), TexelPoints::new(&atlas));
+        let (mut remaining, mut batches) = (&covered[..], BatchSizer::new(FIRST_BATCH));
+        while !remaining.is_empty() {
+            batches.next(&mut remaining, |batch| {
+                let triangle = |texel: u32| triangles[texel as usize] as usize;
+                let point = |&texel: &u32| points.point(texel, triangle(texel));
+                let batch_points: Vec<TwoSidedPoint> = batch.iter().map(point).collect();
+                let samples = gather_two_sided(gatherer, &field, &batch_points)?;
+                for (&texel, sample) in batch.iter().zip(&samples) {
+                    irradiance[texel as usize] = sample.irradiance;
+                    if is_buried(sample, points.texel_size(triangle(texel))) {
+                        buried.push(texel);
+                    } else {
+                        gathered[texel as usize] = true;
+                    }
+                }
+                Ok::<_, Error>(())
+            })?;
+            if progress(covered.len() - remaining.len(), covered.len()).is_break() {
+                return Ok(None);
+            }
+        }
+        let mut known = gathered.clone();
+        fill_from_neighbours(&mut irradiance, &mut known, atlas.size, buried, usize::MAX);
+        seams::weld(&atlas, &mut irradiance);
+        dilate(&mut irradiance, &triangles, atlas.size);
+        Ok(Some(LightMap { atlas, irradiance, gathered, triangles }))
+    }
+
+    /// Radiosity of each texel, W/m² per channel: what its material emits and reflects, without
+    /// textures.
+    pub fn radiosity(&self) -> Vec<Rgb> {
+        let scene = self.atlas.scene();
+        let of_texel = |(&t, &irradiance): (&u32, &Rgb)| {
+            if t == NO_TRIANGLE {
+                return Rgb::ZERO;
+            }
+            let material = scene.material(t as usize);
+            material.exitance + material.albedo() * irradiance
+        };
+        let mut radiosity: Vec<Rgb> =
+            self.triangles.iter().zip(&self.irradiance).map(of_texel).collect();
+        dilate(&mut radiosity, &self.triangles, self.atlas.size);
+        radiosity
+    }
+
+    /// The share of all texels that triangles cover, in [0, 1].
+    pub fn coverage(&self) -> f64 {
+        let covered = self.triangles.iter().filter(|&&t| t != NO_TRIANGLE).count();
+        covered as f64 / self.triangles.len() as f64
+    }
+}
+
+/// Gives empty texels next to charts the values of their neighbours.
+fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
+    let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
+    let empty = (0..known.len() as u32).filter(|&k| !known[k as usize]).collect();
+    fill_from_neighbours(values, &mut known, size, empty, DILATION);
+}
+
+/// Checks that `light` is that of the scene of `atlas`, whose triangles a bake may have cut.
+fn check_scene(atlas: &Atlas, light: &GatheredMesh) -> Result<(), Error> {
+    let (scene, other) = (atlas.scene(), light.mesh.scene());
+    if scene.groups() == other.groups() && scene.materials() == other.materials() {
+        return Ok(());
+    }
+    let remedy = "bake the scene that the atlas was made for";
+    Err(Error::new(ErrorKind::Setting, "light to gather", "light of another scene", remedy))
+}

@@ -1,0 +1,122 @@
+//! Texture coordinates that a file gives, and whether a light map can have them.
+
+use std::fmt;
+
+use glam::DVec2;
+
+use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size, in_texels};
+use super::coverage::{NO_TRIANGLE, depth_inside, for_each_texel_around};
+use crate::error::Error;
+use crate::scene::Scene;
+
+/// Why a light map cannot have the texture coordinates of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unusable {
+    /// So many triangles have none.
+    Missing(usize),
+    /// So many triangles reach out of [0, 1], where textures repeat.
+    Outside(usize),
+    /// So many triangles lie on a point or a line.
+    Collapsed(usize),
+    /// These triangles lie on one another.
+    Overlapping([usize; 2]),
+}
+
+/// How deep inside of two triangles the centre of a texel lies where they overlap, in texels: files
+/// have few digits, and neighbours may overlap by what these leave.
+const OVERLAP: f64 = 0.25;
+
+/// Texture coordinates may be this far out of [0, 1]: what 32-bit numbers leave of them.
+const OUTSIDE: f64 = 1e-6;
+
+/// Where the triangles of `scene` lie by the coordinates of its file, unless these are unusable.
+///
+/// # Errors
+/// [`ErrorKind::Setting`](crate::ErrorKind::Setting) for more than [`MAX_SIDE`] texels.
+pub(super) fn layout(
+    scene: &Scene,
+    resolution: Resolution,
+) -> Result<Result<Layout, Unusable>, Error> {
+    let triangles = 0..scene.triangles().len();
+    let downwards = |corners: [DVec2; 3]| corners.map(|p| DVec2::new(p.x, 1.0 - p.y));
+    let none = [DVec2::NAN; 3];
+    let coordinates: Vec<[DVec2; 3]> =
+        triangles.map(|t| downwards(scene.texture_coordinates(t).unwrap_or(none))).collect();
+    let count = |is: fn(&[DVec2; 3]) -> bool| coordinates.iter().filter(|c| is(c)).count();
+    for (found, unusable) in [
+        (count(|c| !c.iter().all(|p| p.is_finite())), Unusable::Missing as fn(usize) -> Unusable),
+        (count(|c| !c.iter().all(is_inside)), Unusable::Outside),
+        (count(|c| area(c) < f64::EPSILON), Unusable::Collapsed),
+    ] {
+        if found > 0 {
+            return Ok(Err(unusable(found)));
+        }
+    }
+    let side = match resolution {
+        Resolution::Pixels(side) => side,
+        Resolution::TexelSize(size) => {
+            let on_surfaces: f64 = (0..coordinates.len()).map(|t| scene.area(t)).sum();
+            let side = (on_surfaces / coordinates.iter().map(area).sum::<f64>()).sqrt() / size;
+            if side > f64::from(MAX_SIDE) {
+                return Err(bad_size(resolution, format!("{} along a side", side.ceil())));
+            }
+            side.ceil() as u32
+        }
+    };
+    let size = [side; 2];
+    Ok(match overlapping(&coordinates, size) {
+        Some(pair) => Err(Unusable::Overlapping(pair)),
+        None => Ok(Layout { size, coordinates, charts: None }),
+    })
+}
+
+fn is_inside(p: &DVec2) -> bool {
+    p.cmpge(DVec2::splat(-OUTSIDE)).all() && p.cmple(DVec2::splat(1.0 + OUTSIDE)).all()
+}
+
+fn area([a, b, c]: &[DVec2; 3]) -> f64 {
+    (b - a).perp_dot(c - a).abs() / 2.0
+}
+
+/// The first two triangles that the centre of one texel lies inside of. It ends with the first that
+/// has two, so that no more are found inside than there are texels, however many overlap.
+fn overlapping(coordinates: &[[DVec2; 3]], size: [u32; 2]) -> Option<[usize; 2]> {
+    let mut owners = vec![NO_TRIANGLE; size[0] as usize * size[1] as usize];
+    let mut found = None;
+    for (t, &corners) in coordinates.iter().enumerate() {
+        let corners = in_texels(corners, size);
+        for_each_texel_around(corners, 0.0, size, |texel, centre| {
+            if depth_inside(corners, centre) > OVERLAP {
+                let owner = std::mem::replace(&mut owners[texel], t as u32);
+                if owner != NO_TRIANGLE {
+                    found = Some([owner as usize, t]);
+                }
+            }
+            found.is_none()
+        });
+        if found.is_some() {
+            break;
+        }
+    }
+    found
+}
+
+impl fmt::Display for Unusable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let triangles = |count: &usize| match count {
+            1 => "1 triangle".to_string(),
+            count => format!("{count} triangles"),
+        };
+        match self {
+            Unusable::Missing(count) => write!(f, "missing for {}", triangles(count)),
+            Unusable::Outside(count) => {
+                write!(f, "out of [0, 1] for {}, where textures repeat", triangles(count))
+            }
+            Unusable::Collapsed(count) => write!(f, "on a point or line for {}", triangles(count)),
+            Unusable::Overlapping([a, b]) => {
+                write!(f, "overlapping for triangles {} and {}", a + 1, b + 1)
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! New texture coordinates: every smooth surface in charts, and all charts in one texture.
+//!
+//! Charts, their parameterisation (Lévy, Petitjean, Ray, Maillot 2002: least squares conformal
+//! maps) and their packing are those of the crate `uvunwrap`.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rustc_hash::FxHashMap;
+use uvunwrap::{Density, MeshInput, Options, OutputMesh, Packing};
+
+use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size};
+use crate::error::Error;
+use crate::mesh::SurfaceTopology;
+use crate::scene::Scene;
+
+/// Empty texels around a chart: one that points on its outline are shown with, and two of dilation.
+const PADDING: u32 = 3;
+
+/// Smooth surfaces up to which charts are packed by their shapes, which leaves less empty, and
+/// takes seconds for a few thousand. Chosen by hand.
+const MAX_BY_SHAPE: usize = 1000;
+
+/// A smooth surface as the unwrapper takes it: 32-bit numbers.
+#[derive(Default)]
+struct Surface {
+    triangles: Vec<usize>,
+    positions: Vec<[f32; 3]>,
+    /// Three for each triangle.
+    indices: Vec<u32>,
+}
+
+/// Places of the triangles of `scene` in a texture, by surfaces.
+///
+/// # Errors
+/// [`ErrorKind::Setting`](crate::ErrorKind::Setting) where they do not fit into [`MAX_SIDE`]
+/// texels, or not into as few as were asked for.
+pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Error> {
+    let unit = scene.bounds().longest_side();
+    let density = match resolution {
+        Resolution::Pixels(page_size) => Density::Auto { page_size },
+        Resolution::TexelSize(size) => {
+            let area: f64 = (0..scene.triangles().len()).map(|t| scene.area(t)).sum();
+            let side = area.sqrt() / size;
+            if side > f64::from(MAX_SIDE) {
+                return Err(bad_size(resolution, format!("at least {} along a side", side.ceil())));
+            }
+            Density::Fixed { texels_per_unit: (unit / size) as f32, page_size: None }
+        }
+    };
+    let surfaces = surfaces(scene);
+    let packing = if surfaces.len() > MAX_BY_SHAPE { Packing::Fast } else { Packing::Shape };
+    let options = Options { density, packing, padding: PADDING, ..Options::default() };
+    let inputs: Vec<MeshInput<'_>> =
+        surfaces.iter().map(|s| MeshInput::new(&s.positions, &s.indices)).collect();
+    let atlas = uvunwrap::generate(&inputs, &options)
+        .map_err(|e| bad_size(resolution, format!("no room: {e}")).with_source(e))?;
+    let side = atlas.width.max(atlas.height);
+    if atlas.page_count > 1 {
+        return Err(bad_size(
+            resolution,
+            format!("no room: charts take {} maps", atlas.page_count),
+        ));
+    }
+    if side > MAX_SIDE {
+        return Err(bad_size(resolution, format!("{side} along a side")));
+    }
+    let mut coordinates = vec![[DVec2::ZERO; 3]; scene.triangles().len()];
+    for (surface, OutputMesh { vertices, indices, .. }) in surfaces.iter().zip(&atlas.meshes) {
+        for (&t, corners) in surface.triangles.iter().zip(indices.chunks_exact(3)) {
+            coordinates[t] = [0, 1, 2].map(|k| {
+                let [u, v] = vertices[corners[k] as usize].uv;
+                DVec2::new(u.into(), v.into())
+            });
+        }
+    }
+    let size = [atlas.width, atlas.height];
+    Ok(Layout { size, coordinates, charts: Some(atlas.chart_count as usize) })
+}
+
+/// The smooth surfaces of `scene`, in units of its longest side from its centre, so that 32 bits
+/// are enough for coordinates of any size.
+fn surfaces(scene: &Scene) -> Vec<Surface> {
+    let (bounds, topology) = (scene.bounds(), SurfaceTopology::new(scene));
+    let (centre, unit) = (bounds.centre(), bounds.longest_side());
+    let mut surfaces: BTreeMap<u32, (Surface, FxHashMap<u32, u32>)> = BTreeMap::new();
+    for (t, surface) in topology.surfaces().into_iter().enumerate() {
+        let (surface, numbers) = surfaces.entry(surface).or_default();
+        surface.triangles.push(t);
+        for (corner, position) in topology.corners[t].into_iter().zip(scene.corners(t)) {
+            let number = *numbers.entry(corner).or_insert_with(|| {
+                surface.positions.push(((position - centre) / unit).as_vec3().to_array());
+                surface.positions.len() as u32 - 1
+            });
+            surface.indices.push(number);
+        }
+    }
+    surfaces.into_values().map(|(surface, _)| surface).collect()
+}

@@ -1,0 +1,3 @@
+mod atlas;
+mod files;
+mod light;
