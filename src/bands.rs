@@ -22,9 +22,9 @@
 //! # use radiosity::bands::{Band, BandMaterial, Bands};
 //! # use radiosity::{Backend, BakeTarget, Error, load_obj};
 //! # fn main() -> Result<(), Error> {
-//! let baked = BakeTarget::Error(0.3).bake(load_obj("scenes/cornell_box.obj")?, &Backend::Cpu, |_| {
-//!     ControlFlow::Continue(())
-//! })?;
+//! let scene = load_obj("scenes/cornell_box.obj")?;
+//! let go = |_: &_| ControlFlow::Continue(());
+//! let baked = BakeTarget::Error(0.3).bake(scene, &Backend::Cpu, go)?;
 //! let names = ["near", "far"].map(|name| Band { name: name.into(), wavelength: None });
 //! // The materials of baked.mesh.scene(), one for one: white, red, green and light.
 //! let wall = |reflectance: [f64; 2]| BandMaterial::opaque(reflectance.into());

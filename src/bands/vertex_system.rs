@@ -1,9 +1,9 @@
 //! The radiosity equation at the vertices, for all bands by the same rows.
 //!
-//! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, by few rays, and
-//! s is what emitters, the sky and the sun cause. Jacobi's iteration adds one bounce a sweep. Rows
-//! sum to at most 1, so that with c = max (ρ + τ) in a band what is left after a sweep that changed
-//! R by δ is at most δ c / (1 − c), in the maximum norm: a band ends where that is small.
+//! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, by few rays,
+//! and s is what emitters, the sky and the sun cause. Jacobi's iteration adds one bounce a sweep.
+//! Rows sum to at most 1, so that with c = max (ρ + τ) in a band what is left after a sweep that
+//! changed R by δ is at most δ c / (1 − c), in the maximum norm: a band ends where that is small.
 
 use std::ops::ControlFlow;
 

@@ -14,9 +14,9 @@ use crate::io::tone::ToneCurve;
 /// Vertices: `x y z nx ny nz` (float, the scene's unit) and, for each band by its name,
 /// `radiosity_NAME`, `irradiance_NAME` and `error_NAME`, the standard error of the radiosity by
 /// noise (float, W/m² or W/(m² nm)); where all bands have wavelengths also `red green blue` (uchar,
-/// the colours that they add up to, for viewers, by `tone` of radiosity or one that fits). Faces: `vertex_indices`,
-/// triangles, counter-clockwise from the front. Where 32 bits do not do, numbers are double, as in
-/// [`write_ply`](crate::write_ply).
+/// the colours that they add up to, for viewers, by `tone` of radiosity or one that fits). Faces:
+/// `vertex_indices`, triangles, counter-clockwise from the front. Where 32 bits do not do, numbers
+/// are double, as in [`write_ply`](crate::write_ply).
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
