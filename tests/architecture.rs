@@ -35,7 +35,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "backend error form_factor gather geometry mesh progress sampling scene solver verify \
          vertex visibility",
     ),
-    ("light_map", "backend bake error gather mesh progress scene vertex"),
+    ("light_map", "backend bake error gather mesh progress scene vertex visibility"),
     ("io", "camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 
