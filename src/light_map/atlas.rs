@@ -9,6 +9,7 @@ use super::unwrapping;
 use crate::error::{Error, ErrorKind};
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
+use crate::visibility::lit_sides;
 
 /// How large the texels of a light map are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +58,8 @@ pub(super) struct Layout {
 pub(super) const MAX_SIDE: u32 = 8192;
 
 impl Atlas {
-    /// Lays out all triangles of `scene`. Which sides of surfaces reflect must be settled
-    /// ([`Scene::resolve_sides`]), so that each side has a triangle.
+    /// Lays out all triangles of `scene`, one for each side that reflects
+    /// ([`Scene::resolve_sides`]): [`Atlas::scene`] has them, and is to be baked.
     ///
     /// Coordinates that the file gives ([`ObjSettings::texture_coordinates`]) can be used where all
     /// triangles have them, within [0, 1], and none overlap by more than a quarter of a texel. New
@@ -77,7 +78,7 @@ impl Atlas {
         coordinates: Coordinates,
     ) -> Result<Atlas, Error> {
         resolution.check()?;
-        let scene = scene.into();
+        let scene = lit_sides::resolved(scene.into());
         let given = match coordinates {
             Coordinates::Unwrapped => None,
             _ => Some(given_coordinates::layout(&scene, resolution)?),

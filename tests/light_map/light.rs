@@ -206,8 +206,7 @@ fn charts_of_a_smooth_surface_meet_without_a_seam() {
 
 #[test]
 fn the_same_light_gives_the_same_bits_and_can_be_stopped() {
-    let scene = cornell_box(f64::INFINITY).scene().clone();
-    let scene = Arc::new(scene);
+    let scene = Arc::new(cornell_box(f64::INFINITY).scene().resolve_sides());
     let atlas = Atlas::new(scene.clone(), Resolution::Pixels(64), Coordinates::Auto).unwrap();
     let light = light(&scene, 1.0);
     let run = |threads: usize| {
