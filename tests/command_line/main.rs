@@ -1,6 +1,7 @@
 //! The program: what its commands write, and how they refuse wrong usage and bad scenes.
 #![cfg(feature = "cli")]
 
+mod luminaires;
 mod sky;
 mod view_factors;
 

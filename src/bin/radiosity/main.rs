@@ -25,6 +25,7 @@ mod args;
 mod bake;
 mod heat;
 mod interrupt;
+mod luminaires;
 mod progress;
 mod report;
 mod scene_options;
