@@ -1,3 +1,4 @@
+mod cie_171;
 mod contacts;
 pub mod cornell_box;
 #[cfg(feature = "textures")]
