@@ -40,6 +40,7 @@ pub mod model;
 mod outcome;
 mod pipeline;
 mod progress;
+mod received_points;
 mod resolved_light;
 mod result;
 mod settings;

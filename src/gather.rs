@@ -20,6 +20,7 @@ mod gathered_mesh;
 mod interpolated_refinement;
 pub(crate) mod light_projection;
 pub(crate) mod lights;
+pub(crate) mod luminaire_light;
 pub(crate) mod point_irradiance;
 pub(crate) mod point_row;
 mod progress;
@@ -61,8 +62,8 @@ pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
     /// reflected, and the sky where there is no surface.
     pub irradiance: Rgb,
-    /// The part of `irradiance` from the emission of lights that were sampled explicitly, W/m² per
-    /// channel. Emission that is seen like any other surface is not in it.
+    /// The part of `irradiance` from luminaires and from the emission of lights that were sampled
+    /// explicitly, W/m² per channel. Emission that is seen like any other surface is not in it.
     pub direct: Rgb,
     /// Share of the hemisphere in which nothing is seen, in [0, 1].
     pub escaped: f64,
@@ -98,7 +99,8 @@ pub struct RadiosityField<'a> {
 /// - see the same directions from a point whatever the field, so that the difference of two fields
 ///   has no more noise than is in the difference;
 /// - count each front by emitted plus reflected radiosity, backs as black, and directions that meet
-///   no surface by the radiosity of the scene's sky, π times its radiance.
+///   no surface by the radiosity of the scene's sky, π times its radiance;
+/// - add what comes straight from the sun and from the scene's luminaires, which no surface shows.
 ///
 /// It is called with some hundred points at once or more, and should make use of all of the machine
 /// for a call. Progress and cancelling are the caller's business.

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
+//! | IESNA LM-63, EULUMDAT | [`read_photometry`] | how a luminaire spreads its light |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -23,6 +24,7 @@ mod mtl;
 #[cfg(feature = "npz")]
 mod npz;
 mod obj;
+mod photometry;
 mod ply;
 mod ply_bands;
 mod ply_reader;
@@ -56,6 +58,7 @@ pub use self::png::{write_png, write_png_with_tone};
 #[cfg(feature = "npz")]
 pub use npz::{npz_from_bytes, read_npz, write_npz};
 pub use obj::{ObjSettings, load_obj, read_obj};
+pub use photometry::{Photometry, photometry_from_bytes, read_photometry};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_bands::write_ply_bands;
 pub use ply_reader::read_ply;

@@ -94,7 +94,7 @@
 //!
 //! Glossy reflection, what mirrors and lenses throw onto others, participating media,
 //! polarisation, time. Light leaves and arrives diffusely, passes clear glass straight on, and an
-//! emitter is a surface or the light from outside. Pictures show mirrors and glass.
+//! emitter is a surface, a luminaire or the light from outside. Pictures show mirrors and glass.
 
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.
 #![cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
@@ -148,7 +148,8 @@ pub use io::{ObjSettings, load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use progress::{StopReason, Timings};
 pub use scene::{
-    Material, Rgb, Scene, Sides, Sky, SkyDistribution, Specular, Sun, Triangle, Warning,
+    IntensityDistribution, Luminaire, Material, Rgb, Scene, Sides, Sky, SkyDistribution, Specular,
+    Sun, Triangle, Warning,
 };
 pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;

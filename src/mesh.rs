@@ -253,6 +253,9 @@ impl Mesh {
             all.update(bytemuck::bytes_of(&[triangle, level, i, j, flipped.into()]));
         }
         all.update(bytemuck::cast_slice(&self.scene.sky().key()));
+        for luminaire in self.scene.luminaires() {
+            all.update(bytemuck::cast_slice(&luminaire.key().collect::<Vec<_>>()));
+        }
         if self.scene.has_textures() {
             for e in 0..self.element_count() {
                 let pair = [self.reflectance(e), self.exitance(e)];

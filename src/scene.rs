@@ -13,6 +13,8 @@ mod covers;
 mod cut;
 mod cut_outs;
 pub(crate) mod glass_bodies;
+mod intensity;
+mod luminaire;
 mod material;
 mod rgb;
 mod scene_textures;
@@ -35,6 +37,8 @@ pub use crate::geometry::aabb::Aabb;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
+pub use intensity::{IntensityDistribution, Pole};
+pub use luminaire::{Luminaire, Opening};
 pub use material::Material;
 pub use rgb::Rgb;
 pub(crate) use rgb::luminance;
@@ -78,6 +82,8 @@ pub struct Scene {
     warnings: Vec<Warning>,
     /// See [`Scene::sky`].
     sky: Sky,
+    /// See [`Scene::luminaires`].
+    luminaires: Arc<[Luminaire]>,
     /// Textures of materials, and where they lie on triangles.
     textures: Arc<SceneTextures>,
     /// Per triangle, the sides across which its surface does not continue; empty for none.
@@ -199,6 +205,7 @@ impl Scene {
             coordinate_ulp,
             warnings,
             sky,
+            luminaires: Arc::default(),
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
             cut_sides: vec![],
             covered_backs: OnceLock::new(),
@@ -385,7 +392,8 @@ impl Scene {
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
         let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
-        let scene = Scene { sky: self.sky.clone(), textures, cut_sides, ..scene };
+        let (sky, luminaires) = (self.sky.clone(), self.luminaires.clone());
+        let scene = Scene { sky, luminaires, textures, cut_sides, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

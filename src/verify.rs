@@ -35,6 +35,7 @@
 //! has the mean |B_told − B_true|², however noisy they are.
 
 mod emitters;
+mod luminaires;
 mod path_tracer;
 mod sampler;
 mod settings;

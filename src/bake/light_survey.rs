@@ -10,7 +10,7 @@
 //!   falls on the house in its middle, and no hemicube of its patches resolves the house. Where
 //!   less than half of a light falls on anything that reflects, each element looks for it instead.
 //!
-//! The sky lights what sees it, and is always gathered.
+//! Sky and luminaires light what sees them, and are always gathered.
 //!
 //! Both are by direct light alone: what is reflected seldom falls further.
 
@@ -72,21 +72,21 @@ impl LightSurvey {
         let places = places(scene);
         // A scene with more triangles than a mesh may have elements is refused when it is cut.
         let is_too_large = scene.triangles().len() > Mesh::MAX_ELEMENTS;
-        let has_sky = !scene.sky().is_black();
-        if (lights.is_empty() && !has_sky) || places.is_empty() || is_too_large {
+        let has_others = scene.has_light_of_no_surface();
+        if (lights.is_empty() && !has_others) || places.is_empty() || is_too_large {
             return survey;
         }
         // Direct light at each place: flux over the area that it stands for, W.
         let mut flux = vec![0.0; places.len()];
-        if has_sky {
-            let seen = look(scene, &[], scene.sky().clone(), &places);
+        if has_others {
+            let seen = look(scene, &[], &places);
             for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
                 *flux += place.area * seen.irradiance.length();
             }
         }
         for first in (0..lights.len()).step_by(3) {
             let lights = &lights[first..lights.len().min(first + 3)];
-            let seen = look(scene, lights, Sky::default(), &places);
+            let seen = look(scene, lights, &places);
             for (channel, light) in lights.iter().enumerate() {
                 let exitance = scene.materials()[light.material as usize].exitance.length();
                 let mut landing = 0.0;
@@ -164,14 +164,9 @@ fn places(scene: &Scene) -> Vec<Place> {
 }
 
 /// What each of `places` sees where each of up to three `lights` emits 1 W/m² in a channel of its
-/// own and nothing else does but the `sky`: under a black one the irradiances are form factors,
-/// visible shares of the hemisphere, weighted by the cosine.
-fn look(
-    scene: &Scene,
-    lights: &[MaterialLight],
-    sky: Sky,
-    places: &[Place],
-) -> Vec<IrradianceSample> {
+/// own and nothing else does: the irradiances are form factors, visible shares of the hemisphere,
+/// weighted by the cosine. With no lights what it sees of all that no surface emits.
+fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<IrradianceSample> {
     let mut materials: Vec<Material> = scene.materials().to_vec();
     for material in &mut materials {
         if material.clear_transmittance().is_none() {
@@ -183,8 +178,11 @@ fn look(
     for (light, channel) in lights.iter().zip([Rgb::X, Rgb::Y, Rgb::Z]) {
         materials[light.material as usize].exitance = channel;
     }
-    let looked_at = scene.with_materials(materials).expect("as many materials, all in range");
-    let looked_at = looked_at.with_sky(sky).expect("a sky of the scene");
+    let mut looked_at = scene.with_materials(materials).expect("as many materials, all in range");
+    if !lights.is_empty() {
+        looked_at = looked_at.with_sky(Sky::default()).expect("a black sky");
+        looked_at = looked_at.with_luminaires(vec![]).expect("none");
+    }
     let mesh = Mesh::new(looked_at, f64::INFINITY).expect("no splits");
     let points: Vec<GatherPoint> = places.iter().map(|place| place.point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];

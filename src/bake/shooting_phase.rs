@@ -22,6 +22,7 @@ use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
+use crate::bake::received_points::received_points;
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::bake::strata::SampleCounts;
@@ -117,14 +118,14 @@ fn solve(
     }
 }
 
-/// What the elements of `mesh` receive of the lights that are gathered, and of the sky.
+/// What the elements of `mesh` receive of the lights that are gathered, and of sky and luminaires.
 fn received(
     settings: &SolveSettings,
     mesh: &Mesh,
     backend: &ResilientBackend,
 ) -> Result<ReceivedLight, Error> {
     let materials = &settings.gathered_materials;
-    if materials.is_empty() && mesh.scene().sky().is_black() {
+    if materials.is_empty() && !mesh.scene().has_light_of_no_surface() {
         return Ok(ReceivedLight::default());
     }
     let scene = mesh.scene();
@@ -136,14 +137,16 @@ fn received(
     let above = SurfaceOffset::new(mesh.scene());
     let elements = 0..mesh.element_count();
     let reflecting: Vec<usize> = elements.filter(|&e| mesh.scatters(mesh.element(e))).collect();
-    let point = |&e: &usize| above.above_element(mesh, mesh.element(e));
-    let points: Vec<GatherPoint> = reflecting.iter().map(point).collect();
+    let points: Vec<Vec<GatherPoint>> =
+        reflecting.iter().map(|&e| received_points(&above, mesh, mesh.element(e))).collect();
     let corners = vec![[0; 3]; mesh.element_count()];
     let mut gatherer = backend.gather(mesh, model::RECEIVED_RAYS, f64::INFINITY, 0.0)?;
-    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &points)?;
+    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &points.concat())?;
     let mut irradiance = vec![Rgb::ZERO; mesh.element_count()];
-    for (e, sample) in reflecting.into_iter().zip(samples) {
-        irradiance[e] = sample.irradiance;
+    let mut samples = samples.iter();
+    for (e, points) in reflecting.into_iter().zip(points) {
+        let sum: Rgb = samples.by_ref().take(points.len()).map(|s| s.irradiance).sum();
+        irradiance[e] = sum / points.len() as f64;
     }
     Ok(ReceivedLight { irradiance, materials: materials.clone() })
 }

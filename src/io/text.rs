@@ -54,22 +54,27 @@ pub(super) fn place(file: &Path, line: usize) -> String {
     format!("{}:{line}", file.display())
 }
 
-/// The lines of `text`, which ends them with LF, CRLF or CR. A backslash at the end of a line joins
-/// the next one to it. A byte-order mark is skipped.
-pub(super) fn lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
+/// The lines of `text` as they stand; it ends them with LF, CRLF or CR. A byte-order mark is
+/// skipped.
+pub(super) fn physical_lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
     let end = if text.contains('\n') { '\n' } else { '\r' };
-    let mut physical = text.strip_prefix('\u{feff}').unwrap_or(text).split(end).enumerate();
+    let lines = text.strip_prefix('\u{feff}').unwrap_or(text).split(end);
+    lines.zip(1..).map(move |(text, number)| Line { file, number, text: text.trim().into() })
+}
+
+/// The same, with the next line joined to one that ends with a backslash.
+pub(super) fn lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
+    let mut physical = physical_lines(file, text);
     std::iter::from_fn(move || {
-        let (before, first) = physical.next()?;
-        let mut text = Cow::Borrowed(first.trim());
+        let Line { number, mut text, .. } = physical.next()?;
         while let Some(start) = text.strip_suffix('\\').map(str::len) {
             let joined = text.to_mut();
             joined.truncate(start);
-            let Some((_, next)) = physical.next() else { break };
+            let Some(next) = physical.next() else { break };
             joined.push(' ');
-            joined.push_str(next.trim());
+            joined.push_str(&next.text);
         }
-        Some(Line { file, number: before + 1, text })
+        Some(Line { file, number, text })
     })
 }
 

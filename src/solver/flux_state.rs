@@ -129,8 +129,8 @@ impl Flux {
     }
 }
 
-/// Light that elements have received before any is shot: that of the sky, and of lights which were
-/// looked at from the elements, since most of what they emit goes elsewhere.
+/// Light that elements have received before any is shot: that of sky and luminaires, and of lights
+/// which were looked at from the elements, since most of what they emit goes elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ReceivedLight {
     /// Irradiance of each element, W/m² per channel; empty for none.

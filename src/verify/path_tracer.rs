@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::emitters::{Emitters, Weights};
+use super::luminaires;
 use crate::progress::BatchSizer;
 use crate::scene::{Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
@@ -169,6 +170,9 @@ impl<'a> PathTracer<'a> {
             if let Some(sun) = self.scene.sky().sun() {
                 reflected += throughput * self.irradiance_of_sun(&at, sun, rng);
             }
+            if !self.scene.luminaires().is_empty() {
+                reflected += throughput * self.irradiance_of_luminaire(&at, rng);
+            }
             let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
             let hit = match self.next_hit(&at, direction) {
                 Some(hit) if hit.front => hit,
@@ -260,6 +264,23 @@ impl<'a> PathTracer<'a> {
             return Rgb::ZERO;
         }
         self.passed(at, direction, f64::INFINITY) * sun.irradiance * cosine
+    }
+
+    /// Irradiance at `at` from one point of a luminaire, W/m². No path meets one by itself.
+    fn irradiance_of_luminaire(&self, at: &SurfacePoint, rng: &mut Rng) -> Rgb {
+        let normal = self.normals[at.triangle];
+        let chosen = luminaires::choose(self.scene.luminaires(), at.position, normal, rng);
+        let Some((luminaire, probability)) = chosen else { return Rgb::ZERO };
+        let point = luminaire.point([rng.f64(), rng.f64(), rng.f64()]);
+        let irradiance = luminaire.irradiance(point, at.position, normal);
+        let (direction, distance) = (point - at.position).normalize_and_length();
+        let between = self.contact..distance - self.contact;
+        let hides = |hit: &Hit| hit.triangle != at.triangle;
+        if irradiance == 0.0 || self.rays.occluded(at.position, direction, between, hides) {
+            return Rgb::ZERO;
+        }
+        let passed = self.passed(at, direction, distance);
+        passed * luminaire.scale * (irradiance / probability)
     }
 
     /// The share per channel that clear panes let through from `at` along `direction` (unit length)

@@ -34,7 +34,7 @@ impl ReflectingGroup {
         if total == 0.0 {
             return wrong("none that is used reflects", "give one a reflectance above 0");
         }
-        if !scene.has_emitter() && scene.sky().is_black() {
+        if !scene.has_emitter() && !scene.has_light_of_no_surface() {
             return wrong("none that is used emits", "give one an exitance above 0, or a sky");
         }
         let group = |(group, areas): (usize, Vec<(usize, f64)>)| {

@@ -3,4 +3,5 @@ mod cpu_gather;
 mod cut_outs;
 mod doubled_faces;
 mod gpu;
+mod luminaires;
 mod panes;

@@ -1,7 +1,9 @@
+mod cie_171;
 mod contacts;
 pub mod cornell_box;
 #[cfg(feature = "textures")]
 mod cut_outs;
+mod luminaires;
 mod outcome;
 mod sky;
 mod sky_models;

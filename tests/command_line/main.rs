@@ -4,6 +4,7 @@
 mod bands;
 mod light;
 mod light_map;
+mod luminaires;
 mod sky;
 mod view_factors;
 

@@ -2,6 +2,7 @@
 //! that once crashed, took too long or broke something. `docs/robustness.md` says how to look for
 //! more.
 
+mod luminaire;
 #[cfg(feature = "npz")]
 mod npz;
 mod ply;
@@ -59,6 +60,12 @@ fn every_ply_input_keeps_its_promises() {
 fn every_stl_input_keeps_its_promises() {
     let (accepted, refused) = replay("stl", stl::try_stl);
     assert!(accepted > 4 && refused > 4, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+fn every_photometric_file_keeps_its_promises() {
+    let (accepted, refused) = replay("luminaire", luminaire::try_luminaire);
+    assert!(accepted > 8 && refused > 8, "{accepted} accepted, {refused} refused");
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod obj_polygons;
 mod obj_texts;
 #[cfg(feature = "textures")]
 mod obj_textures;
+mod photometry;
 mod ply;
 mod ply_reader;
 mod stl;

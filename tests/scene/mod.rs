@@ -1,1 +1,2 @@
+mod luminaires;
 mod sides;

@@ -3,7 +3,10 @@
 
 use glam::{DAffine3, DVec3};
 use radiosity::solver::Method;
-use radiosity::{ErrorKind, Mesh, RayRows, Rgb, Scene, Sky, SkyDistribution, Solver, Sun};
+use radiosity::{
+    ErrorKind, IntensityDistribution, Luminaire, Mesh, RayRows, Rgb, Scene, Sky, SkyDistribution,
+    Solver, Sun,
+};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};
@@ -40,7 +43,7 @@ fn changed_solve_saves_its_old_rows() {
 }
 
 #[test]
-fn a_state_is_of_one_sky() {
+fn a_state_is_of_one_sky_and_its_luminaires() {
     let mesh = cornell_box(300.0);
     let under = |sky: Sky| mesh.with_scene(mesh.scene().clone().with_sky(sky).unwrap()).unwrap();
     let overcast =
@@ -54,15 +57,24 @@ fn a_state_is_of_one_sky() {
         overcast(Rgb::ONE).with_sun(sun(DVec3::Y)).unwrap(),
         overcast(Rgb::ONE).with_sun(sun(DVec3::X)).unwrap(),
     ];
+    let lamp = Luminaire::new(
+        IntensityDistribution::isotropic(1.0).unwrap(),
+        DVec3::splat(300.0),
+        DVec3::NEG_Y,
+    );
+    let with = |luminaire: Luminaire| {
+        let scene = mesh.scene().clone().with_luminaires(vec![luminaire]).unwrap();
+        mesh.with_scene(scene).unwrap()
+    };
+    let dimmed = Luminaire { scale: Rgb::splat(0.5), ..lamp.clone() };
+    let meshes: Vec<Mesh> = skies.into_iter().map(under).chain([lamp, dimmed].map(with)).collect();
     let solver = Solver::new(Method::Jacobi);
-    for (k, sky) in skies.iter().enumerate() {
-        let mesh = under(sky.clone());
-        let mut solve = solver.begin(&mesh).unwrap();
-        solve.advance(&mut rays(&mesh), keep_going).unwrap();
+    for (k, mesh) in meshes.iter().enumerate() {
+        let mut solve = solver.begin(mesh).unwrap();
+        solve.advance(&mut rays(mesh), keep_going).unwrap();
         let state = solve.to_bytes();
-        for (l, other) in skies.iter().enumerate() {
-            let other = under(other.clone());
-            let taken = solver.resume_bytes(&other, &rays(&other), &state);
+        for (l, other) in meshes.iter().enumerate() {
+            let taken = solver.resume_bytes(other, &rays(other), &state);
             assert_eq!(taken.is_ok(), k == l, "saved under {k}, resumed under {l}");
         }
     }

@@ -3,7 +3,8 @@
 //! ```text
 //!                ┌ rays over the hemisphere ─► reflected light, escaped, backface, 1/distance
 //! point ─ trace ─┤
-//!                └ shadow rays to each light ─► visible share × closed form = direct light
+//!                ├ shadow rays to each light ─► visible share × closed form = direct light
+//!                └ shadow rays to luminaires ─► see `LuminaireLight`
 //! ```
 //!
 //! The number of rays doubles until halves of them agree, or the most is reached:
@@ -27,6 +28,7 @@ use rayon::prelude::*;
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_projection::LightProjection;
 use crate::gather::lights::{Light, Lights, NO_LIGHT};
+use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
@@ -127,9 +129,17 @@ impl RayGather {
         let scene = fields[0].mesh.scene();
         let lights = self.sampled_lights(scene, point);
         let sun = scene.sky().sun();
+        let luminaires = LuminaireLight {
+            luminaires: scene.luminaires(),
+            rays: &self.scene,
+            panes: &self.panes,
+            rotations: &self.rotations,
+        };
+        let of_luminaires = luminaires.irradiance(point);
         let trace = |range| self.trace(fields, point, &lights, range);
-        let sample =
-            |sums: &RaySums<FIELDS>, count| self.samples_of(sums, (point, &lights, sun), count);
+        let sample = |sums: &RaySums<FIELDS>, count| {
+            self.samples_of(sums, of_luminaires, (point, &lights, sun), count)
+        };
         let mut count = self.min_rays;
         let mut sums = trace(0..count / 2);
         loop {
@@ -215,14 +225,16 @@ impl RayGather {
         sums
     }
 
-    /// The irradiance from each field by sums over `count` rays.
+    /// The irradiance from each field by sums over `count` rays, and from luminaires.
     fn samples_of<const FIELDS: usize>(
         &self,
         sums: &RaySums<FIELDS>,
+        of_luminaires: Rgb,
         (point, lights, sun): (&GatherPoint, &[(u32, f64)], Option<&Sun>),
         count: u32,
     ) -> [IrradianceSample; FIELDS] {
         let (share, mut out) = (1.0 / f64::from(count), sums.hemisphere);
+        out.direct = of_luminaires;
         out.irradiance *= share;
         out.escaped *= share;
         out.backface *= share;

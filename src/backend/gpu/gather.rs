@@ -7,7 +7,9 @@
 //! ```
 //!
 //! What comes straight from a light or the sun is its closed form times the share of its tile that
-//! is seen; all other light is the sum of radiosity × form factor over the pixels of the hemicube.
+//! is seen; luminaires are looked for by rays on the CPU, one each where they are points, which
+//! takes less than a view of the scene; all other light is the sum of radiosity × form factor over
+//! the pixels of the hemicube.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Instant;
@@ -29,12 +31,15 @@ use super::split_float::SplitFloat;
 use crate::error::{Error, ErrorKind};
 use crate::gather::light_projection::LightProjection;
 use crate::gather::lights::{Lights, MAX_EXPLICIT_LIGHTS, NO_LIGHT};
+use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::Mesh;
 use crate::progress::Timings;
 use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene, Sky, Sun};
+use crate::visibility::panes::Panes;
+use crate::visibility::ray_scene::RayScene;
 
 /// Gathers with hemicubes (Cohen and Greenberg 1985) on a graphics device, one a point.
 ///
@@ -50,6 +55,8 @@ pub struct HemicubeGather {
     batches: Option<Batches>,
     coordinates: SplitFloat,
     rotations: CellRotation,
+    /// What rays to luminaires meet and pass; none without luminaires.
+    sight: Option<(RayScene, Panes)>,
     /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
     radiance_unit: f64,
     triangles: usize,
@@ -113,6 +120,8 @@ impl HemicubeGather {
             batches: None,
             coordinates: SplitFloat::new(scene),
             rotations: CellRotation::new(&scene.bounds()),
+            sight: (!scene.luminaires().is_empty())
+                .then(|| (RayScene::of_scene(scene), Panes::of_scene(scene))),
             radiance_unit: if brightest > 0.0 { brightest.log2().floor().exp2() } else { 1.0 },
             triangles: scene.triangles().len(),
             size,
@@ -265,7 +274,26 @@ impl HemicubeGather {
         })?;
         self.timings = timings;
         self.drawn += points.len() as u64;
-        samples.map_err(|found| gpu.invalid_result(found))
+        let mut samples = samples.map_err(|found| gpu.invalid_result(found))?;
+        self.add_luminaires(light.scene, points, &mut samples);
+        Ok(samples)
+    }
+
+    /// Adds what comes straight from luminaires.
+    fn add_luminaires(
+        &self,
+        scene: &Scene,
+        points: &[GatherPoint],
+        samples: &mut [IrradianceSample],
+    ) {
+        let Some((rays, panes)) = &self.sight else { return };
+        let (luminaires, rotations) = (scene.luminaires(), &self.rotations);
+        let light = LuminaireLight { luminaires, rays, panes, rotations };
+        points.par_iter().zip(samples).for_each(|(point, sample)| {
+            let irradiance = light.irradiance(point);
+            sample.irradiance += irradiance;
+            sample.direct += irradiance;
+        });
     }
 
     /// Puts the light on the device. Where there is no memory for it, smaller batches make room.

@@ -81,7 +81,7 @@ fn places_see_closed_form_factors() {
     let floor = (level(0.01, 0.0, true), grey());
     let lamp = (level(1.0, 1.0, false), glow());
     let scene = scene(&[floor, lamp]);
-    let seen = look(&scene, &strongest_lights(&scene), Sky::default(), &places(&scene));
+    let seen = look(&scene, &strongest_lights(&scene), &places(&scene));
     // A point below the middle of a square of side 2 at distance 1: 4 corner terms (Howell, C-4).
     let r = 1.0 / 2f64.sqrt();
     let expected = 4.0 / PI * r * r.atan();
@@ -101,7 +101,7 @@ fn a_sky_lights_what_nothing_is_above() {
     let sheltered = scene(&[(level(1.0, 2.0, true), grey()), floor, roof]);
     let survey = LightSurvey::new(&sheltered.with_sky(Rgb::ONE).unwrap());
     assert_eq!((survey.region, survey.gathered_materials), (None, vec![]));
-    let samples = look(&open, &[], Sky::default(), &places(&open));
+    let samples = look(&open, &[], &places(&open));
     assert!(samples.iter().all(|sample| sample.escaped == 1.0));
 }
 

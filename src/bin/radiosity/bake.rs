@@ -85,6 +85,12 @@ Files and devices:
                     2026-06-21T12:00:00+02:00
   --up x,y,z        away from the ground, for skies [+y or +z, whichever seems to be]
   --north x,y,z     where north is, for --sun-at [-z; +y where +z is up]
+  --luminaire FILE@x,y,z[:AIM[:C0]][*SCALE]  a lamp whose light an IESNA LM-63 (.ies) or EULUMDAT
+                    (.ldt) file has, at x,y,z; aiming along x,y,z [down], with C = 0° towards x,y,z
+                    [+x]; times a number or r,g,b [1]; may be repeated
+  --luminaires LIST.json  many: a list of {\"file\": \"a.ies\", \"at\": [x, y, z]}, perhaps
+                    with \"aim\", \"c0\" and \"scale\"; files lie in its folder
+  --metres-per-unit M  of the scene's unit, for luminaires: 0.001 for millimetres [1]
   --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
                     are wound, front or both [auto]
   --specular WHICH  what the light that is spread takes mirrors and glass for: clear, it passes
@@ -251,7 +257,9 @@ impl Bake {
             Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
         args::print_warnings(&scene);
-        let mut warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        let mut warnings = self.reading.luminaires.warnings();
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        warnings.extend(scene.warnings().iter().map(ToString::to_string));
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;
         let triangles = scene.triangles().len();
@@ -294,6 +302,7 @@ impl Bake {
         let report = Report {
             scene: name,
             sky,
+            luminaires: self.reading.luminaires,
             adapter: device.adapter(),
             target: self.target,
             triangles,

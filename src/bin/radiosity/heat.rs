@@ -52,7 +52,7 @@ struct Options {
 
 /// Where view factors come from.
 enum Source {
-    Scene(Scene),
+    Scene(Box<Scene>),
     Matrix(ViewFactors),
 }
 
@@ -140,7 +140,7 @@ impl Options {
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz")) {
             return progress::of_reading(path, || read_npz(path)).map(Source::Matrix);
         }
-        progress::of_reading(path, || self.reading.load(path)).map(Source::Scene)
+        progress::of_reading(path, || self.reading.load(path).map(Box::new)).map(Source::Scene)
     }
 }
 

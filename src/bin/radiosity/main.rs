@@ -32,6 +32,7 @@ mod heat;
 mod interrupt;
 mod light;
 mod light_map;
+mod luminaires;
 mod probes;
 mod progress;
 mod report;

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::bake::files::{Picture, camera_value};
 use crate::bake::{Target, bands, settings};
+use crate::luminaires::LuminaireOptions;
 
 /// What the report tells of.
 pub struct Report {
@@ -16,6 +17,8 @@ pub struct Report {
     pub scene: String,
     /// The options that give its sky, where that is more than a radiance.
     pub sky: Option<String>,
+    /// What else lights it that is no surface.
+    pub luminaires: LuminaireOptions,
     /// Name, type and driver of what made the rows.
     pub adapter: AdapterInfo,
     /// What was asked for.
@@ -69,6 +72,7 @@ impl Report {
                     json!(radiance.unwrap_or(Rgb::ZERO).to_array())
                 }
             },
+            "luminaires": self.luminaires.report(),
             "shot_elements": baked.mesh.element_count(),
             "elements": baked.light.mesh.element_count(),
             "vertices": baked.light.surface.positions.len(),
@@ -257,6 +261,7 @@ impl Report {
                 self.total
             ),
         ];
+        lines.extend(self.luminaires.table());
         if let Some(Picture { camera, exposure }) = &self.picture {
             let camera = camera_value(camera);
             lines.push(format!("picture    --camera {camera} --exposure {exposure}"));

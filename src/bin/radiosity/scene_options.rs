@@ -1,4 +1,4 @@
-//! How the commands read a scene, and what lights it from outside.
+//! How the commands read a scene, and what lights it that is no surface.
 
 use std::path::Path;
 
@@ -7,6 +7,7 @@ use radiosity::io::SpecularSurfaces;
 use radiosity::{Error, ObjSettings, Rgb, Scene, Sides};
 
 use crate::args::{Stop, rgb, value, wrong_value};
+use crate::luminaires::LuminaireOptions;
 use crate::sky::SkyOptions;
 
 /// What is said of how a scene is to be read.
@@ -14,6 +15,7 @@ use crate::sky::SkyOptions;
 pub struct SceneOptions {
     obj: ObjSettings,
     pub sky: SkyOptions,
+    pub luminaires: LuminaireOptions,
 }
 
 impl SceneOptions {
@@ -45,19 +47,22 @@ impl SceneOptions {
             "transmit" => self.obj.transmit.push(of_material(parser, "transmit")?),
             "sides" => self.obj.sides = sides(parser)?,
             "specular" => self.obj.specular = specular(parser)?,
-            _ => return self.sky.option(name, parser),
+            _ => return Ok(self.sky.option(name, parser)? || self.luminaires.option(name, parser)?),
         }
         Ok(true)
     }
 
-    /// The scene of an OBJ file, under the sky that was asked for.
+    /// The scene of an OBJ file, under the sky and with the luminaires that were asked for.
     ///
     /// # Errors
-    /// Those of [`ObjSettings::load`] and [`SkyOptions::over`].
+    /// Those of [`ObjSettings::load`], [`SkyOptions::over`] and [`LuminaireOptions::over`].
     pub fn load(&self, path: &Path) -> Result<Scene, Error> {
         let mut obj = self.obj.clone();
         obj.sky = self.sky.while_reading();
-        self.sky.over(obj.load(path)?)
+        if !self.luminaires.is_empty() {
+            obj.sky.get_or_insert_default();
+        }
+        self.luminaires.over(self.sky.over(obj.load(path)?)?)
     }
 }
 

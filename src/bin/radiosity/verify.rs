@@ -41,8 +41,8 @@ last line compares the two. After Ctrl-C what was measured so far is printed.
   --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
   --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
   --transmit MATERIAL=r,g,b  this material lets this share through (as the bake had)
-  --sky r,g,b       radiance of a uniform sky, or none; another sky and a sun are given by the
-                    options that the bake had, those of `radiosity bake --help`
+  --sky r,g,b       radiance of a uniform sky, or none; another sky, a sun and luminaires are given
+                    by the options that the bake had, those of `radiosity bake --help`
   --sides WHICH     auto, front or both (as the bake had) [auto]
   --specular WHICH  clear, diffuse, black or ignore (as the bake had) [clear]
   --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
@@ -162,6 +162,7 @@ impl Options {
         let start = Instant::now();
         let told = Told::beside(ply);
         told.check_sky(scene, self.reading.sky.words(scene), ply)?;
+        told.check_luminaires(&self.reading.luminaires.report(), ply)?;
         let solution = progress::of_reading(ply, || read_ply(ply))?;
         interrupt::catch();
         let found = progress::of_count("points", |report| {
@@ -269,6 +270,21 @@ impl Told {
         }
         let found = format!("baked under a sky of {told}");
         let remedy = format!("verify it under the same: --sky {told}");
+        Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
+    }
+
+    /// Refuses a solution that was baked with other luminaires than `own`, those of the scene.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] with how many there were.
+    fn check_luminaires(&self, own: &Json, ply: &Path) -> Result<(), Error> {
+        let told = &self.0["luminaires"];
+        let count = |list: &Json| list.as_array().map_or(0, Vec::len);
+        if self.0.is_null() || told == own || count(told) + count(own) == 0 {
+            return Ok(());
+        }
+        let found = format!("baked with {} luminaires, which are not these", count(told));
+        let remedy = "verify it with the same: --luminaire and --luminaires as for the bake";
         Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
     }
 

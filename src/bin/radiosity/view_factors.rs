@@ -161,7 +161,9 @@ impl Options {
                 Long(name) => {
                     let name = name.to_string();
                     // Factors are of fronts, and --two-sided names the groups with two.
-                    if matches!(&*name, "sides" | "specular") || !reading.option(&name, parser)? {
+                    if matches!(&*name, "sides" | "specular" | "luminaire" | "luminaires")
+                        || !reading.option(&name, parser)?
+                    {
                         return Err(Long(&name).unexpected().into());
                     }
                 }

@@ -49,6 +49,8 @@ pub struct Walks<'a> {
     powers: AreaSampler,
     /// Exitance of the brightest, W/m² summed over the channels.
     brightest: f64,
+    /// Flux of each luminaire, W summed over the channels.
+    fluxes: AreaSampler,
     /// Surfaces within this distance of each other are in one place, scene unit.
     contact: f64,
 }
@@ -70,6 +72,7 @@ impl<'a> Walks<'a> {
             shining_backs: FxHashMap::default(),
             powers: AreaSampler::new(lamps.iter().map(power)),
             brightest,
+            fluxes: AreaSampler::new(scene.luminaires().iter().map(|l| l.flux().element_sum())),
             lamps,
             contact: (offset::PATH_CONTACT * scene.bounds().diagonal())
                 .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
@@ -80,7 +83,7 @@ impl<'a> Walks<'a> {
 
     /// Whether there is any light.
     pub fn has_light(&self) -> bool {
-        !self.lamps.is_empty() || !self.scene.sky().is_black()
+        !self.lamps.is_empty() || self.scene.has_light_of_no_surface()
     }
 
     /// What the surface of triangle `t` does on its sides.
@@ -116,8 +119,9 @@ impl<'a> Walks<'a> {
     pub fn walk_to_light(&self, mut at: DVec3, mut side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let mut throughput = 1.0;
         for _ in 0..MAX_BOUNCES {
-            let of_lamp = self.irradiance_of_lamp(at, side, rng);
-            if let Some(irradiance) = of_lamp.or_else(|| self.irradiance_of_sun(at, side, rng)) {
+            let direct = self.irradiance_of_lamp(at, side, rng);
+            let direct = direct.or_else(|| self.irradiance_of_luminaire(at, side, rng));
+            if let Some(irradiance) = direct.or_else(|| self.irradiance_of_sun(at, side, rng)) {
                 return Some(throughput * irradiance);
             }
             let direction = self.random_direction(side, rng);
@@ -203,6 +207,26 @@ impl<'a> Walks<'a> {
             cosine > 0.0 && !self.rays.occluded(at, direction, self.contact..f64::INFINITY, hides);
         let irradiance = || sun.irradiance.element_sum() * cosine;
         is_seen.then(|| irradiance() * self.passed(at, direction, f64::INFINITY))
+    }
+
+    /// Irradiance at a place on a side from a luminaire, chosen by flux; none if it is not seen.
+    fn irradiance_of_luminaire(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
+        let total = self.fluxes.total_area();
+        if total == 0.0 {
+            return None;
+        }
+        let luminaire = &self.scene.luminaires()[self.fluxes.locate(rng.f64()).0];
+        let point = luminaire.point([rng.f64(), rng.f64(), rng.f64()]);
+        let irradiance = luminaire.irradiance(point, at, self.normal(side));
+        let (direction, distance) = (point - at).normalize_and_length();
+        let between = self.contact..distance - self.contact;
+        let hides = |hit: &Hit| hit.triangle != side / 2;
+        if irradiance == 0.0 || self.rays.occluded(at, direction, between, hides) {
+            return None;
+        }
+        // As if all of the flux came from there.
+        let share = luminaire.scale.element_sum() * total / luminaire.flux().element_sum();
+        Some(irradiance * share * self.passed(at, direction, distance))
     }
 
     /// The share that clear panes let through, in the mean over the channels.

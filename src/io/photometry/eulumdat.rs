@@ -1,0 +1,194 @@
+//! EULUMDAT files (A. Stockmar, "EULUMDAT – ein Leuchtendatenformat für den europäischen
+//! Beleuchtungsplaner", Licht '90): a line for each thing that is told, then the numbers.
+//!
+//! | line | |
+//! |---|---|
+//! | 1 | company |
+//! | 3 to 7 | symmetry, C-planes and their step, angles γ and theirs |
+//! | 9 | name |
+//! | 16 to 21 | opening: length or diameter, width or 0, heights at C = 0°, 90°, 180°, 270°, mm |
+//! | 24 | factor for the intensities |
+//! | 26 | sets of lamps; six lines of each: number, kind, flux, colour, rendering, watts |
+//! | then | ten direct ratios, C-angles, γ-angles, intensities in cd/klm plane by plane |
+//!
+//! Length is along C = 90°, width along C = 0°.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::super::text::{Line, finite, physical_lines, place};
+use super::numbers::{Comma, Numbers};
+use super::planes::{Planes, SAME};
+use super::{Photometry, name_of};
+use crate::error::{Error, ErrorKind, quoted};
+use crate::scene::{Opening, Pole};
+
+/// Lines before those of the sets of lamps.
+const HEADER: usize = 26;
+
+/// Lines of a set of lamps.
+const LAMP_LINES: usize = 6;
+
+/// Sets of lamps, at most: the format's own limit.
+const MAX_SETS: f64 = 20.0;
+
+/// Ratios before the angles.
+const DIRECT_RATIOS: usize = 10;
+
+pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
+    let mut warnings = vec![];
+    let mut rest = physical_lines(file, text);
+    let header: Vec<Line> = rest.by_ref().take(HEADER).collect();
+    let field = |number: usize| Field { file, number, line: header.get(number - 1) };
+    let symmetry = match field(3).value() {
+        Some(code) if [0.0, 1.0, 2.0, 3.0, 4.0].contains(&code) => code as u8,
+        _ => {
+            let found = format!("{} for the symmetry", quoted(&[field(3).text()]));
+            let remedy = "give an IESNA LM-63 file, or a EULUMDAT file with 0 to 4 in line 3";
+            return Err(field(3).error(found, remedy));
+        }
+    };
+    let plane_count = field(4).count("the number of C-planes")?;
+    let polar_count = field(6).count("the number of angles in a plane")?;
+    let opening = opening([16, 17, 18, 19, 20, 21].map(|k| field(k).number_or_zero() / 1000.0));
+    let mut factor = field(24).number_or_zero();
+    if factor <= 0.0 {
+        warnings.push(format!("the factor {factor} for intensities is taken for 1"));
+        factor = 1.0;
+    }
+    let sets = field(26).number("the number of sets of lamps")?;
+    if !(0.0..=MAX_SETS).contains(&sets) || sets.fract() != 0.0 {
+        let found = format!("{sets} sets of lamps");
+        return Err(field(26).error(found, "give a whole number from 0 to 20"));
+    }
+    let lamps: Vec<Line> = rest.by_ref().take(LAMP_LINES * sets as usize).collect();
+    let lamp = |k: usize| Field { file, number: HEADER + k, line: lamps.get(k - 1) };
+    let is_absolute = lamp(1).number_or_zero() < 0.0;
+    let flux = lamp(3).number_or_zero().abs();
+    if flux > 0.0 {
+        factor *= flux / 1000.0;
+    } else {
+        warnings.push("lamps without flux: intensities are taken for candela".into());
+    }
+    let mut numbers = Numbers::new(file, rest, Comma::IsDecimal);
+    numbers.list(DIRECT_RATIOS, "a direct ratio")?;
+    let azimuths = numbers.list(plane_count, "a C-angle")?;
+    let angles = numbers.list(polar_count, "an angle γ")?;
+    let values = numbers.rest();
+    let mut measured = measured(symmetry, &azimuths);
+    let (wanted, all) = (measured.len() * polar_count, azimuths.len() * polar_count);
+    if values.len() < wanted || wanted == 0 {
+        let (found, planes) = (values.len(), measured.len());
+        let found = format!("{found} intensities for {planes} planes of symmetry {symmetry}");
+        return Err(numbers.error(found, "give a file that is whole, with counts that are right"));
+    }
+    let mut is_folded = true;
+    if values.len() >= all && all > wanted {
+        warnings.push(format!("all planes are there in spite of symmetry {symmetry}: they count"));
+        (measured, is_folded) = (azimuths, false);
+    } else if values.len() > wanted {
+        let left = values.len() - wanted;
+        warnings.push(format!("{left} numbers after the last intensity are left out"));
+    }
+    let rows = values.chunks_exact(polar_count).map(<[f64]>::to_vec);
+    let mut planes = Planes { angles, planes: measured.into_iter().zip(rows).collect() };
+    planes.sort(&mut warnings);
+    planes.scale(factor, &mut warnings);
+    let wrong = |found: String| numbers.error(found, "give those that the symmetry needs");
+    unfold(if is_folded { symmetry } else { 0 }, &mut planes).map_err(wrong)?;
+    let intensity = planes.distribution(Pole::Aim).map_err(|e| e.inside(file))?;
+    Ok(Photometry {
+        name: name_of(&format!("{} {}", field(1).text(), field(9).text())),
+        intensity: intensity.into(),
+        opening,
+        lamp_flux: (!is_absolute && flux > 0.0).then_some(flux),
+        power: lamp(6).number_or_zero().max(0.0),
+        warnings,
+    })
+}
+
+/// The C-angles of the planes that a file of this `symmetry` gives, in their order, of all.
+fn measured(symmetry: u8, azimuths: &[f64]) -> Vec<f64> {
+    let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + SAME);
+    match symmetry {
+        1 => azimuths.iter().copied().take(1).collect(),
+        2 => up_to(180.0).collect(),
+        3 => {
+            let from_270 = azimuths.iter().filter(|a| (270.0 - SAME..360.0 - SAME).contains(*a));
+            from_270.map(|a| a - 360.0).chain(up_to(90.0)).collect()
+        }
+        4 => up_to(90.0).collect(),
+        _ => azimuths.to_vec(),
+    }
+}
+
+/// Makes planes of this `symmetry` go all around; what is wrong where they cannot.
+fn unfold(symmetry: u8, planes: &mut Planes) -> Result<(), String> {
+    let Some([first, last]) = planes.span().filter(|_| planes.planes.len() > 1) else {
+        return Ok(());
+    };
+    let is = |from: f64, to: f64| (first - from).abs() < SAME && (last - to).abs() < SAME;
+    match symmetry {
+        1 => {}
+        2 if is(0.0, 180.0) => planes.mirror_at_last(),
+        3 if is(-90.0, 90.0) => planes.mirror_at_last(),
+        4 if is(0.0, 90.0) => {
+            planes.mirror_at_last();
+            planes.mirror_at_last();
+        }
+        0 if is(first, first + 360.0) => {}
+        0 if planes.can_close() => planes.close(),
+        _ => return Err(format!("C-angles {first}° to {last}° of symmetry {symmetry}")),
+    }
+    Ok(())
+}
+
+/// The opening from the numbers of its lines, metres. Without a width it is round.
+fn opening([length, width, heights @ ..]: [f64; 6]) -> Opening {
+    let is_round = width == 0.0 && length > 0.0;
+    let across = if is_round { length } else { width };
+    let height = heights.into_iter().fold(0.0, f64::max);
+    Opening { size: DVec3::new(across, length, height).max(DVec3::ZERO), is_round }
+}
+
+/// A line of the header, or none where the file ends before it.
+struct Field<'a> {
+    file: &'a Path,
+    number: usize,
+    line: Option<&'a Line<'a>>,
+}
+
+impl Field<'_> {
+    fn text(&self) -> &str {
+        self.line.map_or("", |line| &line.text)
+    }
+
+    /// What it says, with a comma or a point before fractions; none where it says no number.
+    fn value(&self) -> Option<f64> {
+        finite(self.text().split_whitespace().next()?.replace(',', ".").as_str())
+    }
+
+    /// For what light does not depend on.
+    fn number_or_zero(&self) -> f64 {
+        self.value().unwrap_or(0.0)
+    }
+
+    fn number(&self, what: &str) -> Result<f64, Error> {
+        let found = || format!("{} for {what}", quoted(&[self.text()]));
+        let remedy = "give a number; lines that are empty count as well";
+        self.value().ok_or_else(|| self.error(found(), remedy))
+    }
+
+    fn count(&self, what: &str) -> Result<usize, Error> {
+        let number = self.number(what)?;
+        if !(number >= 1.0 && number <= f64::from(u32::MAX) && number.fract() == 0.0) {
+            return Err(self.error(format!("{what} {number}"), "give a whole number from 1"));
+        }
+        Ok(number as usize)
+    }
+
+    fn error(&self, found: String, remedy: &str) -> Error {
+        Error::new(ErrorKind::Scene, place(self.file, self.number), found, remedy)
+    }
+}

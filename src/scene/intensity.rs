@@ -1,0 +1,204 @@
+//! Intensity by direction, as goniometers measure it: bilinear between the angles measured.
+//!
+//! ```text
+//!                 ╲  azimuth: C-planes, 0° to 360° around the pole
+//!        ──────────●──────────► C = 0°
+//!                  │╲
+//!           polar  │ ╲   I(C, γ) at the crossings; in a cell linear in both angles
+//!           angle γ│  ╲
+//!                  ▼ pole: γ = 0°
+//! ```
+
+use std::cmp::Ordering;
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use crate::error::{Error, ErrorKind};
+
+/// Intensity by direction, W/sr; candela where a scene's numbers are photometric. Bilinear in the
+/// two angles; none beyond the angles that are given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntensityDistribution {
+    /// Radians, ascending; one alone means that all azimuths are alike.
+    azimuths: Vec<f64>,
+    /// Radians from the pole, ascending, in [0, π].
+    polar: Vec<f64>,
+    /// Of each azimuth, those of all polar angles.
+    values: Vec<f64>,
+    pole: Pole,
+}
+
+/// The axis of a luminaire that the angles of an [`IntensityDistribution`] turn around.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pole {
+    /// Where it aims; azimuths from C = 0° towards C = 90°. Type C of the IES, and EULUMDAT.
+    #[default]
+    Aim,
+    /// Towards C = 0°; azimuths from the aim towards C = 90°. Type B.
+    C0,
+    /// Towards C = 90°; azimuths from the aim towards C = 0°. Type A.
+    C90,
+}
+
+/// Azimuths that span a whole turn but for this are closed, degrees: above the rounding of files.
+const TURN_TOLERANCE: f64 = 1e-6;
+
+impl IntensityDistribution {
+    /// For `azimuths` and `polar` angles, both in degrees and ascending, and for each azimuth the
+    /// values at all polar angles, W/sr. One azimuth alone stands for all.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] for no azimuth or fewer than two polar angles, angles that do not
+    /// ascend, azimuths of more than a turn, polar angles outside [0, 180], another number of
+    /// values than angles make, or one that is negative or not finite.
+    pub fn new(
+        azimuths: &[f64],
+        polar: &[f64],
+        values: Vec<f64>,
+    ) -> Result<IntensityDistribution, Error> {
+        let bad = |found: String, remedy: &str| {
+            Err(Error::new(ErrorKind::Scene, "intensity distribution", found, remedy))
+        };
+        if azimuths.is_empty() || polar.len() < 2 {
+            let found = format!("{} azimuths, {} polar angles", azimuths.len(), polar.len());
+            return bad(found, "give one azimuth and two polar angles at least");
+        }
+        for angles in [azimuths, polar] {
+            // Nothing ascends to or from NaN.
+            let ascends =
+                |k: usize| angles[k].partial_cmp(&angles[k - 1]) == Some(Ordering::Greater);
+            if let Some(k) = (1..angles.len()).find(|&k| !ascends(k)) {
+                let found = format!("{}° after {}°", angles[k], angles[k - 1]);
+                return bad(found, "angles must ascend");
+            }
+        }
+        let (first, last) = (azimuths[0], azimuths[azimuths.len() - 1]);
+        if !(first.is_finite() && last - first <= 360.0 + TURN_TOLERANCE) {
+            return bad(format!("azimuths {first}° to {last}°"), "they must be of one turn");
+        }
+        let (low, high) = (polar[0], polar[polar.len() - 1]);
+        if !(low >= 0.0 && high <= 180.0) {
+            return bad(format!("polar angles {low}° to {high}°"), "they must be 0° to 180°");
+        }
+        if values.len() != azimuths.len() * polar.len() {
+            let found = format!("{} values for {} angles", values.len(), azimuths.len());
+            return bad(found, "give one for each azimuth and polar angle");
+        }
+        if let Some(value) = values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
+            return bad(format!("intensity {value}"), "give at least 0, and finite");
+        }
+        let radians = |angles: &[f64]| angles.iter().map(|a| a.to_radians()).collect();
+        let (azimuths, polar) = (radians(azimuths), radians(polar));
+        Ok(IntensityDistribution { azimuths, polar, values, pole: Pole::Aim })
+    }
+
+    /// The same with angles around `pole`.
+    pub fn around(self, pole: Pole) -> IntensityDistribution {
+        IntensityDistribution { pole, ..self }
+    }
+
+    /// `intensity` in all directions, W/sr.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] when it is negative or not finite.
+    pub fn isotropic(intensity: f64) -> Result<IntensityDistribution, Error> {
+        IntensityDistribution::new(&[0.0], &[0.0, 180.0], vec![intensity; 2])
+    }
+
+    /// Intensity along a direction of unit length in the frame of the luminaire, x towards C = 0°,
+    /// y towards C = 90° and z where it aims; W/sr.
+    pub fn along(&self, direction: DVec3) -> f64 {
+        let DVec3 { x, y, z } = direction;
+        let [x, y, z] = match self.pole {
+            Pole::Aim => [x, y, z],
+            Pole::C0 => [z, y, x],
+            Pole::C90 => [z, x, y],
+        };
+        let Some((row, down)) = cell(&self.polar, x.hypot(y).atan2(z)) else { return 0.0 };
+        let at = |column: usize| {
+            let values = &self.values[column * self.polar.len() + row..];
+            values[0] + down * (values[1] - values[0])
+        };
+        if self.azimuths.len() == 1 {
+            return at(0);
+        }
+        let first = self.azimuths[0];
+        let azimuth = first + (y.atan2(x) - first).rem_euclid(TAU);
+        let Some((column, across)) = cell(&self.azimuths, azimuth) else {
+            return if self.is_closed() { at(0) } else { 0.0 };
+        };
+        let (before, after) = (at(column), at(column + 1));
+        before + across * (after - before)
+    }
+
+    /// All of the flux, W; lumens where intensities are candela. Exact: in each cell the integral
+    /// of what [`IntensityDistribution::along`] gives. Between polar angles m ∓ h, with I₀ and I₁
+    /// there,
+    ///
+    /// ```text
+    /// ∫ I sin γ dγ = (I₀ + I₁) sin m sin h + (I₁ − I₀) cos m (sin h / h − cos h)
+    /// ```
+    pub fn flux(&self) -> f64 {
+        let of_column = |column: usize| -> f64 {
+            let values = &self.values[column * self.polar.len()..];
+            let ring = |(angles, values): (&[f64], &[f64])| {
+                let (middle, half) = (angles[0].midpoint(angles[1]), (angles[1] - angles[0]) / 2.0);
+                let (even, odd) = (middle.sin() * half.sin(), middle.cos() * bend(half));
+                values[0] * (even - odd) + values[1] * (even + odd)
+            };
+            self.polar.windows(2).zip(values.windows(2)).map(ring).sum()
+        };
+        if self.azimuths.len() == 1 {
+            return TAU * of_column(0);
+        }
+        let wedges = self.azimuths.windows(2).enumerate();
+        wedges.map(|(k, a)| (a[1] - a[0]) * (of_column(k) + of_column(k + 1)) / 2.0).sum()
+    }
+
+    /// The largest intensity, W/sr.
+    pub fn peak(&self) -> f64 {
+        self.values.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Whether azimuths are all around.
+    fn is_closed(&self) -> bool {
+        let span = self.azimuths[self.azimuths.len() - 1] - self.azimuths[0];
+        span >= TAU - TURN_TOLERANCE.to_radians()
+    }
+
+    /// Numbers that two distributions share if they are the same.
+    pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
+        let pole = match self.pole {
+            Pole::Aim => 0.0,
+            Pole::C0 => 1.0,
+            Pole::C90 => 2.0,
+        };
+        let angles = self.azimuths.iter().chain(&self.polar);
+        angles.chain(&self.values).copied().chain([pole])
+    }
+}
+
+/// sin h / h − cos h, by its series where h is small and the two are nearly equal.
+fn bend(h: f64) -> f64 {
+    let square = h * h;
+    match h < 0.1 {
+        true => {
+            let inner = 1.0 / 840.0 - square / 45360.0;
+            square * (1.0 / 3.0 - square * (1.0 / 30.0 - square * inner))
+        }
+        false => h.sin() / h - h.cos(),
+    }
+}
+
+/// The step of ascending `angles` that `angle` lies in, and how far along it, in [0, 1]; none
+/// outside of them. What lies outside by the rounding of a turn counts as inside.
+fn cell(angles: &[f64], angle: f64) -> Option<(usize, f64)> {
+    const ROUNDING: f64 = TAU * f64::EPSILON;
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    if angle < first - ROUNDING || angle > last + ROUNDING {
+        return None;
+    }
+    let k = angles.partition_point(|&a| a <= angle).clamp(1, angles.len() - 1) - 1;
+    Some((k, ((angle - angles[k]) / (angles[k + 1] - angles[k])).clamp(0.0, 1.0)))
+}

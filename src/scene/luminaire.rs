@@ -1,0 +1,180 @@
+//! Luminaires: lamps that are known by the intensity which they send in each direction.
+//!
+//! ```text
+//!               ┌──── opening ────┐
+//!               │        ●────────┼──► C = 0°        position: the middle of the opening
+//!               └────────┼────────┘                  E = I(direction) cos θ / d²
+//!                        ▼ aim, γ = 0°
+//! ```
+//!
+//! They are no surfaces: nothing meets them, and pictures do not show them. With an opening all of
+//! its points send the same distribution, each its share of it: what was measured from afar is all
+//! that is known (IES Lighting Handbook, 10th edition 2011, 9.7: the far field).
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{IntensityDistribution, Rgb, Scene, WarningKind};
+use crate::error::{Error, ErrorKind};
+
+/// A lamp with a measured distribution of light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Luminaire {
+    /// Intensity by direction, W/sr. Many luminaires may share one.
+    pub intensity: Arc<IntensityDistribution>,
+    /// Middle of the opening, scene unit.
+    pub position: DVec3,
+    /// Where it aims: towards γ = 0°, straight down for what hangs from a ceiling. Of any length.
+    pub aim: DVec3,
+    /// Towards C = 0°: what of it is at right angles to `aim`. Seen from behind, as from above
+    /// where it aims down, C runs counter-clockwise.
+    pub c0: DVec3,
+    /// What of it shines.
+    pub opening: Opening,
+    /// What intensities are multiplied with, per channel.
+    pub scale: Rgb,
+}
+
+/// The part of a luminaire that shines: a box or an upright cylinder, flat or of no size at all.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Opening {
+    /// Extent along C = 0°, along C = 90° and along the aim; scene unit, metres in files.
+    pub size: DVec3,
+    /// Whether the first two are diameters.
+    pub is_round: bool,
+}
+
+impl Luminaire {
+    /// A point that sends `intensity` from `position`, aims at `aim` (of any length) and has C = 0°
+    /// towards +x, or +y if it aims along x.
+    pub fn new(
+        intensity: impl Into<Arc<IntensityDistribution>>,
+        position: DVec3,
+        aim: DVec3,
+    ) -> Luminaire {
+        let is_along_x = DVec3::X.reject_from(aim.normalize_or(DVec3::Z)).length() < 1e-6;
+        let c0 = if is_along_x { DVec3::Y } else { DVec3::X };
+        let (opening, scale) = (Opening::default(), Rgb::ONE);
+        Luminaire { intensity: intensity.into(), position, aim, c0, opening, scale }
+    }
+
+    /// The same, given in metres, for a scene whose unit is so many `metres`: the opening and the
+    /// inverse square of distances are those of that unit, so that irradiance stays per m².
+    pub fn in_unit_of(mut self, metres: f64) -> Luminaire {
+        self.opening.size /= metres;
+        self.scale /= metres * metres;
+        self
+    }
+
+    /// Flux per channel, W; lumens where intensities are candela.
+    pub fn flux(&self) -> Rgb {
+        self.intensity.flux() * self.scale
+    }
+
+    /// The same with axes of unit length at right angles.
+    fn checked(mut self, number: usize) -> Result<Luminaire, Error> {
+        let bad = |found: String, remedy: &str| {
+            Error::new(ErrorKind::Scene, format!("luminaire {number}"), found, remedy)
+        };
+        let Luminaire { position, aim, c0, scale, .. } = self;
+        if !position.is_finite() {
+            return Err(bad(format!("position {position}"), "all three must be finite"));
+        }
+        let unit = aim.try_normalize();
+        self.aim = unit.ok_or_else(|| bad(format!("aim {aim}"), "give a direction, not zero"))?;
+        let across =
+            c0.try_normalize().and_then(|c0| c0.reject_from_normalized(self.aim).try_normalize());
+        let remedy = "give a direction across the aim";
+        self.c0 = across.ok_or_else(|| bad(format!("C = 0° towards {c0}"), remedy))?;
+        let size = self.opening.size;
+        if !(size.is_finite() && size.min_element() >= 0.0) {
+            return Err(bad(format!("opening {size}"), "give at least 0 each way, and finite"));
+        }
+        if !(self.flux().is_finite() && scale.is_finite() && scale.min_element() >= 0.0) {
+            return Err(bad(format!("scale {scale}"), "give at least 0 per channel, and finite"));
+        }
+        Ok(self)
+    }
+
+    /// Towards C = 90°, unit length.
+    fn c90(&self) -> DVec3 {
+        self.c0.cross(self.aim)
+    }
+
+    /// The longest way across the opening, scene unit.
+    pub(crate) fn extent(&self) -> f64 {
+        self.opening.size.length()
+    }
+
+    /// The distance from `at` to the box around the opening, scene unit.
+    pub(crate) fn distance_to_box(&self, at: DVec3) -> f64 {
+        let local = [self.c0, self.c90(), self.aim].map(|axis| (at - self.position).dot(axis));
+        let beyond = DVec3::from_array(local).abs() - self.opening.size / 2.0;
+        beyond.max(DVec3::ZERO).length()
+    }
+
+    /// A point of the opening: points of the unit cube are spread over it evenly.
+    pub(crate) fn point(&self, [x, y, z]: [f64; 3]) -> DVec3 {
+        let [x, y] = match self.opening.is_round {
+            false => [x - 0.5, y - 0.5],
+            true => {
+                let (sine, cosine) = (std::f64::consts::TAU * y).sin_cos();
+                [0.5 * x.sqrt() * cosine, 0.5 * x.sqrt() * sine]
+            }
+        };
+        let local = self.opening.size * DVec3::new(x, y, z - 0.5);
+        self.position + local.x * self.c0 + local.y * self.c90() + local.z * self.aim
+    }
+
+    /// Irradiance at `at` with this unit `normal` where all of it shines from `point` and nothing
+    /// hides that; in units of the scale, 0 behind the surface and at `point` itself.
+    pub(crate) fn irradiance(&self, point: DVec3, at: DVec3, normal: DVec3) -> f64 {
+        let (direction, distance) = (at - point).normalize_and_length();
+        let cosine = -normal.dot(direction);
+        // NaN is of no distance.
+        if cosine.is_nan() || cosine <= 0.0 {
+            return 0.0;
+        }
+        let local = [self.c0, self.c90(), self.aim].map(|axis| direction.dot(axis));
+        let far = self.intensity.along(DVec3::from_array(local)) * cosine;
+        let irradiance = far / (distance * distance);
+        if irradiance.is_finite() { irradiance } else { 0.0 }
+    }
+
+    /// Numbers that two luminaires share if they are the same.
+    pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
+        let Luminaire { position, aim, c0, opening, scale, .. } = self;
+        let vectors = [*position, *aim, *c0, opening.size, *scale];
+        let vectors = vectors.into_iter().flat_map(|v| v.to_array());
+        vectors.chain([f64::from(u8::from(opening.is_round))]).chain(self.intensity.key())
+    }
+}
+
+impl Scene {
+    /// The luminaires; none unset. Their axes have unit length and are at right angles.
+    pub fn luminaires(&self) -> &[Luminaire] {
+        &self.luminaires
+    }
+
+    /// The same scene with these luminaires in the place of its own. What was said of a scene
+    /// without light is said no more.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] for a position, an opening or a scale that is not finite, an opening or
+    /// scale below 0, or axes that are no directions or the same.
+    pub fn with_luminaires(mut self, luminaires: Vec<Luminaire>) -> Result<Scene, Error> {
+        let numbered = (1..).zip(luminaires);
+        self.luminaires =
+            numbered.map(|(k, luminaire)| luminaire.checked(k)).collect::<Result<_, _>>()?;
+        if !self.luminaires.is_empty() {
+            self.warnings.retain(|warning| warning.kind != WarningKind::NoLight);
+        }
+        Ok(self)
+    }
+
+    /// Whether there is light that no surface emits: a sky, the sun, luminaires. It is gathered.
+    pub(crate) fn has_light_of_no_surface(&self) -> bool {
+        !self.sky.is_black() || !self.luminaires.is_empty()
+    }
+}

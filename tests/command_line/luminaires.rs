@@ -1,0 +1,94 @@
+//! Luminaires, as the program takes them.
+
+use std::path::Path;
+
+use crate::{refused, room, run, write};
+
+/// An LM-63 file of a point that sends 100 cd in all directions.
+const EVEN: &str = "IESNA:LM-63-2002\n[LUMINAIRE] Bulb\nTILT=NONE\n\
+                    1 -1 1 2 1 1 2 0 0 0\n1 1 9\n0 180\n0\n100 100\nleft\n";
+
+/// The solution and the report of the room `scene` with these `options`.
+fn baked(scene: &Path, options: &[&str]) -> (radiosity::VertexMesh, serde_json::Value, String) {
+    let scene_name = scene.display().to_string();
+    let mut args = vec![scene_name.as_str(), "--error", "0.1", "--cpu", "--write", "json,ply"];
+    args.extend(options);
+    let out = run("bake", &args);
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "{said}");
+    let json = std::fs::read(scene.with_extension("json")).unwrap();
+    let table = said + &String::from_utf8(out.stdout).unwrap();
+    let solution = radiosity::io::read_ply(scene.with_extension("ply")).unwrap();
+    (solution, serde_json::from_slice(&json).unwrap(), table)
+}
+
+#[test]
+fn luminaires_light_a_room_and_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "room.obj", &room(6));
+    let lamp = write(folder.path(), "bulb.ies", EVEN).display().to_string();
+    let at = format!("{lamp}@0.5,0.4,0.6");
+    let (solution, report, said) = baked(&scene, &["--luminaire", &at]);
+    assert!(solution.radiosity.iter().all(|b| b.x > 0.0));
+    // 100 cd all around.
+    let lumens = report["luminaires"][0]["lumens"][0].as_f64().unwrap();
+    assert!((lumens / (400.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12, "{lumens}");
+    assert_eq!(report["luminaires"][0]["name"], "Bulb");
+    assert!(report["warnings"][0].as_str().unwrap().contains("bulb.ies: 1 words"), "{report}");
+    assert!(said.contains("(Bulb): 1 of 1256.6 lm") && !said.contains("sky of"), "{said}");
+    // Without them it is another scene; with them it is what it was.
+    let (scene_name, ply) = (scene.display().to_string(), scene.with_extension("ply"));
+    let ply = ply.display().to_string();
+    let verify = |more: &[&str]| {
+        let out = run("verify", &[&[scene_name.as_str(), ply.as_str()][..], more].concat());
+        (out.status.success(), String::from_utf8(out.stderr).unwrap())
+    };
+    let (fine, said) = verify(&["--sky", "none"]);
+    assert!(!fine && said.contains("baked with 1 luminaires"), "{said}");
+    let (fine, said) = verify(&["--luminaire", &at, "--precision", "1"]);
+    assert!(fine, "{said}");
+    // A list with the lamp twice at half of its light, one aimed somewhere; in millimetres.
+    let list = r#"[{"file": "bulb.ies", "at": [500, 400, 600], "scale": 0.5},
+                   {"file": "bulb.ies", "at": [500, 400, 600], "aim": [1, 0, 0], "c0": [0, 0, 1],
+                    "scale": [0.5, 0.5, 0.5]}]"#;
+    let list = write(folder.path(), "lamps.json", list).display().to_string();
+    let large = room(6).lines().map(in_mm).collect::<Vec<_>>().join("\n");
+    let large = write(folder.path(), "large.obj", &large);
+    let (same, report, _) = baked(&large, &["--luminaires", &list, "--metres-per-unit", "0.001"]);
+    assert_eq!(report["luminaires"].as_array().unwrap().len(), 2);
+    let brightest = |s: &radiosity::VertexMesh| s.radiosity.iter().map(|b| b.x).fold(0.0, f64::max);
+    let ratio = brightest(&same) / brightest(&solution);
+    // The same light in another unit, to half of the error asked for.
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+/// A line of an OBJ file in metres, in millimetres.
+fn in_mm(line: &str) -> String {
+    let Some(numbers) = line.strip_prefix("v ") else { return line.into() };
+    let scaled = numbers.split_whitespace().map(|n| (1e3 * n.parse::<f64>().unwrap()).to_string());
+    format!("v {}", scaled.collect::<Vec<_>>().join(" "))
+}
+
+#[test]
+fn wrong_luminaires_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "room.obj", &room(6)).display().to_string();
+    let lamp = write(folder.path(), "bulb.ies", EVEN).display().to_string();
+    for (option, value, words) in [
+        ("--luminaire", lamp.clone(), "FILE@x,y,z"),
+        ("--luminaire", format!("{lamp}@1,2"), "FILE@x,y,z"),
+        ("--luminaire", format!("{lamp}@1,2,3:1,2"), "FILE@x,y,z"),
+        ("--luminaire", format!("{lamp}@1,2,3:0,0,1:1,0,0:0,0,1"), "FILE@x,y,z"),
+        ("--luminaire", format!("{lamp}@1,2,3*x"), "FILE@x,y,z"),
+        ("--luminaire", format!("{lamp}@1,2,3:0,0,0"), "aim"),
+        ("--luminaire", format!("{lamp}@1,2,3:0,0,1:0,0,2"), "C = 0"),
+        ("--luminaire", format!("{lamp}@1,2,3*-1"), "at least 0"),
+        ("--luminaire", format!("{scene}@1,2,3"), "LM-63"),
+        ("--luminaire", "nothing.ies@1,2,3".into(), "nothing.ies"),
+        ("--luminaires", "nothing.json".into(), "nothing.json"),
+        ("--luminaires", scene.clone(), "\"at\""),
+        ("--metres-per-unit", "0".into(), "above 0"),
+    ] {
+        refused(&[&scene, option, &value], &[words]);
+    }
+}
