@@ -159,33 +159,15 @@ impl RadiosityField<'_> {
     /// channels. What is darker is not worth most of the elements.
     pub(crate) fn radiosity_floor(&self) -> f64 {
         let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
-        for (reflected, element_area) in self.reflecting_elements() {
-            flux += reflected * element_area;
-            area += element_area;
+        for (e, corners) in self.corners.iter().enumerate() {
+            let node = self.mesh.element(e);
+            if self.mesh.material(node).scatters() {
+                let mean = corners.iter().map(|&v| self.reflected[v as usize]).sum::<Rgb>() / 3.0;
+                flux += mean.length() * self.mesh.solid_area(node);
+                area += self.mesh.solid_area(node);
+            }
         }
         RADIOSITY_FLOOR_SHARE * flux / area
-    }
-
-    /// Reflected radiosity of what is bright, W/m²: a length over the channels, and the mean over
-    /// all light that leaves surfaces, of those that it leaves.
-    pub(crate) fn bright_radiosity(&self) -> f64 {
-        let (mut square, mut flux) = (0.0, f64::MIN_POSITIVE);
-        for (reflected, area) in self.reflecting_elements() {
-            square += reflected * reflected * area;
-            flux += reflected * area;
-        }
-        square / flux
-    }
-
-    /// The reflected radiosity, a length over the channels in W/m², and the area of each element
-    /// that reflects.
-    fn reflecting_elements(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.corners.iter().enumerate().filter_map(|(e, corners)| {
-            let node = self.mesh.element(e);
-            let mean = || corners.iter().map(|&v| self.reflected[v as usize]).sum::<Rgb>() / 3.0;
-            let scatters = self.mesh.material(node).scatters();
-            scatters.then(|| (mean().length(), self.mesh.solid_area(node)))
-        })
     }
 
     /// Radiosity that barycentric position (`u`, `v`) of the scene's triangle `t` reflects, W/m²

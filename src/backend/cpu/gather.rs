@@ -10,13 +10,11 @@
 //! The number of rays doubles until halves of them agree, or the most is reached:
 //!
 //! ```text
-//! error = max(|E_first − E_second|, c / n) / 2   ≤   noise · max(E, dim) ?
+//! error = max(|E_first − E_second|, c_max / n) / 2   ≤   noise · max(E, dim) ?
 //! ```
 //!
-//! E_first and E_second being those of the two halves of the rays, and c the largest contribution
-//! of one ray, but no less than what is bright in the scene: all rays may have missed the same
-//! small source. Did only those points take more rays that had met it, the others would stop at
-//! darkness, and dim places that see a little of something bright were too dark in the mean.
+//! E_first and E_second being those of the two halves of the rays, and c_max the largest
+//! contribution of one ray: both halves may miss the same small source.
 
 mod point_rows;
 
@@ -97,8 +95,8 @@ impl RayGather {
     /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
     /// `noise`·max(E, `dim`), E being the irradiance and `dim` in W/m². The estimate is half the
     /// larger of: the difference between the irradiance of both halves of the rays, and the largest
-    /// contribution of one ray, or that of one that meets what is bright in the scene. Few points
-    /// need more rays: those that are dim.
+    /// contribution of one ray. Few points need more rays, such as those that see a bright spot
+    /// through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
         let max_rays = if noise.is_finite() {
             (self.min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS)
@@ -109,22 +107,12 @@ impl RayGather {
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
-    /// Radiosity of what is bright among all that rays of `field` may meet, W/m²; 0 where nobody
-    /// asks for it.
-    fn bright(&self, field: &RadiosityField) -> f64 {
-        if self.noise.is_infinite() {
-            return 0.0;
-        }
-        field.bright_radiosity().max(PI * field.mesh.scene().sky().brightest())
-    }
-
     /// What arrives at `point` from each of `fields`, all of one scene, with the same rays: as many
-    /// as the first takes, among which there is something `bright` (W/m²).
+    /// as the first takes.
     fn irradiance<const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
-        bright: f64,
     ) -> [IrradianceSample; FIELDS] {
         let scene = fields[0].mesh.scene();
         let lights = self.sampled_lights(scene, point);
@@ -147,7 +135,7 @@ impl RayGather {
             let [a, b] = [&sums, &second].map(|half| sample(half, count / 2)[0].irradiance);
             sums.add(&second);
             let all = sample(&sums, count);
-            let largest_share = sums.max_contribution.max(bright) / f64::from(count);
+            let largest_share = sums.max_contribution / f64::from(count);
             let difference = a.distance(b).max(largest_share);
             let allowed = self.noise * all[0].irradiance.length().max(self.dim);
             if difference / 2.0 <= allowed || count == self.max_rays {
@@ -420,8 +408,7 @@ impl Gather for RayGather {
         sources: &RadiosityField,
         places: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        let bright = self.bright(sources);
-        Ok(places.par_iter().map(|p| self.irradiance([sources], p, bright)[0]).collect())
+        Ok(places.par_iter().map(|p| self.irradiance([sources], p)[0]).collect())
     }
 
     fn gather_both(
@@ -429,8 +416,7 @@ impl Gather for RayGather {
         sources: [&RadiosityField; 2],
         places: &[GatherPoint],
     ) -> Result<[Vec<IrradianceSample>; 2], Error> {
-        let bright = self.bright(sources[0]);
-        let both = places.par_iter().map(|p| self.irradiance(sources, p, bright).into());
+        let both = places.par_iter().map(|p| self.irradiance(sources, p).into());
         let (first, second) = both.unzip::<IrradianceSample, IrradianceSample, _, _>();
         Ok([first, second])
     }
