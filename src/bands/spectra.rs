@@ -144,6 +144,10 @@ impl Bands {
             let remedy = format!("give one for each of the scene's {wanted}");
             return wrong("materials of bands", format!("{found} of them"), &remedy);
         }
+        if !scene.luminaires().is_empty() {
+            let found = format!("{} in the scene", scene.luminaires().len());
+            return wrong("luminaires", found, "they have no bands: bake without them");
+        }
         for (values, place) in [(&self.sky, "sky"), (&self.sun, "sun")] {
             check_count(values, "values", &self.bands, place)?;
             if let Some(bad) = values.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {

@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use radiosity::bands::{Band, BandMaterial};
-use radiosity::{Bands, Material};
+use radiosity::scene::IntensityDistribution;
+use radiosity::{Bands, Luminaire, Material};
 
 use super::{bake, glow, glowing, numbered};
 use crate::common::cube;
@@ -39,6 +41,15 @@ fn bad_bands_are_refused() {
     refused(&|bands| bands.sun[1] = f64::INFINITY, &["sun", "inf"]);
     let three = Band { name: "2".into(), wavelength: None };
     refused(&|bands| bands.bands.push(three.clone()), &["sky: 2 values", "give 3"]);
+}
+
+#[test]
+fn luminaires_have_no_bands() {
+    let intensity = IntensityDistribution::isotropic(1.0).unwrap();
+    let lamp = Luminaire::new(intensity, DVec3::splat(0.5), -DVec3::Z);
+    let scene = cube(&glow()).with_luminaires(vec![lamp]).unwrap();
+    let error = good().check(&scene).unwrap_err().to_string();
+    assert!(error.contains("luminaires: 1 in the scene"), "{error}");
 }
 
 #[test]

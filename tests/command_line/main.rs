@@ -330,7 +330,7 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
             &["fry"][..],
             &[
                 "'fry'",
-                "bake, view-factors, merge, heat, grid, probes, trade-off",
+                "bake, light-map, view-factors, merge, heat, grid, probes, trade-off",
                 "radiosity --help",
             ][..],
         ),
