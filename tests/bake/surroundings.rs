@@ -145,8 +145,9 @@ fn each_group_meets_its_error_on_a_plane_under_a_sky() {
     assert_eq!(scene.groups()[baked.groups[0].group as usize], "ground");
     for group in &baked.groups[1..] {
         assert!(group.area_share < 1e-5, "{group:?}");
-        // Of 32 points, half of them where errors are likely: some lie between lamp and ceiling,
-        // where nobody sees them.
-        assert!(group.estimate.total <= 0.1 && group.estimate.samples >= 16, "{group:?}");
+        // Of 48 points, half of them where errors are likely. In a scene of 1.7 km what is within
+        // 0.17 m of another surface counts as a crack: of the low block, whose errors are at its
+        // foot, about two thirds. 16 ± 3.3 are left, by chance 8 or more.
+        assert!(group.estimate.total <= 0.1 && group.estimate.samples >= 8, "{group:?}");
     }
 }
