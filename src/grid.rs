@@ -15,6 +15,8 @@
 //! [measured](MeasuringGrid::measure) in the light of a bake. Strip and spacing are those of EN
 //! 12464-1 unless [`GridSettings`] say otherwise.
 
+mod measuring_grid;
+mod plane;
 mod quantity;
 mod settings;
 mod statistics;
@@ -27,33 +29,12 @@ use glam::DVec3;
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, PointIrradiance, irradiance_at};
 use crate::scene::{Rgb, Scene};
+pub use measuring_grid::MeasuringGrid;
+pub use plane::GridPlane;
 pub use quantity::Quantity;
 pub use settings::GridSettings;
 pub use statistics::GridStatistics;
 use surface::LevelSurface;
-
-/// A parallelogram in space. Light arrives at it from where the cross product of its edges points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GridPlane {
-    /// A corner, scene unit.
-    pub origin: DVec3,
-    /// The two edges from there, scene unit.
-    pub edges: [DVec3; 2],
-}
-
-/// The points of a plane at which light is measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeasuringGrid {
-    /// What it is called: after the group below it, if there is one.
-    pub name: String,
-    /// What the cells fill: without the strip along the walls.
-    pub plane: GridPlane,
-    /// Points along each edge.
-    pub counts: [usize; 2],
-    /// Positions, scene unit, row by row: those along the first edge follow one another. `None`
-    /// where the surface below ends, or is nearer to its end than the strip is wide.
-    pub points: Vec<Option<DVec3>>,
-}
 
 /// A grid, and what was measured at its points.
 #[derive(Clone, Debug)]
@@ -62,28 +43,6 @@ pub struct MeasuredGrid {
     pub grid: MeasuringGrid,
     /// What arrives, in the order of [`MeasuringGrid::points`]; `None` where there is none.
     pub values: Vec<Option<PointIrradiance>>,
-}
-
-impl GridPlane {
-    /// Unit normal.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Setting`] for a plane without area, or one that is not finite.
-    pub fn normal(&self) -> Result<DVec3, Error> {
-        let [u, v] = self.edges;
-        let normal = u.normalize_or_zero().cross(v.normalize_or_zero());
-        let normal = normal.try_normalize().filter(|_| self.origin.is_finite());
-        normal.ok_or_else(|| {
-            let found = format!("from {} along {u} and {v}", self.origin);
-            let remedy = "give a finite corner and two edges that are not parallel";
-            Error::new(ErrorKind::Setting, "measuring plane", found, remedy)
-        })
-    }
-
-    /// The point at these shares of both edges.
-    fn at(&self, [x, y]: [f64; 2]) -> DVec3 {
-        self.origin + self.edges[0] * x + self.edges[1] * y
-    }
 }
 
 impl MeasuringGrid {
@@ -143,22 +102,6 @@ impl MeasuringGrid {
             let place = format!("grid above group '{group}'");
             Error::new(ErrorKind::Setting, place, found, "give a narrower strip, or 0")
         })
-    }
-
-    /// The grid whose cells fill `plane`, with the points that are `inside`.
-    fn filling(
-        name: String,
-        plane: GridPlane,
-        settings: &GridSettings,
-        inside: impl Fn(DVec3) -> bool,
-    ) -> Result<MeasuringGrid, Error> {
-        let counts = settings.counts(plane.edges.map(DVec3::length))?;
-        let middle = |k: usize, axis: usize| (k as f64 + 0.5) / counts[axis] as f64;
-        let cells = (0..counts[1]).flat_map(|row| (0..counts[0]).map(move |column| (row, column)));
-        let points = cells
-            .map(|(row, column)| plane.at([middle(column, 0), middle(row, 1)]))
-            .map(|p| inside(p).then_some(p));
-        Ok(MeasuringGrid { name, plane, counts, points: points.collect() })
     }
 
     /// Edges of a cell, scene unit.

@@ -17,13 +17,16 @@
 mod atlas;
 mod coverage;
 mod dilation;
+mod footprint;
 mod gathered;
 mod given_coordinates;
+mod layout;
 mod sampled;
 mod seams;
 mod texel_points;
 mod unwrapping;
 
-pub use atlas::{Atlas, Coordinates, Resolution};
+pub use atlas::{Atlas, Coordinates};
 pub use gathered::LightMap;
 pub use given_coordinates::Unusable;
+pub use layout::Resolution;

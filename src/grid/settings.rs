@@ -1,6 +1,5 @@
 //! How far apart points are, and how far off the walls: EN 12464-1.
 
-use super::GridPlane;
 use crate::error::{Error, ErrorKind};
 
 /// How a grid is laid out. Its lengths are in metres, as those of the norm.
@@ -83,20 +82,5 @@ impl GridSettings {
                 Err(Error::new(ErrorKind::Setting, place, value.to_string(), remedy))
             }
         }
-    }
-}
-
-impl GridPlane {
-    /// The plane without a strip of this width along its edges, scene unit; none where nothing is
-    /// left.
-    pub(super) fn without(&self, strip: f64) -> Option<GridPlane> {
-        let [u, v] = self.edges;
-        // Of a parallelogram, along each edge: the strip is measured across the other one.
-        let sine = u.normalize_or_zero().cross(v.normalize_or_zero()).length();
-        let shares = [u, v].map(|edge| strip / (sine * edge.length()));
-        shares.iter().all(|share| *share < 0.5).then(|| GridPlane {
-            origin: self.at(shares),
-            edges: [u * (1.0 - 2.0 * shares[0]), v * (1.0 - 2.0 * shares[1])],
-        })
     }
 }

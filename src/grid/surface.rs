@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
-use super::{GridPlane, GridSettings, MeasuringGrid};
+use super::measuring_grid::MeasuringGrid;
+use super::plane::GridPlane;
+use super::settings::GridSettings;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::geometry::rectangle::Rectangle;
 use crate::geometry::union_find::UnionFind;

@@ -5,21 +5,12 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::given_coordinates::{self, Unusable};
+use super::layout::{Layout, Resolution, in_texels};
 use super::unwrapping;
 use crate::error::{Error, ErrorKind};
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
-
-/// How large the texels of a light map are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Resolution {
-    /// Edge of a texel on the surface, scene unit, above 0: the mean of all where the texture
-    /// coordinates are those of the file.
-    TexelSize(f64),
-    /// Texels along a side of the map; where surfaces are laid out anew its height may be less.
-    Pixels(u32),
-}
 
 /// Which texture coordinates a light map has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,20 +33,6 @@ pub struct Atlas {
     charts: Option<usize>,
     unusable: Option<Unusable>,
 }
-
-/// Places of triangles in a map, before it is known for which scene.
-pub(super) struct Layout {
-    /// Texels in a row, and rows.
-    pub size: [u32; 2],
-    /// Of the corners of each triangle, as [`Atlas::coordinates`] has them.
-    pub coordinates: Vec<[DVec2; 3]>,
-    /// Connected parts of surfaces that were laid out, if they were.
-    pub charts: Option<usize>,
-}
-
-/// Texels along a side of a map at most: what any graphics device takes (WebGPU's
-/// `maxTextureDimension2D`).
-pub(super) const MAX_SIDE: u32 = 8192;
 
 impl Atlas {
     /// Lays out all triangles of `scene`, one for each side that reflects
@@ -166,38 +143,4 @@ impl Atlas {
         let [a, b, c] = self.corners(t);
         a * (1.0 - u - v) + b * u + c * v
     }
-}
-
-/// Texture coordinates in units of texels, from the centre of the upper left one.
-pub(super) fn in_texels(coordinates: [DVec2; 3], [width, height]: [u32; 2]) -> [DVec2; 3] {
-    coordinates.map(|p| p * DVec2::new(width.into(), height.into()) - 0.5)
-}
-
-impl Resolution {
-    fn check(self) -> Result<(), Error> {
-        match self {
-            Resolution::TexelSize(size) if !(size > 0.0 && size.is_finite()) => {
-                let remedy = "give a length above 0, in the scene's unit";
-                let place = format!("texels of {size}");
-                Err(Error::new(ErrorKind::Setting, place, "not above 0", remedy))
-            }
-            Resolution::Pixels(side) if side == 0 || side > MAX_SIDE => {
-                Err(bad_size(self, "out of range".into()))
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// The error of a map that is too large, or too small for its surfaces: `found` says how.
-pub(super) fn bad_size(resolution: Resolution, found: String) -> Error {
-    let place = match resolution {
-        Resolution::TexelSize(size) => format!("texels of {size}"),
-        Resolution::Pixels(pixels) => format!("{pixels} texels along a side"),
-    };
-    let remedy = match resolution {
-        Resolution::TexelSize(_) => format!("ask for larger ones: up to {MAX_SIDE} along a side"),
-        Resolution::Pixels(_) => format!("ask for 1 to {MAX_SIDE}, and enough for all surfaces"),
-    };
-    Error::new(ErrorKind::Setting, place, found, remedy)
 }

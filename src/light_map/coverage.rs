@@ -15,8 +15,6 @@
 
 use glam::DVec2;
 
-use super::atlas::Atlas;
-
 /// In place of a triangle's index, for texels that none covers.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
@@ -24,18 +22,21 @@ pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 /// leave of them across 8192 texels.
 pub(super) const ROUNDING: f64 = 1e-3;
 
-/// For each texel of `atlas` the triangle that it gathers on: of those that cover it the one
-/// nearest to its centre, the first of several.
-pub(super) fn triangles_of_texels(atlas: &Atlas) -> Vec<u32> {
-    let texels = atlas.size[0] as usize * atlas.size[1] as usize;
+/// For each texel of a map of this `size` the one of `triangles`, by their corners in units of
+/// texels, that it gathers on: of those that cover it the one nearest to its centre, the first of
+/// several.
+pub(super) fn triangles_of_texels(
+    size: [u32; 2],
+    triangles: impl Iterator<Item = [DVec2; 3]>,
+) -> Vec<u32> {
+    let texels = size[0] as usize * size[1] as usize;
     let mut owners = vec![NO_TRIANGLE; texels];
     let mut distances = vec![f32::INFINITY; texels];
-    for t in 0..atlas.coordinates.len() {
-        let corners = atlas.corners(t);
-        for_each_texel_around(corners, 1.0 - ROUNDING, atlas.size, |texel, centre| {
+    for (t, corners) in (0..).zip(triangles) {
+        for_each_texel_around(corners, 1.0 - ROUNDING, size, |texel, centre| {
             let distance = nearest_point(corners, centre).1 as f32;
             if distance < distances[texel] {
-                (owners[texel], distances[texel]) = (t as u32, distance);
+                (owners[texel], distances[texel]) = (t, distance);
             }
             true
         });

@@ -82,7 +82,8 @@ impl LightMap {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<LightMap>, Error> {
         check_scene(&atlas, light)?;
-        let triangles = triangles_of_texels(&atlas);
+        let places = (0..atlas.coordinates.len()).map(|t| atlas.corners(t));
+        let triangles = triangles_of_texels(atlas.size, places);
         let covered: Vec<u32> = (0..triangles.len() as u32)
             .filter(|&texel| triangles[texel as usize] != NO_TRIANGLE)
             .collect();

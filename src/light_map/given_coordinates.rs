@@ -4,8 +4,8 @@ use std::fmt;
 
 use glam::DVec2;
 
-use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size, in_texels};
 use super::coverage::{NO_TRIANGLE, depth_inside, for_each_texel_around};
+use super::layout::{Layout, MAX_SIDE, Resolution, bad_size, in_texels};
 use crate::error::Error;
 use crate::scene::Scene;
 

@@ -18,7 +18,7 @@ use glam::DVec2;
 
 use super::atlas::Atlas;
 use super::coverage::ROUNDING;
-use super::sampled::Footprint;
+use super::footprint::Footprint;
 use crate::mesh::SurfaceTopology;
 use crate::scene::Rgb;
 

@@ -9,7 +9,7 @@ use glam::DVec2;
 use rustc_hash::FxHashMap;
 use uvunwrap::{Density, MeshInput, Options, OutputMesh, Packing};
 
-use super::atlas::{Layout, MAX_SIDE, Resolution, bad_size};
+use super::layout::{Layout, MAX_SIDE, Resolution, bad_size};
 use crate::error::Error;
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;

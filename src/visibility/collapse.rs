@@ -16,7 +16,9 @@
 use arrayvec::ArrayVec;
 
 use super::sah_tree::SahTree;
-use super::wide_bvh::WIDTH;
+
+/// Boxes in a wide node.
+pub(super) const WIDTH: usize = 8;
 
 /// How the tree is cut below each of its nodes.
 pub(super) struct Collapse {

@@ -17,8 +17,9 @@
 use arrayvec::ArrayVec;
 use glam::Vec4;
 
+use super::collapse::WIDTH;
 use super::ray32::{BoxPlanes, Ray32, splat};
-use super::wide_bvh::{Child, ChildKind, WIDTH, WideBvh};
+use super::wide_bvh::{Child, ChildKind, WideBvh};
 
 /// Rays traced together at most. Their numbers are bytes; twice as many take as long each.
 pub(super) const MAX_STREAM: usize = 64;

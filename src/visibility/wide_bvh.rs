@@ -12,13 +12,10 @@
 use arrayvec::ArrayVec;
 use glam::{DVec3, Vec4};
 
-use super::collapse::Collapse;
+use super::collapse::{Collapse, WIDTH};
 use super::ray32::{BoxPlanes, Ray32, splat};
 use super::sah_tree::{MAX_LEVELS, SahTree};
 use super::triangle_pack::TrianglePack;
-
-/// Boxes in a node.
-pub(super) const WIDTH: usize = 8;
 
 /// Open boxes at most: on each level all of a node but the one that is entered.
 const MAX_OPEN: usize = (WIDTH - 1) * MAX_LEVELS as usize + WIDTH;
