@@ -77,6 +77,7 @@ fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Resu
     let size = (width as usize, height as usize);
     let image = Image::from_encoded_channels(size, Encoding::FAST_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(vec![]);
-    image.write().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;
+    // One block after the other: in parallel they would come in another order on each run.
+    image.write().non_parallel().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;
     write_file(path, |out| std::io::Write::write_all(out, bytes.get_ref()))
 }

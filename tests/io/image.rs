@@ -29,6 +29,27 @@ fn exr_reads_back_bit_for_bit() {
     assert_eq!(read.layer_data.channel_data.pixels, want);
 }
 
+/// Blocks that several threads compress may come in any order.
+#[test]
+fn exr_has_the_same_bytes_on_every_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let (width, height) = (64, 1024);
+    let pixel = |k: u32| Rgb::splat(f64::from(k.wrapping_mul(2_654_435_761) % 1009));
+    let image = RadianceImage {
+        width,
+        height,
+        pixels: (0..width * height).map(pixel).collect(),
+        sky: vec![false; (width * height) as usize],
+    };
+    let bytes = |k: u32| {
+        let path = folder.path().join(format!("{k}.exr"));
+        write_exr(&path, &image).unwrap();
+        std::fs::read(path).unwrap()
+    };
+    let first = bytes(0);
+    assert!((1..10).all(|k| bytes(k) == first));
+}
+
 #[test]
 fn png_has_every_pixel_through_the_tone_curve() {
     let (image, folder) = (image(), tempfile::tempdir().unwrap());
