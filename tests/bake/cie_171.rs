@@ -7,10 +7,10 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::gather::{Gather, GatherPoint, RadiosityField};
+use radiosity::gather::{Gather, GatherPoint};
 use radiosity::{
-    Backend, BakeSettings, BakeTarget, IntensityDistribution, Luminaire, Material, Rgb, Scene, Sky,
-    Sun,
+    Backend, BakeSettings, BakeTarget, GatheredMesh, IntensityDistribution, Luminaire, Material,
+    Rgb, Scene, Sky, Sun,
 };
 
 use crate::common::keep_going;
@@ -35,16 +35,16 @@ fn sunlit(surface: Quad, rho: f64, others: &[Quad], direction: DVec3, cosine: f6
     quads(&all).with_sky(sky).unwrap()
 }
 
-/// Holds what the settled light of `scene` brings to `places` with this `normal`, without what
+/// The settled light of `scene`.
+fn settled(scene: Scene) -> GatheredMesh {
+    BakeTarget::Error(0.01).bake(scene, &Backend::Cpu, keep_going).unwrap().light
+}
+
+/// Holds what `settled` light brings to `places` with this `normal`, without what
 /// comes straight from the sun, against the form factor to what is seen of the surface that
 /// reflects, and that against the table.
-fn check(scene: Scene, normal: DVec3, places: &[Place], seen: impl Fn(DVec3) -> Quad) {
-    let settled = BakeTarget::Error(0.01).bake(scene, &Backend::Cpu, keep_going).unwrap().light;
-    let field = RadiosityField {
-        mesh: &settled.mesh,
-        corners: &settled.corners,
-        reflected: &settled.reflected,
-    };
+fn check(settled: &GatheredMesh, normal: DVec3, places: &[Place], seen: impl Fn(DVec3) -> Quad) {
+    let field = settled.radiosity_field();
     let at = |place: &Place| DVec3::from_array(place.1);
     let point =
         |place: &Place| GatherPoint { position: at(place) + 1e-6 * normal, normal, near: 1e-7 };
@@ -69,12 +69,12 @@ fn case_5_6_reflection_by_a_diffuse_surface() {
     let (wall, ceiling) =
         (walls([0.0, 0.0, 0.5], [4.0, 4.0, 3.0])[2], facing_down([0.0, 4.0], [0.0, 4.0], 3.0));
     let (sine, cosine) = 35f64.to_radians().sin_cos();
-    let scene = || sunlit(floor, 0.3, &[wall, ceiling], DVec3::new(0.0, cosine, sine), sine);
+    let light = settled(sunlit(floor, 0.3, &[wall, ceiling], DVec3::new(0.0, cosine, sine), sine));
     let on_wall = [('B', 35.901), ('C', 27.992), ('D', 21.639), ('E', 16.716), ('F', 12.967)];
     let heights = (0..).map(|k| 0.75 + 0.5 * f64::from(k));
     let on_wall: Vec<Place> =
         on_wall.iter().zip(heights).map(|(&(n, table), z)| (n, [2.0, 0.0, z], table)).collect();
-    check(scene(), DVec3::Y, &on_wall, |_| floor);
+    check(&light, DVec3::Y, &on_wall, |_| floor);
     let on_ceiling = [
         ('G', 26.80),
         ('H', 30.94),
@@ -88,7 +88,7 @@ fn case_5_6_reflection_by_a_diffuse_surface() {
     let depths = (0..).map(|k| 0.25 + 0.5 * f64::from(k));
     let on_ceiling: Vec<Place> =
         on_ceiling.iter().zip(depths).map(|(&(n, table), y)| (n, [2.0, y, 3.0], table)).collect();
-    check(scene(), DVec3::NEG_Z, &on_ceiling, |_| floor);
+    check(&light, DVec3::NEG_Z, &on_ceiling, |_| floor);
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn case_5_7_reflection_past_an_obstruction() {
     let others: Vec<Quad> =
         block([0.0, 2.5, 0.0], [4.0, 2.7, 1.0]).into_iter().chain([wall, floor]).collect();
     let (sine, cosine) = 60f64.to_radians().sin_cos();
-    let scene = || sunlit(sunny, 0.6, &others, DVec3::new(0.0, -cosine, sine), cosine);
+    let light = settled(sunlit(sunny, 0.6, &others, DVec3::new(0.0, -cosine, sine), cosine));
     // What is seen of the wall past the nearer and the further edge of the block's top.
     let seen = |from: DVec3| {
         let past = |edge: f64| from.z + (1.0 - from.z) * (4.0 - from.y) / (edge - from.y);
@@ -113,12 +113,12 @@ fn case_5_7_reflection_past_an_obstruction() {
     let heights = (0..).map(|k| 2.75 - 0.5 * f64::from(k));
     let on_wall: Vec<Place> =
         on_wall.iter().zip(heights).map(|(&(n, table), z)| (n, [2.0, 0.0, z], table)).collect();
-    check(scene(), DVec3::Y, &on_wall, seen);
+    check(&light, DVec3::Y, &on_wall, seen);
     let on_floor = [('G', 3.38), ('H', 3.63), ('I', 3.01), ('J', 0.0), ('K', 0.0)];
     let depths = (0..).map(|k| 0.25 + 0.5 * f64::from(k));
     let on_floor: Vec<Place> =
         on_floor.iter().zip(depths).map(|(&(n, table), y)| (n, [2.0, y, 0.0], table)).collect();
-    check(scene(), DVec3::Z, &on_floor, seen);
+    check(&light, DVec3::Z, &on_floor, seen);
 }
 
 #[test]
