@@ -3,7 +3,7 @@
 //! **The measure.** Over the area of all surfaces that reflect, the root mean square of
 //!
 //! ```text
-//!   e = |B − B_true| / max(|B_true|, floor)      floor: 5 % of the mean of |B_true| there
+//!   e = |B − B_true| / max(|B_true|, floor)      floor: 5 % of the mean of |B_true|
 //! ```
 //!
 //! with B the reflected radiosity (emission is known and has no error) and | | a length over the
@@ -11,9 +11,10 @@
 //! are left out: those that see backs in more than 95 % of their hemisphere, weighted by the
 //! cosine, or in more than 40 % of it backs that nearly touch them, or on average nothing but what
 //! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
-//! what stands on them, or in a crack. Those that see nothing are left out too: what the sky gives
-//! them is exact, and would hide the error of others. A group of the scene has the same figure over
-//! its own area, with the floor of the scene.
+//! what stands on them, or in a crack. Those that see surfaces in less than 1 % of their hemisphere
+//! are left out too: what the sky gives them is exact, and would hide the error of others. The mean
+//! is over the same places: a dark plane of a kilometre makes nothing on it brighter. A group of the
+//! scene has the same figure over its own area, with the floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result
@@ -107,7 +108,7 @@ pub(super) struct Observation {
     /// What the middle of the element may be off by, up to a common factor, W/m².
     pub element_residual: f64,
     /// Whether the point is hidden by what touches its surface or encloses it, so that nobody sees
-    /// it, or sees nothing itself.
+    /// it, or sees next to nothing itself.
     pub excluded: bool,
     /// Share of the hemisphere in which nothing is seen.
     pub escaped: f64,
@@ -256,6 +257,23 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
         even: even.sqrt(),
     };
     Estimate { groups: groups.collect(), whole, by_light, spread }
+}
+
+/// Mean length of the reflected radiosity that was gathered at the points that are not excluded, by
+/// the area that they stand for, W/m²; none if there are no such points.
+pub(super) fn mean_reflected(observations: &[Observation], strata: &[Stratum]) -> Option<f64> {
+    let mut all = vec![0.0; strata.len()];
+    for observation in observations {
+        all[observation.stratum] += observation.weight;
+    }
+    let (mut sum, mut area) = (0.0, 0.0);
+    for observation in observations.iter().filter(|observation| !observation.excluded) {
+        let of_stratum = strata[observation.stratum].area / all[observation.stratum];
+        let [first, second] = observation.gathered;
+        sum += observation.weight * of_stratum * (first + second).length() / 2.0;
+        area += observation.weight * of_stratum;
+    }
+    (area > 0.0).then(|| sum / area)
 }
 
 /// [`StratumDeviations::by_light`]'s floor, W/m²: as that of the measure, of the mean radiosity

@@ -78,6 +78,15 @@ pub(super) struct EstimatedError {
     pub vertices: Vec<f64>,
 }
 
+/// What a few points tell before any vertex has gathered.
+pub(super) struct Pilot {
+    /// Root mean square error, relative, of what vertices interpolate to because the gatherer casts
+    /// so many rays and not more.
+    pub sampling: f64,
+    /// Reflected radiosity below which errors are relative to this instead, W/m².
+    pub radiosity_floor: f64,
+}
+
 impl EstimatedError {
     /// What a target judges.
     pub fn judged(&self) -> Judged<'_> {
@@ -120,13 +129,13 @@ impl ErrorEstimator<'_> {
         gatherer: &mut dyn Gather,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<EstimatedError, Error> {
-        let radiosity_floor = self.radiosity_floor();
-        let (mut strata, samples) = self.samples(counts, radiosity_floor);
+        let (mut strata, samples) = self.samples(counts, self.expected_floor());
         let gathers = self.gather(&samples, gatherer, progress)?;
         let observed = samples.iter().zip(&gathers);
         let observations: Vec<Observation> = observed
             .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)))
             .collect();
+        let radiosity_floor = self.floor(&observations, &strata);
         let unshot_bound = self.unshot(radiosity_floor, &mut strata);
         let conditions = Conditions {
             strata: &strata,
@@ -141,37 +150,51 @@ impl ErrorEstimator<'_> {
         Ok(EstimatedError { whole, by_light, groups, vertices })
     }
 
-    /// Root mean square error, relative, of what vertices interpolate to because `gatherer` casts
-    /// so many rays and not more; by `count` points.
-    pub fn sampling_error(&self, count: usize, gatherer: &mut dyn Gather) -> Result<f64, Error> {
+    /// What `count` points tell.
+    pub fn pilot(&self, count: usize, gatherer: &mut dyn Gather) -> Result<Pilot, Error> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
-        let floor = self.radiosity_floor();
-        let (strata, samples) = self.samples(counts, floor);
-        let points: Vec<TwoSidedPoint> = samples.iter().map(|s| s.point).collect();
-        let jittered: Vec<TwoSidedPoint> = samples.iter().map(Sample::jittered).collect();
-        let sources = self.sources().radiosity_field();
-        let first = gather_two_sided(gatherer, &sources, &points)?;
-        let second = gather_two_sided(gatherer, &sources, &jittered)?;
+        let (strata, samples) = self.samples(counts, self.expected_floor());
+        let gathers = self.gather(&samples, gatherer, &mut |_, _| ControlFlow::Continue(()))?;
+        let observed = samples.iter().zip(&gathers);
+        let observations: Vec<Observation> = observed
+            .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)))
+            .collect();
+        let radiosity_floor = self.floor(&observations, &strata);
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mut sums = [(0.0, 0.0); 2];
-        for (sample, (first, second)) in samples.iter().zip(first.iter().zip(&second)) {
-            let [a, b] = [first, second].map(|gathered| sample.reflected(gathered));
-            let light = a.length().max(sample.interpolated.length());
-            let square = ((a - b) / light.max(floor)).length_squared() / 2.0;
-            let area = sample.weight * strata[sample.stratum].area;
+        for observation in observations.iter().filter(|observation| !observation.excluded) {
+            let [a, b] = observation.gathered;
+            let light = a.length().max(observation.interpolated.length());
+            let square = ((a - b) / light.max(radiosity_floor)).length_squared() / 2.0;
+            let area = observation.weight * strata[observation.stratum].area;
             for (sum, weight) in sums.iter_mut().zip([area, area * light]) {
                 *sum = (sum.0 + weight * square, sum.1 + weight);
             }
         }
         let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
-        Ok((model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt())
+        let sampling = (model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt();
+        Ok(Pilot { sampling, radiosity_floor })
     }
 
-    /// Reflected radiosity below which errors are relative to this instead, W/m². Where next to
-    /// nothing is reflected, rounding of what is emitted is no error.
-    fn radiosity_floor(&self) -> f64 {
+    /// Reflected radiosity below which errors are relative to this instead, W/m²: by what was
+    /// observed. Where next to nothing is reflected, rounding of what is emitted is no error.
+    fn floor(&self, observations: &[Observation], strata: &[Stratum]) -> f64 {
+        let negligible = negligible_reflection(self.light.mesh.scene());
+        match error_estimate::mean_reflected(observations, strata) {
+            Some(mean) => (model::RADIOSITY_FLOOR * mean).max(negligible),
+            None => self.expected_floor(),
+        }
+    }
+
+    /// The same before anything is observed, by what vertices interpolate to everywhere.
+    fn expected_floor(&self) -> f64 {
         let negligible = negligible_reflection(self.light.mesh.scene());
         self.light.radiosity_field().radiosity_floor().max(negligible)
+    }
+
+    /// What the middle of `element` may be off by, up to a common factor, W/m².
+    fn residual(&self, element: usize) -> f64 {
+        self.element_residual.get(element).copied().unwrap_or(0.0)
     }
 
     /// What lights the vertices.
@@ -276,7 +299,7 @@ impl ErrorEstimator<'_> {
             let corners = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
             let reflected = (corners.iter().sum::<Rgb>() / 3.0).length();
             let scale = reflected.max(floor);
-            let residual = self.element_residual.get(element).copied().unwrap_or(0.0) / scale;
+            let residual = self.residual(element) / scale;
             let area = mesh.solid_share(node) * area(&surface.faces[face]);
             Some(SampledFace {
                 face,
@@ -383,9 +406,9 @@ impl Sample {
             interpolated: self.interpolated,
             gathered: [self.reflected(first), self.reflected(second)],
             next: self.reflected(next),
-            element_residual: estimator.element_residual[self.element],
+            element_residual: estimator.residual(self.element),
             excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal))
-                || [first, second, next].iter().all(|g| g.inverse_distance == 0.0),
+                || (first.escaped + second.escaped) / 2.0 > buried::OPEN,
             escaped: first.escaped,
             backface: first.backface,
             inverse_distance: first.inverse_distance,

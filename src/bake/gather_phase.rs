@@ -15,7 +15,7 @@
 use std::ops::ControlFlow;
 
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
-use crate::bake::estimator::{ErrorEstimator, EstimatedError};
+use crate::bake::estimator::{ErrorEstimator, EstimatedError, Pilot};
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::judge::Judge;
 use crate::bake::light_survey;
@@ -255,7 +255,8 @@ impl<'a> GatherPhase<'a> {
         Estimated { light, found, cancelled }
     }
 
-    /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points.
+    /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points; they
+    /// tell how dim is too dim to matter, too.
     fn choose_rays(&mut self, target: ErrorTarget) -> Result<(), Error> {
         let pilot = ErrorEstimator {
             light: self.state.source(),
@@ -270,7 +271,9 @@ impl<'a> GatherPhase<'a> {
         let noise = controller::noise_tolerance(target.error);
         let dim = self.state.radiosity_floor();
         let mut gatherer = self.backend.gather(&self.shot.mesh, self.gather.rays, noise, dim)?;
-        let sampling = pilot.sampling_error(model::PILOT_POINTS, &mut *gatherer)?;
+        let Pilot { sampling, radiosity_floor } =
+            pilot.pilot(model::PILOT_POINTS, &mut *gatherer)?;
+        self.state.set_radiosity_floor(radiosity_floor);
         let chosen = controller::with_rays_for(&self.gather, sampling, target.error);
         let settings = BakeSettings { solve: self.solve.clone(), gather: Some(chosen) };
         if let (solve, Some(gather)) = target.overridden(settings) {

@@ -17,7 +17,7 @@ use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase::{self, ShotLight};
 use crate::error::Error;
 use crate::gather::{GatheredMesh, Progress};
-use crate::mesh::{Mesh, cut_at_contacts};
+use crate::mesh::{Mesh, cut_at_contacts, cut_large_triangles};
 use crate::progress::StopReason;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
@@ -56,6 +56,10 @@ pub(super) fn run(
     let finest = match &settings.gather {
         Some(gather) => gather.refinement.min_edge,
         None => settings.solve.element_size,
+    };
+    let scene = match &settings.solve.region {
+        Some(region) => &cut_large_triangles(scene, region),
+        None => scene,
     };
     let scene = &cut_at_contacts(scene, finest);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;

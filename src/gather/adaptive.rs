@@ -125,6 +125,11 @@ impl<'a> AdaptiveGather<'a> {
         self.scale.radiosity_floor
     }
 
+    /// Sets [`AdaptiveGather::radiosity_floor`], which is that of the source light at the start.
+    pub fn set_radiosity_floor(&mut self, floor: f64) {
+        self.scale.radiosity_floor = floor;
+    }
+
     /// What was reached so far.
     pub fn to_gathered_mesh(&self) -> GatheredMesh {
         self.gathered_mesh_of(&self.samples)

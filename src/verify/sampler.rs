@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::hidden::{self, Outlook};
 use super::path_tracer::{PathTracer, SurfacePoint, random_numbers};
 use super::settings::Settings;
 use super::solution::SolutionLookup;
@@ -15,22 +16,6 @@ use crate::progress::BatchSizer;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
 
-/// A point is hidden where more than this share of its rays meets backs first,
-const HIDDEN: f64 = 0.95;
-
-/// or more than this share meets backs that are near:
-const HIDDEN_NEAR: f64 = 0.4;
-
-/// nearer than this share of the diagonal of all that reflects.
-const NEAR: f64 = 0.002;
-
-/// It is hidden in a crack, too, where the mean of 1/distance to what it sees is above one over
-/// this share of that diagonal.
-const CRACK: f64 = 1e-4;
-
-/// Rays that find that out.
-const HIDDEN_RAYS: usize = 128;
-
 /// A solution is of another scene if more than this share of the points lie on none of its faces.
 const MISSING_SHARE: f64 = 0.01;
 
@@ -40,8 +25,6 @@ pub(super) struct Sampler<'a> {
     settings: Settings,
     tracer: PathTracer<'a>,
     strata: Vec<Stratum>,
-    /// Of all that reflects, scene unit.
-    diagonal: f64,
     /// Paths done at every point but the new ones.
     paths: usize,
 }
@@ -60,7 +43,8 @@ struct TracedPoint {
     point: SurfacePoint,
     /// What the solution tells, W/m²; none before it is asked, and where it has no face.
     told: Option<Rgb>,
-    /// Known with the first paths.
+    /// What it sees; known with the first paths, and with it whether it is hidden.
+    outlook: Outlook,
     hidden: bool,
     paths: usize,
     /// What the paths found, part by part: sums, W/m².
@@ -73,7 +57,6 @@ impl<'a> Sampler<'a> {
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             tracer: PathTracer::new(scene),
-            diagonal: scene.reflecting_bounds().diagonal(),
             scene,
             settings: settings.clone(),
             paths: 0,
@@ -96,8 +79,15 @@ impl<'a> Sampler<'a> {
                 let index = list.len();
                 let words = [self.settings.seed, surface.group as u64, index as u64];
                 let point = surface.point(self.scene, &mut random_numbers(&words));
-                let sums = [Rgb::ZERO; PARTS];
-                list.push(TracedPoint { index, point, told: None, hidden: false, paths: 0, sums });
+                list.push(TracedPoint {
+                    index,
+                    point,
+                    told: None,
+                    outlook: Outlook::default(),
+                    hidden: false,
+                    paths: 0,
+                    sums: [Rgb::ZERO; PARTS],
+                });
             }
         }
     }
@@ -169,7 +159,21 @@ impl<'a> Sampler<'a> {
             }
         }
         self.paths = paths;
+        let diagonal = self.lit_diagonal();
+        for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
+            point.hidden = point.outlook.is_hidden(diagonal);
+        }
         ControlFlow::Continue(())
+    }
+
+    /// Diagonal of where the light is: what is near or narrow is so beside a lit room, and not
+    /// beside the wide plane that the room stands on; scene unit.
+    fn lit_diagonal(&self) -> f64 {
+        let points = self.strata.iter().flat_map(|s| {
+            let area = s.surface.share / s.points.len() as f64;
+            s.points.iter().map(move |p| (p.point.position, area * p.sample().found().length()))
+        });
+        hidden::lit_diagonal(self.scene, &points.collect::<Vec<_>>())
     }
 
     /// All points, with the groups that they are of.
@@ -187,33 +191,29 @@ impl<'a> Sampler<'a> {
         }
         if point.paths == 0 {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
-            let hits = self.tracer.hits(&point.point, HIDDEN_RAYS, &mut rng);
-            let backs = |nearer: f64| {
-                let near = hits.iter().filter(|hit| !hit.front && hit.distance < nearer);
-                near.count() as f64 / HIDDEN_RAYS as f64
-            };
-            let inverse = hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>();
-            traced.hidden = hits.is_empty()
-                || backs(f64::INFINITY) > HIDDEN
-                || backs(NEAR * self.diagonal) > HIDDEN_NEAR
-                || inverse / HIDDEN_RAYS as f64 * CRACK * self.diagonal > 1.0;
+            traced.outlook = Outlook::new(&self.tracer, &point.point, &mut rng);
         }
         traced.paths = paths;
         traced
     }
 
-    /// The mean length of reflected radiosity over all that reflects, W/m².
-    fn mean_reflected(&self) -> f64 {
-        let mean = |s: &Stratum| {
-            let lengths = s.points.iter().map(|p| p.sample().found().length());
-            s.surface.share * lengths.sum::<f64>() / (s.points.len() as f64).max(1.0)
-        };
-        self.strata.iter().map(mean).sum()
+    /// The mean length of reflected radiosity over all that counts, W/m².
+    fn mean_reflected(&self, hidden: bool) -> f64 {
+        let (mut sum, mut share) = (0.0, 0.0);
+        for s in &self.strata {
+            let counting = s.points.iter().filter(|p| hidden || !p.hidden);
+            for point in counting {
+                let of_point = s.surface.share / s.points.len() as f64;
+                sum += of_point * point.sample().found().length();
+                share += of_point;
+            }
+        }
+        if share > 0.0 { sum / share } else { 0.0 }
     }
 
     /// The mean square error of every group, and the share that it counts with.
     fn by_group(&self, hidden: bool) -> Vec<Option<(f64, MeanSquare)>> {
-        let floor = FLOOR * self.mean_reflected();
+        let floor = FLOOR * self.mean_reflected(hidden);
         let group = |s: &Stratum| {
             let counts = |p: &&TracedPoint| p.told.is_some() && (hidden || !p.hidden);
             let counting = s.points.iter().filter(counts);
@@ -232,7 +232,7 @@ impl<'a> Sampler<'a> {
 
     /// What is known so far.
     pub fn verification(&self) -> Verification {
-        let mean_reflected = self.mean_reflected();
+        let mean_reflected = self.mean_reflected(self.settings.hidden);
         let by_group = self.by_group(self.settings.hidden);
         let group = |(s, error): (&Stratum, Option<(f64, MeanSquare)>)| GroupError {
             group: s.surface.group,

@@ -49,7 +49,7 @@ pub struct Verification {
     pub groups: Vec<GroupError>,
     /// The points, group by group.
     pub points: Vec<PointError>,
-    /// Mean length of the reflected radiosity over the area that reflects, W/m².
+    /// Mean length of the reflected radiosity over the area that counts, W/m².
     pub mean_reflected: f64,
     /// Paths traced at each point.
     pub paths: usize,

@@ -9,6 +9,7 @@
 //! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | another viewpoint is tried |
 //! | [`NEAR_BACKS`] | 0.4 | sample of the error estimate | left out, if they are very near too |
 //! | [`HIDDEN`] | 0.95 | sample of the error estimate | left out |
+//! | [`OPEN`] | 0.99, of nothing | sample of the error estimate | left out |
 //! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
 //! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
 //!
@@ -39,6 +40,11 @@ pub(crate) const CRACK: f64 = 1e-4;
 
 /// A sample of the error estimate that sees more than this share of backs lies inside a solid.
 pub(crate) const HIDDEN: f64 = 0.95;
+
+/// A sample of the error estimate that sees nothing in more than this share of its hemisphere is
+/// in the open: what the sky gives it is exact. How many rays there are must not decide it, since
+/// the further from a room one looks for places that see some of it, the more of them there are.
+pub(crate) const OPEN: f64 = 0.99;
 
 /// A gather point that sees more than this share of backs is buried, if they are near.
 pub(crate) const BURIED: f64 = 0.9;

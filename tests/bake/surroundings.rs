@@ -2,9 +2,10 @@
 
 use glam::{DVec3, dvec3};
 use radiosity::bake::Outcome;
+use radiosity::verify::PathTracer;
 use radiosity::{Backend, BakeResult, BakeTarget, Material, Rgb, Scene, Triangle};
 
-use crate::common::{cornell_box, keep_going};
+use crate::common::{cornell_box, keep_counting, keep_going, truth};
 
 /// Triangles of one more material, in a group of its own.
 struct Addition {
@@ -88,8 +89,12 @@ fn what_adds_no_light_costs_and_changes_nothing() {
     for around in [sky(5e5, 0.0), ground(5e5, -1.0)] {
         let baked = bake(with(&cornell(), &around), 0.05);
         let (light, expected) = (mean_light(&baked), mean_light(&alone));
-        // Both are off by 5 % in places at random, of which some thousand are averaged.
-        assert!((light / expected - 1.0).abs() < 5e-3, "{}: {light} {expected}", around.name);
+        // Both are off by 5 % in places at random, of which some thousand are averaged. Of the light
+        // 30 % leaves by the opening, at most the half of it onto the ground, which reflects 30 %,
+        // less than a third of it back in: at most 1.5 % of what stays.
+        let added = if around.name == "ground" { 0.015 } else { 0.0 };
+        let more = light / expected - 1.0;
+        assert!((-5e-3..added + 5e-3).contains(&more), "{}: {light} {expected}", around.name);
         // What a bake costs on any machine: points that gathered and rows.
         let [cost, before] = [&baked, &alone].map(|b| b.light.gather_count + b.hemicubes);
         println!("{}: {cost} for {before}", around.name);
@@ -149,5 +154,26 @@ fn each_group_meets_its_error_on_a_plane_under_a_sky() {
         // 0.17 m of another surface counts as a crack: of the low block, whose errors are at its
         // foot, about two thirds. 16 ± 3.3 are left, by chance 8 or more.
         assert!(group.estimate.total <= 0.1 && group.estimate.samples >= 8, "{group:?}");
+    }
+}
+
+#[test]
+fn a_wide_plane_is_lit_as_it_is_right_before_a_room() {
+    // Half a kilometre in the twelve levels that elements may be split would be 0.24 m, before an
+    // opening of 0.55 m.
+    let scene = with(&cornell(), &ground(5e5, -1.0));
+    let baked = bake(scene, 0.05);
+    let scene = baked.light.mesh.scene();
+    let tracer = PathTracer::new(scene);
+    let places = [-20.0, -50.0, -100.0, -200.0, -400.0].map(|z| dvec3(278.0, -1.0, z));
+    let points = places.map(|place| tracer.locate(place, DVec3::Y).unwrap());
+    let found = tracer.reflected(&points, 1 << 14, 1, keep_counting);
+    for (place, found) in places.into_iter().zip(found) {
+        let (told, _) = truth::at(&baked.light.surface, place, DVec3::Y).unwrap();
+        let told = told - found.radiosity;
+        // The error that was asked for holds in the mean: three times that at a place, and four
+        // standard errors of the paths.
+        let allowed = 0.15 * found.radiosity.length() + 4.0 * found.standard_error.length();
+        assert!(told.length() < allowed, "{place}: {told} of {}", found.radiosity);
     }
 }

@@ -144,6 +144,33 @@ fn dark_surfaces_count_by_the_mean() {
 }
 
 #[test]
+fn a_wide_plane_hides_no_room() {
+    // The diagonal of all is 2.8 million: a crack of a ten thousandth of it would hold the room.
+    let room = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let plane = facing_up([-1e6, 1e6], [-1e6, 1e6], -1.0).map(DVec3::from_array);
+    let mut positions = room.positions().to_vec();
+    let first = positions.len() as u32;
+    positions.extend(plane);
+    let mut triangles = room.triangles().to_vec();
+    triangles.extend([[0, 1, 2], [0, 2, 3]].map(|corners| Triangle {
+        corners: corners.map(|k: u32| first + k),
+        group: 1,
+        material: room.materials().len() as u32,
+        ..Default::default()
+    }));
+    let groups = vec!["room".into(), "plane".into()];
+    let materials = [room.materials(), &[paint(0.5, 0.0)]].concat();
+    let scene = Scene::new(positions, triangles, groups, materials).unwrap();
+    let wrong = solution(&scene, |t| match t.group {
+        0 => furnace(&scene, t, 1.1),
+        _ => Rgb::ZERO,
+    });
+    let found = verify(&scene, &wrong, &settings(0.05), keep_going).unwrap();
+    assert_eq!(found.groups[0].hidden_share, 0.0);
+    check(found.groups[0].error, 0.1, 0.02);
+}
+
+#[test]
 fn what_only_emits_has_no_weight() {
     let floor = facing_up([0.0, 1.0], [0.0, 1.0], 0.0);
     let light = facing_down([-99.0, 100.0], [-99.0, 100.0], 1.0);

@@ -1,0 +1,103 @@
+//! What nobody sees: points inside solids, right behind plates, in cracks; and those that see next to
+//! nothing.
+
+use fastrand::Rng;
+use glam::DVec3;
+
+use super::path_tracer::{PathTracer, SurfacePoint};
+use crate::scene::{Aabb, Scene};
+
+/// A point is hidden where more than this share of its rays meets backs first,
+const HIDDEN: f64 = 0.95;
+
+/// or more than this share meets backs that are near:
+const HIDDEN_NEAR: f64 = 0.4;
+
+/// nearer than this share of the diagonal of where the light is.
+const NEAR: f64 = 0.002;
+
+/// It is hidden in a crack, too, where the mean of 1/distance to what it sees is above one over
+/// this share of that diagonal.
+const CRACK: f64 = 1e-4;
+
+/// A point that sees surfaces in less than this share of its hemisphere is left out too.
+const OPEN: f64 = 0.01;
+
+/// Rays that find that out.
+const RAYS: usize = 128;
+
+/// Share of the light that may lie outside of the box where the light is, at either end of an axis.
+const TRIMMED_SHARE: f64 = 0.01;
+
+/// The box has to be this many times smaller than the one around all that reflects: in an ordinary
+/// room the light fills the room.
+const MIN_CONCENTRATION: f64 = 4.0;
+
+/// What a point sees.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outlook {
+    /// Share of the hemisphere in which there is a surface.
+    covered: f64,
+    /// Share of backs among all that it sees.
+    backs: f64,
+    /// Distance within which the share of [`HIDDEN_NEAR`] are backs, scene unit; infinite if fewer
+    /// are.
+    near_backs: f64,
+    /// Mean of 1/distance, per scene unit.
+    inverse_distance: f64,
+}
+
+impl Outlook {
+    /// What rays from `point` meet.
+    pub fn new(tracer: &PathTracer, point: &SurfacePoint, rng: &mut Rng) -> Outlook {
+        let hits = tracer.hits(point, RAYS, rng);
+        let mut backs: Vec<f64> =
+            hits.iter().filter(|hit| !hit.front).map(|hit| hit.distance).collect();
+        backs.sort_by(f64::total_cmp);
+        let most_in_front = (HIDDEN_NEAR * RAYS as f64) as usize;
+        Outlook {
+            covered: hits.len() as f64 / RAYS as f64,
+            backs: backs.len() as f64 / RAYS as f64,
+            near_backs: backs.get(most_in_front).copied().unwrap_or(f64::INFINITY),
+            inverse_distance: hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>() / RAYS as f64,
+        }
+    }
+
+    /// Whether nobody sees the point, or it sees next to nothing, where the light fills a box of this
+    /// `diagonal` (scene unit).
+    pub fn is_hidden(&self, diagonal: f64) -> bool {
+        self.covered < OPEN
+            || self.backs > HIDDEN
+            || self.near_backs < NEAR * diagonal
+            || self.inverse_distance * CRACK * diagonal > 1.0
+    }
+}
+
+/// Diagonal of the box that nearly all light is in, by `points` and what each reflects, W up to a
+/// factor; of all of `scene` that reflects where that is not much larger; scene unit.
+pub(super) fn lit_diagonal(scene: &Scene, points: &[(DVec3, f64)]) -> f64 {
+    let whole = scene.reflecting_bounds().diagonal();
+    let total: f64 = points.iter().map(|(_, flux)| flux).sum();
+    let end = |axis: usize, sign: f64| {
+        let mut along: Vec<(f64, f64)> =
+            points.iter().map(|(at, flux)| (sign * at[axis], *flux)).collect();
+        along.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut outside = 0.0;
+        let first_within = along.into_iter().find(|(_, flux)| {
+            outside += flux;
+            outside > TRIMMED_SHARE * total
+        });
+        first_within.map(|(at, _)| sign * at)
+    };
+    let ends = |sign: f64| {
+        let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
+        Some(DVec3::new(x?, y?, z?))
+    };
+    match (ends(1.0), ends(-1.0)) {
+        (Some(low), Some(high)) if total > 0.0 => {
+            let lit = Aabb { low, high }.diagonal();
+            if lit * MIN_CONCENTRATION < whole { lit } else { whole }
+        }
+        _ => whole,
+    }
+}
