@@ -65,6 +65,9 @@ pub(super) struct ErrorEstimator<'a> {
     pub gather_passes: u32,
     /// Diagonal of where the light is, scene unit.
     pub diagonal: f64,
+    /// Reflected radiosity below which errors are relative to this instead, W/m², as far as is
+    /// known before the points are looked at; they say it better.
+    pub expected_floor: f64,
 }
 
 /// The estimated error of a result.
@@ -129,7 +132,8 @@ impl ErrorEstimator<'_> {
         gatherer: &mut dyn Gather,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<EstimatedError, Error> {
-        let (mut strata, samples) = self.samples(counts, self.expected_floor());
+        let (mut strata, samples) =
+            self.samples(counts, self.at_least_negligible(self.expected_floor));
         let gathers = self.gather(&samples, gatherer, progress)?;
         let observed = samples.iter().zip(&gathers);
         let observations: Vec<Observation> = observed
@@ -153,7 +157,7 @@ impl ErrorEstimator<'_> {
     /// What `count` points tell.
     pub fn pilot(&self, count: usize, gatherer: &mut dyn Gather) -> Result<Pilot, Error> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
-        let (strata, samples) = self.samples(counts, self.expected_floor());
+        let (strata, samples) = self.samples(counts, self.at_least_negligible(self.expected_floor));
         let gathers = self.gather(&samples, gatherer, &mut |_, _| ControlFlow::Continue(()))?;
         let observed = samples.iter().zip(&gathers);
         let observations: Vec<Observation> = observed
@@ -179,17 +183,13 @@ impl ErrorEstimator<'_> {
     /// Reflected radiosity below which errors are relative to this instead, W/m²: by what was
     /// observed. Where next to nothing is reflected, rounding of what is emitted is no error.
     fn floor(&self, observations: &[Observation], strata: &[Stratum]) -> f64 {
-        let negligible = negligible_reflection(self.light.mesh.scene());
-        match error_estimate::mean_reflected(observations, strata) {
-            Some(mean) => (model::RADIOSITY_FLOOR * mean).max(negligible),
-            None => self.expected_floor(),
-        }
+        let observed = error_estimate::mean_reflected(observations, strata)
+            .map(|mean| model::RADIOSITY_FLOOR * mean);
+        self.at_least_negligible(observed.unwrap_or(self.expected_floor))
     }
 
-    /// The same before anything is observed, by what vertices interpolate to everywhere.
-    fn expected_floor(&self) -> f64 {
-        let negligible = negligible_reflection(self.light.mesh.scene());
-        self.light.radiosity_field().radiosity_floor().max(negligible)
+    fn at_least_negligible(&self, floor: f64) -> f64 {
+        floor.max(negligible_reflection(self.light.mesh.scene()))
     }
 
     /// What the middle of `element` may be off by, up to a common factor, W/m².

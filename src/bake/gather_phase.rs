@@ -204,6 +204,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             gather_passes: self.gather.refinement.gather_passes,
             diagonal: self.diagonal(),
+            expected_floor: self.state.radiosity_floor(),
         };
         let each_group = self.target.is_some_and(|target| target.each_group);
         let mut counts = SampleCounts {
@@ -265,6 +266,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             gather_passes: 0,
             diagonal: self.diagonal(),
+            expected_floor: self.state.radiosity_floor(),
         };
         // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for
         // more of them everywhere.

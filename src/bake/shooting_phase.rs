@@ -199,6 +199,7 @@ pub(super) fn estimate_elements(
         ledger: &shot.solution.ledger,
         gather_passes: 0,
         diagonal: light_survey::diagonal(settings.solve.region.as_ref(), shot.mesh.scene()),
+        expected_floor: light.radiosity_field().radiosity_floor(),
     };
     let counts =
         SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };

@@ -334,11 +334,21 @@ pub(super) fn random_numbers(words: &[u64]) -> Rng {
     Rng::with_seed(words.iter().fold(0, hash))
 }
 
-/// A point of triangle `t`, uniform over its solid area; where little of it is solid, it may be in
-/// a hole.
-pub(super) fn random_point(scene: &Scene, t: usize, rng: &mut Rng) -> DVec3 {
-    let place = random_barycentric(rng);
-    let others = std::iter::repeat_with(|| random_barycentric(rng)).take(MAX_TRIES);
+/// A point of the part of triangle `t` with these `corners` (weights of its second and third),
+/// uniform over its solid area; where little of it is solid, it may be in a hole.
+pub(super) fn random_point(
+    scene: &Scene,
+    t: usize,
+    corners: [[f64; 2]; 3],
+    rng: &mut Rng,
+) -> DVec3 {
+    let mut random_place = || {
+        let [x, y] = random_barycentric(rng);
+        let [p, q, r] = corners;
+        [0, 1].map(|axis| p[axis] * (1.0 - x - y) + q[axis] * x + r[axis] * y)
+    };
+    let place = random_place();
+    let others = std::iter::repeat_with(random_place).take(MAX_TRIES);
     let solid = scene.first_solid(t, std::iter::once(place).chain(others));
     point_at(scene.corners(t), solid.unwrap_or(place))
 }

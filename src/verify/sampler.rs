@@ -33,6 +33,8 @@ pub(super) struct Sampler<'a> {
 struct Stratum {
     surface: ReflectingGroup,
     points: Vec<TracedPoint>,
+    /// Sum of the weights of the points.
+    weight: f64,
 }
 
 /// A point, and the paths that began there.
@@ -41,6 +43,8 @@ struct TracedPoint {
     /// Number among those of its group.
     index: usize,
     point: SurfacePoint,
+    /// Area that it stands for, over that of points spread evenly over the group.
+    weight: f64,
     /// What the solution tells, W/m²; none before it is asked, and where it has no face.
     told: Option<Rgb>,
     /// What it sees; known with the first paths, and with it whether it is hidden.
@@ -53,7 +57,7 @@ struct TracedPoint {
 
 impl<'a> Sampler<'a> {
     pub fn new(scene: &'a Scene, settings: &Settings) -> Result<Sampler<'a>, Error> {
-        let stratum = |surface| Stratum { surface, points: vec![] };
+        let stratum = |surface| Stratum { surface, points: vec![], weight: 0.0 };
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             tracer: PathTracer::new(scene),
@@ -70,18 +74,28 @@ impl<'a> Sampler<'a> {
         Ok(lookup)
     }
 
-    /// Adds points until there are about `points` of them, spread over the area, and as many in
-    /// each group as it has at least.
+    /// Adds points until there are about `points` of them, spread over the area that counts as far
+    /// as that is known, and as many in each group as it has at least.
     pub fn add_points(&mut self, points: usize) {
-        for Stratum { surface, points: list } in &mut self.strata {
-            let by_area = (surface.share * points as f64).ceil() as usize;
+        let counting = |s: &Stratum| s.surface.share * (1.0 - s.hidden_share());
+        let whole: f64 = self.strata.iter().map(counting).sum();
+        for stratum in &mut self.strata {
+            // Where all is hidden, as far as is known, all is looked at.
+            let share = match whole > 0.0 {
+                true => counting(stratum) / whole,
+                false => stratum.surface.share,
+            };
+            let Stratum { surface, points: list, weight: of_all } = stratum;
+            let by_area = (share * points as f64).ceil() as usize;
             while list.len() < by_area.max(self.settings.points_per_group) {
                 let index = list.len();
                 let words = [self.settings.seed, surface.group as u64, index as u64];
-                let point = surface.point(self.scene, &mut random_numbers(&words));
+                let (point, weight) = surface.point(self.scene, &mut random_numbers(&words));
+                *of_all += weight;
                 list.push(TracedPoint {
                     index,
                     point,
+                    weight,
                     told: None,
                     outlook: Outlook::default(),
                     hidden: false,
@@ -170,8 +184,8 @@ impl<'a> Sampler<'a> {
     /// beside the wide plane that the room stands on; scene unit.
     fn lit_diagonal(&self) -> f64 {
         let points = self.strata.iter().flat_map(|s| {
-            let area = s.surface.share / s.points.len() as f64;
-            s.points.iter().map(move |p| (p.point.position, area * p.sample().found().length()))
+            let flux = |p: &TracedPoint| s.area_of(p) * p.sample().found().length();
+            s.points.iter().map(move |p| (p.point.position, flux(p)))
         });
         hidden::lit_diagonal(self.scene, &points.collect::<Vec<_>>())
     }
@@ -203,9 +217,8 @@ impl<'a> Sampler<'a> {
         for s in &self.strata {
             let counting = s.points.iter().filter(|p| hidden || !p.hidden);
             for point in counting {
-                let of_point = s.surface.share / s.points.len() as f64;
-                sum += of_point * point.sample().found().length();
-                share += of_point;
+                sum += s.area_of(point) * point.sample().found().length();
+                share += s.area_of(point);
             }
         }
         if share > 0.0 { sum / share } else { 0.0 }
@@ -217,9 +230,9 @@ impl<'a> Sampler<'a> {
         let group = |s: &Stratum| {
             let counts = |p: &&TracedPoint| p.told.is_some() && (hidden || !p.hidden);
             let counting = s.points.iter().filter(counts);
-            let squares: Vec<SquareError> =
-                counting.map(|p| p.sample().square_error(floor)).collect();
-            let share = s.surface.share * squares.len() as f64 / s.points.len() as f64;
+            let squares: Vec<(f64, SquareError)> =
+                counting.map(|p| (s.area_of(p), p.sample().square_error(floor))).collect();
+            let share = squares.iter().map(|(area, _)| area).sum();
             Some((share, MeanSquare::of_group(&squares)?))
         };
         self.strata.iter().map(group).collect()
@@ -273,10 +286,15 @@ impl<'a> Sampler<'a> {
 }
 
 impl Stratum {
-    /// The share of the points that is hidden.
+    /// The area that `point` stands for, as a share of that of the scene.
+    fn area_of(&self, point: &TracedPoint) -> f64 {
+        self.surface.share * point.weight / self.weight
+    }
+
+    /// The share of its area that is hidden, by its points.
     fn hidden_share(&self) -> f64 {
-        let hidden = self.points.iter().filter(|point| point.hidden).count();
-        hidden as f64 / (self.points.len() as f64).max(1.0)
+        let hidden: f64 = self.points.iter().filter(|p| p.hidden).map(|p| p.weight).sum();
+        if self.weight > 0.0 { hidden / self.weight } else { 0.0 }
     }
 }
 

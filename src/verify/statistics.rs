@@ -104,21 +104,24 @@ pub(super) struct MeanSquare {
 }
 
 impl MeanSquare {
-    /// Over a group, from its points; none from fewer than two.
-    pub fn of_group(points: &[SquareError]) -> Option<MeanSquare> {
+    /// Over a group, from its points and the areas that they stand for; none from fewer than two.
+    pub fn of_group(points: &[(f64, SquareError)]) -> Option<MeanSquare> {
         let count = points.len() as f64;
         if points.len() < 2 {
             return None;
         }
-        let mean = |f: fn(&SquareError) -> f64| points.iter().map(f).sum::<f64>() / count;
-        let value = mean(|p| p.value);
-        let spread: f64 = points.iter().map(|p| (p.value - value).powi(2)).sum();
-        let variance = spread / (count - 1.0) / count;
+        let area: f64 = points.iter().map(|(area, _)| area).sum();
+        let sum = |of: &dyn Fn(f64, &SquareError) -> f64| -> f64 {
+            points.iter().map(|(part, point)| of(part / area, point)).sum()
+        };
+        let value = sum(&|share, p| share * p.value);
+        // A ratio of two sums over random points (Cochran 1977, equation 6.13).
+        let spread = sum(&|share, p| (share * (p.value - value)).powi(2));
         Some(MeanSquare {
             value,
-            variance,
-            noise: mean(|p| p.noise) / count,
-            bias: mean(|p| p.bias),
+            variance: spread * count / (count - 1.0),
+            noise: sum(&|share, p| share * share * p.noise),
+            bias: sum(&|share, p| share * p.bias),
         })
     }
 
@@ -163,7 +166,7 @@ mod tests {
     }
 
     fn measured(samples: &[Sample], floor: f64) -> MeanSquare {
-        let squares: Vec<_> = samples.iter().map(|s| s.square_error(floor)).collect();
+        let squares: Vec<_> = samples.iter().map(|s| (1.0, s.square_error(floor))).collect();
         MeanSquare::of_group(&squares).unwrap()
     }
 

@@ -36,25 +36,25 @@ fn misses_are_called_by_their_obstacle() {
         let target = BakeTarget::Error(error);
         target.bake_with(cornell(), &Backend::Cpu, overrides, keep_going).unwrap()
     };
-    let few = bake(0.01, &|s| {
+    let few = bake(0.02, &|s| {
         if let Some(gather) = &mut s.gather {
             gather.refinement.max_elements = 1000;
         }
     });
     assert_eq!(few.outcome, Outcome::Missed(Obstacle::Elements));
-    assert!(few.estimate.total > 0.01);
-    let fixed = bake(0.01, &|s| {
+    assert!(few.estimate.total > 0.02);
+    let fixed = bake(0.02, &|s| {
         let coarse = BakeSettings::for_error(0.2, &cornell()).gather;
         s.gather = coarse;
     });
     assert_eq!(fixed.outcome, Outcome::Missed(Obstacle::Settings));
-    let none = bake(0.01, &|s| s.gather = None);
+    let none = bake(0.02, &|s| s.gather = None);
     assert_eq!(none.outcome, Outcome::Missed(Obstacle::Settings));
     let stop = |stage: &BakeProgress| match stage {
         BakeProgress::Gathering(_) => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     };
-    let stopped = BakeTarget::Error(0.01).bake(cornell(), &Backend::Cpu, stop).unwrap();
+    let stopped = BakeTarget::Error(0.02).bake(cornell(), &Backend::Cpu, stop).unwrap();
     assert_eq!(stopped.outcome, Outcome::Missed(Obstacle::Cancelled));
     assert_eq!(stopped.outcome.to_string(), "missed: it was stopped");
 }
