@@ -20,13 +20,13 @@
 //! |·| are Euclidean over the three channels; and m is the mean of |B_true| over that area. A
 //! textured point is told and measured with the mean reflectance of its material: that compares the
 //! light, and no detail of the texture, which takes part where paths go on. What emits and does not
-//! reflect has no error and no weight. A group's error is the same root mean square over the group's
-//! own reflecting area, with the scene's m.
+//! reflect has no error and no weight. A group's error is the same root mean square over its own
+//! reflecting area, with the scene's m.
 //!
 //! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
 //! more than 95 % of their hemisphere, weighted by the cosine; or in more than 40 % of it backs
-//! nearer than 0.2 % of the diagonal of where the light is; or whose mean of 1/distance to what they
-//! see is above 10 000 over that diagonal. They lie inside a solid, under what stands on them,
+//! nearer than 0.2 % of the diagonal of where the light is; or whose mean of 1/distance to what
+//! they see is above 10 000 over that diagonal. They lie inside a solid, under what stands on them,
 //! right behind a plate or in a crack; nobody sees them, and bakes tell there what would be
 //! seen without it. So are points that see surfaces in less than 1 % of their hemisphere: what the
 //! sky gives them is exact. The mean m is over the points that count: a dark plane of a kilometre

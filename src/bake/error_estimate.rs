@@ -13,8 +13,8 @@
 //! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
 //! what stands on them, or in a crack. Those that see surfaces in less than 1 % of their hemisphere
 //! are left out too: what the sky gives them is exact, and would hide the error of others. The mean
-//! is over the same places: a dark plane of a kilometre makes nothing on it brighter. A group of the
-//! scene has the same figure over its own area, with the floor of the scene.
+//! is over the same places: a dark plane of a kilometre makes nothing on it brighter. A group has
+//! the same figure over its own area, with the floor of the scene.
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result

@@ -1,6 +1,6 @@
 //! Triangles that are far larger than the place where the light is, in pieces: a quadtree has
-//! [`super::Mesh::MAX_DEPTH`] levels, and twelve halvings of a ground plane of a kilometre leave elements
-//! of a quarter of a metre, which resolve nothing of the room that stands on it.
+//! [`super::Mesh::MAX_DEPTH`] levels, and twelve halvings of a ground plane of a kilometre leave
+//! elements of a quarter of a metre, which resolve nothing of the room that stands on it.
 //!
 //! Pieces grow with their distance from the light as elements do, so that there are as many at
 //! each octave of the distance. They are made by halving longest edges; where the two triangles at

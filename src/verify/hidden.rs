@@ -1,5 +1,5 @@
-//! What nobody sees: points inside solids, right behind plates, in cracks; and those that see next to
-//! nothing.
+//! What nobody sees: points inside solids, right behind plates, in cracks; and those that see next
+//! to nothing.
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -63,8 +63,8 @@ impl Outlook {
         }
     }
 
-    /// Whether nobody sees the point, or it sees next to nothing, where the light fills a box of this
-    /// `diagonal` (scene unit).
+    /// Whether nobody sees the point, or it sees next to nothing, where the light fills a box of
+    /// this `diagonal` (scene unit).
     pub fn is_hidden(&self, diagonal: f64) -> bool {
         self.covered < OPEN
             || self.backs > HIDDEN
