@@ -90,8 +90,8 @@ fn what_adds_no_light_costs_and_changes_nothing() {
         let baked = bake(with(&cornell(), &around), 0.05);
         let (light, expected) = (mean_light(&baked), mean_light(&alone));
         // Both are off by 5 % in places at random, of which some thousand are averaged. Of the
-        // light 30 % leaves by the opening, at most the half of it onto the ground, which reflects 30 %,
-        // less than a third of it back in: at most 1.5 % of what stays.
+        // light 30 % leaves by the opening, at most the half of it onto the ground, which reflects
+        // 30 % of that, less than a third of it back in: at most 1.5 % of what stays.
         let added = if around.name == "ground" { 0.015 } else { 0.0 };
         let more = light / expected - 1.0;
         assert!((-5e-3..added + 5e-3).contains(&more), "{}: {light} {expected}", around.name);

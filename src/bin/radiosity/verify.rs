@@ -207,8 +207,8 @@ impl Options {
             let with_it = found.error_with_hidden.map_or(0.0, |error| error.value);
             let _ = write!(
                 end,
-                "\n{:.2} % of the area is hidden or sees next to nothing, and left out: with it the \
-                 error is {:.2} %",
+                "\n{:.2} % of the area is hidden or sees next to nothing, and left out: with it \
+                 the error is {:.2} %",
                 100.0 * found.hidden_share,
                 100.0 * with_it
             );
