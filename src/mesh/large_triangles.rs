@@ -30,16 +30,21 @@ use crate::scene::{Piece, Scene, longest_edge};
 /// Pieces there are at most; a scene that would have more stays as it is, and so do its elements.
 const MAX_PIECES: usize = 1 << 18;
 
+/// Pieces are no smaller than one over this of the scene: what is smaller is lost in the rounding of
+/// coordinates.
+const MAX_CONCENTRATION: f64 = 1e9;
+
 /// `scene` with its reflecting triangles cut until none has a longer edge than the diagonal of
 /// `region`, where the light is, or the distance from it; as it is where none is so large. Below a
 /// piece there are [`super::Mesh::MAX_DEPTH`] levels of elements, down to 1/4096 of the region.
 pub(crate) fn cut_large_triangles(scene: &Arc<Scene>, region: &Aabb) -> Arc<Scene> {
+    let least = region.diagonal().max(scene.reflecting_bounds().diagonal() / MAX_CONCENTRATION);
     let is_large = |t: usize, corners: &[DVec3; 3]| {
         let material = scene.material(t);
         // Glass that is cut here and not there would enclose no body.
         material.scatters()
             && !material.specular.is_some_and(|specular| specular.is_glass())
-            && longest_edge(*corners) > region.diagonal() * size_growth(Some(region), corners)
+            && longest_edge(*corners) > least * size_growth(Some(region), corners)
     };
     let count = scene.triangles().len();
     if !(0..count).any(|t| is_large(t, &scene.corners(t))) {
@@ -275,6 +280,14 @@ mod tests {
     fn what_is_no_larger_than_the_light_stays() {
         let scene = ground(0.4);
         assert!(Arc::ptr_eq(&scene, &cut_large_triangles(&scene, &region())));
+    }
+
+    #[test]
+    fn a_region_of_no_size_makes_no_pieces_of_no_size() {
+        let point = Aabb { low: DVec3::ZERO, high: DVec3::splat(1e-300) };
+        let cut = cut_large_triangles(&ground(1e3), &point);
+        let pieces = cut.triangles().len();
+        assert!((0..pieces).all(|t| cut.area(t) > 1e-13) && pieces > 100, "{pieces}");
     }
 
     #[test]

@@ -39,8 +39,11 @@ const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 /// axis.
 const TRIMMED_SHARE: f64 = 0.1;
 
-/// That place has to be this many times smaller than all of the scene.
+/// That place has to be this many times smaller than all of the scene,
 const MIN_CONCENTRATION: f64 = 4.0;
+
+/// but no more than so many: parts that are smaller are lost in the rounding of coordinates.
+const MAX_CONCENTRATION: f64 = 1e9;
 
 impl ReflectingGroup {
     /// Those of `scene` that reflect anything.
@@ -91,9 +94,8 @@ fn centre(scene: &Scene, triangles: &[usize]) -> Option<Aabb> {
     });
     let [low, high] = [0, 1].map(|end| DVec3::from_array(ends.map(|axis| axis[end])));
     let centre = Aabb { low, high };
-    let is_concentrated =
-        centre.diagonal() * MIN_CONCENTRATION < scene.reflecting_bounds().diagonal();
-    (is_concentrated && low != high).then_some(centre)
+    let concentration = scene.reflecting_bounds().diagonal() / centre.diagonal();
+    (MIN_CONCENTRATION..MAX_CONCENTRATION).contains(&concentration).then_some(centre)
 }
 
 /// The parts of a group's `triangles` that points are spread over.
@@ -171,6 +173,16 @@ mod tests {
         let groups = vec!["ground".into(), "room".into()];
         let bright = Material { exitance: crate::scene::Rgb::ONE, ..Material::grey("m", 0.5) };
         Scene::new(positions, triangles, groups, vec![bright]).unwrap()
+    }
+
+    #[test]
+    fn a_place_of_no_size_is_none() {
+        let scene = scene();
+        let all: Vec<usize> = (0..scene.triangles().len()).collect();
+        assert!(centre(&scene, &all).is_some());
+        // Twenty times the same triangle, among others.
+        let same: Vec<usize> = std::iter::repeat_n(2, 20).chain([0, 1]).collect();
+        assert!(centre(&scene, &same).is_none());
     }
 
     #[test]
