@@ -30,8 +30,8 @@ use crate::scene::{Piece, Scene, longest_edge};
 /// Pieces there are at most; a scene that would have more stays as it is, and so do its elements.
 const MAX_PIECES: usize = 1 << 18;
 
-/// Pieces are no smaller than one over this of the scene: what is smaller is lost in the rounding of
-/// coordinates.
+/// Pieces are no smaller than one over this of the scene: what is smaller is lost in the rounding
+/// of coordinates.
 const MAX_CONCENTRATION: f64 = 1e9;
 
 /// `scene` with its reflecting triangles cut until none has a longer edge than the diagonal of

@@ -294,7 +294,7 @@ impl Stratum {
     /// The share of its area that is hidden, by its points.
     fn hidden_share(&self) -> f64 {
         let hidden: f64 = self.points.iter().filter(|p| p.hidden).map(|p| p.weight).sum();
-        if self.weight > 0.0 { hidden / self.weight } else { 0.0 }
+        if hidden > 0.0 { hidden / self.weight } else { 0.0 }
     }
 }
 
