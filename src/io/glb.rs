@@ -15,6 +15,7 @@ mod document;
 mod images;
 #[cfg(feature = "light-map")]
 mod light_map;
+mod parts;
 mod primitives;
 
 use std::io::{self, Write};

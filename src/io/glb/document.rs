@@ -2,24 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
-use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
-use gltf_json::buffer::{Stride, Target, View};
-use gltf_json::extras::RawValue;
-use gltf_json::image::MimeType;
+use gltf_json::accessor::Type;
+use gltf_json::buffer::Target;
 use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
-use gltf_json::mesh::{Mode, Semantic};
+use gltf_json::mesh::Semantic;
 use gltf_json::scene::Node;
-use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
+use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
+use gltf_json::{Accessor, Index, Material, Root, Value};
 
+use super::parts::{self, accessor};
 use super::primitives::Primitive;
 use super::{Attribute, INDEX_BYTES, Model};
-use crate::scene::Rgb;
-
-/// The extension that shows a colour as it is.
-const UNLIT: &str = "KHR_materials_unlit";
 
 impl Attribute {
     fn semantic(self) -> Semantic {
@@ -41,28 +35,6 @@ impl Attribute {
 
 impl Model<'_> {
     pub fn document(&self) -> Root {
-        let mut root = Root { asset: self.asset(), ..Default::default() };
-        root.extensions_used.push(UNLIT.into());
-        root.push(Buffer {
-            byte_length: self.binary_length().into(),
-            name: None,
-            uri: None,
-            extensions: None,
-            extras: None,
-        });
-        self.add_views(&mut root);
-        self.add_images(&mut root);
-        let groups = self.add_groups(&mut root);
-        let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
-        let name = Some("scene".into());
-        let top = Node { name, children: Some(groups), translation, ..Default::default() };
-        let nodes = vec![root.push(top)];
-        let scene = Scene { nodes, name: None, extensions: None, extras: None };
-        root.scene = Some(root.push(scene));
-        root
-    }
-
-    fn asset(&self) -> Asset {
         let notes = BTreeMap::from([
             ("axes", Value::from("those of the scene's file")),
             ("unit", Value::from("that of the scene's file")),
@@ -76,32 +48,23 @@ impl Model<'_> {
             ),
             ("exposure", Value::from(self.tone.exposure())),
         ]);
-        Asset {
-            generator: Some(concat!("radiosity ", env!("CARGO_PKG_VERSION")).into()),
-            extras: notes_of(&notes),
-            ..Default::default()
-        }
+        let mut root = parts::document(self.binary_length(), &notes);
+        self.add_views(&mut root);
+        self.add_images(&mut root);
+        let groups = self.add_groups(&mut root);
+        parts::add_scene(&mut root, groups, self.origin);
+        root
     }
 
     /// A view of the binary chunk for each attribute, and one for the indices.
     fn add_views(&self, root: &mut Root) {
         let mut offset = 0;
-        let mut add = |length: u64, stride: Option<Stride>, target: Option<Target>| {
-            root.push(View {
-                buffer: Index::new(0),
-                byte_length: length.into(),
-                byte_offset: Some(offset.into()),
-                byte_stride: stride,
-                name: None,
-                target: target.map(Valid),
-                extensions: None,
-                extras: None,
-            });
-            offset += length;
+        let mut add = |length: u64, stride: Option<u64>, target: Option<Target>| {
+            parts::add_view(root, &mut offset, length, stride, target);
         };
         for attribute in self.attributes() {
             let (count, size) = (self.vertex_count(attribute), attribute.size());
-            add(count * size, Some(Stride(size as usize)), Some(Target::ArrayBuffer));
+            add(count * size, Some(size), Some(Target::ArrayBuffer));
         }
         add(3 * self.face_count() * INDEX_BYTES, None, Some(Target::ElementArrayBuffer));
         for image in self.images.iter() {
@@ -113,14 +76,7 @@ impl Model<'_> {
     fn add_images(&self, root: &mut Root) {
         let first = self.attributes().count() + 1;
         for (k, _) in self.images.iter().enumerate() {
-            root.push(Image {
-                buffer_view: Some(Index::new((first + k) as u32)),
-                mime_type: Some(MimeType("image/png".into())),
-                name: None,
-                uri: None,
-                extensions: None,
-                extras: None,
-            });
+            parts::add_image(root, (first + k) as u32, None);
         }
     }
 
@@ -141,16 +97,8 @@ impl Model<'_> {
                 primitives.push(self.primitive(root, primitive, material, &written));
                 written.add(primitive);
             }
-            let name = self.light.mesh.scene().groups()[of_group[0].group as usize].clone();
-            let mesh = root.push(Mesh {
-                primitives,
-                name: Some(name.clone()),
-                weights: None,
-                extensions: None,
-                extras: None,
-            });
-            let node = Node { mesh: Some(mesh), name: Some(name), ..Default::default() };
-            nodes.push(root.push(node));
+            let name = &self.light.mesh.scene().groups()[of_group[0].group as usize];
+            nodes.push(parts::add_group(root, name, primitives));
         }
         nodes
     }
@@ -173,38 +121,18 @@ impl Model<'_> {
             };
             if attribute == Attribute::Position {
                 let vertices = 0..primitive.vertices.len();
-                let values = || vertices.clone().map(|k| self.value(attribute, primitive, k));
-                accessor.min = Some(numbers(values().fold(Vec3::INFINITY, Vec3::min)));
-                accessor.max = Some(numbers(values().fold(Vec3::NEG_INFINITY, Vec3::max)));
+                let positions = vertices.map(|k| self.value(attribute, primitive, k));
+                accessor = parts::with_bounds(accessor, positions);
             }
             attributes.insert(Valid(attribute.semantic()), root.push(accessor));
         }
-        let indices = self.attributes().count();
-        let indices = Accessor {
-            component_type: Valid(GenericComponentType(ComponentType::U32)),
-            type_: Valid(Type::Scalar),
-            ..accessor(indices, 3 * written.faces * INDEX_BYTES, 3 * primitive.faces.len())
-        };
-        gltf_json::mesh::Primitive {
-            attributes,
-            indices: Some(root.push(indices)),
-            material: Some(material),
-            mode: Valid(Mode::Triangles),
-            targets: None,
-            extensions: None,
-            extras: None,
-        }
+        let indices = (self.attributes().count(), written.faces, primitive.faces.len());
+        parts::triangles(root, attributes, indices, material)
     }
 
     /// Unlit: all colour is in the vertices, and in the image if there is one.
     fn material(&self, root: &mut Root, primitive: &Primitive<'_>) -> Material {
         let material = &self.light.mesh.scene().materials()[primitive.material as usize];
-        let channels = |c: Rgb| Value::from(c.to_array().to_vec());
-        let notes = BTreeMap::from([
-            ("reflectance", channels(material.reflectance)),
-            ("exitance", channels(material.exitance)),
-        ]);
-        let unlit = gltf_json::extensions::material::Unlit {};
         // Viewers see through clear panes.
         let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
         let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
@@ -214,19 +142,15 @@ impl Model<'_> {
             (None, false) => AlphaMode::Opaque,
         };
         let alpha = 1.0 - passed.unwrap_or(0.0) as f32;
+        let colour = PbrMetallicRoughness {
+            base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
+            base_color_texture: self.texture(root, primitive),
+            ..Default::default()
+        };
         Material {
             alpha_mode: Valid(alpha_mode),
             alpha_cutoff: (alpha_mode == AlphaMode::Mask).then_some(AlphaCutoff(0.5)),
-            name: Some(material.name.clone()),
-            pbr_metallic_roughness: PbrMetallicRoughness {
-                base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
-                base_color_texture: self.texture(root, primitive),
-                metallic_factor: gltf_json::material::StrengthFactor(0.0),
-                ..Default::default()
-            },
-            extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
-            extras: notes_of(&notes),
-            ..Default::default()
+            ..parts::unlit(material, colour)
         }
     }
 
@@ -234,20 +158,15 @@ impl Model<'_> {
     fn texture(&self, root: &mut Root, primitive: &Primitive<'_>) -> Option<Info> {
         let clamped = primitive.shown?.frame()?.clamped;
         let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
-        let sampler = root.push(Sampler {
+        let sampler = Sampler {
             mag_filter: Some(Valid(MagFilter::Linear)),
             min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
             wrap_s: wrap,
             wrap_t: wrap,
             ..Default::default()
-        });
-        let texture = root.push(Texture {
-            sampler: Some(sampler),
-            source: Index::new(self.images.number(primitive.material)? as u32),
-            name: None,
-            extensions: None,
-            extras: None,
-        });
+        };
+        let source = Index::new(self.images.number(primitive.material)? as u32);
+        let texture = parts::add_texture(root, source, sampler);
         Some(Info { index: texture, tex_coord: 0, extensions: None, extras: None })
     }
 }
@@ -274,32 +193,4 @@ impl Written {
             _ => self.vertices,
         }
     }
-}
-
-/// Vectors of floats in a view, from an offset in bytes on.
-pub(super) fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
-    Accessor {
-        buffer_view: Some(Index::new(view as u32)),
-        byte_offset: Some(offset.into()),
-        count: count.into(),
-        component_type: Valid(GenericComponentType(ComponentType::F32)),
-        type_: Valid(Type::Vec3),
-        min: None,
-        max: None,
-        name: None,
-        normalized: false,
-        sparse: None,
-        extensions: None,
-        extras: None,
-    }
-}
-
-pub(super) fn numbers(v: Vec3) -> Value {
-    Value::from(v.to_array().to_vec())
-}
-
-/// `extras` with these entries.
-pub(super) fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
-    let text = gltf_json::serialize::to_string(notes).ok()?;
-    RawValue::from_string(text).ok()
 }

@@ -10,20 +10,19 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::{DVec2, Vec2, Vec3};
-use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
-use gltf_json::buffer::{Stride, Target, View};
-use gltf_json::image::MimeType;
+use gltf_json::accessor::Type;
+use gltf_json::buffer::Target;
 use gltf_json::material::PbrMetallicRoughness;
 use gltf_json::mesh::Semantic;
 use gltf_json::scene::Node;
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
+use gltf_json::{Accessor, Index, Material, Root, Value};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rustc_hash::FxHashMap;
 
-use super::document::{accessor, notes_of, numbers};
+use super::parts::{self, Attributes, accessor};
 use super::primitives::Shown;
 use super::{INDEX_BYTES, PLACE_BYTES, VECTOR_BYTES, container, origin};
 use crate::error::Error;
@@ -173,69 +172,27 @@ impl Model<'_> {
     }
 
     fn document(&self, tone: &ToneCurve) -> Root {
-        let mut root = Root { asset: asset(tone), ..Default::default() };
-        root.extensions_used.push("KHR_materials_unlit".into());
-        root.push(Buffer {
-            byte_length: self.binary_length().into(),
-            name: None,
-            uri: None,
-            extensions: None,
-            extras: None,
-        });
+        let notes = BTreeMap::from([
+            ("axes", Value::from("those of the scene's file")),
+            ("unit", Value::from("that of the scene's file")),
+            ("TEXCOORD_1", Value::from("places in the light map")),
+            ("light map", Value::from("radiosity times exposure, highlights rolled off")),
+            ("exposure", Value::from(tone.exposure())),
+        ]);
+        let mut root = parts::document(self.binary_length(), &notes);
         self.add_views(&mut root);
-        let texture = self.add_texture(&mut root);
+        let texture = add_texture(&mut root);
         let groups = self.add_groups(&mut root, texture);
-        let translation = (self.origin != Vec3::ZERO).then(|| self.origin.to_array());
-        let name = Some("scene".into());
-        let top = Node { name, children: Some(groups), translation, ..Default::default() };
-        let nodes = vec![root.push(top)];
-        let scene = Scene { nodes, name: None, extensions: None, extras: None };
-        root.scene = Some(root.push(scene));
+        parts::add_scene(&mut root, groups, self.origin);
         root
     }
 
     fn add_views(&self, root: &mut Root) {
-        let mut offset = 0;
-        let stride = Some(Stride(VERTEX_BYTES as usize));
-        for (length, stride, target) in [
-            (self.vertex_bytes(), stride, Some(Target::ArrayBuffer)),
-            (self.index_bytes(), None, Some(Target::ElementArrayBuffer)),
-            (self.png.len() as u64, None, None),
-        ] {
-            root.push(View {
-                buffer: Index::new(0),
-                byte_length: length.into(),
-                byte_offset: Some(offset.into()),
-                byte_stride: stride,
-                name: None,
-                target: target.map(Valid),
-                extensions: None,
-                extras: None,
-            });
-            offset += length;
-        }
-    }
-
-    /// The map as a texture, smoothly filtered and not repeated.
-    fn add_texture(&self, root: &mut Root) -> Index<Texture> {
-        let source = root.push(Image {
-            buffer_view: Some(Index::new(IMAGE)),
-            mime_type: Some(MimeType("image/png".into())),
-            name: Some("light map".into()),
-            uri: None,
-            extensions: None,
-            extras: None,
-        });
-        let sampler = root.push(Sampler {
-            mag_filter: Some(Valid(MagFilter::Linear)),
-            // Without smaller images, in which charts would run together.
-            min_filter: Some(Valid(MinFilter::Linear)),
-            wrap_s: Valid(WrappingMode::ClampToEdge),
-            wrap_t: Valid(WrappingMode::ClampToEdge),
-            ..Default::default()
-        });
-        let sampler = Some(sampler);
-        root.push(Texture { sampler, source, name: None, extensions: None, extras: None })
+        let (offset, target) = (&mut 0, Target::ArrayBuffer);
+        parts::add_view(root, offset, self.vertex_bytes(), Some(VERTEX_BYTES), Some(target));
+        let target = Target::ElementArrayBuffer;
+        parts::add_view(root, offset, self.index_bytes(), None, Some(target));
+        parts::add_view(root, offset, self.png.len() as u64, None, None);
     }
 
     /// A node and a mesh for each group that has triangles.
@@ -249,61 +206,39 @@ impl Model<'_> {
                     let material = self.material(primitive.material, texture);
                     root.push(material)
                 });
-                primitives.push(gltf_json::mesh::Primitive {
-                    attributes: primitive.attributes(root, vertices * VERTEX_BYTES),
-                    indices: Some(root.push(Accessor {
-                        component_type: Valid(GenericComponentType(ComponentType::U32)),
-                        type_: Valid(Type::Scalar),
-                        ..accessor(INDICES, 3 * faces * INDEX_BYTES, 3 * primitive.faces.len())
-                    })),
-                    material: Some(material),
-                    mode: Valid(gltf_json::mesh::Mode::Triangles),
-                    targets: None,
-                    extensions: None,
-                    extras: None,
-                });
+                let attributes = primitive.attributes(root, vertices * VERTEX_BYTES);
+                let indices = (INDICES, faces, primitive.faces.len());
+                primitives.push(parts::triangles(root, attributes, indices, material));
                 vertices += primitive.vertices.len() as u64;
                 faces += primitive.faces.len() as u64;
             }
-            let name = self.map.atlas.scene().groups()[of_group[0].group as usize].clone();
-            let mesh = root.push(Mesh {
-                primitives,
-                name: Some(name.clone()),
-                weights: None,
-                extensions: None,
-                extras: None,
-            });
-            let node = Node { mesh: Some(mesh), name: Some(name), ..Default::default() };
-            nodes.push(root.push(node));
+            let name = &self.map.atlas.scene().groups()[of_group[0].group as usize];
+            nodes.push(parts::add_group(root, name, primitives));
         }
         nodes
     }
 
     fn material(&self, number: u32, index: Index<Texture>) -> Material {
         let material = &self.map.atlas.scene().materials()[number as usize];
-        let channels = |c: crate::scene::Rgb| Value::from(c.to_array().to_vec());
-        let notes = BTreeMap::from([
-            ("reflectance", channels(material.reflectance)),
-            ("exitance", channels(material.exitance)),
-        ]);
-        let unlit = gltf_json::extensions::material::Unlit {};
-        Material {
-            name: Some(material.name.clone()),
-            pbr_metallic_roughness: PbrMetallicRoughness {
-                base_color_texture: Some(Info {
-                    index,
-                    tex_coord: 1,
-                    extensions: None,
-                    extras: None,
-                }),
-                metallic_factor: gltf_json::material::StrengthFactor(0.0),
-                ..Default::default()
-            },
-            extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
-            extras: notes_of(&notes),
-            ..Default::default()
-        }
+        let texture = Info { index, tex_coord: 1, extensions: None, extras: None };
+        let colour =
+            PbrMetallicRoughness { base_color_texture: Some(texture), ..Default::default() };
+        parts::unlit(material, colour)
     }
+}
+
+/// Adds the map as a texture, smoothly filtered and not repeated.
+fn add_texture(root: &mut Root) -> Index<Texture> {
+    let source = parts::add_image(root, IMAGE, Some("light map"));
+    let sampler = Sampler {
+        mag_filter: Some(Valid(MagFilter::Linear)),
+        // Without smaller images, in which charts would run together.
+        min_filter: Some(Valid(MinFilter::Linear)),
+        wrap_s: Valid(WrappingMode::ClampToEdge),
+        wrap_t: Valid(WrappingMode::ClampToEdge),
+        ..Default::default()
+    };
+    parts::add_texture(root, source, sampler)
 }
 
 impl Primitive {
@@ -313,22 +248,14 @@ impl Primitive {
     }
 
     /// Its attributes, whose numbers begin at an offset in bytes of the vertices.
-    fn attributes(
-        &self,
-        root: &mut Root,
-        offset: u64,
-    ) -> BTreeMap<gltf_json::validation::Checked<Semantic>, Index<Accessor>> {
-        let positions = || self.vertices.iter().map(|vertex| vertex.position);
+    fn attributes(&self, root: &mut Root, offset: u64) -> Attributes {
+        let positions = self.vertices.iter().map(|vertex| vertex.position);
         let count = self.vertices.len();
         let at = |bytes: u64, type_: Type| Accessor {
             type_: Valid(type_),
             ..accessor(VERTICES, offset + bytes, count)
         };
-        let position = Accessor {
-            min: Some(numbers(positions().fold(Vec3::INFINITY, Vec3::min))),
-            max: Some(numbers(positions().fold(Vec3::NEG_INFINITY, Vec3::max))),
-            ..at(0, Type::Vec3)
-        };
+        let position = parts::with_bounds(at(0, Type::Vec3), positions);
         let mut attributes = vec![
             (Semantic::Positions, position),
             (Semantic::Normals, at(VECTOR_BYTES, Type::Vec3)),
@@ -357,19 +284,4 @@ fn given_places(map: &LightMap, t: usize) -> [DVec2; 3] {
         let place = frame.map_or(place, |map| place * map.scale + map.offset);
         DVec2::new(place.x, 1.0 - place.y)
     })
-}
-
-fn asset(tone: &ToneCurve) -> Asset {
-    let notes = BTreeMap::from([
-        ("axes", Value::from("those of the scene's file")),
-        ("unit", Value::from("that of the scene's file")),
-        ("TEXCOORD_1", Value::from("places in the light map")),
-        ("light map", Value::from("radiosity times exposure, highlights rolled off")),
-        ("exposure", Value::from(tone.exposure())),
-    ]);
-    Asset {
-        generator: Some(concat!("radiosity ", env!("CARGO_PKG_VERSION")).into()),
-        extras: notes_of(&notes),
-        ..Default::default()
-    }
 }
