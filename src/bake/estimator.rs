@@ -132,13 +132,7 @@ impl ErrorEstimator<'_> {
         gatherer: &mut dyn Gather,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<EstimatedError, Error> {
-        let (mut strata, samples) =
-            self.samples(counts, self.at_least_negligible(self.expected_floor));
-        let gathers = self.gather(&samples, gatherer, progress)?;
-        let observed = samples.iter().zip(&gathers);
-        let observations: Vec<Observation> = observed
-            .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)))
-            .collect();
+        let (mut strata, observations) = self.observe(counts, gatherer, progress)?;
         let radiosity_floor = self.floor(&observations, &strata);
         let unshot_bound = self.unshot(radiosity_floor, &mut strata);
         let conditions = Conditions {
@@ -154,15 +148,28 @@ impl ErrorEstimator<'_> {
         Ok(EstimatedError { whole, by_light, groups, vertices })
     }
 
+    /// What is observed at random points, and the strata that they stand for.
+    fn observe(
+        &self,
+        counts: SampleCounts,
+        gatherer: &mut dyn Gather,
+        progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<(Vec<Stratum>, Vec<Observation>), Error> {
+        let floor = self.at_least_negligible(self.expected_floor);
+        let (strata, samples) = self.samples(counts, floor);
+        let gathers = self.gather(&samples, gatherer, progress)?;
+        let observed = samples.iter().zip(&gathers);
+        let observations = observed
+            .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)));
+        let observations = observations.collect();
+        Ok((strata, observations))
+    }
+
     /// What `count` points tell.
     pub fn pilot(&self, count: usize, gatherer: &mut dyn Gather) -> Result<Pilot, Error> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
-        let (strata, samples) = self.samples(counts, self.at_least_negligible(self.expected_floor));
-        let gathers = self.gather(&samples, gatherer, &mut |_, _| ControlFlow::Continue(()))?;
-        let observed = samples.iter().zip(&gathers);
-        let observations: Vec<Observation> = observed
-            .filter_map(|(sample, gathers)| Some(sample.observation(self, gathers.as_ref()?)))
-            .collect();
+        let mut proceed = |_, _| ControlFlow::Continue(());
+        let (strata, observations) = self.observe(counts, gatherer, &mut proceed)?;
         let radiosity_floor = self.floor(&observations, &strata);
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mut sums = [(0.0, 0.0); 2];

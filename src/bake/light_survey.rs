@@ -14,8 +14,6 @@
 //!
 //! Both are by direct light alone: what is reflected seldom falls further.
 
-use glam::DVec3;
-
 use crate::backend::cpu::RayGather;
 use crate::gather::RadiosityField;
 use crate::gather::gather_points::SurfaceOffset;
@@ -199,24 +197,8 @@ pub(super) fn dark<'a>(mesh: &'a Mesh, corners: &'a [[u32; 3]]) -> RadiosityFiel
 /// The box that all but [`TRIMMED_SHARE`] of the `flux` at `places` falls in, at either end of each
 /// axis; none without light.
 fn region(places: &[Place], flux: &[f64]) -> Option<Aabb> {
-    let total: f64 = flux.iter().sum();
-    let end = |axis: usize, sign: f64| {
-        let along = |k: &usize| sign * places[*k].point.position[axis];
-        let mut order: Vec<usize> = (0..places.len()).collect();
-        order.sort_by(|a, b| along(a).total_cmp(&along(b)));
-        let mut outside = 0.0;
-        let first_within = order.into_iter().find(|&k| {
-            outside += flux[k];
-            outside > TRIMMED_SHARE * total
-        });
-        first_within.map(|k| places[k].point.position[axis])
-    };
-    let ends = |sign: f64| {
-        let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
-        Some(DVec3::new(x?, y?, z?))
-    };
-    let (low, high) = (ends(1.0)?, ends(-1.0)?);
-    (total > 0.0 && low != high).then_some(Aabb { low, high })
+    let positions = places.iter().map(|place| place.point.position);
+    Aabb::around_most(&positions.zip(flux.iter().copied()).collect::<Vec<_>>(), TRIMMED_SHARE)
 }
 
 #[cfg(test)]

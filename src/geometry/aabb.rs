@@ -34,6 +34,29 @@ impl Aabb {
     pub const FACES: [[usize; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
+    /// The box around all of `points` but this `share` of their weight at either end of each axis;
+    /// none if they have no weight, or are all in one place.
+    pub fn around_most(points: &[(DVec3, f64)], share: f64) -> Option<Aabb> {
+        let total: f64 = points.iter().map(|(_, weight)| weight).sum();
+        let end = |axis: usize, sign: f64| {
+            let mut along: Vec<(f64, f64)> =
+                points.iter().map(|&(at, weight)| (sign * at[axis], weight)).collect();
+            along.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut outside = 0.0;
+            let first_within = along.into_iter().find(|(_, weight)| {
+                outside += weight;
+                outside > share * total
+            });
+            first_within.map(|(at, _)| sign * at)
+        };
+        let ends = |sign: f64| {
+            let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
+            Some(DVec3::new(x?, y?, z?))
+        };
+        let (low, high) = (ends(1.0)?, ends(-1.0)?);
+        (total > 0.0 && low != high).then_some(Aabb { low, high })
+    }
+
     /// The smallest box around `points`; [`Aabb::EMPTY`] around none.
     pub fn from_points(points: impl IntoIterator<Item = DVec3>) -> Aabb {
         let mut bounds = Aabb::EMPTY;

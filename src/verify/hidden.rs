@@ -77,27 +77,8 @@ impl Outlook {
 /// factor; of all of `scene` that reflects where that is not much larger; scene unit.
 pub(super) fn lit_diagonal(scene: &Scene, points: &[(DVec3, f64)]) -> f64 {
     let whole = scene.reflecting_bounds().diagonal();
-    let total: f64 = points.iter().map(|(_, flux)| flux).sum();
-    let end = |axis: usize, sign: f64| {
-        let mut along: Vec<(f64, f64)> =
-            points.iter().map(|(at, flux)| (sign * at[axis], *flux)).collect();
-        along.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut outside = 0.0;
-        let first_within = along.into_iter().find(|(_, flux)| {
-            outside += flux;
-            outside > TRIMMED_SHARE * total
-        });
-        first_within.map(|(at, _)| sign * at)
-    };
-    let ends = |sign: f64| {
-        let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
-        Some(DVec3::new(x?, y?, z?))
-    };
-    match (ends(1.0), ends(-1.0)) {
-        (Some(low), Some(high)) if total > 0.0 => {
-            let lit = Aabb { low, high }.diagonal();
-            if lit * MIN_CONCENTRATION < whole { lit } else { whole }
-        }
+    match Aabb::around_most(points, TRIMMED_SHARE) {
+        Some(lit) if lit.diagonal() * MIN_CONCENTRATION < whole => lit.diagonal(),
         _ => whole,
     }
 }

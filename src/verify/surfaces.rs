@@ -84,16 +84,9 @@ impl ReflectingGroup {
 
 /// The place that most of `triangles` are in, if it is far smaller than the scene.
 fn centre(scene: &Scene, triangles: &[usize]) -> Option<Aabb> {
-    let middle = |&t: &usize| scene.corners(t).iter().sum::<DVec3>() / 3.0;
-    let middles: Vec<DVec3> = triangles.iter().map(middle).collect();
-    let outside = (TRIMMED_SHARE * middles.len() as f64) as usize;
-    let ends = [0, 1, 2].map(|axis| {
-        let mut along: Vec<f64> = middles.iter().map(|p| p[axis]).collect();
-        along.sort_by(f64::total_cmp);
-        [along[outside], along[along.len() - 1 - outside]]
-    });
-    let [low, high] = [0, 1].map(|end| DVec3::from_array(ends.map(|axis| axis[end])));
-    let centre = Aabb { low, high };
+    let middle = |&t: &usize| (scene.corners(t).iter().sum::<DVec3>() / 3.0, 1.0);
+    let middles: Vec<(DVec3, f64)> = triangles.iter().map(middle).collect();
+    let centre = Aabb::around_most(&middles, TRIMMED_SHARE)?;
     let concentration = scene.reflecting_bounds().diagonal() / centre.diagonal();
     (MIN_CONCENTRATION..MAX_CONCENTRATION).contains(&concentration).then_some(centre)
 }
