@@ -29,6 +29,11 @@ const MIN_FIT_POINTS: usize = 4;
 /// are close to one line. Far above the rounding of a regular one; chosen by hand.
 const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
+/// What a fit may make of errors of the elements, at most: the sum of the weights' magnitudes. One
+/// end of a strip, extrapolated from both of its elements, has 2, the corner of a rectangle 2.5;
+/// slivers along a line had 36. Chosen by hand, well above what plain surfaces have.
+const MAX_AMPLIFICATION: f64 = 4.0;
+
 /// Vertices with at least this many elements around them are not grown across: every element there
 /// would have all others in its ring, which takes quadratic time. Six are usual, and the pole of a
 /// fine sphere has some hundred. Chosen by hand.
@@ -96,7 +101,9 @@ fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -
     let first = matrix.inverse().row(0);
     let weights: Vec<(u32, f64)> = rows.into_iter().map(|(e, x)| (e, first.dot(x))).collect();
     let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    if (sum - 1.0).abs() < MAX_WEIGHT_SUM_ERROR { weights } else { vec![] }
+    let amplification: f64 = weights.iter().map(|(_, weight)| weight.abs()).sum();
+    let is_regular = (sum - 1.0).abs() < MAX_WEIGHT_SUM_ERROR;
+    if is_regular && amplification < MAX_AMPLIFICATION { weights } else { vec![] }
 }
 
 /// The elements that share a vertex with one of `elements`, those included, ascending; see
@@ -125,4 +132,45 @@ fn vertices_on_boundary(outlines: &ElementLoops) -> Vec<usize> {
     vertices.sort_unstable();
     vertices.dedup();
     vertices
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::mesh::SurfaceTopology;
+    use crate::scene::{Material, Scene, Triangle};
+    use crate::vertex::keys::Vertices;
+
+    /// Fits at the corners of a fan: a triangle for each two neighbours of `rim` around the origin.
+    fn fits(rim: &[[f64; 2]]) -> Vec<Vec<(u32, f64)>> {
+        let at = |&[x, y]: &[f64; 2]| DVec3::new(x, y, 0.0);
+        let triangle = |k: u32| Triangle { corners: [0, k, k + 1], ..Default::default() };
+        let scene = Scene::new(
+            std::iter::once(DVec3::ZERO).chain(rim.iter().map(at)).collect(),
+            (1..rim.len() as u32).map(triangle).collect(),
+            vec!["fan".into()],
+            vec![Material::grey("fan", 0.5)],
+        );
+        let mesh = Mesh::new(scene.unwrap(), f64::INFINITY).unwrap();
+        let Vertices { positions, outlines, .. } =
+            Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
+        let normals = vec![DVec3::Z; positions.len()];
+        let boundary = boundary_vertices(&mesh, &outlines, &positions, &normals);
+        boundary.into_iter().map(|vertex| vertex.fit).collect()
+    }
+
+    #[test]
+    fn fits_that_amplify_errors_are_left_out() {
+        // From the middle of a half disc, and from both ends of its straight side, its triangles
+        // lie in all directions; from the rim they all lie along an arc.
+        let fan = |angle: f64, width: f64| -> Vec<[f64; 2]> {
+            (0..7).map(|k| f64::from(k) * angle).map(|a| [a.cos(), width * a.sin()]).collect()
+        };
+        let count = |rim: &[[f64; 2]]| fits(rim).iter().filter(|fit| !fit.is_empty()).count();
+        assert!(count(&fan(PI / 6.0, 1.0)) >= 3);
+        // Nearly on a line: what is across it is extrapolated from a hundredth of that.
+        assert_eq!(count(&fan(0.02, 1.0)), 0);
+    }
 }

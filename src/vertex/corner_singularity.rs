@@ -165,7 +165,7 @@ fn edge_exchanges(
         for &j in &boundary[other].neighbourhood {
             let factor = fitted_factor(j);
             let relative = mesh.relative_reflectance(j as usize);
-            total += factor;
+            total += factor.abs();
             gain += relative * factor;
             received += shot[j as usize] * relative * factor;
         }
@@ -175,7 +175,7 @@ fn edge_exchanges(
             received: reflectance * received,
         });
     }
-    // An extrapolated form factor can be too large: their sum is at most 1.
+    // Extrapolated form factors can be too large, of either sign: together they are at most 1.
     let scale = 1.0 / f64::max(total, 1.0);
     for exchange in &mut exchanges {
         exchange.gain *= scale;
@@ -351,6 +351,29 @@ mod tests {
         // Half of the sky is the wall; within a few elements of reach, some of it is not.
         assert!(gain(&[other]) > 0.3 && gain(&[other]) < 0.8 * 0.6, "{}", gain(&[other]));
         assert!((gain(&[other; 5]) - 0.8).abs() < 1e-14);
+    }
+
+    /// Weights of opposite signs, each far above one: the sum of what they extrapolate is small.
+    #[test]
+    fn factors_of_opposite_signs_amplify_nothing() {
+        let mesh = corner(0.8);
+        let Vertices { positions, outlines, .. } =
+            Vertices::new(&mesh, &SurfaceTopology::new(mesh.scene()));
+        let normals = normals(&mesh, &outlines, positions.len());
+        let mut boundary = boundary_vertices(&mesh, &outlines, &positions, &normals);
+        let middle = |p: &BoundaryVertex| p.position.distance(DVec3::Y) < 1e-9;
+        let met: Vec<usize> = (0..boundary.len()).filter(|&k| middle(&boundary[k])).collect();
+        for (n, (_, weight)) in boundary[met[0]].fit.iter_mut().enumerate() {
+            *weight = if n % 3 == 0 { 100.0 } else { -100.0 };
+        }
+        // Whatever is lit: one element of the wall after the other.
+        for lit in 0..mesh.element_count() {
+            let mut shot = vec![Rgb::ZERO; mesh.element_count()];
+            shot[lit] = Rgb::ONE;
+            for exchange in edge_exchanges(&mesh, &boundary, met[0], &met[1..], &shot) {
+                assert!(exchange.received.abs().max_element() <= 0.8, "{}", exchange.received);
+            }
+        }
     }
 
     #[test]
