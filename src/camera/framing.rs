@@ -20,7 +20,7 @@ use super::view_score::ViewScorer;
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::sampling::low_discrepancy::{r2_point, radical_inverse};
-use crate::scene::Scene;
+use crate::scene::{Rgb, Scene};
 
 /// Vertical field of view from outside and from inside, degrees. Chosen by hand: a room asks for a
 /// wide one.
@@ -70,6 +70,12 @@ const OUTLYING_SHARE: f64 = 0.02;
 const CORE_SIZE: f64 = 0.6;
 const CORE_HEIGHT: f64 = 0.8;
 
+/// Share of the reflected light that may lie outside of the box where the light is, at either end
+/// of an axis; and how many times smaller than the scene that box has to be to be framed instead.
+/// Chosen by hand: in an ordinary room the light fills the room.
+const UNLIT_SHARE: f64 = 0.01;
+const LIT_CONCENTRATION: f64 = 4.0;
+
 impl Camera {
     /// Chooses a view of `light`, for a picture of this width over height: from inside where the
     /// scene is a room, from outside where it is an object.
@@ -82,11 +88,15 @@ impl Camera {
         let scene = light.mesh.scene();
         let up = up_axis(scene);
         let points = reflecting_points(scene);
-        let core = core(&points, up);
+        let (core, inside) = match lit_box(light) {
+            // A lamp in a long tunnel: where it is dark, there is nothing to see.
+            Some(lit) => (lit.corners().to_vec(), lit),
+            None => (core(&points, up), scene.reflecting_bounds()),
+        };
         let scorer = ViewScorer::new(light, Aabb::from_points(core.iter().copied()));
-        let framing = Framing { scorer, up, aspect };
+        let framing = Framing { scorer, inside, up, aspect };
         let mut views = framing.outside(&points);
-        if core.len() < points.len() {
+        if core != points {
             views.extend(framing.outside(&core));
         }
         views.extend(framing.inside());
@@ -100,6 +110,8 @@ type View = (Camera, f64);
 
 struct Framing<'a> {
     scorer: ViewScorer<'a>,
+    /// Where eyes inside are looked for, scene unit.
+    inside: Aabb,
     up: DVec3,
     aspect: f64,
 }
@@ -210,13 +222,12 @@ impl Framing<'_> {
         Camera { eye, target, up: self.up, vertical_fov: INSIDE_FOV }
     }
 
-    /// Point `k` of the scene's box, moved to eye height between the floor below and the ceiling
+    /// Point `k` of the box inside, moved to eye height between the floor below and the ceiling
     /// above, if there are both. None where that is not inside.
     fn inside_eye(&self, k: usize) -> Option<DVec3> {
         let [x, y] = r2_point(k, 0.5);
         let place = DVec3::new(x, y, radical_inverse(k as u32 + 1));
-        let bounds = &self.scorer.bounds;
-        let point = bounds.low + bounds.size() * place;
+        let point = self.inside.low + self.inside.size() * place;
         let distance = |direction: DVec3| {
             self.scorer
                 .rays
@@ -257,6 +268,22 @@ fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
         }
     }
     scene.positions().iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| *p).collect()
+}
+
+/// The box where nearly all light is reflected; none where that is not much smaller than the scene.
+fn lit_box(light: &GatheredMesh) -> Option<Aabb> {
+    let surface = &light.surface;
+    let place = |(face, &element): (&[u32; 3], &u32)| {
+        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
+        let emitted = light.mesh.material(light.mesh.element(element as usize)).exitance;
+        let radiosity: Rgb = face.iter().map(|&v| surface.radiosity[v as usize]).sum();
+        let reflected = (radiosity / 3.0 - emitted).max(Rgb::ZERO).length();
+        ((a + b + c) / 3.0, reflected * (b - a).cross(c - a).length())
+    };
+    let places: Vec<(DVec3, f64)> =
+        surface.faces.iter().zip(&surface.elements).map(place).collect();
+    let whole = light.mesh.scene().reflecting_bounds().diagonal();
+    Aabb::around_most(&places, UNLIT_SHARE).filter(|lit| lit.diagonal() * LIT_CONCENTRATION < whole)
 }
 
 /// Those of `points` that are not among the outlying ones; all, if what is left is not much

@@ -34,8 +34,8 @@ const NEAR_POWER: i32 = 3;
 /// What is nearer than this share of the scene's diagonal is too near. Chosen by hand.
 const NEAR_SHARE: f64 = 0.05;
 
-/// Of the luminance that nine tenths of the reflecting area stay below, the share from which on
-/// something is lit, and the score of a view of nothing that is lit. Chosen by hand.
+/// Of the radiosity from which on half of the reflected light is, the share from which on something
+/// is lit, and the score of a view of nothing that is lit. Chosen by hand.
 const LIT_SHARE: f64 = 0.05;
 const UNLIT_SCORE: f64 = 0.02;
 
@@ -48,8 +48,6 @@ const EDGE_LOSS: f64 = 0.5;
 /// A scene with its light, as views of it are scored.
 pub(super) struct ViewScorer<'a> {
     pub rays: RayScene,
-    /// Box around what reflects, scene unit.
-    pub bounds: Aabb,
     /// Box around what is to be seen; what reflects outside it counts as if on its boundary.
     pub focus: Aabb,
     scene: &'a Scene,
@@ -65,7 +63,7 @@ struct Part {
     index: usize,
     /// Scene unit squared.
     area: f64,
-    /// Sum of the channels of its radiosity times area.
+    /// Mean of the channels of its reflected radiosity, times area.
     flux: f64,
     /// Share of what there is to see.
     weight: f64,
@@ -77,8 +75,7 @@ impl ViewScorer<'_> {
     pub fn new(light: &GatheredMesh, focus: Aabb) -> ViewScorer<'_> {
         let scene = light.mesh.scene();
         let rays = RayScene::of_scene(scene);
-        let bounds = scene.reflecting_bounds();
-        let mut scorer = ViewScorer { rays, bounds, focus, scene, parts: FxHashMap::default() };
+        let mut scorer = ViewScorer { rays, focus, scene, parts: FxHashMap::default() };
         scorer.add_parts(light);
         scorer.weigh_parts();
         scorer
@@ -95,13 +92,15 @@ impl ViewScorer<'_> {
                 continue;
             }
             let [a, b, c] = face.map(|v| surface.positions[v as usize]);
-            let radiosity: Rgb = face.map(|v| surface.radiosity[v as usize]).into_iter().sum();
+            let emitted = self.scene.material(t).exitance;
+            let radiosity = face.map(|v| surface.radiosity[v as usize]).into_iter().sum::<Rgb>();
+            let reflected = (radiosity / 3.0 - emitted).max(Rgb::ZERO);
             let share = mesh.solid_share(mesh.element(element as usize));
             let area = share * (b - a).cross(c - a).length() / 2.0;
             let next = Part { index: self.parts.len(), ..Default::default() };
             let part = self.parts.entry(self.key(t, (a + b + c) / 3.0)).or_insert(next);
             part.area += area;
-            part.flux += area * radiosity.element_sum() / 3.0;
+            part.flux += area * reflected.element_sum() / 3.0;
         }
     }
 
@@ -202,16 +201,17 @@ impl ViewScorer<'_> {
     }
 }
 
-/// The mean radiosity that parts of nine tenths of the area stay below.
+/// The mean radiosity of the parts from which on half of all light is reflected: where most of a
+/// tunnel is dark, what is lit is still the place with the lamp.
 fn bright_radiosity(parts: &[(PartKey, Part)]) -> f64 {
-    let mut order: Vec<(f64, f64)> =
-        parts.iter().map(|(_, part)| (part.flux / part.area, part.area)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = order.iter().map(|part| part.1).sum();
-    let mut below = 0.0;
-    let bright = order.iter().find(|part| {
-        below += part.1;
-        below >= 0.9 * total
+    let radiosity = |part: &Part| part.flux / part.area;
+    let mut order: Vec<&Part> = parts.iter().map(|(_, part)| part).collect();
+    order.sort_by(|a, b| radiosity(b).total_cmp(&radiosity(a)));
+    let total: f64 = order.iter().map(|part| part.flux).sum();
+    let mut above = 0.0;
+    let bright = order.into_iter().find(|part| {
+        above += part.flux;
+        above >= total / 2.0
     });
-    bright.map_or(0.0, |part| part.0)
+    bright.map_or(0.0, radiosity)
 }

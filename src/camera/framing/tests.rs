@@ -30,6 +30,16 @@ fn light_of(boxes: &[([f64; 3], [f64; 3], bool)], up: DVec3) -> GatheredMesh {
     GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]).unwrap()
 }
 
+/// A tunnel whose last twentieth alone is lit, as 1; the rest as 1e-9.
+#[test]
+fn what_is_lit_is_seen_in_a_dark_tunnel() {
+    let mut light = light_of(&[([0.0; 3], [100.0, 3.0, 3.0], true)], DVec3::Z);
+    let lit = |p: &DVec3| if p.x > 95.0 { 1.0 } else { 1e-9 };
+    light.surface.radiosity = light.surface.positions.iter().map(|p| Rgb::splat(lit(p))).collect();
+    let camera = Camera::framing(&light, 1.0);
+    assert!(camera.eye.x > 90.0, "{camera:?}");
+}
+
 fn bounds(light: &GatheredMesh) -> Aabb {
     light.mesh.scene().bounds()
 }
