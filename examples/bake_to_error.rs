@@ -1,4 +1,4 @@
-//! Lesson 2 of 8: a scene of your own, to an error or within a time.
+//! Lesson 2 of 9: a scene of your own, to an error or within a time.
 //!
 //!     cargo run --release --example bake_to_error -- SCENE.obj
 

@@ -1,4 +1,4 @@
-//! Lesson 6 of 8: the best picture of a bake: every pixel gathers the light of the surface that it
+//! Lesson 6 of 9: the best picture of a bake: every pixel gathers the light of the surface that it
 //! sees, rather than interpolate between vertices. Shadows are sharp whatever the mesh.
 //!
 //!     cargo run --release --example camera_image

@@ -1,4 +1,4 @@
-//! Lesson 1 of 8: the Cornell box, from an OBJ file to radiosity at vertices and a picture. Writes
+//! Lesson 1 of 9: the Cornell box, from an OBJ file to radiosity at vertices and a picture. Writes
 //! `cornell_box.ply`, `.exr` and `.png` to the current folder.
 //!
 //!     cargo run --release --example cornell_box

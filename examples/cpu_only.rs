@@ -1,4 +1,4 @@
-//! Lesson 3 of 8: no graphics device. Rays on the CPU make the form factors; without the feature
+//! Lesson 3 of 9: no graphics device. Rays on the CPU make the form factors; without the feature
 //! `gpu` the crate does not depend on wgpu.
 //!
 //!     cargo run --release --no-default-features --example cpu_only

@@ -1,4 +1,4 @@
-//! Lesson 7 of 8: a lamp is dimmed, a block is moved, and the solve goes on from where it was.
+//! Lesson 7 of 9: a lamp is dimmed, a block is moved, and the solve goes on from where it was.
 //!
 //!     cargo run --release --example incremental
 

@@ -1,4 +1,4 @@
-//! Lesson 8 of 8: a wgpu device that the program has already, for its own drawing, is used for the
+//! Lesson 8 of 9: a wgpu device that the program has already, for its own drawing, is used for the
 //! bake too. The wgpu version must be that of this crate.
 //!
 //!     cargo run --release --example own_device

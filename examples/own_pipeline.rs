@@ -1,4 +1,4 @@
-//! Lesson 4 of 8: the steps of a bake one by one, for programs that want to replace some of them.
+//! Lesson 4 of 9: the steps of a bake one by one, for programs that want to replace some of them.
 //!
 //!     Scene ─> Mesh ─> FormFactors ─> Solver ─> GatheredMesh ─> file
 //!

@@ -1,4 +1,4 @@
-//! Lesson 5 of 8: view factors between the groups of a scene, for heat transfer. Exact but for the
+//! Lesson 5 of 9: view factors between the groups of a scene, for heat transfer. Exact but for the
 //! error asked for; no graphics device is used.
 //!
 //!     cargo run --release --example view_factors -- SCENE.obj
