@@ -88,6 +88,8 @@ pub struct Scene {
     textures: Arc<SceneTextures>,
     /// Per triangle, the sides across which its surface does not continue; empty for none.
     cut_sides: Vec<[bool; 3]>,
+    /// See [`Scene::crease_degrees`].
+    crease_degrees: Option<f64>,
     /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
     covered_backs: OnceLock<Covers>,
     /// See [`Scene::clear_panes`]; looked for when they are first asked for.
@@ -208,6 +210,7 @@ impl Scene {
             luminaires: Arc::default(),
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
             cut_sides: vec![],
+            crease_degrees: None,
             covered_backs: OnceLock::new(),
             clear_panes: OnceLock::new(),
         };
@@ -392,13 +395,25 @@ impl Scene {
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
         let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
+        let crease_degrees = self.crease_degrees;
         let (sky, luminaires) = (self.sky.clone(), self.luminaires.clone());
-        let scene = Scene { sky, luminaires, textures, cut_sides, ..scene };
+        let scene = Scene { sky, luminaires, textures, cut_sides, crease_degrees, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));
         }
         Ok(scene)
+    }
+
+    /// Angle between normals, degrees, from which on neighbouring triangles of which no smoothing
+    /// group is known meet in a crease; none where nobody chose one.
+    pub(crate) fn crease_degrees(&self) -> Option<f64> {
+        self.crease_degrees
+    }
+
+    /// The same scene with [`Scene::crease_degrees`].
+    pub(crate) fn with_crease_degrees(&self, degrees: f64) -> Scene {
+        Scene { crease_degrees: Some(degrees), ..self.clone() }
     }
 
     pub(crate) fn warn(&mut self, warning: Warning) {

@@ -62,7 +62,7 @@ pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 /// Points of the first round, at least.
 const FIRST_POINTS: usize = 512;
 
-/// Paths a point in the first round.
+/// Paths a point in the first round, at least for anything to be known.
 const FIRST_PATHS: usize = 64;
 
 /// There is a point for so many vertices, at least: the more there are, the rarer are the places
@@ -97,7 +97,7 @@ pub fn verify(
 ) -> Result<Verification, Error> {
     settings.check()?;
     let scene = scene.resolve_sides();
-    let mut verifier = Verifier::new(&scene, settings.clone(), FIRST_POINTS)?;
+    let mut verifier = Verifier::new(&scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))?;
     verifier.measure(solution, Limits::default(), &mut progress)
 }
 
@@ -121,10 +121,14 @@ pub(crate) struct Limits {
 
 impl<'a> Verifier<'a> {
     /// For solutions of `scene`, with so many `points` in the first round, or more if there are
-    /// many vertices.
-    pub fn new(scene: &'a Scene, settings: Settings, points: usize) -> Result<Verifier<'a>, Error> {
+    /// many vertices, and so many `paths` at each.
+    pub fn new(
+        scene: &'a Scene,
+        settings: Settings,
+        (points, paths): (usize, usize),
+    ) -> Result<Verifier<'a>, Error> {
         let sampler = Sampler::new(scene, &settings)?;
-        Ok(Verifier { sampler, settings, points, paths: FIRST_PATHS })
+        Ok(Verifier { sampler, settings, points, paths })
     }
 
     /// See [`verify`].
@@ -156,7 +160,8 @@ impl<'a> Verifier<'a> {
                 break Stop::Negligible;
             }
             let is_precise = error.standard_error <= settings.precision * error.value;
-            if !biased && (is_precise || limits.decided_by(&error)) {
+            let enough = self.paths >= FIRST_PATHS;
+            if enough && !biased && (is_precise || limits.decided_by(&error)) {
                 break Stop::Precise;
             }
             // Another round doubles all that was done so far.
@@ -164,8 +169,10 @@ impl<'a> Verifier<'a> {
                 break Stop::Time;
             }
             let traced = (sampler.drawn() * self.paths) as u64;
-            let too_many = limits.paths.is_some_and(|most| 2 * traced > most);
-            if too_many || self.points >= MAX_POINTS || self.paths >= MAX_PATHS {
+            let in_vain = limits
+                .paths
+                .is_some_and(|most| 2 * traced > most || limits.is_in_vain(most / traced, &error));
+            if in_vain || self.points >= MAX_POINTS || self.paths >= MAX_PATHS {
                 break Stop::Rounds;
             }
             match 2.0 * all.noise > all.variance || biased {
@@ -183,6 +190,15 @@ impl Limits {
         let off = error.standard_error;
         let is_far = |limit: f64| (error.value - limit).abs() > 2.0 * off;
         self.error.is_some_and(is_far) && off <= ROUGHLY * error.value
+    }
+
+    /// Whether by `factor` times the paths an error as large as the one to be met, or as what was
+    /// surely found, is still not told from none, at best: where noise falls as fast as the number
+    /// of paths grows.
+    fn is_in_vain(&self, factor: u64, error: &Estimate) -> bool {
+        let found = error.value - 2.0 * error.standard_error;
+        let off = error.standard_error / factor as f64;
+        self.error.is_some_and(|limit| 2.0 * off > limit.max(found))
     }
 }
 

@@ -104,8 +104,8 @@ impl<'a> GatherPhase<'a> {
             let is_stuck = idle_rounds >= model::MAX_IDLE_ROUNDS;
             let rounds_left = if is_stuck { 0 } else { model::MAX_ROUNDS - rounds };
             let mut next = self.next_step(&estimated, rounds_left)?;
-            if next.is_err() && !estimated.cancelled {
-                // Gathers find nothing more to do; paths may.
+            if next.is_err() {
+                // Gathers find nothing more to do, or were stopped; paths may find more.
                 estimated = self.judge(estimated, reporter, clock);
                 let sources = estimated.found.whole.sources;
                 let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
@@ -135,7 +135,8 @@ impl<'a> GatherPhase<'a> {
             Ok(Err(if reached { Outcome::Reached } else { Outcome::Missed(obstacle) }))
         };
         if *cancelled || light.stop == StopReason::Cancelled {
-            end(Obstacle::Cancelled)
+            // Whatever a few points say of it.
+            Ok(Err(Outcome::Missed(Obstacle::Cancelled)))
         } else if target.is_met(judged) {
             end(Obstacle::Edges)
         } else if light.stop == StopReason::Elements {
@@ -217,9 +218,10 @@ impl<'a> GatherPhase<'a> {
         let mut cancelled = stop == StopReason::Cancelled;
         let found = loop {
             let found = estimator.estimate(counts, &mut *self.gatherer, &mut |samples, of| {
-                cancelled = cancelled
-                    || reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-                if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+                // What is told of a bake that was stopped is to hold, too.
+                let enough = cancelled && samples >= *model::SAMPLES.start();
+                if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;
             let undecided = |target: ErrorTarget| target.is_undecided(found.judged());
             let most = counts.per_group.max(counts.total / model::SAMPLES_RATIO);
@@ -237,7 +239,7 @@ impl<'a> GatherPhase<'a> {
         Ok(Estimated { light, found, cancelled })
     }
 
-    /// Holds the estimate against paths.
+    /// Holds the estimate against paths; where the bake was stopped, against few of them.
     fn judge(
         &mut self,
         estimated: Estimated,
@@ -245,11 +247,16 @@ impl<'a> GatherPhase<'a> {
         clock: &mut StageClock,
     ) -> Estimated {
         let Estimated { light, found, mut cancelled } = estimated;
-        let paths = model::judge_paths(light.gather_count, self.gather.rays);
+        let was_stopped = cancelled;
+        let paths = match was_stopped {
+            true => model::JUDGE_PATHS,
+            false => model::judge_paths(light.gather_count, self.gather.rays),
+        };
         let limits = (self.target.map(|target| target.error), paths);
         let found = self.judge.judge(found, &light.surface, limits, &mut |samples, of| {
             cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-            if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let stop = cancelled && !was_stopped;
+            if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(found.whole)).is_break();

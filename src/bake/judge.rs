@@ -76,7 +76,10 @@ impl<'a> Judge<'a> {
     fn verifier(&mut self) -> Result<&mut Verifier<'a>, Error> {
         let verifier = match self.verifier.take() {
             Some(verifier) => verifier,
-            None => Verifier::new(self.scene, self.settings(), model::JUDGE_POINTS)?,
+            None => {
+                let first = (model::JUDGE_POINTS, model::JUDGE_FIRST_PATHS);
+                Verifier::new(self.scene, self.settings(), first)?
+            }
         };
         Ok(self.verifier.insert(verifier))
     }

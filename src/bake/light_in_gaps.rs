@@ -25,7 +25,7 @@ use crate::gather::exchange::{Place, SeenPlace, is_in_gap, settle};
 use crate::gather::gather_points::SurfaceOffset;
 use crate::gather::point_row::{PointRows, SurfaceHit};
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
-use crate::gather::{Progress, RadiosityField};
+use crate::gather::{IrradianceSample, Progress, RadiosityField};
 use crate::mesh::Mesh;
 use crate::progress::BatchSizer;
 use crate::scene::Rgb;
@@ -102,13 +102,15 @@ impl GatheringElements<'_> {
         let elements: Vec<usize> = (0..mesh.element_count()).filter(scatters).collect();
         let mut gaps = vec![];
         let flow = self.in_batches(&elements, |batch, points| {
-            let samples = gather_two_sided(rays, field, points)?;
-            for (&e, sample) in batch.iter().zip(samples) {
-                let size = mesh.area(mesh.element(e)).sqrt();
-                if is_in_gap(sample.inverse_distance, size.max(footprint)) {
-                    gaps.push((e, albedo(mesh, e) * sample.irradiance));
-                }
-            }
+            let narrow = |(&e, p): (&usize, &TwoSidedPoint)| {
+                let size = mesh.area(mesh.element(e)).sqrt().max(footprint);
+                is_in_gap(rays.inverse_distance(&p.point), size).then_some((e, *p))
+            };
+            let found = batch.par_iter().zip(points).filter_map(narrow);
+            let (found, points): (Vec<usize>, Vec<TwoSidedPoint>) = found.unzip();
+            let samples = gather_two_sided(rays, field, &points)?;
+            let light = |(e, s): (usize, IrradianceSample)| (e, albedo(mesh, e) * s.irradiance);
+            gaps.extend(found.into_iter().zip(samples).map(light));
             Ok(())
         })?;
         Ok(flow.is_continue().then_some(gaps))

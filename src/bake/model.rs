@@ -44,6 +44,8 @@
 
 use std::ops::RangeInclusive;
 
+use crate::mesh::Mesh;
+
 /// A setting as a power of the error it is for: setting = scale · error^exponent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -140,9 +142,19 @@ pub const COARSE_CONTACTS_ABOVE: f64 = 0.07;
 /// Up to this error vertices gather twice, since the first time they see what was shot on elements.
 pub const TWO_PASSES_UP_TO: f64 = 0.03;
 
+/// Triangles of which no smoothing group is known share vertices where their normals differ by up to
+/// so many times the error, radians. A shared vertex has the light of the mean normal, which is half
+/// of the angle δ from either; the irradiance from one direction at an angle θ is off by tan θ · δ/2
+/// then, and between three vertices half of such squares are left: 0.35 δ at 45°, half of the error.
+pub const CREASE_TIMES_ERROR: f64 = 1.3;
 /// Receivers within this many patch diameters get closed-form factors, whatever the error.
 pub const NEAR_REACH: f64 = 1.0;
 
+/// The angle up to which triangles of no known smoothing group share vertices for `error`, degrees.
+pub(super) fn crease_degrees(error: f64) -> f64 {
+    let degrees = (CREASE_TIMES_ERROR * error).to_degrees();
+    degrees.clamp(Mesh::COPLANAR_DEGREES, Mesh::CREASE_DEGREES)
+}
 /// The solver's patch tolerance for `error`.
 pub(super) fn patch_tolerance(error: f64) -> f64 {
     error.min(PATCH_TOLERANCE_BASE + PATCH_TOLERANCE_SHARE * error)
@@ -326,6 +338,8 @@ pub const COST_EXPONENT: f64 = 1.5;
 /// Share of the remaining time that the next error is chosen for: what it takes is a guess.
 pub const TIME_FRACTION: f64 = 0.5;
 
+/// Share of the time that is kept for the estimate of what was reached, should a bake be stopped.
+pub const TIME_FOR_ESTIMATE: f64 = 0.1;
 /// A further bake has to be of an error smaller by this factor, as each starts from nothing.
 pub const MIN_IMPROVEMENT: f64 = 1.3;
 
@@ -393,6 +407,8 @@ pub const JUDGE_PRECISION: f64 = 0.1;
 
 /// Points at which paths measure a result, at least: rare errors take many points, of few paths.
 pub const JUDGE_POINTS: usize = 1024;
+/// Paths at each of them, to begin with: few show whether more of them are worth their time.
+pub const JUDGE_FIRST_PATHS: usize = 16;
 
 /// A further bounce that leaves more than this share of the error of the sources was in vain.
 pub const MIN_SOURCES_STEP: f64 = 0.8;

@@ -57,6 +57,10 @@ pub(super) fn run(
         Some(gather) => gather.refinement.min_edge,
         None => settings.solve.element_size,
     };
+    let scene = match target {
+        Some(target) => &with_creases(scene, model::crease_degrees(target.error)),
+        None => scene,
+    };
     let scene = match &settings.solve.region {
         Some(region) => &cut_large_triangles(scene, region),
         None => scene,
@@ -99,6 +103,14 @@ pub(super) fn run(
         device_failure: backend.failure(),
         timings: clock.timings,
     })
+}
+
+/// `scene`, with creases where it does not say and normals differ by more than this.
+fn with_creases(scene: &Arc<Scene>, degrees: f64) -> Arc<Scene> {
+    match scene.triangles().iter().any(|t| t.smoothing.is_none()) {
+        true => Arc::new(scene.with_crease_degrees(degrees)),
+        false => scene.clone(),
+    }
 }
 
 /// What was shot, as vertices gather it; none if the bake was cancelled.

@@ -18,6 +18,7 @@ use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
+use crate::bake::judge::Judge;
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
@@ -206,10 +207,20 @@ pub(super) fn estimate_elements(
     // With settings to gather by, it was cancelled before vertices could.
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
     let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
-        cancelled =
-            cancelled || reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-        if cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+        let enough = cancelled && samples >= *model::SAMPLES.start();
+        if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
+    let found = match target {
+        // What is told of a bake that was stopped is to hold, too.
+        Some(target) if cancelled => Judge::new(shot.mesh.scene(), target.each_group).judge(
+            found,
+            &light.surface,
+            (Some(target.error), model::JUDGE_PATHS),
+            &mut |_, _| ControlFlow::Continue(()),
+        ),
+        _ => found,
+    };
     let is_reached = target.is_some_and(|target| target.is_reached(found.judged()));
     let EstimatedError { whole: estimate, groups, vertices, .. } = found;
     light.surface.error = vertices;
@@ -218,8 +229,8 @@ pub(super) fn estimate_elements(
     let _ = reporter.report(BakeProgress::Estimated(estimate));
     let outcome = match target {
         None => Outcome::Unasked,
-        Some(_) if is_reached => Outcome::Reached,
         Some(_) if cancelled => Outcome::Missed(Obstacle::Cancelled),
+        Some(_) if is_reached => Outcome::Reached,
         Some(_) => Outcome::Missed(Obstacle::Settings),
     };
     Ok(BakedLight { light, estimate, groups, outcome, settings: settings.clone() })

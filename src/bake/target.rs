@@ -140,6 +140,7 @@ fn bake_in_time(
         return Err(not_a_time(0.0));
     }
     let start = Instant::now();
+    let end = limit.mul_f64(1.0 - model::TIME_FOR_ESTIMATE);
     let without_checkpoint = |settings: &mut BakeSettings| {
         overrides(settings);
         settings.solve.checkpoint = None;
@@ -151,7 +152,7 @@ fn bake_in_time(
         let mut stopped = false;
         let target = ErrorTarget { error, each_group: false, overrides: &without_checkpoint };
         let attempt = bake_to_error(target, scene, backend, &mut |stage| {
-            stopped |= progress(stage).is_break() || start.elapsed() >= limit;
+            stopped |= progress(stage).is_break() || start.elapsed() >= end;
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let baked = match (attempt, best.take()) {

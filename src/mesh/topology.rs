@@ -68,15 +68,13 @@ type TriangleSide = (usize, usize);
 
 impl SurfaceTopology {
     /// Surfaces that continue by the scene's smoothing groups and by angles: up to
-    /// [`Mesh::CREASE_DEGREES`] within one smoothing group or where none is known, else up to
-    /// [`Mesh::COPLANAR_DEGREES`].
+    /// [`Mesh::CREASE_DEGREES`] within one smoothing group, up to [`Scene::crease_degrees`] where
+    /// none is known, else up to [`Mesh::COPLANAR_DEGREES`].
     pub fn new(scene: &Scene) -> SurfaceTopology {
-        SurfaceTopology::with_crease_angle(scene, |a, b| {
-            if a.smoothing == b.smoothing && a.smoothing != Some(0) {
-                Mesh::CREASE_DEGREES
-            } else {
-                Mesh::COPLANAR_DEGREES
-            }
+        SurfaceTopology::with_crease_angle(scene, |a, b| match (a.smoothing, b.smoothing) {
+            (None, None) => scene.crease_degrees().unwrap_or(Mesh::CREASE_DEGREES),
+            (Some(a), Some(b)) if a == b && a != 0 => Mesh::CREASE_DEGREES,
+            _ => Mesh::COPLANAR_DEGREES,
         })
     }
 

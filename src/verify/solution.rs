@@ -50,6 +50,13 @@ fn other_emission(material: &Material, told: Rgb) -> Error {
     Error::new(ErrorKind::Scene, "solution", found, remedy)
 }
 
+/// Whether `material` has this radiosity under this irradiance, W/m², as exactly as they are known.
+fn is_light_of(material: &Material, radiosity: Rgb, irradiance: Rgb) -> bool {
+    let reflected = material.albedo() * irradiance;
+    let noise = EMISSION_NOISE * radiosity.max_element().max(reflected.max_element());
+    (radiosity - reflected).abs_diff_eq(material.exitance, noise)
+}
+
 /// A solution that can be asked at points.
 pub(super) struct SolutionLookup<'a> {
     solution: &'a VertexMesh,
@@ -124,10 +131,15 @@ impl<'a> SolutionLookup<'a> {
                 continue;
             }
             let material = scene.material(t);
-            for (told, noise) in self.emitted(scene, t) {
+            for (radiosity, irradiance) in self.light(scene, t) {
+                if is_light_of(material, radiosity, irradiance) {
+                    emission.agrees = true;
+                } else if scene.materials().iter().any(|m| is_light_of(m, radiosity, irradiance)) {
+                    // Of two surfaces in one place the solution's face is that of the other.
+                    continue;
+                }
                 emission.places += 1;
-                emission.agrees |= told.abs_diff_eq(material.exitance, noise);
-                emission.told = told;
+                emission.told = radiosity - material.albedo() * irradiance;
             }
         }
         for (emission, material) in of_materials.iter().zip(scene.materials()) {
@@ -138,20 +150,16 @@ impl<'a> SolutionLookup<'a> {
         Ok(())
     }
 
-    /// What the solution emits at places of triangle `t` of `scene`, W/m², and how exactly that is
-    /// known.
-    fn emitted(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, f64)> {
-        let (corners, normal, albedo) =
-            (scene.corners(t), scene.normal(t), scene.material(t).albedo());
+    /// Radiosity and irradiance of the solution at places of triangle `t` of `scene`, W/m².
+    fn light(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, Rgb)> {
+        let (corners, normal) = (scene.corners(t), scene.normal(t));
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
             let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
-            let radiosity = self.interpolated(&hit, &self.solution.radiosity);
-            let irradiance = self.interpolated(&hit, &self.solution.irradiance);
-            let reflected = albedo * irradiance;
-            let noise = EMISSION_NOISE * radiosity.max_element().max(reflected.max_element());
-            Some((radiosity - reflected, noise))
+            let values = [&self.solution.radiosity, &self.solution.irradiance];
+            let [radiosity, irradiance] = values.map(|values| self.interpolated(&hit, values));
+            Some((radiosity, irradiance))
         })
     }
 

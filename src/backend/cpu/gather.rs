@@ -107,6 +107,18 @@ impl RayGather {
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
+    /// Mean of 1/distance over the hemisphere above `point`, per scene unit, by as many rays as it
+    /// gathers with at least; directions that see nothing count 0. No light is looked up.
+    pub(crate) fn inverse_distance(&self, point: &GatherPoint) -> f64 {
+        let rotation = self.rotations.at(point.position, point.near);
+        let directions = self.samples.directions_in(0..self.min_rays, point.normal, rotation);
+        let mut sum = 0.0;
+        self.scene.closest_hits(point.position, directions, point.near, None, |_, hit| {
+            sum += hit.map_or(0.0, |hit| 1.0 / hit.distance);
+        });
+        sum / f64::from(self.min_rays)
+    }
+
     /// What arrives at `point` from each of `fields`, all of one scene, with the same rays: as many
     /// as the first takes.
     fn irradiance<const FIELDS: usize>(
