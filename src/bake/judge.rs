@@ -12,9 +12,10 @@
 //! ```
 //!
 //! What is told above the estimate is a part of its own, the *sources*: what the vertices gathered
-//! from. Below it is told only what the paths know better than the estimate, by the standard error
-//! of each as a share of itself: points that have missed what is rare find little, and s with it.
-//! Points and paths are kept for all rounds of a bake.
+//! from. Groups are many, so that it takes three standard errors there in the place of two. Below
+//! the estimate is told only what the paths know better, by the standard error of each as a share
+//! of itself: points that have missed what is rare find little, and s with it. Points and paths are
+//! kept for all rounds of a bake.
 
 use std::ops::ControlFlow;
 
@@ -28,6 +29,11 @@ use crate::verify::{
     Verifier,
 };
 use crate::vertex::VertexMesh;
+
+/// Standard errors that a measurement may be off by: of the whole, and of one of many groups, of
+/// which some are off by more than two by chance.
+const SURELY: f64 = 2.0;
+const SURELY_OF_MANY: f64 = 3.0;
 
 /// Measures the results of a bake.
 pub(super) struct Judge<'a> {
@@ -104,13 +110,14 @@ fn held_against(found: EstimatedError, measured: &Verification) -> EstimatedErro
     let Some(error) = measured.error else {
         return EstimatedError { whole, by_light, groups, vertices };
     };
-    let told = whole.held_against(error, measured.bias, measured.paths);
+    let told = whole.held_against(error, SURELY, (measured.bias, measured.paths));
     let growth = if whole.total > 0.0 { told.total / whole.total } else { 1.0 };
     vertices.iter_mut().for_each(|error| *error *= growth);
     let of_group = |group: GroupError| {
         let same = measured.groups.iter().find(|other| other.group == group.group as usize);
         let hold = |other: &MeasuredGroup| {
-            Some(group.estimate.held_against(other.error?, other.bias, measured.paths))
+            let paths = (other.bias, measured.paths);
+            Some(group.estimate.held_against(other.error?, SURELY_OF_MANY, paths))
         };
         GroupError { estimate: same.and_then(hold).unwrap_or(group.estimate), ..group }
     };
@@ -119,11 +126,16 @@ fn held_against(found: EstimatedError, measured: &Verification) -> EstimatedErro
 }
 
 impl ErrorEstimate {
-    /// The estimate as far as `measured`, by so many `paths` a point, leaves it open; its square is
-    /// too large by about `bias`.
-    fn held_against(self, measured: Measured, bias: f64, paths: usize) -> ErrorEstimate {
+    /// The estimate as far as `measured` leaves it open, which is off by up to `surely` standard
+    /// errors: by so many `paths` a point, and with a square that is too large by about `bias`.
+    fn held_against(
+        self,
+        measured: Measured,
+        surely: f64,
+        (bias, paths): (f64, usize),
+    ) -> ErrorEstimate {
         let Measured { value, standard_error } = measured;
-        let low = (value.powi(2) - (2.0 * standard_error).powi(2) - bias).max(0.0).sqrt();
+        let low = (value.powi(2) - (surely * standard_error).powi(2) - bias).max(0.0).sqrt();
         let know_more = standard_error * self.total <= self.uncertainty * value;
         let high = if know_more { value + standard_error } else { f64::INFINITY };
         let told = self.total.clamp(low, high);
@@ -163,7 +175,7 @@ mod tests {
             ..Default::default()
         };
         let told = |value, standard_error| {
-            let told = parts.held_against(Measured { value, standard_error }, 0.0, 64);
+            let told = parts.held_against(Measured { value, standard_error }, SURELY, (0.0, 64));
             let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, sources, .. } =
                 told;
             let squares = [mesh, gaps, sampling, truncation, unshot, sources].map(|p| p * p);
@@ -185,6 +197,6 @@ mod tests {
         assert_eq!(told(0.01, 0.02), 0.05);
         // Known to be no more than the noise of what it is relative to.
         let measured = Measured { value: 0.1, standard_error: 0.0 };
-        assert_eq!(parts.held_against(measured, 0.01, 64).total, 0.05);
+        assert_eq!(parts.held_against(measured, SURELY, (0.01, 64)).total, 0.05);
     }
 }

@@ -97,5 +97,6 @@ fn light_shot_too_coarsely_is_told() {
     let measured = verify::verify(&cornell(), &baked.light.surface, &settings, proceed).unwrap();
     let (told, measured) = (baked.estimate, measured.error.unwrap().value);
     println!("{}, told {told:?}, measured {measured}", baked.outcome);
-    assert!((0.7..1.4).contains(&(told.total / measured)), "{told:?} {measured}");
+    // What is told of an error is to be within a factor of two of it.
+    assert!((0.5..2.0).contains(&(told.total / measured)), "{told:?} {measured}");
 }
