@@ -334,6 +334,17 @@ mod tests {
     }
 
     #[test]
+    fn a_chosen_angle_holds_where_no_smoothing_group_is_known() {
+        let surfaces = |degrees, smoothing| {
+            let scene = fold(degrees, [smoothing; 2]).with_crease_degrees(10.0);
+            SurfaceTopology::new(&scene).surfaces()
+        };
+        assert_eq!(surfaces(9.9, None), [0, 0]);
+        assert_eq!(surfaces(10.1, None), [0, 1]);
+        assert_eq!(surfaces(10.1, Some(1)), [0, 0]);
+    }
+
+    #[test]
     fn angles_alone_decide_where_smoothing_groups_are_ignored() {
         for pair in [SAME.as_slice(), &NOT_THE_SAME].concat() {
             assert_eq!(

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use glam::DVec3;
 use radiosity::bake::{Obstacle, Outcome};
 use radiosity::verify;
-use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Material, Rgb, Scene};
+use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Material, Rgb, Scene, Triangle};
 
 use crate::common::scenes::{facing_up, quads};
 use crate::common::{cornell_box, keep_going};
@@ -99,4 +100,43 @@ fn light_shot_too_coarsely_is_told() {
     println!("{}, told {told:?}, measured {measured}", baked.outcome);
     // What is told of an error is to be within a factor of two of it.
     assert!((0.5..2.0).contains(&(told.total / measured)), "{told:?} {measured}");
+}
+
+/// A column of 16 faces, folded by 22.5°, beside a lamp: its faces are flat, whatever is between
+/// them, unless its file says that it is smooth.
+#[test]
+fn flat_faces_take_few_elements() {
+    let count = |smoothing: Option<u32>| {
+        let rim = |k: u32, z: f64| {
+            let (sin, cos) = (f64::from(k) * PI / 8.0).sin_cos();
+            DVec3::new(cos, sin, z)
+        };
+        let mut positions: Vec<DVec3> = (0..16).flat_map(|k| [rim(k, 0.0), rim(k, 4.0)]).collect();
+        let mut triangles = vec![];
+        for k in 0..16 {
+            let [a, b, c, d] = [2 * k, (2 * k + 2) % 32, (2 * k + 3) % 32, 2 * k + 1];
+            for corners in [[a, b, c], [a, c, d]] {
+                triangles.push(Triangle { corners, group: 0, material: 0, smoothing });
+            }
+        }
+        // Four metres off, facing it.
+        let lamp = [[4.0, -1.0, 1.0], [4.0, -1.0, 3.0], [4.0, 1.0, 3.0], [4.0, 1.0, 1.0]];
+        positions.extend(lamp.map(DVec3::from_array));
+        for corners in [[32, 33, 34], [32, 34, 35]] {
+            triangles.push(Triangle { corners, group: 1, material: 1, smoothing: None });
+        }
+        let materials = vec![Material::grey("column", 0.5), lamp_material()];
+        let names = ["column", "lamp"].map(String::from).to_vec();
+        let scene = Scene::new(positions, triangles, names, materials).unwrap();
+        let baked = BakeTarget::Error(0.05).bake(scene, &Backend::Cpu, keep_going).unwrap();
+        assert_eq!(baked.outcome, Outcome::Reached);
+        baked.light.mesh.element_count()
+    };
+    let (flat, smooth) = (count(None), count(Some(1)));
+    println!("{flat} elements, {smooth} where folds are smooth");
+    assert!(2 * flat < smooth, "{flat} {smooth}");
+}
+
+fn lamp_material() -> Material {
+    Material { exitance: Rgb::splat(10.0), ..Material::grey("lamp", 0.0) }
 }

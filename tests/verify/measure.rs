@@ -270,6 +270,29 @@ fn it_stops_when_told_and_when_time_is_up() {
     assert_eq!((none.stop, none.error.unwrap().value), (Stop::Negligible, 0.0));
 }
 
+/// Of two sheets in one place, the solution's faces there are those of one of them.
+#[test]
+fn another_surface_in_the_same_place_emits_nothing() {
+    let sheet = facing_up([0.0, 1.0], [0.0, 1.0], 0.0);
+    let lamp = (facing_down([0.0, 1.0], [0.0, 1.0], 1.0), paint(0.5, 1.0));
+    let scene = quads(&[(sheet, paint(0.5, 0.0)), (sheet, paint(0.2, 0.0)), lamp]);
+    let light = |material: u32| scene.materials()[material as usize].clone();
+    // Where they differ there is the light of the first, on the faces of both.
+    let mut told = solution(&scene, |_| Rgb::ZERO);
+    told.irradiance = vec![Rgb::ONE; told.positions.len()];
+    let materials =
+        scene.triangles().iter().map(|t| light(if t.material == 1 { 0 } else { t.material }));
+    let radiosity = materials.map(|m| m.exitance + m.reflectance);
+    told.radiosity = radiosity.flat_map(|radiosity| [radiosity; 3]).collect();
+    let stop = |_: &Progress| ControlFlow::Break(());
+    assert!(verify(&scene, &told, &settings(1.0), stop).is_ok());
+    // What no material of the scene would emit or reflect is refused.
+    told.radiosity[..6].fill(Rgb::splat(0.7));
+    told.radiosity[6..12].fill(Rgb::splat(0.7));
+    let error = verify(&scene, &told, &settings(1.0), stop).unwrap_err();
+    assert!(error.to_string().contains("emits radiance"), "{error}");
+}
+
 #[test]
 fn what_cannot_be_measured_is_refused() {
     let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
