@@ -6,7 +6,9 @@ mod emit;
 mod light;
 mod light_map;
 mod luminaires;
+mod output;
 mod sky;
+mod usage;
 mod view_factors;
 
 use std::path::{Path, PathBuf};
