@@ -48,6 +48,9 @@ const LIGHT_NAMES: [&str; 36] = [
     "arealight",
 ];
 
+/// Ends of words that say the same: German writes compounds as one word, as in `Deckenleuchte`.
+const LIGHT_ENDS: [&str; 2] = ["leuchte", "lampe"];
+
 /// Names of materials that look like lamps.
 fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let is_light = |name: &&str| words(name).iter().any(|word| says_light(word));
@@ -57,7 +60,7 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// Whether a word in lower case is one for a lamp, or for several.
 fn says_light(word: &str) -> bool {
     let word = word.strip_suffix('s').filter(|one| !one.is_empty()).unwrap_or(word);
-    LIGHT_NAMES.contains(&word)
+    LIGHT_NAMES.contains(&word) || LIGHT_ENDS.iter().any(|end| word.ends_with(end))
 }
 
 /// The words of a name, in lower case: what other characters than letters part, and capitals that

@@ -54,9 +54,9 @@ impl SceneOptions {
 
     /// Tells the user what is odd about a scene and what lights it, and returns that.
     pub fn print_warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        let mut warnings = self.luminaires.warnings();
         warnings.extend(self.sky.warning(scene));
-        warnings.extend(self.luminaires.warnings());
+        warnings.extend(scene.warnings().iter().map(ToString::to_string));
         warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         warnings
     }
