@@ -112,13 +112,34 @@ pub(crate) fn shortened(text: &str) -> Cow<'_, str> {
 
 /// Up to eight of `names`, quoted, and how many more there are.
 pub(crate) fn quoted<S: AsRef<str>>(names: &[S]) -> String {
-    const SHOWN: usize = 8;
+    quoted_few(names, 8)
+}
+
+/// Up to `shown` of `names`, quoted, and how many more there are.
+pub(crate) fn quoted_few<S: AsRef<str>>(names: &[S], shown: usize) -> String {
     let name = |name: &S| format!("'{}'", shortened(name.as_ref()).escape_debug());
-    let mut list = names.iter().take(SHOWN).map(name).collect::<Vec<_>>().join(", ");
-    if names.len() > SHOWN {
-        list += &format!(" and {} more", names.len() - SHOWN);
+    let mut list = names.iter().take(shown).map(name).collect::<Vec<_>>().join(", ");
+    if names.len() > shown {
+        list += &format!(" and {} more", names.len() - shown);
     }
     list
+}
+
+/// Which of `names` is meant by `wrong`, perhaps: one in other letters, or a few typing errors off.
+pub(crate) fn nearest<'n>(
+    wrong: &str,
+    names: impl IntoIterator<Item = &'n str>,
+) -> Option<&'n str> {
+    /// Letters that a typing error may be in, at least; and longest name that is looked at.
+    const LETTERS_AN_ERROR: usize = 3;
+    const LONGEST: usize = 100;
+    let lower = |name: &str| name.to_lowercase();
+    let wrong = lower(wrong);
+    let count = wrong.chars().count();
+    let near = names.into_iter().filter(|name| name.len() <= LONGEST && count <= LONGEST);
+    let distances = near.map(|name| (strsim::osa_distance(&wrong, &lower(name)), name));
+    let nearest = distances.min_by_key(|(distance, _)| *distance);
+    nearest.filter(|(distance, _)| *distance <= count / LETTERS_AN_ERROR).map(|(_, name)| name)
 }
 
 #[cfg(test)]
@@ -129,5 +150,22 @@ mod tests {
     fn messages_stay_short() {
         assert_eq!(shortened(&"é".repeat(1000)).chars().count(), 61);
         assert_eq!(quoted(&["a"; 10]), format!("{} and 2 more", ["'a'"; 8].join(", ")));
+    }
+
+    #[test]
+    fn names_are_meant_that_are_a_few_letters_off() {
+        let names = ["light", "lamp_shade", "wall"];
+        for (wrong, meant) in [
+            ("Light", Some("light")),
+            ("lihgt", Some("light")),
+            ("lampshade", Some("lamp_shade")),
+            ("well", Some("wall")),
+            ("floor", None),
+            ("", None),
+        ] {
+            assert_eq!(nearest(wrong, names), meant, "{wrong}");
+        }
+        let long = "x".repeat(1000);
+        assert_eq!(nearest(&long, [&*long]), None);
     }
 }

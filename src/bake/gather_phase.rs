@@ -135,8 +135,9 @@ impl<'a> GatherPhase<'a> {
             Ok(Err(if reached { Outcome::Reached } else { Outcome::Missed(obstacle) }))
         };
         if *cancelled || light.stop == StopReason::Cancelled {
-            // Whatever a few points say of it.
-            Ok(Err(Outcome::Missed(Obstacle::Cancelled)))
+            // Fewer points say so than would if it had gone on: it is to be met safely.
+            let met = target.is_met(judged);
+            Ok(Err(if met { Outcome::Reached } else { Outcome::Missed(Obstacle::Cancelled) }))
         } else if target.is_met(judged) {
             end(Obstacle::Edges)
         } else if light.stop == StopReason::Elements {

@@ -26,6 +26,8 @@ pub enum Obstacle {
     Elements,
     /// The callback stopped the bake.
     Cancelled,
+    /// The time that there was, of [`BakeTarget::Within`](crate::BakeTarget::Within).
+    Time,
     /// What was left to refine are settings made by hand.
     Settings,
     /// After all rounds light still changes within elements, as at the edge of a shadow.
@@ -64,6 +66,7 @@ impl Obstacle {
                 format!("allow more than {count} elements, which takes memory and time")
             }
             Obstacle::Cancelled => "let it go on".into(),
+            Obstacle::Time => "give it more time, or ask for less".into(),
             Obstacle::Settings => "leave settings to the bake".into(),
             Obstacle::Edges => "ask for less, or look at the worst groups".into(),
             Obstacle::Gaps => "look at surfaces that nearly touch".into(),
@@ -79,6 +82,7 @@ impl fmt::Display for Obstacle {
         f.write_str(match self {
             Obstacle::Elements => "the limit of elements",
             Obstacle::Cancelled => "it was stopped",
+            Obstacle::Time => "the time was up",
             Obstacle::Settings => "settings made by hand",
             Obstacle::Edges => "edges of light that the mesh does not resolve",
             Obstacle::Gaps => "gaps between surfaces that no mesh resolves",

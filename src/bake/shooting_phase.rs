@@ -221,7 +221,10 @@ pub(super) fn estimate_elements(
         ),
         _ => found,
     };
-    let is_reached = target.is_some_and(|target| target.is_reached(found.judged()));
+    let is_reached = target.is_some_and(|target| match cancelled {
+        true => target.is_met(found.judged()),
+        false => target.is_reached(found.judged()),
+    });
     let EstimatedError { whole: estimate, groups, vertices, .. } = found;
     light.surface.error = vertices;
     clock.timings.estimate = clock.lap();
@@ -229,8 +232,8 @@ pub(super) fn estimate_elements(
     let _ = reporter.report(BakeProgress::Estimated(estimate));
     let outcome = match target {
         None => Outcome::Unasked,
-        Some(_) if cancelled => Outcome::Missed(Obstacle::Cancelled),
         Some(_) if is_reached => Outcome::Reached,
+        Some(_) if cancelled => Outcome::Missed(Obstacle::Cancelled),
         Some(_) => Outcome::Missed(Obstacle::Settings),
     };
     Ok(BakedLight { light, estimate, groups, outcome, settings: settings.clone() })

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
-use crate::bake::controller::ErrorTarget;
-use crate::bake::outcome::Outcome;
+use crate::bake::controller::{ErrorTarget, Judged};
+use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, ProgressCallback};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
@@ -41,6 +41,17 @@ pub enum BakeTarget {
     /// the one before took, for as long as another fits in. What is not done in time is stopped,
     /// and the last that was done is returned; if none was, what was reached.
     Time(Duration),
+    /// An error, but no longer than a wall time: bakes to errors that fit into it, as for
+    /// [`BakeTarget::Time`], which end when this one is reached. [`BakeResult::outcome`] tells
+    /// whether it was.
+    Within {
+        /// As in [`BakeTarget::Error`].
+        error: f64,
+        /// Whether every group is to have it, as in [`BakeTarget::ErrorEach`].
+        each_group: bool,
+        /// As in [`BakeTarget::Time`].
+        time: Duration,
+    },
 }
 
 impl BakeTarget {
@@ -100,7 +111,13 @@ impl BakeTarget {
                 let target = ErrorTarget { error, each_group, overrides: &overrides };
                 bake_to_error(target, scene, backend, &mut progress)
             }
-            BakeTarget::Time(time) => bake_in_time(time, scene, backend, &overrides, &mut progress),
+            BakeTarget::Time(time) => {
+                bake_in_time(time, None, scene, backend, &overrides, &mut progress)
+            }
+            BakeTarget::Within { error, each_group, time } => {
+                let goal = ErrorTarget { error, each_group, overrides: &overrides };
+                bake_in_time(time, Some(goal), scene, backend, &overrides, &mut progress)
+            }
         }
     }
 }
@@ -110,17 +127,21 @@ fn not_a_time(seconds: f64) -> Error {
     Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
 }
 
+fn check_error(error: f64) -> Result<(), Error> {
+    if error > 0.0 && error < 1.0 {
+        return Ok(());
+    }
+    let remedy = "ask for a share above 0 and below 1, such as 0.02";
+    Err(Error::new(ErrorKind::Setting, format!("error {error}"), "out of range", remedy))
+}
+
 fn bake_to_error(
     target: ErrorTarget,
     scene: &Arc<Scene>,
     backend: &Backend,
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
-    if !(target.error > 0.0 && target.error < 1.0) {
-        let place = format!("error {}", target.error);
-        let remedy = "ask for a share above 0 and below 1, such as 0.02";
-        return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
-    }
+    check_error(target.error)?;
     let mut settings = BakeSettings::for_error(target.error, scene);
     if target.each_group {
         settings.scale_groups(scene);
@@ -129,8 +150,10 @@ fn bake_to_error(
     pipeline::run(&settings, scene, backend, Some(target), progress)
 }
 
+/// Bakes to one error after the other until `limit` or, if there is one, until `goal` is reached.
 fn bake_in_time(
     limit: Duration,
+    goal: Option<ErrorTarget>,
     scene: &Arc<Scene>,
     backend: &Backend,
     overrides: &dyn Fn(&mut BakeSettings),
@@ -146,34 +169,53 @@ fn bake_in_time(
         settings.solve.checkpoint = None;
     };
     let mut best: Option<BakeResult> = None;
-    let mut error = model::INITIAL_ERROR;
+    let (least, each_group) = goal.map_or((0.0, false), |goal| (goal.error, goal.each_group));
+    if goal.is_some() {
+        check_error(least)?;
+    }
+    let mut error = model::INITIAL_ERROR.max(least);
     loop {
         let attempt_start = Instant::now();
-        let mut stopped = false;
-        let target = ErrorTarget { error, each_group: false, overrides: &without_checkpoint };
+        let (mut stopped, mut cancelled) = (false, false);
+        let target = ErrorTarget { error, each_group, overrides: &without_checkpoint };
         let attempt = bake_to_error(target, scene, backend, &mut |stage| {
-            stopped |= progress(stage).is_break() || start.elapsed() >= end;
+            cancelled |= progress(stage).is_break();
+            stopped |= cancelled || start.elapsed() >= end;
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
+        let short = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
         let baked = match (attempt, best.take()) {
             (Err(error), Some(best)) if error.is_device_error() => {
                 return Ok(BakeResult { device_failure: Some(error), ..best });
             }
             (attempt, Some(best)) if stopped => {
                 attempt?;
-                return Ok(best);
+                let outcome = goal.map_or(best.outcome, |_| Outcome::Missed(short));
+                return Ok(BakeResult { outcome, ..best });
             }
             (attempt, _) => attempt?,
         };
-        // A time was asked for, and the errors that were tried are nobody's.
-        let baked = BakeResult { outcome: Outcome::Unasked, ..baked };
+        let is_reached = goal.is_some_and(|goal| {
+            let BakeResult { estimate, groups, .. } = &baked;
+            let judged = Judged { whole: estimate, by_light: estimate, groups };
+            if stopped { goal.is_met(judged) } else { goal.is_reached(judged) }
+        });
+        let outcome = match goal {
+            // A time was asked for, and the errors that were tried are nobody's.
+            None => Outcome::Unasked,
+            Some(_) if is_reached => Outcome::Reached,
+            Some(_) if !stopped && error <= least => baked.outcome,
+            Some(_) => Outcome::Missed(short),
+        };
+        let is_done = is_reached || stopped || error <= least;
+        let baked = BakeResult { outcome, ..baked };
         let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
         let taken = attempt_start.elapsed().as_secs_f64();
         let improvement = model::affordable_improvement(remaining, taken);
-        if stopped || improvement < model::MIN_IMPROVEMENT {
+        if is_done || improvement < model::MIN_IMPROVEMENT.min(error / least) {
             return Ok(baked);
         }
         best = Some(baked);
-        error /= improvement;
+        error = (error / improvement).max(least);
     }
 }

@@ -5,28 +5,80 @@
 //! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
 //! warning that nothing emits names these.
 
+use super::obj::ObjSettings;
 use crate::scene::{Material, Rgb, Sky, Warning, WarningKind};
 
-/// What is part of the names that lamps are given, in lower case.
-const LIGHT_NAMES: [&str; 22] = [
-    "light", "lamp", "emissive", "emission", "emit", "bulb", "lumi", "neon", "glow", "led", "lite",
-    "leuchte", "licht", "lampe", "luz", "luce", "lumiere", "lumière", "lampada", "fluor",
-    "halogen", "sun",
+/// Words in the names that lamps are given, in lower case.
+const LIGHT_NAMES: [&str; 36] = [
+    "light",
+    "lamp",
+    "emissive",
+    "emission",
+    "emit",
+    "emitter",
+    "emitting",
+    "bulb",
+    "luminaire",
+    "luminous",
+    "luminance",
+    "neon",
+    "glow",
+    "glowing",
+    "led",
+    "lite",
+    "leuchte",
+    "licht",
+    "lampe",
+    "luz",
+    "luce",
+    "lumiere",
+    "lumière",
+    "lampada",
+    "fluorescent",
+    "fluor",
+    "halogen",
+    "sun",
+    "spotlight",
+    "downlight",
+    "uplight",
+    "headlight",
+    "flashlight",
+    "lightbulb",
+    "lightsource",
+    "arealight",
 ];
+
+/// Ends of words that say the same: German writes compounds as one word, as in `Deckenleuchte`.
+const LIGHT_ENDS: [&str; 2] = ["leuchte", "lampe"];
 
 /// Names of materials that look like lamps.
 fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    let is_light = |name: &&str| {
-        let name = name.to_lowercase();
-        LIGHT_NAMES.iter().any(|light| match *light {
-            // Within other words these say nothing: "tiled", "sundry", "satellite".
-            "led" | "sun" | "lite" => {
-                name.split(|c: char| !c.is_alphabetic()).any(|word| word == *light)
-            }
-            light => name.contains(light),
-        })
-    };
+    let is_light = |name: &&str| words(name).iter().any(|word| says_light(word));
     names.filter(is_light).collect()
+}
+
+/// Whether a word in lower case is one for a lamp, or for several.
+fn says_light(word: &str) -> bool {
+    let word = word.strip_suffix('s').filter(|one| !one.is_empty()).unwrap_or(word);
+    LIGHT_NAMES.contains(&word) || LIGHT_ENDS.iter().any(|end| word.ends_with(end))
+}
+
+/// The words of a name, in lower case: what other characters than letters part, and capitals that
+/// begin a word, as in `ceilingLamp` and `LEDPanel`.
+fn words(name: &str) -> Vec<String> {
+    let letters: Vec<char> = name.chars().collect();
+    let mut words = vec![String::new()];
+    for (k, letter) in letters.iter().enumerate() {
+        let after_small = k > 0 && letters[k - 1].is_lowercase();
+        let before_small = letters.get(k + 1).is_some_and(|next| next.is_lowercase());
+        if !letter.is_alphabetic() || (letter.is_uppercase() && (after_small || before_small)) {
+            words.push(String::new());
+        }
+        if let (true, Some(word)) = (letter.is_alphabetic(), words.last_mut()) {
+            word.extend(letter.to_lowercase());
+        }
+    }
+    words
 }
 
 /// Radiance of the sky over a scene in which nothing emits, unless said otherwise, W/(m² sr).
@@ -36,14 +88,33 @@ const DEFAULT_SKY: Rgb = Rgb::ONE;
 /// of them emits, if none does and no sky was asked for.
 pub(super) fn sky_and_warning<'a>(
     used: impl Iterator<Item = &'a Material> + Clone,
-    wanted: Option<&Sky>,
+    settings: &ObjSettings,
 ) -> (Sky, Option<Warning>) {
+    let wanted = settings.sky.as_ref();
     let is_dark = !used.clone().any(|m| m.exitance.max_element() > 0.0);
     let warns = is_dark && wanted.is_none_or(Sky::is_black);
     let default = Sky::uniform(if is_dark { DEFAULT_SKY } else { Rgb::ZERO });
     let sky = wanted.cloned().unwrap_or(default);
-    let warning = warns.then(|| no_light(used, sky.is_black()));
+    let put_out = !settings.emit.is_empty();
+    let warning = warns.then(|| match put_out {
+        true => {
+            let under = under(sky.is_black());
+            let remedy = "give one a radiance above 0, or choose the sky yourself";
+            let done = format!("what was told to emit emits 0; {under}; {remedy}");
+            let names = settings.emit.iter().map(|(name, _)| crate::error::shortened(name));
+            Warning::new(WarningKind::NoLight, 1, done).naming(names)
+        }
+        false => no_light(used, sky.is_black()),
+    });
     (sky, warning)
+}
+
+/// What lights a scene without lamps, in words.
+fn under(is_black: bool) -> &'static str {
+    match is_black {
+        true => "left dark",
+        false => "lit from outside by a sky of radiance 1",
+    }
 }
 
 /// The warning that none of `used` emits, under a sky that may be black.
@@ -56,13 +127,23 @@ fn no_light<'a>(used: impl Iterator<Item = &'a Material> + Clone, is_black: bool
     } else {
         format!("{example}=15,15,15")
     };
-    let under = match is_black {
-        true => "left dark",
-        false => "lit from outside by a sky of radiance 1",
-    };
+    let under = under(is_black);
     let done = match names.len() {
         0 => format!("{under}; for a lamp write `Ke` into a material, or --emit {example}"),
         _ => format!("{under}; these names say light: write `Ke` into them, or --emit {example}"),
     };
     Warning::new(WarningKind::NoLight, 1, done).naming(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_say_light_by_whole_words() {
+        let lamps = ["Light", "ceilingLamp", "lamps_2", "LEDPanel", "desk LED", "areaLight3"];
+        assert_eq!(candidates(lamps.into_iter()), lamps);
+        let others = ["Translucent_Glass_Blue", "slightly_grey", "tiled", "satellite", "s", ""];
+        assert!(candidates(others.into_iter()).is_empty());
+    }
 }

@@ -22,11 +22,15 @@ use super::files::{self, FileSource, MAX_BYTES};
 use super::obj::repairs::Repairs;
 use super::specular::{SpecularStatements, SpecularSurfaces};
 use super::text::{self, Line, finite, words};
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, quoted_few, shortened};
 use crate::scene::{Rgb, Specular, Warning, WarningKind};
 
 /// Words of a `mtllib` line that are tried as one name with spaces. Chosen by hand.
 const MAX_WORDS: usize = 8;
+
+/// Libraries, and materials of each, that a message names. Chosen by hand.
+const LIBRARIES: usize = 2;
+const CONTENTS: usize = 4;
 
 /// The materials of all libraries loaded so far.
 #[derive(Default)]
@@ -69,6 +73,21 @@ impl Library {
     /// Whether no file was found yet.
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()
+    }
+
+    /// What the libraries have, for a message behind another: `; a.mtl has 'b', 'c'`. Empty where
+    /// there is none.
+    pub fn contents(&self) -> String {
+        let of_file = |(file, name): (usize, &String)| {
+            let names = self.materials.iter().filter(|m| m.file as usize == file);
+            let names: Vec<&str> = names.map(|m| m.name.as_str()).collect();
+            let names = match names.len() {
+                0 => "no material".into(),
+                _ => quoted_few(&names, CONTENTS),
+            };
+            format!("; {} has {names}", shortened(name).escape_debug())
+        };
+        self.files.iter().enumerate().take(LIBRARIES).map(of_file).collect()
     }
 
     /// Where `material` is defined.

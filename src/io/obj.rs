@@ -180,7 +180,7 @@ impl<'a> ObjFile<'a> {
         let mut geometry = self.geometry(models, &named, settings.texture_coordinates)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
         self.library.warn(&used, settings.specular, &mut self.repairs);
-        let mut materials = self.materials(&used, settings)?;
+        let mut materials = self.materials(&used, &geometry.triangles, settings)?;
         let textures = self.textures(&used, &mut materials, settings)?;
         if textures.is_empty() && !settings.texture_coordinates {
             geometry.texture_coordinates = vec![];
@@ -197,7 +197,7 @@ impl<'a> ObjFile<'a> {
         let mut scene = scene.map_err(|e| e.inside(self.path))?;
         let is_used = |(i, _): &(usize, _)| used.contains(&(*i as u32));
         let emitting = scene.materials().iter().enumerate().filter(is_used).map(|(_, m)| m);
-        let (sky, dark) = lights::sky_and_warning(emitting, settings.sky.as_ref());
+        let (sky, dark) = lights::sky_and_warning(emitting, settings);
         self.repairs.into_warnings().into_iter().chain(dark).for_each(|w| scene.warn(w));
         scene.with_sky(sky)
     }
@@ -248,6 +248,7 @@ impl<'a> ObjFile<'a> {
     /// then those that no library defines, then the one of faces without a material.
     fn named_materials(&mut self) -> Result<Vec<u32>, Error> {
         let mut unknown = self.library.materials.len() as u32;
+        let there = self.library.contents();
         let mut named = vec![];
         for (name, &line) in self.statements.materials.list.iter().zip(&self.statements.first_use) {
             named.push(match self.library.find(name) {
@@ -255,7 +256,8 @@ impl<'a> ObjFile<'a> {
                 None => {
                     let place = || text::place(self.path, line as usize);
                     let kind = WarningKind::UnknownMaterial;
-                    self.repairs.note_at(kind, place, name, UNKNOWN_MATERIAL)?;
+                    let done = || format!("{UNKNOWN_MATERIAL}{there}");
+                    self.repairs.note_at(kind, place, name, done())?;
                     unknown += 1;
                     unknown - 1
                 }

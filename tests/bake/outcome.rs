@@ -71,6 +71,28 @@ fn without_an_error_there_is_nothing_to_miss() {
 }
 
 #[test]
+fn an_error_within_a_time_is_reached_or_the_time_is_up() {
+    let bake = |error, each_group, time, stop: bool| {
+        let flow = if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let target = BakeTarget::Within { error, each_group, time };
+        target.bake(cornell(), &Backend::Cpu, |_| flow)
+    };
+    let hour = Duration::from_secs(3600);
+    for each_group in [false, true] {
+        let reached = bake(0.1, each_group, hour, false).unwrap();
+        assert_eq!(reached.outcome, Outcome::Reached);
+        assert!(reached.estimate.total <= 0.1, "{:?}", reached.estimate);
+        let soon = bake(0.1, each_group, Duration::from_nanos(1), false).unwrap();
+        assert_eq!(soon.outcome, Outcome::Missed(Obstacle::Time));
+        assert_eq!(soon.outcome.to_string(), "missed: the time was up");
+    }
+    let stopped = bake(0.1, false, hour, true).unwrap();
+    assert_eq!(stopped.outcome, Outcome::Missed(Obstacle::Cancelled));
+    assert!(bake(1.5, false, hour, false).unwrap_err().to_string().contains("error 1.5"));
+    assert!(bake(0.1, false, Duration::ZERO, false).unwrap_err().to_string().contains("time"));
+}
+
+#[test]
 fn a_lamp_alone_has_no_error() {
     // It reflects what nothing sends it: 0, but for the rounding of 0.3 π beside it.
     let lamp = Material { exitance: Rgb::splat(0.3 * PI), ..Material::grey("lamp", 0.9) };

@@ -2,10 +2,13 @@
 #![cfg(feature = "cli")]
 
 mod bands;
+mod emit;
 mod light;
 mod light_map;
 mod luminaires;
+mod output;
 mod sky;
+mod usage;
 mod view_factors;
 
 use std::path::{Path, PathBuf};
@@ -15,6 +18,11 @@ use std::process::{Child, Command, Output, Stdio};
 fn run(command: &str, args: &[&str]) -> Output {
     let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
     program.arg(command).args(args).output().expect("the program starts")
+}
+
+/// What the program printed, to standard output and to standard error.
+fn texts(out: &Output) -> [String; 2] {
+    [&out.stdout, &out.stderr].map(|text| String::from_utf8_lossy(text).into_owned())
 }
 
 /// The command fails, prints one error that contains every one of `words`, and writes no PLY.

@@ -138,6 +138,28 @@ fn verify_takes_the_sky_of_the_bake() {
 }
 
 #[test]
+fn a_sun_below_the_horizon_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "ground.obj", GROUND).display().to_string();
+    let told = |more: &[&str]| {
+        let mut args = vec![&*scene, "--error", "0.5", "--cpu", "--write", "json"];
+        args.extend(more);
+        let out = run("bake", &args);
+        let told = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{told}");
+        told
+    };
+    let below = told(&["--sun", "1,-2,0=10"]);
+    let want = "1,-2,0 points towards it; did you mean -1,2,0?";
+    assert!(below.contains("the sun is below the horizon") && below.contains(want), "{below}");
+    let json = std::fs::read_to_string(folder.path().join("ground.json")).unwrap();
+    assert!(json.contains("the sun is below the horizon"), "{json}");
+    for fine in [&["--sun", "1,2,0=10"][..], &["--sun", "1,-2,0=10", "--up", "0,-1,0"]] {
+        assert!(!told(fine).contains("horizon"), "{fine:?}");
+    }
+}
+
+#[test]
 fn a_picture_is_a_sky() {
     let folder = tempfile::tempdir().unwrap();
     // White above the horizon, as EXR; and as HDR, in which 1 is 128, 128, 128 and 2¹⁻⁸⁺¹²⁸.

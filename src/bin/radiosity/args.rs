@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use lexopt::prelude::*;
-use radiosity::{Backend, Error, ErrorKind, Rgb, Scene};
+use radiosity::{Backend, Error, ErrorKind, Rgb};
 
 use crate::interrupt;
 
@@ -13,6 +13,8 @@ use crate::interrupt;
 pub enum Stop {
     /// Its help was asked for.
     Help,
+    /// An option that it does not have, with its dashes.
+    UnknownOption(String),
     /// Arguments that it cannot understand.
     Usage(String),
     /// The work failed.
@@ -35,6 +37,13 @@ impl Stop {
                 say!("{usage}");
                 ExitCode::SUCCESS
             }
+            Stop::UnknownOption(option) => {
+                let meant = match nearest_option(&option, usage) {
+                    Some(known) => format!("; did you mean --{known}?"),
+                    None => String::new(),
+                };
+                Stop::Usage(format!("there is no option '{option}'{meant}")).report(command, usage)
+            }
             Stop::Usage(message) => {
                 let (synopsis, _) = usage.split_once("\n\n").unwrap_or((usage, ""));
                 let program = ["radiosity", command].join(" ");
@@ -51,9 +60,29 @@ impl Stop {
     }
 }
 
+/// Letters that an option has for each typing error in it, at least. Chosen by hand.
+const LETTERS_AN_ERROR: usize = 3;
+
+/// The option in `usage` that `wrong` begins, or else comes close to.
+fn nearest_option<'u>(wrong: &str, usage: &'u str) -> Option<&'u str> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    let name = |after: &'u str| after.split(|c| !is_part(c)).next().filter(|name| !name.is_empty());
+    let names = || usage.split("--").skip(1).filter_map(name);
+    let wrong = wrong.trim_start_matches('-');
+    let nearest = || {
+        let distances = names().map(|name| (strsim::osa_distance(wrong, name), name));
+        let (distance, name) = distances.min_by_key(|(distance, _)| *distance)?;
+        (LETTERS_AN_ERROR * distance <= wrong.chars().count()).then_some(name)
+    };
+    names().find(|name| name.starts_with(wrong)).or_else(nearest)
+}
+
 impl From<lexopt::Error> for Stop {
     fn from(error: lexopt::Error) -> Stop {
-        Stop::Usage(error.to_string())
+        match error {
+            lexopt::Error::UnexpectedOption(option) => Stop::UnknownOption(option),
+            error => Stop::Usage(error.to_string()),
+        }
     }
 }
 
@@ -112,13 +141,6 @@ pub fn rgb(text: &str) -> Option<Rgb> {
     }
 }
 
-/// Tells the user what is odd about a scene.
-pub fn print_warnings(scene: &Scene) {
-    for warning in scene.warnings() {
-        eprintln!("warning: {warning}");
-    }
-}
-
 /// The error for a value that is not as expected.
 pub fn wrong_value(option: &str, found: &str, expected: &str) -> Stop {
     Stop::Usage(format!("--{option} takes {expected}, not '{found}'"))
@@ -135,6 +157,26 @@ pub fn only_scene(scenes: Vec<PathBuf>) -> Result<PathBuf, Stop> {
             Err(Stop::Usage(format!("a second scene, '{second}': one at a time, please")))
         }
     }
+}
+
+/// The path of the files without their endings, of `--out`: in a folder, one that exists or that
+/// ends in a separator, they are named as `default` is; an ending of `endings` is not repeated.
+pub fn stem(out: Option<PathBuf>, default: PathBuf, endings: &[&str]) -> PathBuf {
+    let Some(mut out) = out else { return default };
+    let is_folder = out.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
+    if is_folder || out.is_dir() {
+        return out.join(default.file_name().unwrap_or_default());
+    }
+    let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    if ending.is_some_and(|ending| endings.contains(&&*ending)) {
+        out.set_extension("");
+    }
+    out
+}
+
+/// The endings that formats are named after.
+pub fn names<F, const N: usize>(formats: &[(&'static str, F); N]) -> [&'static str; N] {
+    std::array::from_fn(|k| formats[k].0)
 }
 
 /// What makes form factors, as the user names it.

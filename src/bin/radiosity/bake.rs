@@ -6,7 +6,7 @@ pub mod settings;
 
 use std::cell::Cell;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use files::Files;
 use lexopt::prelude::*;
@@ -19,7 +19,7 @@ use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
 
 pub const USAGE: &str = "\
-usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X | --time SECONDS]
+usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X] [--time SECONDS]
             [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
             [--exposure X] [--image W,H] [--pixel-gather] [--write FORMATS]
             [--elements] [--bands FILE.json] [--adapter NAME | --cpu]
@@ -32,7 +32,8 @@ How far to go:
   --error X         until the estimated error of the vertices' reflected radiosity is below this
                     share, root mean square over the area that reflects: 0.02 for 2 %
   --error-each X    the same for each group of the scene, however small
-  --time SECONDS    as exact as these seconds allow
+  --time SECONDS    as exact as these seconds allow; with an error, until that is reached, but no
+                    longer
   --gather WHICH    without either: vertices that gather the settled light: none, needed (elements
                     are split where the light is not linear in them), or all (of elements that are
                     all split once more) [none]
@@ -80,7 +81,8 @@ Files and devices:
   --sky WHICH       a sky above the horizon: overcast; cie1 to cie15, those of the CIE; or
                     perez:CLEARNESS,BRIGHTNESS; or a picture around the scene, FILE.exr or .hdr
   --zenith r,g,b    radiance of that sky straight up, or what a picture is multiplied with [1]
-  --sun x,y,z=E     a sun in this direction: E, or r,g,b, is the irradiance of what faces it, W/m²
+  --sun x,y,z=E     a sun; x,y,z is the direction towards the sun, and E, or r,g,b, the irradiance
+                    of what faces it, W/m²
   --sun-at LATITUDE,LONGITUDE,TIME=E  the same by place (degrees north and east) and time, as
                     2026-06-21T12:00:00+02:00
   --up x,y,z        away from the ground, for skies [+y or +z, whichever seems to be]
@@ -100,7 +102,8 @@ Files and devices:
   --state FILE      write the state of the solve there now and then, and go on from it if it is
                     there: what is killed loses its last moments only; not with --time, which
                     solves many times
-  --out STEM        where the files go, and how they begin [the scene without its ending]
+  --out STEM        where the files go, and how they begin [the scene without its ending]; a folder
+                    takes files of the scene's name
   --write FORMATS   only these: some of ply, glb, json, exr, png and csv, which is of --bands
                     alone, with commas between them [all but csv]
   --camera ...      eye, target, vertical field of view in degrees; three more numbers are the
@@ -120,6 +123,9 @@ Ctrl-C stops the bake, and what there is is written; again, it ends at once.";
 /// What an error is given as.
 const SHARE: &str = "a share, such as 0.1 for 10 %";
 
+/// What a time is given as.
+const SECONDS: &str = "seconds above 0, such as 10";
+
 /// What is said of a scene that stays dark, and what to do about it.
 const DARK: (&str, &str) = (
     "no light reaches any surface",
@@ -136,6 +142,8 @@ pub struct Bake {
     pub scene: PathBuf,
     reading: SceneOptions,
     pub target: Target,
+    /// When to stop before the error is reached, since the bake began.
+    limit: Option<Duration>,
     /// Settings made by hand, in their order.
     adjustments: Vec<Adjustment>,
     /// What materials are in bands.
@@ -175,11 +183,13 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
 impl Bake {
     fn parse(parser: &mut lexopt::Parser) -> Result<Bake, Stop> {
         let mut scenes = vec![];
+        let (mut error, mut error_each, mut seconds) = (None, None, None);
         let (mut gather, mut state) = (None, false);
         let mut bake = Bake {
             scene: PathBuf::new(),
             reading: SceneOptions::default(),
             target: Target::Settings(Gather::None),
+            limit: None,
             adjustments: vec![],
             bands: None,
             files: Files::new(),
@@ -188,15 +198,9 @@ impl Bake {
         while let Some(arg) = parser.next()? {
             match arg {
                 Long("help") | Short('h') => return Err(Stop::Help),
-                Long("error") => {
-                    bake.target = Target::Error(args::value(parser, "error", SHARE)?);
-                }
-                Long("error-each") => {
-                    bake.target = Target::ErrorEach(args::value(parser, "error-each", SHARE)?);
-                }
-                Long("time") => {
-                    bake.target = Target::Seconds(args::value(parser, "time", "a number")?);
-                }
+                Long("error") => error = Some(args::value(parser, "error", SHARE)?),
+                Long("error-each") => error_each = Some(args::value(parser, "error-each", SHARE)?),
+                Long("time") => seconds = Some(args::value(parser, "time", SECONDS)?),
                 Long("gather") => {
                     gather = Some(args::value(parser, "gather", "one of none, needed, all")?);
                 }
@@ -224,7 +228,8 @@ impl Bake {
                 Short(_) => return Err(arg.unexpected().into()),
             }
         }
-        if state && matches!(bake.target, Target::Seconds(_)) {
+        bake.set_target(error, error_each, seconds)?;
+        if state && seconds.is_some() {
             return Err(Stop::usage("--state is for one solve, --time for many: use --error"));
         }
         if let Some(gather) = gather {
@@ -233,6 +238,37 @@ impl Bake {
         bake.scene = args::only_scene(scenes)?;
         bake.files = bake.files.named_after(&bake.scene);
         Ok(bake)
+    }
+
+    /// Says how far to go: until an error is reached, for some seconds, or the former and no longer
+    /// than the latter.
+    fn set_target(
+        &mut self,
+        error: Option<f64>,
+        error_each: Option<f64>,
+        seconds: Option<f64>,
+    ) -> Result<(), Stop> {
+        let limit = |seconds: f64| {
+            let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero());
+            time.ok_or_else(|| args::wrong_value("time", &seconds.to_string(), SECONDS))
+        };
+        self.target = match (error, error_each, seconds) {
+            (Some(_), Some(_), _) => {
+                let found = "--error is for the whole and --error-each for each group: give one";
+                return Err(Stop::usage(found));
+            }
+            (Some(error), None, _) => Target::Error(error),
+            (None, Some(error), _) => Target::ErrorEach(error),
+            (None, None, Some(seconds)) => {
+                limit(seconds)?;
+                Target::Seconds(seconds)
+            }
+            (None, None, None) => return Ok(()),
+        };
+        if !matches!(self.target, Target::Seconds(_)) {
+            self.limit = seconds.map(limit).transpose()?;
+        }
+        Ok(())
     }
 
     /// Says which vertices gather, whatever else is asked for.
@@ -256,10 +292,7 @@ impl Bake {
         let scene = progress::of_reading(&self.scene, || {
             Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
-        args::print_warnings(&scene);
-        let mut warnings = self.reading.luminaires.warnings();
-        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-        warnings.extend(scene.warnings().iter().map(ToString::to_string));
+        let mut warnings = self.reading.print_warnings(&scene);
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;
         let triangles = scene.triangles().len();
@@ -305,6 +338,7 @@ impl Bake {
             luminaires: self.reading.luminaires,
             adapter: device.adapter(),
             target: self.target,
+            limit: self.limit,
             triangles,
             load,
             open,
@@ -334,25 +368,26 @@ impl Bake {
             }
             unshot_goal.set(settings.solve.solver.unshot);
         };
-        match self.target {
-            Target::Error(error) => {
-                BakeTarget::Error(error).bake_with(scene, device, overrides, progress)
+        let target = match (self.target, self.limit) {
+            (Target::Error(error), None) => BakeTarget::Error(error),
+            (Target::Error(error), Some(time)) => {
+                BakeTarget::Within { error, each_group: false, time }
             }
-            Target::ErrorEach(error) => {
-                BakeTarget::ErrorEach(error).bake_with(scene, device, overrides, progress)
+            (Target::ErrorEach(error), None) => BakeTarget::ErrorEach(error),
+            (Target::ErrorEach(error), Some(time)) => {
+                BakeTarget::Within { error, each_group: true, time }
             }
-            Target::Seconds(seconds) => {
-                BakeTarget::seconds(seconds)?.bake_with(scene, device, overrides, progress)
-            }
-            Target::Settings(gather) => {
+            (Target::Seconds(seconds), _) => BakeTarget::seconds(seconds)?,
+            (Target::Settings(gather), _) => {
                 let mut settings = match gather {
                     Gather::None => BakeSettings::elements_only(&scene),
                     Gather::Needed | Gather::All => BakeSettings::gathering(&scene),
                 };
                 overrides(&mut settings);
-                settings.bake(scene, device, progress)
+                return settings.bake(scene, device, progress);
             }
-        }
+        };
+        target.bake_with(scene, device, overrides, progress)
     }
 }
 

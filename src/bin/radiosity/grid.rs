@@ -47,7 +47,8 @@ What:
   --photometric     `Ke` and skies are luminances in cd/m²: measure illuminance in lx, of which
                     0.2126 are of r, 0.7152 of g and 0.0722 of b; else irradiance in W/m², the mean
                     of the channels
-  --out STEM        where the files go, and how they begin [the scene without its ending]
+  --out STEM        where the files go, and how they begin [the scene without its ending]; a folder
+                    takes files of the scene's name
 ",
     light_usage!()
 );
@@ -82,6 +83,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let light = options.light.bake(scene)?;
     let measured = options.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
     options.write(&grids, &measured)?;
+    progress::print_written();
     args::end()
 }
 
@@ -133,7 +135,7 @@ impl Options {
             }
         }
         options.scene = args::only_scene(scenes)?;
-        options.stem = out.unwrap_or_else(|| options.scene.with_extension(""));
+        options.stem = args::stem(out, options.scene.with_extension(""), &["csv", "png"]);
         Ok(options)
     }
 

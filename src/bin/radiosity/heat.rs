@@ -36,7 +36,7 @@ W where lengths are in m.
   --surroundings T    temperature of the surroundings in K [0]
   --facets, --error E, --two-sided NAME   as in `radiosity view-factors`
   --enforce           make the view factors keep closure and reciprocity first: heat then balances
-  --out FILE.csv      the table
+  --out FILE.csv      the table, or a folder for it
   --strict            refuse what would be repaired in the file";
 
 /// What is asked of the command.
@@ -131,7 +131,7 @@ impl Options {
         let Some(boundaries) = boundaries else {
             return Err(Stop::usage("no --boundaries: what is known of the groups"));
         };
-        let out = out.unwrap_or_else(|| input.with_extension("heat.csv"));
+        let out = args::stem(out, input.with_extension("heat.csv"), &[]);
         Ok(Options { input, reading, factors, boundaries, settings, enforce, out })
     }
 

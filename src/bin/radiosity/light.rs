@@ -13,8 +13,8 @@ use crate::{interrupt, progress};
 macro_rules! light_usage {
     () => {
         "\
-  --error X         how far off what is measured may be, root mean square, as a share: 0.05 for 5 %
-                    [0.05]
+\x20 --error X         how far off what is measured may be, root mean square, as a share: 0.05 for
+                    5 % [0.05]
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
   --cpu             rays on the CPU instead of hemicubes
   --sky, --sun, --emit, --transmit, --sides, --specular, --max-reflectance, --strict, …
@@ -77,7 +77,7 @@ impl LightOptions {
         let scene = progress::of_reading(path, || {
             Ok::<_, Error>(self.reading.load(path)?.resolve_sides())
         })?;
-        args::print_warnings(&scene);
+        self.reading.print_warnings(&scene);
         Ok(scene)
     }
 

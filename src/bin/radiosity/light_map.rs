@@ -35,7 +35,7 @@ scene without its ending and with .light-map, unless given.
   --coordinates file  those of the file, or an error that says why a light map cannot have them
   --coordinates new   new ones: charts for all smooth surfaces
   --radiosity       write STEM.radiosity.exr too: what surfaces emit and reflect, without textures
-  --out STEM        where the files go, and how they begin
+  --out STEM        where the files go, and how they begin; a folder takes files of the scene's name
   --write FORMATS   some of exr, glb, ply, png, with commas between them [exr,glb]. STEM.ply has
                     the scene cut to texels, each with the light that the map shows, as `radiosity
                     verify` takes it; STEM.png is a picture of that
@@ -84,7 +84,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     let scene = progress::of_reading(&options.scene, || {
         Ok::<_, Error>(options.reading.load(&options.scene)?.resolve_sides())
     })?;
-    args::print_warnings(&scene);
+    options.reading.print_warnings(&scene);
     let load = start.elapsed().as_secs_f64();
     let atlas = options.atlas(scene)?;
     let layout = start.elapsed().as_secs_f64();
@@ -110,6 +110,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         texels - bake,
         total - texels
     );
+    progress::print_written();
     Ok(())
 }
 
@@ -201,7 +202,8 @@ impl Options {
             }
         }
         options.scene = args::only_scene(scenes)?;
-        options.stem = stem.unwrap_or_else(|| options.scene.with_extension("light-map"));
+        options.stem =
+            args::stem(stem, options.scene.with_extension("light-map"), &args::names(&FORMATS));
         if let Some(camera) = &options.camera {
             camera.check(PICTURE.0, PICTURE.1, SAMPLES)?;
         }

@@ -42,6 +42,7 @@ mod trade_off;
 mod verify;
 mod view_factors;
 
+use std::ffi::OsStr;
 use std::process::ExitCode;
 
 use args::Stop;
@@ -102,14 +103,23 @@ fn command(parser: &mut lexopt::Parser) -> Result<Option<&'static Command>, Stop
             say!("radiosity {}", env!("CARGO_PKG_VERSION"));
             Ok(None)
         }
-        Some(Value(name)) => {
-            let command = COMMANDS.iter().find(|command| *command.name == *name);
-            command.map(Some).ok_or_else(|| {
-                let names = COMMANDS.map(|command| command.name).join(", ");
-                Stop::usage(format!("no command '{}': there are {names}", name.display()))
-            })
-        }
+        Some(Value(name)) if name == "help" => match parser.next()? {
+            Some(Value(name)) => {
+                say!("{}", named(&name)?.usage);
+                Ok(None)
+            }
+            _ => Err(Stop::Help),
+        },
+        Some(Value(name)) => named(&name).map(Some),
         Some(other) => Err(other.unexpected().into()),
         None => Err(Stop::usage("no command given")),
     }
+}
+
+/// The command of this name.
+fn named(name: &OsStr) -> Result<&'static Command, Stop> {
+    COMMANDS.iter().find(|command| *command.name == *name).ok_or_else(|| {
+        let names = COMMANDS.map(|command| command.name).join(", ");
+        Stop::usage(format!("no command '{}': there are {names}", name.display()))
+    })
 }

@@ -27,7 +27,8 @@ than all else: within solids or behind walls. docs/grids_and_probes.md has formu
   --spacing X       edge of a cell, about, in the scene's unit
   --counts NX,NY,NZ cells along x, y and z
   --box …           lowest and highest corner [those of the scene]
-  --out STEM        where the files go, and how they begin [the scene without its ending]
+  --out STEM        where the files go, and how they begin [the scene without its ending]; a folder
+                    takes files of the scene's name
 ",
     light_usage!()
 );
@@ -62,6 +63,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         args::write_file(path, &json(&grid, &probes))
     })?;
     progress::of_writing(&options.file("csv"), |path| args::write_file(path, &csv(&probes)))?;
+    progress::print_written();
     args::end()
 }
 
@@ -97,7 +99,7 @@ impl Options {
         }
         let scene = args::only_scene(scenes)?;
         let cells = cells.ok_or_else(|| Stop::usage("how many probes? --spacing or --counts"))?;
-        let stem = out.unwrap_or_else(|| scene.with_extension(""));
+        let stem = args::stem(out, scene.with_extension(""), &["csv", "json"]);
         Ok(Options { scene, light, cells, bounds, stem })
     }
 

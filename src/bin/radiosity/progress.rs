@@ -79,8 +79,26 @@ pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
 }
 
 /// Runs `work`, which writes this file, with that shown.
-pub fn of_writing<T>(path: &Path, work: impl FnOnce(&Path) -> T) -> T {
-    of_stage(&format!("writing {}", path.display()), || work(path))
+pub fn of_writing<T, E>(path: &Path, work: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, E> {
+    let done = of_stage(&format!("writing {}", path.display()), || work(path))?;
+    locked(&WRITTEN).push(path.display().to_string());
+    Ok(done)
+}
+
+/// The files that were written.
+static WRITTEN: Mutex<Vec<String>> = Mutex::new(vec![]);
+
+/// A line of the files that were written, if there are any.
+pub fn written() -> Option<String> {
+    let files = locked(&WRITTEN);
+    (!files.is_empty()).then(|| format!("wrote      {}", files.join(", ")))
+}
+
+/// Prints that line.
+pub fn print_written() {
+    if let Some(line) = written() {
+        say!("{line}");
+    }
 }
 
 fn share(done: usize, of: usize) -> f64 {

@@ -1,6 +1,8 @@
 //! The report of a bake: what was done, with what, and where the light and the time went; as JSON
 //! and as a small table.
 
+use std::time::Duration;
+
 use radiosity::backend::{AdapterInfo, RowMaker};
 use radiosity::bake::{GroupError, Obstacle, Outcome};
 use radiosity::solver::Ledger;
@@ -10,6 +12,7 @@ use serde_json::{Map, Value, json};
 use crate::bake::files::{Picture, camera_value};
 use crate::bake::{Target, bands, settings};
 use crate::luminaires::LuminaireOptions;
+use crate::progress;
 
 /// What the report tells of.
 pub struct Report {
@@ -23,6 +26,8 @@ pub struct Report {
     pub adapter: AdapterInfo,
     /// What was asked for.
     pub target: Target,
+    /// When it was to stop before the error is reached.
+    pub limit: Option<Duration>,
     /// Triangles with area.
     pub triangles: usize,
     /// Seconds of reading the scene.
@@ -59,8 +64,8 @@ impl Report {
             "adapter": { "name": name, "type": kind.to_string(), "driver": driver },
             "goal": match self.target {
                 Target::Settings(_) => Value::Null,
-                Target::Error(error) => json!({ "error": error }),
-                Target::ErrorEach(error) => json!({ "error_each": error }),
+                Target::Error(error) => self.goal("error", error),
+                Target::ErrorEach(error) => self.goal("error_each", error),
                 Target::Seconds(seconds) => json!({ "seconds": seconds }),
             },
             "settings": settings::report(&baked.settings),
@@ -106,6 +111,15 @@ impl Report {
             report["bands"] = bands::report(light);
         }
         report
+    }
+
+    /// The error `name` that was to be reached, and within which time.
+    fn goal(&self, name: &str, error: f64) -> Value {
+        let mut goal = json!({ name: error });
+        if let Some(limit) = self.limit {
+            goal["seconds"] = json!(limit.as_secs_f64());
+        }
+        goal
     }
 
     /// The estimated error, of the whole and of each group.
@@ -163,9 +177,15 @@ impl Report {
             Target::Seconds(_) => {
                 return Some(format!("as exact as the time allowed: about {told:.2} %"));
             }
-            Target::Settings(_) => return None,
+            Target::Settings(_) => {
+                return Some("no error asked for: --error 0.05 goes on until 5 %".into());
+            }
         };
         let remedy = match baked.outcome {
+            Outcome::Missed(Obstacle::Time) => {
+                let seconds = self.limit.unwrap_or_default().as_secs_f64();
+                format!("; give it more than --time {seconds}, or ask for less")
+            }
             Outcome::Missed(Obstacle::Elements) => {
                 let most = baked.settings.gather.as_ref().map(|g| g.refinement.max_elements);
                 let most = most.unwrap_or_default();
@@ -266,6 +286,7 @@ impl Report {
             let camera = camera_value(camera);
             lines.push(format!("picture    --camera {camera} --exposure {exposure}"));
         }
+        lines.extend(progress::written());
         lines.extend(self.verdict());
         lines.extend(self.bands.as_ref().map(bands::words));
         lines.join("\n")

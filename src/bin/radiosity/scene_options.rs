@@ -52,6 +52,15 @@ impl SceneOptions {
         Ok(true)
     }
 
+    /// Tells the user what is odd about a scene and what lights it, and returns that.
+    pub fn print_warnings(&self, scene: &Scene) -> Vec<String> {
+        let mut warnings = self.luminaires.warnings();
+        warnings.extend(self.sky.warning(scene));
+        warnings.extend(scene.warnings().iter().map(ToString::to_string));
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        warnings
+    }
+
     /// The scene of an OBJ file, under the sky and with the luminaires that were asked for.
     ///
     /// # Errors

@@ -134,6 +134,25 @@ impl SkyOptions {
         })
     }
 
+    /// What is odd about it over `scene`, which is under it.
+    pub fn warning(&self, scene: &Scene) -> Option<String> {
+        let (Some((SunPlace::Towards(given), _)), Some(sun)) = (&self.sun, scene.sky().sun())
+        else {
+            return None;
+        };
+        let up = self.up.unwrap_or_else(|| up_axis(scene));
+        let list = |v: DVec3| v.to_array().map(|x| (x + 0.0).to_string()).join(",");
+        (sun.direction.dot(up) < 0.0).then(|| {
+            format!(
+                "the sun is below the horizon where {} is up: {} points towards it; did you \
+                 mean {}?",
+                list(up),
+                list(*given),
+                list(-*given)
+            )
+        })
+    }
+
     fn sun(&self, up: DVec3) -> Result<Option<Sun>, Error> {
         let Some((place, irradiance)) = self.sun.clone() else { return Ok(None) };
         let direction = match place {

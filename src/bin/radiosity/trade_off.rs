@@ -136,11 +136,9 @@ impl Options {
             }
         }
         let scene = args::only_scene(scenes)?;
-        let out = out.unwrap_or_else(|| {
-            let mut stem = scene.with_extension("").into_os_string();
-            stem.push("_trade_off");
-            stem.into()
-        });
+        let mut stem = scene.with_extension("").into_os_string();
+        stem.push("_trade_off");
+        let out = args::stem(out, stem.into(), &["csv", "svg", "png"]);
         Ok(Options { scene, reading, truth, out, quick, device })
     }
 
@@ -149,7 +147,7 @@ impl Options {
         let truth = self.read_truth()?;
         let scene = progress::of_reading(&self.scene, || self.reading.load(&self.scene))?;
         let scene = Arc::new(scene);
-        args::print_warnings(&scene);
+        self.reading.print_warnings(&scene);
         let device = self.device.open()?;
         let mut grid = Grid::new(&scene, self.quick);
         interrupt::catch();

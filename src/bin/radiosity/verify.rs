@@ -146,7 +146,7 @@ impl Options {
         let scene = progress::of_reading(&self.scene, || {
             Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
         })?;
-        args::print_warnings(&scene);
+        self.reading.print_warnings(&scene);
         match &self.what {
             What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),
             What::Points { json, paths } => {
@@ -226,7 +226,7 @@ impl Options {
 
 /// The limit of `--time`; none for inf.
 fn time(parser: &mut lexopt::Parser) -> Result<Option<Duration>, Stop> {
-    let expected = "seconds, or inf";
+    let expected = "seconds, such as 10, or inf";
     let seconds: f64 = args::value(parser, "time", expected)?;
     if seconds == f64::INFINITY {
         return Ok(None);

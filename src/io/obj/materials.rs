@@ -1,7 +1,7 @@
 //! The materials of a scene from those of its libraries: repaired, with their textures, and with
 //! the light that the caller gives them.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 use super::super::mtl::MtlMaterial;
@@ -10,9 +10,9 @@ use super::super::textures::{TextureStatement, Textures};
 use super::repairs::Repairs;
 use super::statements::UNKNOWN_MATERIAL;
 use super::{ObjFile, ObjSettings};
-use crate::error::{Error, ErrorKind, quoted};
+use crate::error::{Error, ErrorKind, nearest, quoted};
 use crate::scene::texture::{MaterialTextures, TextureMap};
-use crate::scene::{Material, Rgb, Specular, WarningKind};
+use crate::scene::{Material, Rgb, Specular, Triangle, WarningKind};
 
 /// Of what a texture would reflect, the largest part that its material lets through instead: the
 /// rest tells where.
@@ -94,6 +94,7 @@ impl ObjFile<'_> {
     pub(super) fn materials(
         &mut self,
         used: &HashSet<u32>,
+        triangles: &[Triangle],
         settings: &ObjSettings,
     ) -> Result<Vec<Material>, Error> {
         let library = &mut self.library;
@@ -122,12 +123,13 @@ impl ObjFile<'_> {
         }
         materials.iter_mut().for_each(|material| material.sides = settings.sides);
         for (name, radiance) in &settings.emit {
-            self.named(&mut materials, name, "that could emit", |material| {
+            self.named(&mut materials, triangles, name, "that could emit", |material| {
                 material.exitance = PI * *radiance;
             })?;
         }
         for (name, transmittance) in &settings.transmit {
-            self.named(&mut materials, name, "that could let light through", |material| {
+            let what = "that could let light through";
+            self.named(&mut materials, triangles, name, what, |material| {
                 let all = material.albedo();
                 material.transmittance = transmittance.min(Rgb::splat(settings.max_reflectance));
                 material.reflectance = (all - material.transmittance).max(Rgb::ZERO);
@@ -140,6 +142,7 @@ impl ObjFile<'_> {
     fn named(
         &self,
         materials: &mut [Material],
+        triangles: &[Triangle],
         name: &str,
         what: &str,
         change: impl Fn(&mut Material),
@@ -153,9 +156,47 @@ impl ObjFile<'_> {
             return Ok(());
         }
         let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+        let place = self.path.display().to_string();
+        if let Some((found, remedy)) = self.group_named(name, &names, triangles) {
+            return Err(Error::new(ErrorKind::Scene, place, found, remedy));
+        }
         let found = format!("no material {} {what}", quoted(&[name]));
-        let remedy = format!("its materials are {}", quoted(&names));
-        Err(Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy))
+        let meant = nearest(name, names.iter().copied());
+        let meant =
+            meant.map_or(String::new(), |near| format!("did you mean {}? ", quoted(&[near])));
+        let remedy = format!("{meant}its materials are {}", quoted(&names));
+        Err(Error::new(ErrorKind::Scene, place, found, remedy))
+    }
+
+    /// Where `name` is a group and no material: what it is, and what would be right.
+    fn group_named(
+        &self,
+        name: &str,
+        materials: &[&str],
+        triangles: &[Triangle],
+    ) -> Option<(String, String)> {
+        let group = self.statements.groups.list.iter().position(|group| group == name)? as u32;
+        let in_group = triangles.iter().filter(|t| t.group == group);
+        let own: BTreeSet<u32> = in_group.map(|t| t.material).collect();
+        let own_names: Vec<&str> =
+            own.iter().filter_map(|&k| materials.get(k as usize).copied()).collect();
+        let sharing = triangles.iter().filter(|t| own.contains(&t.material));
+        let sharing = sharing.map(|t| t.group).collect::<BTreeSet<u32>>().len();
+        let (group, list) = (quoted(&[name]), quoted(&own_names));
+        let found = match (own_names.len(), sharing) {
+            (0, _) => return None,
+            (1, 1) => {
+                return Some((
+                    format!("{group} is a group, of material {list}"),
+                    "name the material".into(),
+                ));
+            }
+            (1, _) => {
+                format!("{group} is a group, of material {list}, which {sharing} groups share")
+            }
+            _ => format!("{group} is a group, of materials {list}"),
+        };
+        Some((found, "give it its own usemtl".into()))
     }
 }
 

@@ -43,6 +43,8 @@ const FORMATS: [(&str, Format); 6] = [
 
 /// What to write, and where.
 pub struct Files {
+    /// Where the files go, as it is given.
+    out: Option<PathBuf>,
     /// Path of the files without their ending.
     stem: PathBuf,
     formats: Vec<Format>,
@@ -72,6 +74,7 @@ impl Files {
     pub fn new() -> Files {
         let formats = FORMATS.map(|(_, format)| format).into_iter();
         Files {
+            out: None,
             stem: PathBuf::new(),
             formats: formats.filter(|&format| format != Format::Csv).collect(),
             camera: None,
@@ -85,7 +88,7 @@ impl Files {
     /// Takes an option, if it is one of files.
     pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
         match name {
-            "out" => self.stem = PathBuf::from(parser.value()?),
+            "out" => self.out = Some(parser.value()?.into()),
             "write" => self.formats = args::formats(parser, &FORMATS)?,
             "camera" => self.camera = Some(camera(parser)?),
             "exposure" => self.exposure = Some(args::value(parser, "exposure", "a number")?),
@@ -101,11 +104,10 @@ impl Files {
         Ok(true)
     }
 
-    /// Names the files after the scene, if they have no name yet.
+    /// Names the files after the scene, where they are given no name.
     pub fn named_after(mut self, scene: &Path) -> Files {
-        if self.stem.as_os_str().is_empty() {
-            self.stem = scene.with_extension("");
-        }
+        let default = scene.with_extension("");
+        self.stem = args::stem(self.out.take(), default, &args::names(&FORMATS));
         self
     }
 

@@ -32,6 +32,9 @@ struct Entry {
 }
 
 impl Format {
+    /// What files end in.
+    pub const ENDINGS: [&str; 4] = ["csv", "mtx", "npy", "npz"];
+
     /// The value of `--format`.
     pub fn list(parser: &mut lexopt::Parser) -> Result<Vec<Format>, Stop> {
         let expected = "some of csv, list, mtx, npy, npz, with commas between";

@@ -39,7 +39,8 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         return Err(Stop::usage("no rows given: name the files that --rows has written"));
     };
     // SCENE.A-B.rows
-    let stem = out.unwrap_or_else(|| first.with_extension("").with_extension(""));
+    let stem = first.with_extension("").with_extension("");
+    let stem = args::stem(out, stem, &Format::ENDINGS);
     let parts = paths.iter().map(|path: &PathBuf| progress::of_reading(path, || read_rows(path)));
     let parts = parts.collect::<Result<Vec<_>, Error>>()?;
     let mut matrix = PartialMatrix::merge(parts)?.into_matrix()?;
