@@ -99,9 +99,9 @@ impl Mesh {
     pub const MAX_ELEMENTS: usize = 1 << 26;
 
     /// Neighbouring triangles of one smoothing group meet in a crease if their normals differ by
-    /// more than this many degrees: radiosity jumps there, whatever shading is wanted. Neighbours of
-    /// which no smoothing group is known do so at this angle or, in a bake to an error, at one so
-    /// small that what they share is not off by more. Chosen by hand; no measurement was kept.
+    /// more than this many degrees: radiosity jumps there, whatever shading is wanted. Neighbours
+    /// of which no smoothing group is known do so at this angle or, in a bake to an error, at one
+    /// so small that what they share is not off by more. Chosen by hand; no measurement was kept.
     pub const CREASE_DEGREES: f64 = 40.0;
 
     /// All other neighbouring triangles, in two smoothing groups or in none, meet in a crease if

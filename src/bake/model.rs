@@ -142,10 +142,11 @@ pub const COARSE_CONTACTS_ABOVE: f64 = 0.07;
 /// Up to this error vertices gather twice, since the first time they see what was shot on elements.
 pub const TWO_PASSES_UP_TO: f64 = 0.03;
 
-/// Triangles of which no smoothing group is known share vertices where their normals differ by up to
-/// so many times the error, radians. A shared vertex has the light of the mean normal, which is half
-/// of the angle δ from either; the irradiance from one direction at an angle θ is off by tan θ · δ/2
-/// then, and between three vertices half of such squares are left: 0.35 δ at 45°, half of the error.
+/// Triangles of which no smoothing group is known share vertices where their normals differ by up
+/// to so many times the error, radians. A shared vertex has the light of the mean normal, which is
+/// half of the angle δ from either; the irradiance from one direction at an angle θ is off by
+/// tan θ · δ/2 then, and between three vertices half of such squares are left: 0.35 δ at 45°, half
+/// of the error.
 pub const CREASE_TIMES_ERROR: f64 = 1.3;
 /// Receivers within this many patch diameters get closed-form factors, whatever the error.
 pub const NEAR_REACH: f64 = 1.0;
