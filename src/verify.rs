@@ -169,10 +169,8 @@ impl<'a> Verifier<'a> {
                 break Stop::Time;
             }
             let traced = (sampler.drawn() * self.paths) as u64;
-            let in_vain = limits
-                .paths
-                .is_some_and(|most| 2 * traced > most || limits.is_in_vain(most / traced, &error));
-            if in_vain || self.points >= MAX_POINTS || self.paths >= MAX_PATHS {
+            if limits.end_at(traced, &error) || self.points >= MAX_POINTS || self.paths >= MAX_PATHS
+            {
                 break Stop::Rounds;
             }
             match 2.0 * all.noise > all.variance || biased {
@@ -192,13 +190,16 @@ impl Limits {
         self.error.is_some_and(is_far) && off <= ROUGHLY * error.value
     }
 
-    /// Whether by `factor` times the paths an error as large as the one to be met, or as what was
-    /// surely found, is still not told from none, at best: where noise falls as fast as the number
-    /// of paths grows.
-    fn is_in_vain(&self, factor: u64, error: &Estimate) -> bool {
+    /// Whether there is no other round after `traced` paths, of twice as many: there may not be, or
+    /// it would be in vain. With all that there may be, an error as large as the one to be met, or
+    /// as what was surely found, would still not be told from none, at best: where noise falls as
+    /// fast as the number of paths grows.
+    fn end_at(&self, traced: u64, error: &Estimate) -> bool {
+        let Some(most) = self.paths else { return false };
         let found = error.value - 2.0 * error.standard_error;
-        let off = error.standard_error / factor as f64;
-        self.error.is_some_and(|limit| 2.0 * off > limit.max(found))
+        let off = error.standard_error / (most / traced).max(1) as f64;
+        let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(found));
+        2 * traced > most || in_vain
     }
 }
 

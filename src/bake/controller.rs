@@ -34,9 +34,10 @@ impl ErrorTarget<'_> {
         judged.by_light.total <= limit && self.is_below(whole * self.error, judged)
     }
 
-    /// Whether the estimate is at most the target.
-    pub fn is_reached(&self, judged: Judged) -> bool {
-        self.is_below(self.error, judged)
+    /// Whether the estimate is at most the target; of a bake that was `stopped`, where fewer points
+    /// say so, whether it is safely below.
+    pub fn is_reached(&self, judged: Judged, stopped: bool) -> bool {
+        if stopped { self.is_met(judged) } else { self.is_below(self.error, judged) }
     }
 
     fn is_below(&self, error: f64, Judged { whole, groups, .. }: Judged) -> bool {
@@ -252,11 +253,11 @@ mod tests {
             [0.001, 0.1].map(|mesh| ErrorEstimate { total: mesh, mesh, ..Default::default() });
         let target = target(0.02, false);
         let by_light = Judged { whole: &met, by_light: &missed, groups: &[] };
-        assert!(!target.is_met(by_light) && target.is_reached(by_light));
+        assert!(!target.is_met(by_light) && target.is_reached(by_light, false));
         let new = refined(&gather, by_light, &target);
         assert!(new.refinement.min_edge < gather.refinement.min_edge);
         let dark = Judged { whole: &missed, by_light: &met, groups: &[] };
-        assert!(!target.is_met(dark) && !target.is_reached(dark));
+        assert!(!target.is_met(dark) && !target.is_reached(dark, false));
     }
 
     #[test]

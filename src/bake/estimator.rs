@@ -52,6 +52,13 @@ pub(super) fn negligible_reflection(scene: &Scene) -> f64 {
     (NEGLIGIBLE_REFLECTION * brightest).max(f64::MIN_POSITIVE)
 }
 
+/// Whether an estimate goes on after so many `samples`: of a bake that was stopped until there are
+/// the least there are of any other, for what is told of it is to hold, too.
+pub(super) fn goes_on(stopped: bool, samples: usize) -> ControlFlow<()> {
+    let enough = stopped && samples >= *model::SAMPLES.start();
+    if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
 /// A result whose error is to be estimated.
 pub(super) struct ErrorEstimator<'a> {
     /// The result: what vertices gathered, or the elements' own light.

@@ -15,7 +15,7 @@
 use std::ops::ControlFlow;
 
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
-use crate::bake::estimator::{ErrorEstimator, EstimatedError, Pilot};
+use crate::bake::estimator::{self, ErrorEstimator, EstimatedError, Pilot};
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::judge::Judge;
 use crate::bake::light_survey;
@@ -130,14 +130,13 @@ impl<'a> GatherPhase<'a> {
         let Estimated { light, found, cancelled } = estimated;
         let judged = found.judged();
         let Some(target) = self.target else { return Ok(Err(Outcome::Unasked)) };
+        let stopped = *cancelled || light.stop == StopReason::Cancelled;
         let end = |obstacle| {
-            let reached = target.is_reached(judged);
+            let reached = target.is_reached(judged, stopped);
             Ok(Err(if reached { Outcome::Reached } else { Outcome::Missed(obstacle) }))
         };
-        if *cancelled || light.stop == StopReason::Cancelled {
-            // Fewer points say so than would if it had gone on: it is to be met safely.
-            let met = target.is_met(judged);
-            Ok(Err(if met { Outcome::Reached } else { Outcome::Missed(Obstacle::Cancelled) }))
+        if stopped {
+            end(Obstacle::Cancelled)
         } else if target.is_met(judged) {
             end(Obstacle::Edges)
         } else if light.stop == StopReason::Elements {
@@ -220,9 +219,7 @@ impl<'a> GatherPhase<'a> {
         let found = loop {
             let found = estimator.estimate(counts, &mut *self.gatherer, &mut |samples, of| {
                 cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-                // What is told of a bake that was stopped is to hold, too.
-                let enough = cancelled && samples >= *model::SAMPLES.start();
-                if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                estimator::goes_on(cancelled, samples)
             })?;
             let undecided = |target: ErrorTarget| target.is_undecided(found.judged());
             let most = counts.per_group.max(counts.total / model::SAMPLES_RATIO);

@@ -148,6 +148,7 @@ pub const TWO_PASSES_UP_TO: f64 = 0.03;
 /// tan θ · δ/2 then, and between three vertices half of such squares are left: 0.35 δ at 45°, half
 /// of the error.
 pub const CREASE_TIMES_ERROR: f64 = 1.3;
+
 /// Receivers within this many patch diameters get closed-form factors, whatever the error.
 pub const NEAR_REACH: f64 = 1.0;
 
@@ -156,6 +157,7 @@ pub(super) fn crease_degrees(error: f64) -> f64 {
     let degrees = (CREASE_TIMES_ERROR * error).to_degrees();
     degrees.clamp(Mesh::COPLANAR_DEGREES, Mesh::CREASE_DEGREES)
 }
+
 /// The solver's patch tolerance for `error`.
 pub(super) fn patch_tolerance(error: f64) -> f64 {
     error.min(PATCH_TOLERANCE_BASE + PATCH_TOLERANCE_SHARE * error)
@@ -341,6 +343,7 @@ pub const TIME_FRACTION: f64 = 0.5;
 
 /// Share of the time that is kept for the estimate of what was reached, should a bake be stopped.
 pub const TIME_FOR_ESTIMATE: f64 = 0.1;
+
 /// A further bake has to be of an error smaller by this factor, as each starts from nothing.
 pub const MIN_IMPROVEMENT: f64 = 1.3;
 
@@ -408,6 +411,7 @@ pub const JUDGE_PRECISION: f64 = 0.1;
 
 /// Points at which paths measure a result, at least: rare errors take many points, of few paths.
 pub const JUDGE_POINTS: usize = 1024;
+
 /// Paths at each of them, to begin with: few show whether more of them are worth their time.
 pub const JUDGE_FIRST_PATHS: usize = 16;
 

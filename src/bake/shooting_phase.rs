@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
-use crate::bake::estimator::{ErrorEstimator, EstimatedError};
+use crate::bake::estimator::{self, ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
 use crate::bake::judge::Judge;
 use crate::bake::light_survey;
@@ -208,8 +208,7 @@ pub(super) fn estimate_elements(
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
     let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-        let enough = cancelled && samples >= *model::SAMPLES.start();
-        if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        estimator::goes_on(cancelled, samples)
     })?;
     let found = match target {
         // What is told of a bake that was stopped is to hold, too.
@@ -221,10 +220,7 @@ pub(super) fn estimate_elements(
         ),
         _ => found,
     };
-    let is_reached = target.is_some_and(|target| match cancelled {
-        true => target.is_met(found.judged()),
-        false => target.is_reached(found.judged()),
-    });
+    let is_reached = target.is_some_and(|target| target.is_reached(found.judged(), cancelled));
     let EstimatedError { whole: estimate, groups, vertices, .. } = found;
     light.surface.error = vertices;
     clock.timings.estimate = clock.lap();

@@ -197,8 +197,7 @@ fn bake_in_time(
         };
         let is_reached = goal.is_some_and(|goal| {
             let BakeResult { estimate, groups, .. } = &baked;
-            let judged = Judged { whole: estimate, by_light: estimate, groups };
-            if stopped { goal.is_met(judged) } else { goal.is_reached(judged) }
+            goal.is_reached(Judged { whole: estimate, by_light: estimate, groups }, stopped)
         });
         let outcome = match goal {
             // A time was asked for, and the errors that were tried are nobody's.

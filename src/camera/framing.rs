@@ -16,11 +16,11 @@ use rayon::prelude::*;
 
 use super::Camera;
 use super::up_axis::up_axis;
-use super::view_score::ViewScorer;
+use super::view_score::{Face, ViewScorer, faces};
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::sampling::low_discrepancy::{r2_point, radical_inverse};
-use crate::scene::{Rgb, Scene};
+use crate::scene::Scene;
 
 /// Vertical field of view from outside and from inside, degrees. Chosen by hand: a room asks for a
 /// wide one.
@@ -272,16 +272,8 @@ fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
 
 /// The box where nearly all light is reflected; none where that is not much smaller than the scene.
 fn lit_box(light: &GatheredMesh) -> Option<Aabb> {
-    let surface = &light.surface;
-    let place = |(face, &element): (&[u32; 3], &u32)| {
-        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
-        let emitted = light.mesh.material(light.mesh.element(element as usize)).exitance;
-        let radiosity: Rgb = face.iter().map(|&v| surface.radiosity[v as usize]).sum();
-        let reflected = (radiosity / 3.0 - emitted).max(Rgb::ZERO).length();
-        ((a + b + c) / 3.0, reflected * (b - a).cross(c - a).length())
-    };
-    let places: Vec<(DVec3, f64)> =
-        surface.faces.iter().zip(&surface.elements).map(place).collect();
+    let flux = |face: Face| (face.centre, face.area * face.reflected.length());
+    let places: Vec<(DVec3, f64)> = faces(light).map(flux).collect();
     let whole = light.mesh.scene().reflecting_bounds().diagonal();
     Aabb::around_most(&places, UNLIT_SHARE).filter(|lit| lit.diagonal() * LIT_CONCENTRATION < whole)
 }

@@ -70,6 +70,33 @@ struct Part {
     lit: bool,
 }
 
+/// A face of a surface, and its light.
+pub(super) struct Face {
+    /// Index of the element that it is a part of.
+    pub element: usize,
+    pub centre: DVec3,
+    /// Holes included, scene unit squared.
+    pub area: f64,
+    /// Mean of the reflected radiosity at its corners, W/m².
+    pub reflected: Rgb,
+}
+
+/// The faces of `light`.
+pub(super) fn faces(light: &GatheredMesh) -> impl Iterator<Item = Face> {
+    let surface = &light.surface;
+    surface.faces.iter().zip(&surface.elements).map(|(face, &element)| {
+        let [a, b, c] = face.map(|v| surface.positions[v as usize]);
+        let emitted = light.mesh.material(light.mesh.element(element as usize)).exitance;
+        let radiosity = face.map(|v| surface.radiosity[v as usize]).into_iter().sum::<Rgb>();
+        Face {
+            element: element as usize,
+            centre: (a + b + c) / 3.0,
+            area: (b - a).cross(c - a).length() / 2.0,
+            reflected: (radiosity / 3.0 - emitted).max(Rgb::ZERO),
+        }
+    })
+}
+
 impl ViewScorer<'_> {
     /// For views of `light` in which the parts within `focus` matter most.
     pub fn new(light: &GatheredMesh, focus: Aabb) -> ViewScorer<'_> {
@@ -83,22 +110,17 @@ impl ViewScorer<'_> {
 
     /// Adds up area and light of each part of what reflects, or of all where nothing does.
     fn add_parts(&mut self, light: &GatheredMesh) {
-        let (surface, mesh) = (&light.surface, &light.mesh);
         let any_reflects =
             (0..self.scene.triangles().len()).any(|t| self.scene.material(t).scatters());
-        for (face, &element) in surface.faces.iter().zip(&surface.elements) {
-            let t = mesh.triangle(mesh.element(element as usize));
+        for Face { element, centre, area, reflected } in faces(light) {
+            let node = light.mesh.element(element);
+            let t = light.mesh.triangle(node);
             if any_reflects && !self.scene.material(t).scatters() {
                 continue;
             }
-            let [a, b, c] = face.map(|v| surface.positions[v as usize]);
-            let emitted = self.scene.material(t).exitance;
-            let radiosity = face.map(|v| surface.radiosity[v as usize]).into_iter().sum::<Rgb>();
-            let reflected = (radiosity / 3.0 - emitted).max(Rgb::ZERO);
-            let share = mesh.solid_share(mesh.element(element as usize));
-            let area = share * (b - a).cross(c - a).length() / 2.0;
+            let area = light.mesh.solid_share(node) * area;
             let next = Part { index: self.parts.len(), ..Default::default() };
-            let part = self.parts.entry(self.key(t, (a + b + c) / 3.0)).or_insert(next);
+            let part = self.parts.entry(self.key(t, centre)).or_insert(next);
             part.area += area;
             part.flux += area * reflected.element_sum() / 3.0;
         }

@@ -5,7 +5,6 @@
 //! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
 //! warning that nothing emits names these.
 
-use super::obj::ObjSettings;
 use crate::scene::{Material, Rgb, Sky, Warning, WarningKind};
 
 /// Words in the names that lamps are given, in lower case.
@@ -88,23 +87,22 @@ const DEFAULT_SKY: Rgb = Rgb::ONE;
 /// of them emits, if none does and no sky was asked for.
 pub(super) fn sky_and_warning<'a>(
     used: impl Iterator<Item = &'a Material> + Clone,
-    settings: &ObjSettings,
+    wanted: Option<&Sky>,
+    emit: &[(String, Rgb)],
 ) -> (Sky, Option<Warning>) {
-    let wanted = settings.sky.as_ref();
     let is_dark = !used.clone().any(|m| m.exitance.max_element() > 0.0);
     let warns = is_dark && wanted.is_none_or(Sky::is_black);
     let default = Sky::uniform(if is_dark { DEFAULT_SKY } else { Rgb::ZERO });
     let sky = wanted.cloned().unwrap_or(default);
-    let put_out = !settings.emit.is_empty();
-    let warning = warns.then(|| match put_out {
-        true => {
+    let warning = warns.then(|| match emit {
+        [] => no_light(used, sky.is_black()),
+        _ => {
             let under = under(sky.is_black());
             let remedy = "give one a radiance above 0, or choose the sky yourself";
             let done = format!("what was told to emit emits 0; {under}; {remedy}");
-            let names = settings.emit.iter().map(|(name, _)| crate::error::shortened(name));
+            let names = emit.iter().map(|(name, _)| crate::error::shortened(name));
             Warning::new(WarningKind::NoLight, 1, done).naming(names)
         }
-        false => no_light(used, sky.is_black()),
     });
     (sky, warning)
 }

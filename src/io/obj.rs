@@ -197,7 +197,7 @@ impl<'a> ObjFile<'a> {
         let mut scene = scene.map_err(|e| e.inside(self.path))?;
         let is_used = |(i, _): &(usize, _)| used.contains(&(*i as u32));
         let emitting = scene.materials().iter().enumerate().filter(is_used).map(|(_, m)| m);
-        let (sky, dark) = lights::sky_and_warning(emitting, settings);
+        let (sky, dark) = lights::sky_and_warning(emitting, settings.sky.as_ref(), &settings.emit);
         self.repairs.into_warnings().into_iter().chain(dark).for_each(|w| scene.warn(w));
         scene.with_sky(sky)
     }

@@ -165,12 +165,12 @@ mod tests {
     fn fits_that_amplify_errors_are_left_out() {
         // From the middle of a half disc, and from both ends of its straight side, its triangles
         // lie in all directions; from the rim they all lie along an arc.
-        let fan = |angle: f64, width: f64| -> Vec<[f64; 2]> {
-            (0..7).map(|k| f64::from(k) * angle).map(|a| [a.cos(), width * a.sin()]).collect()
+        let fan = |angle: f64| -> Vec<[f64; 2]> {
+            (0..7).map(|k| f64::from(k) * angle).map(|a| [a.cos(), a.sin()]).collect()
         };
         let count = |rim: &[[f64; 2]]| fits(rim).iter().filter(|fit| !fit.is_empty()).count();
-        assert!(count(&fan(PI / 6.0, 1.0)) >= 3);
+        assert!(count(&fan(PI / 6.0)) >= 3);
         // Nearly on a line: what is across it is extrapolated from a hundredth of that.
-        assert_eq!(count(&fan(0.02, 1.0)), 0);
+        assert_eq!(count(&fan(0.02)), 0);
     }
 }

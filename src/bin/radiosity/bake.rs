@@ -252,22 +252,17 @@ impl Bake {
             let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero());
             time.ok_or_else(|| args::wrong_value("time", &seconds.to_string(), SECONDS))
         };
-        self.target = match (error, error_each, seconds) {
+        let limit = seconds.map(limit).transpose()?;
+        (self.target, self.limit) = match (error, error_each, seconds) {
             (Some(_), Some(_), _) => {
                 let found = "--error is for the whole and --error-each for each group: give one";
                 return Err(Stop::usage(found));
             }
-            (Some(error), None, _) => Target::Error(error),
-            (None, Some(error), _) => Target::ErrorEach(error),
-            (None, None, Some(seconds)) => {
-                limit(seconds)?;
-                Target::Seconds(seconds)
-            }
+            (Some(error), None, _) => (Target::Error(error), limit),
+            (None, Some(error), _) => (Target::ErrorEach(error), limit),
+            (None, None, Some(seconds)) => (Target::Seconds(seconds), None),
             (None, None, None) => return Ok(()),
         };
-        if !matches!(self.target, Target::Seconds(_)) {
-            self.limit = seconds.map(limit).transpose()?;
-        }
         Ok(())
     }
 
