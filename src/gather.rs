@@ -15,6 +15,7 @@ pub(crate) mod adaptive;
 mod batch;
 mod buried;
 pub(crate) mod exchange;
+mod further_bounces;
 pub(crate) mod gather_points;
 mod gathered_mesh;
 mod interpolated_refinement;

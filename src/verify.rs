@@ -53,6 +53,7 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
+pub(crate) use path_tracer::random_numbers;
 pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
 pub use settings::Settings;

@@ -82,8 +82,8 @@ pub(super) enum Step {
     /// All vertices gather once more, after a `bounce` what they gathered themselves; then elements
     /// are split.
     AllVertices { bounce: bool },
-    /// What was reached lights the vertices, all of which gather the difference to what did before.
-    Bounce,
+    /// All further bounces of what vertices have gathered.
+    Bounces,
     /// Elements are split, and new vertices gather.
     Split,
 }
@@ -95,7 +95,7 @@ impl Step {
         if (new.rays, new.noise_tolerance) != (old.rays, old.noise_tolerance) {
             Step::AllVertices { bounce }
         } else if bounce {
-            Step::Bounce
+            Step::Bounces
         } else {
             Step::Split
         }
@@ -266,7 +266,7 @@ mod tests {
         let small = ErrorEstimate { total: 0.5, ..ErrorEstimate::default() };
         let cases = [
             (ErrorEstimate { mesh: 0.05, ..small }, Step::Split),
-            (ErrorEstimate { truncation: 0.05, ..small }, Step::Bounce),
+            (ErrorEstimate { truncation: 0.05, ..small }, Step::Bounces),
             (ErrorEstimate { sampling: 0.05, ..small }, Step::AllVertices { bounce: false }),
             (
                 ErrorEstimate { sampling: 0.05, truncation: 0.05, ..small },
@@ -287,7 +287,7 @@ mod tests {
         // A bounce comes first, and alone: it changes what there is to split.
         let both = ErrorEstimate { mesh: 0.05, truncation: 0.05, ..small };
         let new = refined(&gather, judged(&both, &[]), &target(0.02, false));
-        assert_eq!(Step::between(&gather, &new), Step::Bounce);
+        assert_eq!(Step::between(&gather, &new), Step::Bounces);
         assert_eq!(new.refinement.surplus_tolerance, gather.refinement.surplus_tolerance);
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
         let new = refined(&gather, judged(&met, &[]), &target(0.02, false));

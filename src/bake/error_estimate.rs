@@ -23,14 +23,15 @@
 //! ```text
 //! interpolated − (a+b)/2   mesh + sampling + noise of the two gathers
 //!     a − b                noise of one gather, twice: sampling
-//!     c − a                what one more gather pass would change: truncation
+//!     c − a                what one more bounce would change: truncation
 //! ```
 //!
 //! Points are spread over the groups as well as the area: each group is a stratum, and means are
 //! those of the strata, weighted by area. Within a stratum there are more points where errors are
 //! expected, each with the area that it stands for as its weight. The squared error of mesh and
-//! sampling is the first, plus one standard error of that mean, less half the noise; that of
-//! truncation continues the change as a geometric series in the mean reflectance. Light not shot is
+//! sampling is the first, plus one standard error of that mean, less half the noise. Truncation is
+//! the change of all further bounces: the next one times a growth that paths through the change
+//! find, since light that is off in a gap of bright walls stays there. Light not shot is
 //! added as if it fell like the ambient term. Dim points that see surfaces nearer than their
 //! element is large are a part of their own, the gaps: what no mesh resolves is mostly there. This
 //! file does no gathering: see [`estimator`](super::estimator). Where the light that is gathered is
@@ -105,6 +106,8 @@ pub(super) struct Observation {
     pub gathered: [Rgb; 2],
     /// Reflected radiosity by a gather of the result itself, with the rays of the first, W/m².
     pub next: Rgb,
+    /// What all bounces after that would add, W/m²: without bias, and with noise.
+    pub later: Rgb,
     /// What the middle of the element may be off by, up to a common factor, W/m².
     pub element_residual: f64,
     /// Whether the point is hidden by what touches its surface or encloses it, so that nobody sees
@@ -139,8 +142,9 @@ pub(super) struct Conditions<'a> {
     pub radiosity_floor: f64,
     /// Mean albedo over the area that scatters light, of the channel in which it is highest.
     pub mean_albedo: f64,
-    /// Times that all vertices have gathered; none if the light is that of the elements.
-    pub gather_passes: Option<u32>,
+    /// Bounces of what was shot that vertices have gathered; none if the light is that of the
+    /// elements.
+    pub bounces: Option<f64>,
     /// See [`ErrorEstimate::unshot_bound`].
     pub unshot_bound: f64,
 }
@@ -175,8 +179,10 @@ struct Deviation {
     interpolation: DVec3,
     /// Squared noise of one gather.
     noise: f64,
-    /// Change under one more pass.
+    /// What one more bounce would add.
     next: DVec3,
+    /// What all bounces after that would, with noise.
+    later: DVec3,
     /// Squared element residual.
     residual: f64,
     /// Whether the point is in a gap.
@@ -207,6 +213,7 @@ impl StratumDeviations {
                 interpolation: d.interpolation * scale,
                 noise: d.noise * scale * scale,
                 next: d.next * scale,
+                later: d.later * scale,
                 residual: d.residual * scale * scale,
                 ..*d
             }
@@ -235,9 +242,9 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     }
     all.retain(|stratum| stratum.area > 0.0);
     let passed = passed_share(observations, conditions);
-    let bias = Means(&all).vector(|d| change(d, conditions));
+    let further = FurtherBounces::new(&Means(&all), conditions);
     let parts = |strata: &[StratumDeviations], standard_errors: f64| {
-        parts(strata, bias, passed, standard_errors, conditions)
+        parts(strata, further, passed, standard_errors, conditions)
     };
     let whole = parts(&all, 1.0);
     let lit_floor = lit_floor(&Means(&all));
@@ -284,12 +291,11 @@ fn lit_floor(means: &Means) -> f64 {
     (model::RADIOSITY_FLOOR * mean).max(f64::MIN_POSITIVE)
 }
 
-/// All parts over `strata`, with so many standard errors added to what scatters most. `bias` is the
-/// mean change under one more pass over the whole, and `passed` the share of the unshot light that
-/// the passes keep.
+/// All parts over `strata`, with so many standard errors added to what scatters most; `passed` is
+/// the share of the unshot light that bounces keep.
 fn parts(
     strata: &[StratumDeviations],
-    bias: DVec3,
+    further: FurtherBounces,
     passed: f64,
     standard_errors: f64,
     conditions: &Conditions,
@@ -310,13 +316,10 @@ fn parts(
     let area: f64 = strata.iter().map(|s| s.area).sum::<f64>().max(f64::MIN_POSITIVE);
     let ambient = strata.iter().map(|s| s.stratum.ambient * s.area).sum::<f64>() / area;
     let unshot = ambient * passed * passed;
-    // Light that was not shot is a part of what one more pass would change.
-    let truncation = (truncation(&means, bias, conditions) - unshot).max(0.0);
+    // Light that was not shot is a part of what further bounces add.
+    let truncation = (means.of(|d| further.square(d)) - unshot).max(0.0);
     let total = (interpolation + gaps + truncation + unshot).sqrt();
-    let scatter = means.standard_error(|d| {
-        let change = conditions.gather_passes.map_or(DVec3::ZERO, |_| d.next - bias);
-        d.interpolation.length_squared() + change.length_squared()
-    });
+    let scatter = means.standard_error(|d| d.interpolation.length_squared() + further.square(d));
     ErrorEstimate {
         total,
         uncertainty: if total > 0.0 { scatter / (2.0 * total) } else { 0.0 },
@@ -349,6 +352,7 @@ impl Observation {
             interpolation: (self.interpolated - truth) / scale,
             noise: ((first - second) / scale).length_squared() / 2.0,
             next: (self.next - first) / scale,
+            later: self.later / scale,
             residual: (self.element_residual / scale).powi(2),
             reflected: truth.length(),
             scale,
@@ -399,34 +403,44 @@ fn mean(deviations: &[Deviation], value: &impl Fn(&Deviation) -> f64) -> f64 {
     if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
-/// What one more pass would change at a point.
-fn change(deviation: &Deviation, conditions: &Conditions) -> DVec3 {
-    // The elements' own light is changed by a first pass to what was gathered at the points.
-    match conditions.gather_passes {
-        Some(_) => deviation.next,
-        None => -deviation.interpolation,
+/// What all further bounces add, next to what is known of it at each point.
+#[derive(Clone, Copy)]
+struct FurtherBounces {
+    /// All further bounces over the next one.
+    growth: f64,
+    /// Square of what they add at every point where no vertices have gathered.
+    even: f64,
+}
+
+impl FurtherBounces {
+    /// For a change that each bounce multiplies by λ, growth is 1/(1 − λ): found as
+    /// 1 + ⟨next, later⟩ / ⟨next, next⟩, in which the noise of what is later is averaged. The
+    /// elements' own light is off by the mean of what the points gathered, and all that gathers it.
+    fn new(means: &Means, conditions: &Conditions) -> FurtherBounces {
+        if conditions.bounces.is_none() {
+            let albedo = conditions.mean_albedo;
+            let series = means.vector(|d| d.interpolation).length() / (1.0 - albedo);
+            return FurtherBounces { growth: 1.0, even: (series * albedo).powi(2) };
+        }
+        let square = means.of(|d| d.next.length_squared());
+        let later = means.of(|d| d.next.dot(d.later));
+        let growth = if square > 0.0 { 1.0 + (later / square).max(0.0) } else { 1.0 };
+        FurtherBounces { growth, even: 0.0 }
+    }
+
+    /// Squared, at a point.
+    fn square(&self, deviation: &Deviation) -> f64 {
+        (self.growth * deviation.next).length_squared() + self.even
     }
 }
 
-/// Squared error of stopping after some passes, where one more would change `bias` in the mean.
-fn truncation(means: &Means, bias: DVec3, conditions: &Conditions) -> f64 {
-    let albedo = conditions.mean_albedo;
-    let series = bias.length() / (1.0 - albedo);
-    if conditions.gather_passes.is_some() {
-        // Both gathers cast the same rays, so that their difference has little noise.
-        means.of(|d| (change(d, conditions) - bias).length_squared()) + series * series
-    } else {
-        (series * albedo).powi(2)
-    }
-}
-
-/// Share of the unshot light that is still missing after the passes: each keeps what is reflected
+/// Share of the unshot light that is still missing after the bounces: each keeps what is reflected
 /// of it and does not escape.
 fn passed_share(observations: &[Observation], conditions: &Conditions) -> f64 {
     let escaped = observations.iter().map(|o| o.escaped).sum::<f64>();
     let escaped = escaped / observations.len().max(1) as f64;
-    match conditions.gather_passes {
-        Some(passes) => (conditions.mean_albedo * (1.0 - escaped)).powi(passes as i32),
+    match conditions.bounces {
+        Some(bounces) => (conditions.mean_albedo * (1.0 - escaped)).powf(bounces),
         None => 1.0,
     }
 }

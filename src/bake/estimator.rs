@@ -10,6 +10,7 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::bake::controller::Judged;
 use crate::bake::error_estimate::{
@@ -28,7 +29,9 @@ use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
+use crate::verify::{PathTracer, SurfacePoint as PathStart, random_numbers};
 use crate::visibility::buried;
+use crate::visibility::ray_scene::Hit;
 
 /// Points that are gathered at before progress is reported first: a bake that is stopped uses
 /// these.
@@ -68,13 +71,15 @@ pub(super) struct ErrorEstimator<'a> {
     /// What the middle of each element may be off by, up to a common factor, W/m².
     pub element_residual: &'a [f64],
     pub ledger: &'a Ledger,
-    /// Times that all vertices have gathered.
-    pub gather_passes: u32,
+    /// Bounces of what was shot that vertices have gathered.
+    pub bounces: f64,
     /// Diagonal of where the light is, scene unit.
     pub diagonal: f64,
     /// Reflected radiosity below which errors are relative to this instead, W/m², as far as is
     /// known before the points are looked at; they say it better.
     pub expected_floor: f64,
+    /// Follows paths through the scene; not needed for the elements' own light.
+    pub paths: Option<&'a PathTracer<'a>>,
 }
 
 /// The estimated error of a result.
@@ -112,6 +117,7 @@ struct Sample {
     element: usize,
     albedo: Rgb,
     point: TwoSidedPoint,
+    on_surface: PathStart,
     /// Step to the centroid of the face, scene unit.
     inward: DVec3,
     /// Reflected radiosity that the vertices interpolate to, W/m².
@@ -128,6 +134,8 @@ struct SampleGathers {
     first: IrradianceSample,
     second: IrradianceSample,
     next: IrradianceSample,
+    /// See [`Observation::later`].
+    later: Rgb,
 }
 
 impl ErrorEstimator<'_> {
@@ -146,7 +154,7 @@ impl ErrorEstimator<'_> {
             strata: &strata,
             radiosity_floor,
             mean_albedo: self.light.mesh.mean_albedo().max_element(),
-            gather_passes: self.lit_by.map(|_| self.gather_passes),
+            bounces: self.lit_by.map(|_| self.bounces),
             unshot_bound,
         };
         let estimate = error_estimate::estimate(&observations, &conditions);
@@ -244,10 +252,13 @@ impl ErrorEstimator<'_> {
                         [first.clone(), first]
                     }
                 };
+                let later: Vec<Rgb> =
+                    batch.par_iter().map(|&k| self.later(&samples[k], k)).collect();
                 let second = gather_two_sided(gatherer, &sources, &jittered)?;
                 for (i, &k) in batch.iter().enumerate() {
-                    let (first, second, next) = (first[i], second[i], next[i]);
-                    gathers[k] = Some(SampleGathers { first, second, next });
+                    let (first, second) = (first[i], second[i]);
+                    let (next, later) = (next[i], later[i]);
+                    gathers[k] = Some(SampleGathers { first, second, next, later });
                 }
                 Ok::<_, Error>(())
             })?;
@@ -256,6 +267,20 @@ impl ErrorEstimator<'_> {
             }
         }
         Ok(gathers)
+    }
+
+    /// What bounces after the next one would add at the `k`th sample, by some paths, W/m²: with
+    /// L = E + ρF S gathered from S they add Σ (ρF)ⁿ (L − S) over n ≥ 2.
+    fn later(&self, sample: &Sample, k: usize) -> Rgb {
+        let (Some(lit_by), Some(paths)) = (self.lit_by, self.paths) else { return Rgb::ZERO };
+        let fields = [self.light, lit_by].map(GatheredMesh::radiosity_field);
+        let change = |hit: &Hit| {
+            let [now, before] = fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v));
+            now - before
+        };
+        let mut rng = random_numbers(&[k as u64]);
+        let path = |_| paths.later_bounces(change, &sample.on_surface, &mut rng);
+        (0..model::LATER_PATHS).map(path).sum::<Rgb>() / f64::from(model::LATER_PATHS)
     }
 
     /// Points spread over groups and evenly over the faces of each that reflect, and the strata
@@ -298,6 +323,7 @@ impl ErrorEstimator<'_> {
                 element,
                 albedo: material.albedo(),
                 point: TwoSidedPoint::new(point, material),
+                on_surface: PathStart { triangle: mesh.triangle(node), position },
                 inward: corners(face).iter().sum::<DVec3>() / 3.0 - position,
                 interpolated: reflected,
                 size,
@@ -413,13 +439,14 @@ impl Sample {
     }
 
     fn observation(&self, estimator: &ErrorEstimator, gathers: &SampleGathers) -> Observation {
-        let SampleGathers { first, second, next } = gathers;
+        let SampleGathers { first, second, next, later } = gathers;
         Observation {
             stratum: self.stratum,
             weight: self.weight,
             interpolated: self.interpolated,
             gathered: [self.reflected(first), self.reflected(second)],
             next: self.reflected(next),
+            later: *later,
             element_residual: estimator.residual(self.element),
             excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal))
                 || (first.escaped + second.escaped) / 2.0 > buried::OPEN,

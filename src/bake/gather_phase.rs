@@ -5,8 +5,8 @@
 //! pilot ─► gather ─► estimate ─► error met, nothing left to refine, or stopped ─► result
 //!            ▲           │
 //!            └── step ◄──┘   AllVertices: more rays, so every vertex gathers again
-//!                            Bounce:      the result lights the vertices, which gather the
-//!                                         difference; then elements are split
+//!                            Bounces:     all further ones, of what vertices have gathered, by few
+//!                                         rays
 //!                            Split:       elements are split, and new vertices gather
 //! ```
 //!
@@ -14,6 +14,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::backend::cpu::RayGather;
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError, Pilot};
 use crate::bake::fallback::ResilientBackend;
@@ -32,6 +33,7 @@ use crate::gather::adaptive::AdaptiveGather;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
+use crate::verify::PathTracer;
 
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
@@ -44,6 +46,7 @@ pub(super) struct GatherPhase<'a> {
     backend: &'a ResilientBackend<'a>,
     shot: &'a ShotLight,
     judge: Judge<'a>,
+    paths: PathTracer<'a>,
 }
 
 /// A gathered mesh whose error was estimated.
@@ -74,8 +77,9 @@ impl<'a> GatherPhase<'a> {
             state.radiosity_floor(),
         )?;
         let judge = Judge::new(shot.mesh.scene(), target.is_some_and(|target| target.each_group));
+        let paths = PathTracer::new(shot.mesh.scene());
         let mut phase =
-            GatherPhase { solve, gather, target, state, gatherer, backend, shot, judge };
+            GatherPhase { solve, gather, target, state, gatherer, backend, shot, judge, paths };
         if let Some(target) = target {
             phase.choose_rays(target)?;
         }
@@ -181,9 +185,10 @@ impl<'a> GatherPhase<'a> {
                 }
                 self.state.gather_pass(&refinement, &mut *self.gatherer, &mut progress)
             }
-            Step::Bounce => {
-                let mut coarse = self.gatherer(model::COARSE_RAY_DIVISOR)?;
-                self.state.gather_difference(&mut *coarse, &mut progress)
+            Step::Bounces => {
+                let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
+                let maker = RayGather::new(&self.shot.mesh, rays)?;
+                Ok(self.state.add_further_bounces(&maker, &mut progress))
             }
             Step::Split => self.state.refine(&refinement, &mut *self.gatherer, &mut progress),
         }
@@ -203,9 +208,10 @@ impl<'a> GatherPhase<'a> {
             lit_by: Some(self.state.source()),
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
-            gather_passes: self.gather.refinement.gather_passes,
+            bounces: self.state.bounces(),
             diagonal: self.diagonal(),
             expected_floor: self.state.radiosity_floor(),
+            paths: Some(&self.paths),
         };
         let each_group = self.target.is_some_and(|target| target.each_group);
         let mut counts = SampleCounts {
@@ -269,9 +275,10 @@ impl<'a> GatherPhase<'a> {
             lit_by: None,
             element_residual: &[],
             ledger: &self.shot.solution.ledger,
-            gather_passes: 0,
+            bounces: 0.0,
             diagonal: self.diagonal(),
             expected_floor: self.state.radiosity_floor(),
+            paths: None,
         };
         // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for
         // more of them everywhere.

@@ -132,14 +132,13 @@ impl GatheringElements<'_> {
         let seen_from = |point: &TwoSidedPoint| {
             let mut seen = vec![];
             for (point, share) in point.sides() {
-                for row in rays.rows(mesh, &point, 1) {
-                    let in_gap = |hit: &&SurfaceHit| number[hit.element as usize] != IN_NO_GAP;
-                    seen.extend(row.hits.iter().filter(in_gap).map(|hit| {
-                        let e = hit.element as usize;
-                        let factor = row.share * hit.passed * mesh.relative_reflectance(e);
-                        (number[e], share * factor)
-                    }));
-                }
+                let row = rays.surface_row(mesh, &point);
+                let in_gap = |hit: &&SurfaceHit| number[hit.element as usize] != IN_NO_GAP;
+                seen.extend(row.hits.iter().filter(in_gap).map(|hit| {
+                    let e = hit.element as usize;
+                    let factor = row.share * hit.passed * mesh.relative_reflectance(e);
+                    (number[e], share * factor)
+                }));
             }
             SeenPlace::merged(seen)
         };

@@ -224,7 +224,21 @@ pub const OUTLIER_FACTOR: f64 = 3.0;
 /// all that a vertex sees.
 pub const COARSE_RAY_DIVISOR: u32 = 4;
 
+/// Places that a vertex sees and exchanges light with, over all vertices: 1 GiB of them.
+const MAX_SEEN_PLACES: usize = 1 << 26;
+
+/// Rays by which each of so many `vertices` finds what it exchanges further bounces with, where it
+/// gathers with `rays`.
+pub(super) fn rays_of_rows(rays: u32, vertices: usize) -> u32 {
+    let most = (MAX_SEEN_PLACES / vertices.max(1)).max(1);
+    rays.div_ceil(COARSE_RAY_DIVISOR).min(u32::try_from(most).unwrap_or(u32::MAX))
+}
+
 // ---- 3. Rounds of refinement -------------------------------------------------------------------
+
+/// Paths by which a point finds what bounces after the next one would add: noise is averaged over
+/// all points.
+pub const LATER_PATHS: u32 = 16;
 
 /// The estimate has to be below this share of the error asked for. Errors at points that are chosen
 /// for being difficult (edges, contacts, penumbrae), as users compare them, were up to 1.5 times

@@ -198,9 +198,10 @@ pub(super) fn estimate_elements(
         lit_by: None,
         element_residual: &corner_spread(&light),
         ledger: &shot.solution.ledger,
-        gather_passes: 0,
+        bounces: 0.0,
         diagonal: light_survey::diagonal(settings.solve.region.as_ref(), shot.mesh.scene()),
         expected_floor: light.radiosity_field().radiosity_floor(),
+        paths: None,
     };
     let counts =
         SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };

@@ -24,7 +24,7 @@ pub(crate) fn is_in_gap(inverse_distance: f64, size: f64) -> bool {
 }
 
 /// A place that exchanges light with others.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Place {
     pub albedo: Rgb,
     /// What it reflects of light from elsewhere, W/m²; or the change of it.

@@ -47,4 +47,20 @@ pub(crate) trait PointRows: Sync {
     /// The rows of `point` by each of so many equal `parts` of the rays, over the elements of
     /// `mesh`. Their mean is the row by all of them.
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow>;
+
+    /// The row of what surfaces reflect to `point`: no ray is sent to a light or to the sun.
+    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow;
+}
+
+/// Makes rows of what surfaces reflect, and of no more.
+pub(crate) struct SurfaceRows<'a>(pub &'a dyn PointRows);
+
+impl PointRows for SurfaceRows<'_> {
+    fn rows(&self, mesh: &Mesh, point: &GatherPoint, _parts: u32) -> Vec<PointRow> {
+        vec![self.surface_row(mesh, point)]
+    }
+
+    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
+        self.0.surface_row(mesh, point)
+    }
 }

@@ -12,6 +12,7 @@ use super::gather_points::VertexGatherPoints;
 use super::point_row::{PointRow, PointRows};
 use crate::mesh::Mesh;
 use crate::progress::BatchSizer;
+use crate::scene::Rgb;
 use crate::vertex::keys::Vertices;
 
 /// Vertices in the first batch; later ones follow the clock. Chosen by hand: results do not depend
@@ -50,6 +51,16 @@ impl<'a> VertexRows<'a> {
     /// The material of each vertex, by its index; none where holes are all around it.
     pub fn material(&self, v: u32) -> Option<u32> {
         self.points.material_index(v)
+    }
+
+    /// Albedo of the surface of each vertex; 0 where holes are all around it.
+    pub fn albedo(&self, v: u32) -> Rgb {
+        self.points.albedo(v)
+    }
+
+    /// By how much the front of vertex `v` counts per channel, and the other side if it does.
+    pub fn shares_of_sides(&self, v: u32) -> impl Iterator<Item = Rgb> {
+        self.points.point(v, 0).sides().map(|(_, share)| share).collect::<Vec<_>>().into_iter()
     }
 
     /// What `work` makes of the row of each of `vertices`, in their order, made by so many `parts`

@@ -13,7 +13,7 @@
 //! Light falls from full to none at such a line, and a point in the dark that is given some of the
 //! light beside it is off by many times its own: where things are stuck into one another, a strip
 //! of next to no area makes most of the error, and no element is small enough. So nearly every line
-//! is cut along that has light on both its sides: see [`openness`]. What is nearer than
+//! is cut along that has light on both its sides, or a slit on one: see [`openness`]. What is nearer than
 //! [`SNAP_DISTANCE`] is one point: see [`snapping`].
 
 mod openness;
@@ -129,7 +129,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
             }
             plane.add_contacts(&scene.corners(s), &sides, &boxes[t], &mut segments);
         }
-        segments.retain(|segment| openness.has_light_on_both_sides(segment, corners));
+        segments.retain(|segment| openness.is_worth_a_cut(segment, corners));
         Snapping::new(corners, SNAP_DISTANCE * shortest).cuts(&segments)
     };
     (0..count).into_par_iter().map(cuts).collect()
@@ -264,15 +264,41 @@ mod tests {
         assert_eq!(foot.len(), 2);
     }
 
-    #[test]
-    fn what_is_hidden_or_small_is_not_cut() {
-        let (low, high) = ([3.0, 3.0], [6.0, 6.0]);
+    /// A box on the floor between two corners, 2 high: its sides, and its top.
+    fn box_on_floor(low: [f64; 2], high: [f64; 2]) -> [[[f64; 3]; 4]; 5] {
         let [a, b, c, d] =
             [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]];
         let at = |[x, y]: [f64; 2], z: f64| [x, y, z];
         let side = |p, q| [at(p, 0.0), at(q, 0.0), at(q, 2.0), at(p, 2.0)];
         let top = [at(a, 2.0), at(b, 2.0), at(c, 2.0), at(d, 2.0)];
-        let solid = [FLOOR, side(a, b), side(b, c), side(c, d), side(d, a), top];
+        [side(a, b), side(b, c), side(c, d), side(d, a), top]
+    }
+
+    #[test]
+    fn slits_between_solids_are_cut() {
+        let first = box_on_floor([3.0, 3.0], [5.0, 6.0]);
+        for (width, is_slit) in [(0.05, true), (0.2, false)] {
+            let second = box_on_floor([5.0 + width, 3.0], [7.0, 6.0]);
+            let scene = quads(&[&[FLOOR][..], &first, &second].concat());
+            let cut = cut_at_contacts(&scene, 0.1);
+            let (pieces, _) = floor_of(&cut);
+            assert!((area(&pieces) - 80.0).abs() < 1e-9);
+            assert_eq!(pieces.len() > 2, is_slit, "{width}");
+            let in_slit = |piece: &&[DVec3; 3]| {
+                let middle = piece.iter().sum::<DVec3>() / 3.0;
+                (middle.x - 5.0 - width / 2.0).abs() < width / 2.0 && (middle.y - 4.5).abs() < 1.5
+            };
+            let slit: Vec<[DVec3; 3]> = pieces.iter().filter(in_slit).copied().collect();
+            let expected = if is_slit { 3.0 * width } else { 0.0 };
+            // Its two sides of 3 may snap by so much.
+            let off = 6.0 * SNAP_DISTANCE * SHORTEST_CUT * 0.1;
+            assert!((area(&slit) - expected).abs() < off, "{width}: {}", area(&slit));
+        }
+    }
+
+    #[test]
+    fn what_is_hidden_or_small_is_not_cut() {
+        let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
         assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
         // Without its lid people do.

@@ -78,6 +78,14 @@ impl Cell {
         if self.flipped { [-u, -v] } else { [u, v] }
     }
 
+    /// The inverse of [`Cell::local`]: where in the triangle (u, v) in this cell is.
+    pub fn in_triangle(self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let side = f64::from(1u32 << self.level);
+        let [[i, j], ..] = self.lattice_corners();
+        let [u, v] = if self.flipped { [-u, -v] } else { [u, v] };
+        [(f64::from(i) + u) / side, (f64::from(j) + v) / side]
+    }
+
     /// Number of this cell among the 4ˡ of its level, row by row (`i` first). The item-buffer
     /// shader computes the same number.
     pub fn index(self) -> u32 {
@@ -112,6 +120,18 @@ mod tests {
                     assert_eq!(child.ancestor(l), parent);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn places_in_a_cell_are_found_in_the_triangle() {
+        for cell in level(3) {
+            let [a, b, c] = cell.corners();
+            for (place, corner) in [([0.0, 0.0], a), ([1.0, 0.0], b), ([0.0, 1.0], c)] {
+                assert_eq!(cell.in_triangle(place), corner);
+            }
+            let [u, v] = cell.in_triangle([0.25, 0.125]);
+            assert_eq!(cell.local(u, v), [0.25, 0.125]);
         }
     }
 

@@ -185,7 +185,6 @@ impl<'a> PathTracer<'a> {
             };
             throughput *= self.passed(&at, direction, hit.distance);
             let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
-            let reflectance = self.scene.reflectance_at(hit.triangle, [hit.u, hit.v]);
             if exitance != Rgb::ZERO {
                 let facing = self.normals[hit.triangle].dot(direction).abs();
                 let by_area = self.emitters.density(&weights, hit.triangle);
@@ -193,18 +192,53 @@ impl<'a> PathTracer<'a> {
                 let balance = cosine / PI / (cosine / PI + light);
                 reflected += throughput * exitance * balance;
             }
-            let albedo = self.scene.albedo_around(hit.triangle, [hit.u, hit.v], 0.0);
-            let survival = albedo.max_element().min(MAX_SURVIVAL);
-            if rng.f64() >= survival {
-                return reflected;
+            at.position += hit.distance * direction;
+            match self.scatter_at(&mut at, &hit, rng) {
+                Some(share) => throughput *= share,
+                None => return reflected,
             }
-            at = SurfacePoint {
-                triangle: hit.triangle,
-                position: at.position + hit.distance * direction,
-            };
-            throughput *=
-                self.scatter(&mut at, [reflectance, albedo - reflectance], rng) / survival;
         }
+    }
+
+    /// What the light that is `emitted` at places causes at `point` after two bounces and more, by
+    /// one path: unbiased, W/m². Places are asked where the path meets their fronts.
+    pub(crate) fn later_bounces(
+        &self,
+        emitted: impl Fn(&Hit) -> Rgb,
+        point: &SurfacePoint,
+        rng: &mut Rng,
+    ) -> Rgb {
+        let (mut at, mut reflected) = (*point, Rgb::ZERO);
+        let Material { reflectance, transmittance, .. } = *self.scene.material(at.triangle);
+        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        for bounce in 1.. {
+            let (direction, _) = cosine_weighted(self.normals[at.triangle], rng);
+            let Some(hit) = self.next_hit(&at, direction).filter(|hit| hit.front) else { break };
+            throughput *= self.passed(&at, direction, hit.distance);
+            if bounce > 1 {
+                reflected += throughput * emitted(&hit);
+            }
+            at.position += hit.distance * direction;
+            match self.scatter_at(&mut at, &hit, rng) {
+                Some(share) => throughput *= share,
+                None => break,
+            }
+        }
+        reflected
+    }
+
+    /// Moves `at`, already at the place of `hit`, to the triangle and side that a path goes on from
+    /// there: by what share of the light, over its chance to go on; none if it ends.
+    fn scatter_at(&self, at: &mut SurfacePoint, hit: &Hit, rng: &mut Rng) -> Option<Rgb> {
+        let place = [hit.u, hit.v];
+        let albedo = self.scene.albedo_around(hit.triangle, place, 0.0);
+        let survival = albedo.max_element().min(MAX_SURVIVAL);
+        if rng.f64() >= survival {
+            return None;
+        }
+        at.triangle = hit.triangle;
+        let reflectance = self.scene.reflectance_at(hit.triangle, place);
+        Some(self.scatter(at, [reflectance, albedo - reflectance], rng) / survival)
     }
 
     /// Chooses the side that a path goes on from: that of `at`, or the one behind it, to which it
@@ -329,7 +363,7 @@ pub(super) fn nearest_surface(
 }
 
 /// Random numbers of their own for everything that `words` tell apart.
-pub(super) fn random_numbers(words: &[u64]) -> Rng {
+pub(crate) fn random_numbers(words: &[u64]) -> Rng {
     let hash = |seed, word: &u64| xxh3_64_with_seed(&word.to_le_bytes(), seed);
     Rng::with_seed(words.iter().fold(0, hash))
 }

@@ -11,7 +11,7 @@ const CONDITIONS: Conditions = Conditions {
     strata: &[STRATUM],
     radiosity_floor: 0.05,
     mean_albedo: 0.5,
-    gather_passes: Some(1),
+    bounces: Some(1.0),
     unshot_bound: 0.0,
 };
 
@@ -24,6 +24,7 @@ fn exact() -> Observation {
         interpolated: Rgb::ONE,
         gathered: [Rgb::ONE; 2],
         next: Rgb::ONE,
+        later: Rgb::ZERO,
         element_residual: 0.1,
         excluded: false,
         escaped: 0.0,
@@ -134,17 +135,24 @@ fn rare_large_errors_add_a_standard_error() {
 }
 
 #[test]
-fn change_of_pass_extrapolates_geometrically() {
-    for change in [-0.01, 0.03] {
-        let next = (1.0 + change) * Rgb::ONE;
-        let found = estimate_of(|_| Observation { next, ..exact() });
-        // change (1 + ½ + ¼ + …)
-        assert!((found.truncation / (2.0 * change.abs()) - 1.0).abs() < 1e-12, "{found:?}");
-        // A change that differs from point to point and is none on the average is not passed on.
-        let found = estimate_of(|k| match k % 2 {
-            0 => Observation { next, ..exact() },
-            _ => Observation { next: 2.0 * Rgb::ONE - next, ..exact() },
+fn a_change_grows_by_what_later_bounces_add_to_it() {
+    // A change of c that each bounce multiplies by λ is c/(1 − λ) in the end. Noise of the later
+    // ones that is as large as they are, and that has nothing to do with the change, does nothing.
+    for (change, factor) in [(-0.01, 0.5), (0.03, 0.8)] {
+        let later = change * factor / (1.0 - factor);
+        let found = estimate_of(|k| {
+            let (sign, noise) = ([1.0, -1.0][k % 2], [1.0, 1.0, -1.0, -1.0][k % 4]);
+            Observation {
+                next: (1.0 + sign * change) * Rgb::ONE,
+                later: (sign + noise) * later * Rgb::ONE,
+                ..exact()
+            }
         });
+        let expected = change.abs() / (1.0 - factor);
+        assert!((found.truncation / expected - 1.0).abs() < 1e-12, "{found:?} for {expected}");
+        // Later bounces that go against the next one do not make it smaller.
+        let next = (1.0 + change) * Rgb::ONE;
+        let found = estimate_of(|_| Observation { next, later: -later * Rgb::ONE, ..exact() });
         assert!((found.truncation / change.abs() - 1.0).abs() < 1e-12, "{found:?}");
     }
 }
@@ -152,12 +160,14 @@ fn change_of_pass_extrapolates_geometrically() {
 #[test]
 fn unshot_light_is_counted_once() {
     let ambient = 0.08;
-    for (gather_passes, passed) in [(None, 1.0), (Some(1), 0.375), (Some(2), 0.375 * 0.375)] {
+    for (bounces, passed) in
+        [(None, 1.0), (Some(1.0), 0.375), (Some(2.0), 0.375 * 0.375), (Some(f64::INFINITY), 0.0)]
+    {
         let strata = [Stratum { ambient: ambient * ambient, ..STRATUM }];
-        let conditions = Conditions { strata: &strata, gather_passes, ..CONDITIONS };
+        let conditions = Conditions { strata: &strata, bounces, ..CONDITIONS };
         let all = [Observation { escaped: 0.25, ..exact() }; 10];
         let found = estimate(&all, &conditions).whole;
-        assert!((found.unshot / (ambient * passed) - 1.0).abs() < 1e-12, "{found:?}");
+        assert!((found.unshot - ambient * passed).abs() < 1e-12 * ambient, "{found:?}");
         assert_eq!(found.truncation, 0.0);
     }
 }

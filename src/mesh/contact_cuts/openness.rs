@@ -1,8 +1,10 @@
-//! Where a cut is worth it: where light may fall on both sides of a contact segment.
+//! Where a cut is worth it: where light may fall on both sides of a contact segment, or into a slit.
 //!
 //! What is inside a solid that stands on a surface is dark, and nobody sees it; values at vertices
 //! there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor is there
-//! other light, or none, that is seen.
+//! other light, or none, that is seen. But where two solids leave a slit between them, narrower
+//! than elements are, an element would reach from one side past both to the other, and the slit
+//! would be as bright as what is beside the solids.
 
 use glam::DVec3;
 
@@ -36,8 +38,8 @@ impl Openness {
     }
 
     /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
-    /// the triangle with these `corners`. What is inside is dark, and nobody sees it.
-    pub fn has_light_on_both_sides(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
+    /// the triangle with these `corners`, or the side that is not is a slit.
+    pub fn is_worth_a_cut(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
         let Some(ends) = clipped(segment.ends) else { return false };
         let [from, to] = ends.map(|p| a + p.x * (b - a) + p.y * (c - a));
         let normal = (b - a).cross(c - a).normalize();
@@ -46,10 +48,21 @@ impl Openness {
         long_enough.any(|&beside| {
             OPENNESS_PLACES.into_iter().any(|share| {
                 let place = from.lerp(to, share) + self.above * beside * normal;
-                self.is_open(place + beside * across, normal)
-                    && self.is_open(place - beside * across, normal)
+                let sides = [across, -across].map(|away| (place + beside * away, away));
+                match sides.map(|(beside, _)| self.is_open(beside, normal)) {
+                    [true, true] => true,
+                    [true, false] => self.is_slit(sides[0]),
+                    [false, true] => self.is_slit(sides[1]),
+                    [false, false] => false,
+                }
             })
         })
+    }
+
+    /// Whether another wall is nearer than elements are long, looking `away` from the one beside.
+    fn is_slit(&self, (place, away): (DVec3, DVec3)) -> bool {
+        let [_, finest] = self.beside;
+        self.rays.occluded(place, away, 0.0..finest, |_| true)
     }
 
     fn is_open(&self, place: DVec3, normal: DVec3) -> bool {

@@ -16,6 +16,10 @@ impl PointRows for RayGather {
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
         parts.map(|range| self.row(mesh, point, &lights, range)).collect()
     }
+
+    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
+        self.row_of_surfaces(mesh, point, &[], 0..self.min_rays)
+    }
 }
 
 impl RayGather {
@@ -28,7 +32,33 @@ impl RayGather {
         lights: &[(u32, f64)],
         range: Range<u32>,
     ) -> PointRow {
+        let mut row = self.row_of_surfaces(mesh, point, lights, range.clone());
         let scene = mesh.scene();
+        let rotation = self.rotations.at(point.position, point.near);
+        let range = super::shadow_range(range);
+        for &(light, unoccluded) in lights {
+            let visible = self.shadow_rays(scene, point, light, range.clone(), rotation);
+            let light = &self.lights.lights[light as usize];
+            let factor = mean(visible.seen) * visible.share_of(light.convex.then_some(unoccluded));
+            row.emitters.push((scene.triangles()[light.triangles[0] as usize].material, factor));
+        }
+        if let Some(sun) = scene.sky().sun() {
+            let visible = self.rays_to_sun(point, sun, range, rotation);
+            let cosine = point.normal.dot(sun.direction);
+            let unoccluded = sun.unoccluded(cosine).map(|_| cosine);
+            row.sun = mean(visible.seen) * visible.share_of(unoccluded);
+        }
+        row
+    }
+
+    /// The same without entries for `lights`, to which rays are to be sent, and the sun.
+    fn row_of_surfaces(
+        &self,
+        mesh: &Mesh,
+        point: &GatherPoint,
+        lights: &[(u32, f64)],
+        range: Range<u32>,
+    ) -> PointRow {
         let rotation = self.rotations.at(point.position, point.near);
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
@@ -57,19 +87,6 @@ impl RayGather {
                 emits: light == NO_LIGHT || !lights.iter().any(|&(sampled, _)| sampled == light),
             });
         });
-        let range = super::shadow_range(range);
-        for &(light, unoccluded) in lights {
-            let visible = self.shadow_rays(scene, point, light, range.clone(), rotation);
-            let light = &self.lights.lights[light as usize];
-            let factor = mean(visible.seen) * visible.share_of(light.convex.then_some(unoccluded));
-            row.emitters.push((scene.triangles()[light.triangles[0] as usize].material, factor));
-        }
-        if let Some(sun) = scene.sky().sun() {
-            let visible = self.rays_to_sun(point, sun, range, rotation);
-            let cosine = point.normal.dot(sun.direction);
-            let unoccluded = sun.unoccluded(cosine).map(|_| cosine);
-            row.sun = mean(visible.seen) * visible.share_of(unoccluded);
-        }
         row
     }
 }
