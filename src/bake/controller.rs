@@ -126,17 +126,12 @@ pub(super) fn refined(
     target: &ErrorTarget,
 ) -> GatherSettings {
     let mut refined = gather.clone();
-    if whole.sources > 0.0 {
-        // All else is good enough.
-        refined.refinement.gather_passes += 1;
-        return refined;
-    }
     let allowed = model::allowed_error(target.error);
     let mut steps = Steps::default();
     // Of the whole the one that is further off.
     let worst = if by_light.total > whole.total { by_light } else { whole };
     if worst.total > model::SAFETY * target.error {
-        steps = Steps::to(worst, allowed);
+        steps = Steps::to(&with_what_elements_miss(worst, whole.sources), allowed);
         if let Some(step) = steps.gaps {
             refined.refinement.gap_factor *= step;
         }
@@ -150,9 +145,11 @@ pub(super) fn refined(
         if cautious(&group.estimate) <= model::SAFETY * target.error {
             continue;
         }
-        // What paths find in one group only is what its elements miss.
-        let mesh = group.estimate.mesh.hypot(group.estimate.sources);
-        let own = Steps::to(&ErrorEstimate { mesh, ..group.estimate }, allowed);
+        // What is uncertain may be an error of the elements too.
+        let ErrorEstimate { total, sources, .. } = group.estimate;
+        let uncertain = (cautious(&group.estimate).powi(2) - total.powi(2)).sqrt();
+        let missed = sources.hypot(uncertain);
+        let own = Steps::to(&with_what_elements_miss(&group.estimate, missed), allowed);
         steps = steps.both(own);
         if let Some(step) = own.mesh.or(own.gaps) {
             let factors = &mut refined.refinement.group_factors;
@@ -174,6 +171,12 @@ pub(super) fn refined(
         refined.noise_tolerance *= noise;
     }
     refined
+}
+
+/// `estimate` with what paths find beyond it: bounces are all counted, so that it is what elements
+/// miss.
+fn with_what_elements_miss(estimate: &ErrorEstimate, sources: f64) -> ErrorEstimate {
+    ErrorEstimate { mesh: estimate.mesh.hypot(sources), ..*estimate }
 }
 
 /// By how much settings are to be refined.

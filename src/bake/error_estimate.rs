@@ -64,13 +64,12 @@ pub struct ErrorEstimate {
     /// Gathers take a finite number of pixels or rays: half the mean squared difference of two
     /// independently rotated gathers.
     pub sampling: f64,
-    /// Gathering stops after some passes over all vertices: the change under one more, extrapolated
-    /// by the geometric series in the mean reflectance.
+    /// Gathering stops after some bounces: what all further ones would add.
     pub truncation: f64,
     /// Light that was not shot, if it fell as evenly as the ambient term.
     pub unshot: f64,
     /// What the vertices gathered from is off: the error that paths find at random points beyond
-    /// all other parts.
+    /// all other parts, where elements blur light that gets on from there.
     pub sources: f64,
     /// An upper bound: no more than this share of all radiosity times area is missing because it
     /// was not shot, in the worst channel.

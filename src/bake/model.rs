@@ -8,9 +8,9 @@
 //! | mesh | surplus tolerance t, shortest edge h | t, h | vertices: 1/t to 1/h² |
 //! | gaps | factor of tolerance and size there | the same | vertices in gaps |
 //! | sampling | rays n a vertex | n^−[`RQMC_EXPONENT`] | rays: n |
-//! | truncation | gather passes p | (mean reflectance)^p | gathers: p |
+//! | truncation | one more gather by few rays | nothing is left | a quarter of the gathers |
 //! | unshot | share u of the flux not yet shot | u | shots: ln 1/u; after that, gather passes |
-//! | sources | gather passes, then shooting edges h | (mean reflectance)^p, h | gathers, shots |
+//! | sources | the same as the mesh | t, h | vertices |
 //!
 //! The model is used four times:
 //!
@@ -429,7 +429,7 @@ pub const JUDGE_POINTS: usize = 1024;
 /// Paths at each of them, to begin with: few show whether more of them are worth their time.
 pub const JUDGE_FIRST_PATHS: usize = 16;
 
-/// A further bounce that leaves more than this share of the error of the sources was in vain.
+/// Rounds that leave more than this share of the error of the sources were in vain.
 pub const MIN_SOURCES_STEP: f64 = 0.8;
 
 /// Points on each group at which paths measure a result, at least.

@@ -39,7 +39,7 @@ pub enum Obstacle {
     /// After all rounds a further bounce would still change the light.
     Bounces,
     /// After all rounds paths still find other light than the vertices have, for more than all
-    /// other parts: it was shot too coarsely, or falls where no vertex is.
+    /// other parts: elements blur it, as behind slits, or it falls where no vertex is.
     Sources,
 }
 
@@ -72,7 +72,7 @@ impl Obstacle {
             Obstacle::Gaps => "look at surfaces that nearly touch".into(),
             Obstacle::Rays => "look for small bright sources that are no emitters".into(),
             Obstacle::Bounces => "lower reflectances that are near one".into(),
-            Obstacle::Sources => "ask for less, or set a smaller element size".into(),
+            Obstacle::Sources => "ask for less, or look at the worst groups".into(),
         }
     }
 }
@@ -88,7 +88,7 @@ impl fmt::Display for Obstacle {
             Obstacle::Gaps => "gaps between surfaces that no mesh resolves",
             Obstacle::Rays => "noise, with as many rays as allowed",
             Obstacle::Bounces => "light that is still on its way",
-            Obstacle::Sources => "light that was shot too coarsely",
+            Obstacle::Sources => "light that elements blur, as behind slits",
         })
     }
 }

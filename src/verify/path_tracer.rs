@@ -13,7 +13,8 @@
 //! With the balance heuristic a light adds at most E times the path's throughput at a vertex: as
 //! good for a lamp of a millimetre as for a sky all around.
 
-use std::cell::Cell;
+use std::cell::RefCell;
+use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 
@@ -37,6 +38,9 @@ const MAX_SURVIVAL: f64 = 0.999;
 /// Points further off a surface than this share of the scene's diagonal are not on it. Points from
 /// files have 32 bits or six digits; of several surfaces within it the nearest counts.
 const LOOKUP_REACH: f64 = 1e-4;
+
+/// Surfaces whose distances from a point differ by less than this share of that are in one place.
+const IN_ONE_PLACE: f64 = 0.01;
 
 /// Points of a triangle at which one is looked for that is in no hole. Chosen by hand.
 const MAX_TRIES: usize = 1000;
@@ -96,7 +100,8 @@ impl<'a> PathTracer<'a> {
     /// The point of the scene nearest to `position`, along `normal` (unit length), on a triangle
     /// that faces alike; none where there is none within 1e-4 of the scene's diagonal.
     pub fn locate(&self, position: DVec3, normal: DVec3) -> Option<SurfacePoint> {
-        let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
+        let nearest = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+        let hit = nearest.first()?;
         let [a, b, c] = self.scene.corners(hit.triangle);
         let position = a + hit.u * (b - a) + hit.v * (c - a);
         Some(SurfacePoint { triangle: hit.triangle, position })
@@ -339,27 +344,33 @@ impl<'a> PathTracer<'a> {
     }
 }
 
-/// The hit nearest to `position` along the line of `normal` (unit length), before and behind, of
-/// triangles that face alike by their `normals`, within [`LOOKUP_REACH`] of `diagonal`.
-pub(super) fn nearest_surface(
+/// The hits nearest to `position` along the line of `normal` (unit length), before and behind, of
+/// triangles that face alike by their `normals`, within [`LOOKUP_REACH`] of `diagonal`: those that
+/// lie in one place, the nearest first.
+pub(super) fn nearest_surfaces(
     rays: &RayScene,
     normals: &[DVec3],
     position: DVec3,
     normal: DVec3,
     diagonal: f64,
-) -> Option<Hit> {
+) -> Vec<Hit> {
     let reach = LOOKUP_REACH * diagonal;
-    let nearest: Cell<Option<Hit>> = Cell::new(None);
-    let key = |hit: Hit| ((hit.distance - reach).abs(), hit.triangle);
+    let found = RefCell::new(vec![]);
     // From before it: what lies in one place with another, back to back, is met on its front only.
     rays.occluded(position + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
-        let alike = normals[hit.triangle].dot(normal) > ALIKE;
-        if alike && nearest.get().is_none_or(|best| key(*hit) < key(best)) {
-            nearest.set(Some(*hit));
+        if normals[hit.triangle].dot(normal) > ALIKE {
+            found.borrow_mut().push(*hit);
         }
         false
     });
-    nearest.get()
+    let off = |hit: &Hit| (hit.distance - reach).abs();
+    let mut found = found.into_inner();
+    let nearest = found.iter().map(off).fold(f64::INFINITY, f64::min);
+    found.retain(|hit| off(hit) <= nearest + IN_ONE_PLACE * reach);
+    let key = |hit: &Hit| (off(hit), hit.triangle);
+    found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
+    found.dedup_by_key(|hit| hit.triangle);
+    found
 }
 
 /// Random numbers of their own for everything that `words` tell apart.

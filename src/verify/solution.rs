@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::path_tracer::{SurfacePoint, nearest_surface};
+use super::path_tracer::{SurfacePoint, nearest_surfaces};
 use crate::error::{Error, ErrorKind, shortened};
 use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::VertexMesh;
@@ -132,12 +132,7 @@ impl<'a> SolutionLookup<'a> {
             }
             let material = scene.material(t);
             for (radiosity, irradiance) in self.light(scene, t) {
-                if is_light_of(material, radiosity, irradiance) {
-                    emission.agrees = true;
-                } else if scene.materials().iter().any(|m| is_light_of(m, radiosity, irradiance)) {
-                    // Of two surfaces in one place the solution's face is that of the other.
-                    continue;
-                }
+                emission.agrees |= is_light_of(material, radiosity, irradiance);
                 emission.places += 1;
                 emission.told = radiosity - material.albedo() * irradiance;
             }
@@ -152,15 +147,32 @@ impl<'a> SolutionLookup<'a> {
 
     /// Radiosity and irradiance of the solution at places of triangle `t` of `scene`, W/m².
     fn light(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, Rgb)> {
-        let (corners, normal) = (scene.corners(t), scene.normal(t));
+        let corners = scene.corners(t);
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
-            let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
+            let hit = self.face(scene, &SurfacePoint { triangle: t, position })?;
             let values = [&self.solution.radiosity, &self.solution.irradiance];
             let [radiosity, irradiance] = values.map(|values| self.interpolated(&hit, values));
             Some((radiosity, irradiance))
         })
+    }
+
+    /// Where the solution is hit at `point` of `scene`: the nearest face that faces alike. Of
+    /// several in one place it is the first whose light is the material's.
+    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<Hit> {
+        let (position, normal) = (point.position, scene.normal(point.triangle));
+        let faces = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+        if faces.len() < 2 || self.solution.irradiance.is_empty() {
+            return faces.into_iter().next();
+        }
+        let material = scene.material(point.triangle);
+        let is_of_material = |hit: &&Hit| {
+            let [radiosity, irradiance] = [&self.solution.radiosity, &self.solution.irradiance]
+                .map(|values| self.interpolated(hit, values));
+            is_light_of(material, radiosity, irradiance)
+        };
+        faces.iter().find(is_of_material).or(faces.first()).copied()
     }
 
     /// Of one value a vertex, the one where the solution is hit.
@@ -169,11 +181,10 @@ impl<'a> SolutionLookup<'a> {
         (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
     }
 
-    /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m²: by
-    /// the nearest face that faces alike. None where there is none.
+    /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m². None
+    /// where the solution has no face.
     pub fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
-        let (position, normal) = (point.position, scene.normal(point.triangle));
-        let hit = nearest_surface(&self.rays, &self.normals, position, normal, self.diagonal)?;
+        let hit = self.face(scene, point)?;
         let material = scene.material(point.triangle);
         Some(match scene.textures(point.triangle) {
             Some(_) => material.albedo() * self.interpolated(&hit, &self.solution.irradiance),

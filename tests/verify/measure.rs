@@ -270,27 +270,33 @@ fn it_stops_when_told_and_when_time_is_up() {
     assert_eq!((none.stop, none.error.unwrap().value), (Stop::Negligible, 0.0));
 }
 
-/// Of two sheets in one place, the solution's faces there are those of one of them.
+/// Of two sheets in one place each has light of its own: under the same irradiance of 1.
 #[test]
-fn another_surface_in_the_same_place_emits_nothing() {
+fn surfaces_in_one_place_are_told_apart() {
     let sheet = facing_up([0.0, 1.0], [0.0, 1.0], 0.0);
     let lamp = (facing_down([0.0, 1.0], [0.0, 1.0], 1.0), paint(0.5, 1.0));
-    let scene = quads(&[(sheet, paint(0.5, 0.0)), (sheet, paint(0.2, 0.0)), lamp]);
-    let light = |material: u32| scene.materials()[material as usize].clone();
-    // Where they differ there is the light of the first, on the faces of both.
-    let mut told = solution(&scene, |_| Rgb::ZERO);
-    told.irradiance = vec![Rgb::ONE; told.positions.len()];
-    let materials =
-        scene.triangles().iter().map(|t| light(if t.material == 1 { 0 } else { t.material }));
-    let radiosity = materials.map(|m| m.exitance + m.reflectance);
-    told.radiosity = radiosity.flat_map(|radiosity| [radiosity; 3]).collect();
-    let stop = |_: &Progress| ControlFlow::Break(());
-    assert!(verify(&scene, &told, &settings(1.0), stop).is_ok());
-    // What no material of the scene would emit or reflect is refused.
-    told.radiosity[..6].fill(Rgb::splat(0.7));
-    told.radiosity[6..12].fill(Rgb::splat(0.7));
-    let error = verify(&scene, &told, &settings(1.0), stop).unwrap_err();
-    assert!(error.to_string().contains("emits radiance"), "{error}");
+    for [first, second] in [[0.5, 0.2], [0.2, 0.5]] {
+        let scene = quads(&[(sheet, paint(first, 0.0)), (sheet, paint(second, 0.0)), lamp.clone()]);
+        let mut told = solution(&scene, |_| Rgb::ZERO);
+        told.irradiance = vec![Rgb::ONE; told.positions.len()];
+        let material = |t: usize| scene.materials()[scene.triangles()[t].material as usize].clone();
+        let radiosity =
+            (0..scene.triangles().len()).map(|t| material(t).exitance + material(t).reflectance);
+        told.radiosity = radiosity.flat_map(|radiosity| [radiosity; 3]).collect();
+        let mut settings = settings(1.0);
+        settings.points_per_group = 64;
+        let found = verify(&scene, &told, &settings, keep_going).unwrap();
+        let on_sheets = found.points.iter().filter(|p| p.normal.z > 0.5);
+        let told_on = |group| on_sheets.clone().filter(move |p| p.group == group).map(|p| p.told.x);
+        assert!(told_on(0).count() >= 64 && told_on(1).count() >= 64);
+        assert!(told_on(0).all(|b| (b - first).abs() < 1e-12), "{first}");
+        assert!(told_on(1).all(|b| (b - second).abs() < 1e-12), "{second}");
+        // What no material of the scene would emit or reflect is refused.
+        told.radiosity[..12].fill(Rgb::splat(0.7));
+        let stop = |_: &Progress| ControlFlow::Break(());
+        let error = verify(&scene, &told, &settings, stop).unwrap_err();
+        assert!(error.to_string().contains("emits radiance"), "{error}");
+    }
 }
 
 #[test]
