@@ -54,6 +54,29 @@ fn device() -> &'static [&'static str] {
     }
 }
 
+/// Without any graphics driver, and with nothing said of devices.
+#[test]
+fn rays_take_over_where_there_is_no_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("box");
+    let no_backend = if cfg!(target_os = "macos") { "dx12" } else { "metal" };
+    let bake = |more: &[&str]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+        program.env("WGPU_BACKEND", no_backend).args(["bake", cornell(), "--element-size", "600"]);
+        program.args(["--write", "ply", "--out"]).arg(&stem).args(more).output().unwrap()
+    };
+    let baked = bake(&[]);
+    let [said, warned] = texts(&baked);
+    assert!(baked.status.success(), "{warned}");
+    assert!(said.contains("rays") && stem.with_extension("ply").exists(), "{said}");
+    for word in ["warning: rays on the CPU", "no graphics adapter", "install"] {
+        assert!(warned.contains(word), "'{word}' not in: {warned}");
+    }
+    // One that was asked for by name is not done without.
+    let named = bake(&["--adapter", "some"]);
+    assert!(!named.status.success() && texts(&named)[1].contains("no graphics adapter"));
+}
+
 #[test]
 fn bake_writes_all_it_says() {
     let folder = tempfile::tempdir().unwrap();

@@ -182,7 +182,7 @@ pub fn names<F, const N: usize>(formats: &[(&'static str, F); N]) -> [&'static s
 /// What makes form factors, as the user names it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Device {
-    /// Hemicubes on the adapter with this in its name, or on the best.
+    /// Hemicubes on the adapter with this in its name; or on the best, and rays where there is none.
     Gpu(Option<String>),
     /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
     Cpu,
@@ -194,9 +194,20 @@ impl Device {
         Ok(Device::Gpu(Some(value(parser, "adapter", "a part of an adapter's name")?)))
     }
 
+    /// The device. Where none was named and none can be had, rays on the CPU take its place.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Device`] when there is no adapter of that name, or it cannot be used.
     pub fn open(&self) -> Result<Backend, Error> {
         match self {
-            Device::Gpu(name) => Backend::gpu(name.as_deref()),
+            Device::Gpu(Some(name)) => Backend::gpu(Some(name)),
+            Device::Gpu(None) => Backend::gpu(None).or_else(|error| match error.kind() {
+                ErrorKind::Device => {
+                    eprintln!("warning: rays on the CPU, for want of a device: {error}");
+                    Ok(Backend::Cpu)
+                }
+                _ => Err(error),
+            }),
             Device::Cpu => Ok(Backend::Cpu),
         }
     }
