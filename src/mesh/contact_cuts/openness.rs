@@ -18,6 +18,9 @@ use crate::visibility::ray_scene::RayScene;
 /// Rays by which it is found out whether a place is inside a solid.
 const OPENNESS_RAYS: u32 = 32;
 
+/// So many of them at a time, a divisor of that.
+const RAYS_AT_ONCE: u32 = 4;
+
 /// Shares of a segment's length at which both its sides are looked at.
 const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
 
@@ -66,11 +69,16 @@ impl Openness {
     }
 
     fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
-        let mut backs = 0;
-        let directions = self.directions.directions(normal, 0.5);
-        self.rays.closest_hits(place, directions, 0.0, None, |_, hit| {
-            backs += u32::from(hit.is_some_and(|hit| !hit.front));
-        });
-        f64::from(backs) < buried::BURIED * f64::from(OPENNESS_RAYS)
+        // Most places are in the open, as the first few rays say already.
+        let most = buried::BURIED * f64::from(OPENNESS_RAYS);
+        let (mut cast, mut backs) = (0, 0);
+        while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
+            let directions = self.directions.directions_in(cast..cast + RAYS_AT_ONCE, normal, 0.5);
+            self.rays.closest_hits(place, directions, 0.0, None, |_, hit| {
+                backs += u32::from(hit.is_some_and(|hit| !hit.front));
+            });
+            cast += RAYS_AT_ONCE;
+        }
+        f64::from(backs) < most
     }
 }
