@@ -1,9 +1,9 @@
 //! What all further bounces add to the light that vertices gathered.
 //!
-//! With L = E + ρF S gathered from S, the light that settles is L + Σ (ρF)ⁿ (L − S) over n ≥ 1. Rays
-//! are cast once from every vertex; what they find of L − S is the first bounce, and the vertices
-//! [exchange](super::exchange) it until it is used up. The same rays see both lights, so noise is
-//! that of the small difference, and few rays do.
+//! With L = E + ρF S gathered from S, the light that settles is L + Σ (ρF)ⁿ (L − S) over n ≥ 1.
+//! Rays are cast once from every vertex; what they find of L − S is the first bounce, and the
+//! vertices [exchange](super::exchange) it until it is used up. The same rays see both lights, so
+//! noise is that of the small difference, and few rays do.
 
 use std::ops::ControlFlow;
 

@@ -13,8 +13,8 @@
 //! Light falls from full to none at such a line, and a point in the dark that is given some of the
 //! light beside it is off by many times its own: where things are stuck into one another, a strip
 //! of next to no area makes most of the error, and no element is small enough. So nearly every line
-//! is cut along that has light on both its sides, or a slit on one: see [`openness`]. What is nearer than
-//! [`SNAP_DISTANCE`] is one point: see [`snapping`].
+//! is cut along that has light on both its sides, or a slit on one: see [`openness`]. What is
+//! nearer than [`SNAP_DISTANCE`] is one point: see [`snapping`].
 
 mod openness;
 mod snapping;

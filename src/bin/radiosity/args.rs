@@ -182,7 +182,8 @@ pub fn names<F, const N: usize>(formats: &[(&'static str, F); N]) -> [&'static s
 /// What makes form factors, as the user names it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Device {
-    /// Hemicubes on the adapter with this in its name; or on the best, and rays where there is none.
+    /// Hemicubes on the adapter with this in its name; or on the best, and rays where there is
+    /// none.
     Gpu(Option<String>),
     /// Rays on the CPU, as many a row as the hemicube's top face has pixels.
     Cpu,

@@ -1,4 +1,5 @@
-//! Where a cut is worth it: where light may fall on both sides of a contact segment, or into a slit.
+//! Where a cut is worth it: where light may fall on both sides of a contact segment, or into a
+//! slit.
 //!
 //! What is inside a solid that stands on a surface is dark, and nobody sees it; values at vertices
 //! there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor is there
