@@ -60,7 +60,7 @@ impl GatheredFrom<'_> {
         let mut difference = Rgb::ZERO;
         let mut seen = vec![];
         let sides: [&[PointRow]; 2] = [front, behind];
-        for (share, side) in rows.shares_of_sides(v).zip(sides) {
+        for (share, side) in rows.shares_of_sides(v).into_iter().zip(sides) {
             for row in side {
                 for hit in &row.hits {
                     let share = share * (row.share * hit.passed);

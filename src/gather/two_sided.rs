@@ -41,10 +41,16 @@ impl TwoSidedPoint {
         TwoSidedPoint { point, ..self }
     }
 
+    /// By how much what arrives on the point's own side counts per channel, and on the other.
+    pub fn shares(&self) -> [Rgb; 2] {
+        [Rgb::ONE - self.behind, self.behind]
+    }
+
     /// The sides from which light counts, each as a point and its share per channel.
     pub fn sides(&self) -> impl Iterator<Item = (GatherPoint, Rgb)> {
-        let other = (self.behind != Rgb::ZERO).then(|| (self.other_side(), self.behind));
-        [(self.point, Rgb::ONE - self.behind)].into_iter().chain(other)
+        let [own, behind] = self.shares();
+        let other = (behind != Rgb::ZERO).then(|| (self.other_side(), behind));
+        [(self.point, own)].into_iter().chain(other)
     }
 
     /// The same a `step` higher above the surface, scene unit.

@@ -58,9 +58,9 @@ impl<'a> VertexRows<'a> {
         self.points.albedo(v)
     }
 
-    /// By how much the front of vertex `v` counts per channel, and the other side if it does.
-    pub fn shares_of_sides(&self, v: u32) -> impl Iterator<Item = Rgb> {
-        self.points.point(v, 0).sides().map(|(_, share)| share).collect::<Vec<_>>().into_iter()
+    /// By how much what arrives on the side of vertex `v` counts per channel, and behind it.
+    pub fn shares_of_sides(&self, v: u32) -> [Rgb; 2] {
+        self.points.point(v, 0).shares()
     }
 
     /// What `work` makes of the row of each of `vertices`, in their order, made by so many `parts`

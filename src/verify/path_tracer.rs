@@ -165,9 +165,7 @@ impl<'a> PathTracer<'a> {
 
     /// Reflected radiosity at `point` as one path finds it, W/m².
     fn path(&self, point: &SurfacePoint, rng: &mut Rng) -> Rgb {
-        let mut at = *point;
-        let Material { reflectance, transmittance, .. } = *self.scene.material(at.triangle);
-        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        let (mut at, mut throughput) = self.start(point, rng);
         let mut reflected = Rgb::ZERO;
         loop {
             let weights = self.emitters.weights(at.position);
@@ -213,9 +211,8 @@ impl<'a> PathTracer<'a> {
         point: &SurfacePoint,
         rng: &mut Rng,
     ) -> Rgb {
-        let (mut at, mut reflected) = (*point, Rgb::ZERO);
-        let Material { reflectance, transmittance, .. } = *self.scene.material(at.triangle);
-        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        let (mut at, mut throughput) = self.start(point, rng);
+        let mut reflected = Rgb::ZERO;
         for bounce in 1.. {
             let (direction, _) = cosine_weighted(self.normals[at.triangle], rng);
             let Some(hit) = self.next_hit(&at, direction).filter(|hit| hit.front) else { break };
@@ -230,6 +227,14 @@ impl<'a> PathTracer<'a> {
             }
         }
         reflected
+    }
+
+    /// Where a path from `point` goes on from, on which side, and by what share of the light.
+    fn start(&self, point: &SurfacePoint, rng: &mut Rng) -> (SurfacePoint, Rgb) {
+        let mut at = *point;
+        let Material { reflectance, transmittance, .. } = *self.scene.material(at.triangle);
+        let throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        (at, throughput)
     }
 
     /// Moves `at`, already at the place of `hit`, to the triangle and side that a path goes on from

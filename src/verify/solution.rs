@@ -120,7 +120,7 @@ impl<'a> SolutionLookup<'a> {
     /// # Errors
     /// [`ErrorKind::Scene`] with the material and what it emits in both.
     pub fn check_emission(&self, scene: &Scene) -> Result<(), Error> {
-        if self.solution.irradiance.len() != self.solution.positions.len() {
+        if !self.has_irradiance() {
             return Ok(());
         }
         let mut of_materials = vec![Emission::default(); scene.materials().len()];
@@ -152,9 +152,7 @@ impl<'a> SolutionLookup<'a> {
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
             let hit = self.face(scene, &SurfacePoint { triangle: t, position })?;
-            let values = [&self.solution.radiosity, &self.solution.irradiance];
-            let [radiosity, irradiance] = values.map(|values| self.interpolated(&hit, values));
-            Some((radiosity, irradiance))
+            Some(self.light_at(&hit))
         })
     }
 
@@ -163,16 +161,26 @@ impl<'a> SolutionLookup<'a> {
     fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<Hit> {
         let (position, normal) = (point.position, scene.normal(point.triangle));
         let faces = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
-        if faces.len() < 2 || self.solution.irradiance.is_empty() {
+        if faces.len() < 2 || !self.has_irradiance() {
             return faces.into_iter().next();
         }
         let material = scene.material(point.triangle);
         let is_of_material = |hit: &&Hit| {
-            let [radiosity, irradiance] = [&self.solution.radiosity, &self.solution.irradiance]
-                .map(|values| self.interpolated(hit, values));
+            let (radiosity, irradiance) = self.light_at(hit);
             is_light_of(material, radiosity, irradiance)
         };
         faces.iter().find(is_of_material).or(faces.first()).copied()
+    }
+
+    /// Whether there is an irradiance for every vertex.
+    fn has_irradiance(&self) -> bool {
+        self.solution.irradiance.len() == self.solution.positions.len()
+    }
+
+    /// Radiosity and irradiance where the solution is hit, W/m².
+    fn light_at(&self, hit: &Hit) -> (Rgb, Rgb) {
+        let VertexMesh { radiosity, irradiance, .. } = self.solution;
+        (self.interpolated(hit, radiosity), self.interpolated(hit, irradiance))
     }
 
     /// Of one value a vertex, the one where the solution is hit.
