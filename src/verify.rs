@@ -53,11 +53,11 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
-pub(crate) use path_tracer::random_numbers;
 pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
 pub use settings::Settings;
 pub use statistics::Estimate;
+pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 
 /// Points of the first round, at least.
@@ -116,6 +116,8 @@ pub(crate) struct Verifier<'a> {
 pub(crate) struct Limits {
     /// An error that is to be met: it is enough to know whether it is.
     pub error: Option<f64>,
+    /// Whether every group is to meet it.
+    pub each_group: bool,
     /// Paths over all points, for all measurements together.
     pub paths: Option<u64>,
 }
@@ -162,21 +164,29 @@ impl<'a> Verifier<'a> {
             }
             let is_precise = error.standard_error <= settings.precision * error.value;
             let enough = self.paths >= FIRST_PATHS;
-            if enough && !biased && (is_precise || limits.decided_by(&error)) {
-                break Stop::Precise;
-            }
-            // Another round doubles all that was done so far.
-            if settings.time.is_some_and(|time| 2 * start.elapsed() > time) {
-                break Stop::Time;
-            }
             let traced = (sampler.drawn() * self.paths) as u64;
-            if limits.end_at(traced, &error) || self.points >= MAX_POINTS || self.paths >= MAX_PATHS
+            let stop = if enough && !biased && (is_precise || limits.decided_by(&error)) {
+                Stop::Precise
+            } else if settings.time.is_some_and(|time| 2 * start.elapsed() > time) {
+                // Another round doubles all that was done so far.
+                break Stop::Time;
+            } else if limits.end_at(traced, &error)
+                || self.points >= MAX_POINTS
+                || self.paths >= MAX_PATHS
             {
-                break Stop::Rounds;
-            }
-            match 2.0 * all.noise > all.variance || biased {
-                true => self.paths *= 2,
-                false => self.points *= 2,
+                Stop::Rounds
+            } else {
+                match 2.0 * all.noise > all.variance || biased {
+                    true => self.paths *= 2,
+                    false => self.points *= 2,
+                }
+                continue;
+            };
+            // The whole is as well known as it has to be: groups may not be.
+            let is_open = |group: &Estimate| limits.leaves_open(group, settings.precision);
+            let more = (sampler.double(is_open) * self.paths) as u64;
+            if more == 0 || limits.paths.is_some_and(|most| traced + more > most) {
+                break stop;
             }
         };
         Ok(verification)
@@ -189,6 +199,13 @@ impl Limits {
         let off = error.standard_error;
         let is_far = |limit: f64| (error.value - limit).abs() > 2.0 * off;
         self.error.is_some_and(is_far) && off <= ROUGHLY * error.value
+    }
+
+    /// Whether it is open whether a `group` meets the error, and more points would tell.
+    fn leaves_open(&self, group: &Estimate, precision: f64) -> bool {
+        let off = group.standard_error;
+        let is_near = |limit: f64| (group.value - limit).abs() <= off;
+        self.each_group && self.error.is_some_and(is_near) && off > precision * group.value
     }
 
     /// Whether there is no other round after `traced` paths, of twice as many: there may not be, or
@@ -209,3 +226,60 @@ const MAX_POINTS: usize = 1 << 22;
 
 /// Paths a point at most.
 const MAX_PATHS: usize = 1 << 30;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Rgb, Triangle};
+    use glam::DVec3;
+
+    #[test]
+    fn a_group_near_the_limit_has_more_points() {
+        // Two regular tetrahedra seen from within, the second a hundred times smaller. One that
+        // reflects ρ of an exitance of 1 has the radiosity 1/(1 − ρ).
+        let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let positions = [(100.0, 0.0), (1.0, 200.0)].into_iter().flat_map(|(size, at)| {
+            corners.map(|corner| size * DVec3::from_array(corner) + DVec3::X * at)
+        });
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let triangles = (0..2).flat_map(|group| {
+            faces.map(|face| Triangle {
+                corners: face.map(|k| k + 4 * group),
+                group,
+                ..Default::default()
+            })
+        });
+        let bright = Material { exitance: Rgb::ONE, ..Material::grey("bright", 0.5) };
+        let names = vec!["large".into(), "small".into()];
+        let scene =
+            Scene::new(positions.collect(), triangles.collect(), names, vec![bright]).unwrap();
+        // All of the large one is off by 0.2. One face of the small one is, so that all of it is by
+        // 0.1: of 64 points 16 ± 3.5 find that, and by these it is 0.1 ± 0.011.
+        let mut told = VertexMesh::default();
+        for t in 0..8 {
+            let first = told.positions.len() as u32;
+            told.positions.extend(scene.corners(t));
+            told.normals.extend([scene.normal(t); 3]);
+            told.radiosity.extend([Rgb::splat(if t < 5 { 2.2 } else { 2.0 }); 3]);
+            told.faces.push([first, first + 1, first + 2]);
+        }
+        let points = |limit: f64, each_group: bool, paths: u64| {
+            let settings = Settings {
+                precision: 0.05,
+                points_per_group: 64,
+                time: None,
+                ..Default::default()
+            };
+            let mut verifier = Verifier::new(&scene, settings, (64, 2048)).unwrap();
+            let limits = Limits { error: Some(limit), each_group, paths: Some(paths) };
+            let found = verifier.measure(&told, limits, &mut |_| ControlFlow::Continue(()));
+            found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()
+        };
+        let most = 1 << 22;
+        assert_eq!(points(0.1, false, most), [64, 64], "only the whole is to meet it");
+        assert_eq!(points(0.5, true, most), [64, 64], "far from the limit");
+        let [large, small] = points(0.1, true, most)[..] else { panic!("two groups") };
+        assert!(large == 64 && small >= 128, "{small}");
+        assert_eq!(points(0.1, true, 2048 * 130), [64, 64], "no more paths than there may be");
+    }
+}

@@ -1,8 +1,9 @@
 //! Random points that observe how far off a result is.
 //!
 //! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
-//! the reflecting area of each: half of them evenly, half where the residuals of the elements say
-//! that the error is, since few places make up most of a root mean square. Each gathers twice what
+//! the reflecting area of each: a quarter of them evenly, a quarter evenly over octaves of distance
+//! (where all is near, that is the same), half where the residuals of the elements say that the
+//! error is, since few places make up most of a root mean square. Each gathers twice what
 //! lit the result, the second time from a hair beside, where rays and hemicubes are rotated
 //! otherwise; and once the result itself. The [statistics](super::error_estimate) of that are the
 //! estimate; the share of each vertex follows the residuals of the elements around it.
@@ -17,7 +18,7 @@ use crate::bake::error_estimate::{
     self, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError, Observation, Stratum,
 };
 use crate::bake::model;
-use crate::bake::strata::{SampleCounts, SampledFace, strata_of};
+use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
@@ -25,11 +26,13 @@ use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_
 use crate::gather::{Gather, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
+use crate::sampling::octaves::{Octaves, Part};
+use crate::sampling::random::random_numbers;
 use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
-use crate::verify::{PathTracer, SurfacePoint as PathStart, random_numbers};
+use crate::verify::{PathTracer, SurfacePoint as PathStart};
 use crate::visibility::buried;
 use crate::visibility::ray_scene::Hit;
 
@@ -75,6 +78,8 @@ pub(super) struct ErrorEstimator<'a> {
     pub bounces: f64,
     /// Diagonal of where the light is, scene unit.
     pub diagonal: f64,
+    /// Over which points are spread.
+    pub octaves: &'a Octaves,
     /// Reflected radiosity below which errors are relative to this instead, W/m², as far as is
     /// known before the points are looked at; they say it better.
     pub expected_floor: f64,
@@ -283,7 +288,7 @@ impl ErrorEstimator<'_> {
         (0..model::LATER_PATHS).map(path).sum::<Rgb>() / f64::from(model::LATER_PATHS)
     }
 
-    /// Points spread over groups and evenly over the faces of each that reflect, and the strata
+    /// Points spread over groups and over the faces of each that reflect, and the strata
     /// that they stand for. Residuals are relative to no less than `floor`, W/m².
     fn samples(&self, counts: SampleCounts, floor: f64) -> (Vec<Stratum>, Vec<Sample>) {
         let (surface, mesh) = (&self.light.surface, &self.light.mesh);
@@ -295,14 +300,15 @@ impl ErrorEstimator<'_> {
         let above = SurfaceOffset::new(mesh.scene());
         let inset = |place: [f64; 2]| place.map(|b| b + (1.0 / 3.0 - b) * INSET);
         let rotations = CellRotation::new(&mesh.scene().bounds());
-        let sample = |stratum: usize, weight: f64, face: usize, barycentric: [f64; 2]| {
-            let element = surface.elements[face] as usize;
-            let face = &surface.faces[face];
+        let sample = |stratum: usize, weight: f64, part: &SampledPart, barycentric: [f64; 2]| {
+            let element = surface.elements[part.face] as usize;
+            let face = &surface.faces[part.face];
             let node = mesh.element(element);
             let at =
                 |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
             let is_solid = |&place: &[f64; 2]| mesh.is_solid(node, at(place)(corners(face)));
-            let [u, v] = shifted(barycentric).map(inset).find(is_solid)?;
+            let in_face = |place| part.part.place(inset(place));
+            let [u, v] = shifted(barycentric).map(in_face).find(is_solid)?;
             let mix = at([u, v]);
             let material = mesh.material(node);
             let size = mesh.area(node).sqrt();
@@ -330,39 +336,48 @@ impl ErrorEstimator<'_> {
                 rotation: rotations.at(point.position, point.near),
             })
         };
-        let faces = (0..surface.faces.len()).filter_map(|face| {
+        let parts = (0..surface.faces.len()).flat_map(|face| {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
             if !mesh.scatters(node) {
-                return None;
+                return vec![];
             }
-            let corners = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
-            let reflected = (corners.iter().sum::<Rgb>() / 3.0).length();
+            let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
+            let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
             let scale = reflected.max(floor);
             let residual = self.residual(element) / scale;
-            let area = mesh.solid_share(node) * area(&surface.faces[face]);
-            Some(SampledFace {
+            let solid = mesh.solid_share(node);
+            let (corners, area) = (corners(&surface.faces[face]), area(&surface.faces[face]));
+            // Where holes are is not known part by part.
+            let parts = match solid < 1.0 {
+                true => vec![self.octaves.whole(corners, solid * area)],
+                false => self.octaves.parts(corners, area),
+            };
+            let sampled = |part: Part| SampledPart {
                 face,
                 group: mesh.group(node),
-                area,
-                error: area * residual.powi(2),
-                flux: area * reflected,
-            })
+                part,
+                error: part.area * residual.powi(2),
+                flux: part.area * reflected,
+            };
+            parts.into_iter().map(sampled).collect()
         });
         let mut samples = vec![];
         let mut strata = vec![];
-        for (k, stratum) in strata_of(faces.collect(), counts).into_iter().enumerate() {
-            let error: f64 = stratum.faces.iter().map(|face| face.error).sum();
-            let density = |face: &SampledFace| {
-                let even = face.area / stratum.area;
-                if error > 0.0 { (even + face.error / error) / 2.0 } else { even }
+        for (k, stratum) in strata_of(parts.collect(), counts).into_iter().enumerate() {
+            let sum = |of: fn(&SampledPart) -> f64| stratum.parts.iter().map(of).sum::<f64>();
+            let (error, angular) = (sum(|part| part.error), sum(|part| part.part.angular));
+            let density = |part: &SampledPart| {
+                let by_area = part.part.area / stratum.area;
+                let even = (by_area + part.part.angular / angular) / 2.0;
+                if error > 0.0 { (even + part.error / error) / 2.0 } else { even }
             };
-            let sampler = AreaSampler::new(stratum.faces.iter().map(density));
+            let sampler = AreaSampler::new(stratum.parts.iter().map(density));
             let places = sampler.spread(stratum.samples, 0.5);
             samples.extend(places.filter_map(|SurfacePoint { triangle, barycentric }| {
-                let face = &stratum.faces[triangle];
-                let weight = face.area / density(face) / stratum.area / stratum.samples as f64;
-                sample(k, weight, face.face, barycentric)
+                let part = &stratum.parts[triangle];
+                let area = part.part.area / density(part);
+                sample(k, area / stratum.area / stratum.samples as f64, part, barycentric)
             }));
             strata.push(Stratum { group: stratum.group, area: stratum.area, ambient: 0.0 });
         }
@@ -473,3 +488,6 @@ fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
         || sample.inverse_distance * buried::CRACK * diagonal > 1.0
         || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
 }
+
+#[cfg(test)]
+mod tests;

@@ -33,7 +33,8 @@ use crate::gather::adaptive::AdaptiveGather;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::verify::PathTracer;
+use crate::sampling::octaves::Octaves;
+use crate::verify::{PathTracer, octaves_of};
 
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
@@ -47,6 +48,7 @@ pub(super) struct GatherPhase<'a> {
     shot: &'a ShotLight,
     judge: Judge<'a>,
     paths: PathTracer<'a>,
+    octaves: Octaves,
 }
 
 /// A gathered mesh whose error was estimated.
@@ -76,10 +78,21 @@ impl<'a> GatherPhase<'a> {
             gather.noise_tolerance,
             state.radiosity_floor(),
         )?;
-        let judge = Judge::new(shot.mesh.scene(), target.is_some_and(|target| target.each_group));
-        let paths = PathTracer::new(shot.mesh.scene());
-        let mut phase =
-            GatherPhase { solve, gather, target, state, gatherer, backend, shot, judge, paths };
+        let scene = shot.mesh.scene();
+        let judge = Judge::new(scene, target.is_some_and(|target| target.each_group));
+        let (paths, octaves) = (PathTracer::new(scene), octaves_of(scene));
+        let mut phase = GatherPhase {
+            solve,
+            gather,
+            target,
+            state,
+            gatherer,
+            backend,
+            shot,
+            judge,
+            paths,
+            octaves,
+        };
         if let Some(target) = target {
             phase.choose_rays(target)?;
         }
@@ -210,6 +223,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             bounces: self.state.bounces(),
             diagonal: self.diagonal(),
+            octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
             paths: Some(&self.paths),
         };
@@ -277,6 +291,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             bounces: 0.0,
             diagonal: self.diagonal(),
+            octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
             paths: None,
         };

@@ -60,7 +60,7 @@ impl<'a> Judge<'a> {
         (error, paths): (Option<f64>, u64),
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> EstimatedError {
-        let limits = Limits { error, paths: Some(paths) };
+        let limits = Limits { error, each_group: self.each_group, paths: Some(paths) };
         let mut stopped = false;
         let measured = self.verifier().and_then(|verifier| {
             verifier.measure(surface, limits, &mut |p: &Progress| {

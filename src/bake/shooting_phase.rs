@@ -38,6 +38,7 @@ use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::{Rgb, Scene};
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
+use crate::verify::octaves_of;
 
 /// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
 const CHECKPOINT_INTERVAL: u32 = 10;
@@ -200,6 +201,7 @@ pub(super) fn estimate_elements(
         ledger: &shot.solution.ledger,
         bounces: 0.0,
         diagonal: light_survey::diagonal(settings.solve.region.as_ref(), shot.mesh.scene()),
+        octaves: &octaves_of(shot.mesh.scene()),
         expected_floor: light.radiosity_field().radiosity_floor(),
         paths: None,
     };

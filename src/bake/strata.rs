@@ -6,6 +6,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::bake::model;
+use crate::sampling::octaves::Part;
 
 /// How many random points there are to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,42 +17,41 @@ pub(super) struct SampleCounts {
     pub per_group: usize,
 }
 
-/// A face that reflects.
-pub(super) struct SampledFace {
+/// A face that reflects, or a part of it.
+pub(super) struct SampledPart {
     pub face: usize,
     pub group: u32,
-    /// Length unit squared.
-    pub area: f64,
-    /// The area times the squared relative residual of the element: up to a factor, what the face
+    pub part: Part,
+    /// The area times the squared relative residual of the element: up to a factor, what the part
     /// is expected to add to the squared error.
     pub error: f64,
     /// The area times the reflected radiosity, W: a length over the channels.
     pub flux: f64,
 }
 
-/// The faces of a stratum, and the points that it gets.
-pub(super) struct StratumFaces {
+/// The parts of a stratum, and the points that it gets.
+pub(super) struct StratumParts {
     pub group: Option<u32>,
-    pub faces: Vec<SampledFace>,
+    pub parts: Vec<SampledPart>,
     pub area: f64,
     pub flux: f64,
     pub samples: usize,
 }
 
-/// The strata of `faces`: the largest groups, and one for all others if there are too many.
-pub(super) fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<StratumFaces> {
-    let mut by_group: Vec<StratumFaces> = vec![];
+/// The strata of `parts`: the largest groups, and one for all others if there are too many.
+pub(super) fn strata_of(parts: Vec<SampledPart>, counts: SampleCounts) -> Vec<StratumParts> {
+    let mut by_group: Vec<StratumParts> = vec![];
     let mut index = FxHashMap::default();
-    for face in faces {
-        let k = *index.entry(face.group).or_insert_with(|| {
-            let group = Some(face.group);
-            let (faces, area, flux) = (vec![], 0.0, 0.0);
-            by_group.push(StratumFaces { group, faces, area, flux, samples: 0 });
+    for part in parts {
+        let k = *index.entry(part.group).or_insert_with(|| {
+            let group = Some(part.group);
+            let (parts, area, flux) = (vec![], 0.0, 0.0);
+            by_group.push(StratumParts { group, parts, area, flux, samples: 0 });
             by_group.len() - 1
         });
-        by_group[k].area += face.area;
-        by_group[k].flux += face.flux;
-        by_group[k].faces.push(face);
+        by_group[k].area += part.part.area;
+        by_group[k].flux += part.flux;
+        by_group[k].parts.push(part);
     }
     let total: f64 = by_group.iter().map(|s| s.area).sum();
     let total_flux: f64 = by_group.iter().map(|s| s.flux).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -61,8 +61,8 @@ pub(super) fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<St
         let small = by_group.split_off(single.min(by_group.len()));
         let area = small.iter().map(|s| s.area).sum();
         let flux = small.iter().map(|s| s.flux).sum();
-        let faces = small.into_iter().flat_map(|s| s.faces).collect();
-        by_group.push(StratumFaces { group: None, faces, area, flux, samples: 0 });
+        let parts = small.into_iter().flat_map(|s| s.parts).collect();
+        by_group.push(StratumParts { group: None, parts, area, flux, samples: 0 });
     }
     for stratum in &mut by_group {
         let share = (stratum.area / total).max(stratum.flux / total_flux);
@@ -75,9 +75,11 @@ pub(super) fn strata_of(faces: Vec<SampledFace>, counts: SampleCounts) -> Vec<St
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::octaves::Octaves;
 
-    fn face(group: u32, area: f64, flux: f64) -> SampledFace {
-        SampledFace { face: group as usize, group, area, error: 0.0, flux }
+    fn face(group: u32, area: f64, flux: f64) -> SampledPart {
+        let part = Octaves::new([], 1.0).whole(Default::default(), area);
+        SampledPart { face: group as usize, group, part, error: 0.0, flux }
     }
 
     #[test]
@@ -97,7 +99,7 @@ mod tests {
         assert_eq!(strata.len(), model::MAX_GROUPS + 1);
         assert_eq!(strata[0].group, Some(count - 1), "the largest first");
         let rest = &strata[model::MAX_GROUPS];
-        assert_eq!((rest.group, rest.faces.len(), rest.area), (None, 10, 55.0));
+        assert_eq!((rest.group, rest.parts.len(), rest.area), (None, 10, 55.0));
         let all = strata_of(
             vec![face(3, 1.0, 0.0), face(4, 1.0, 0.0)],
             SampleCounts { total: 64, per_group: 0 },

@@ -21,11 +21,12 @@ use std::ops::ControlFlow;
 use fastrand::Rng;
 use glam::DVec3;
 use rayon::prelude::*;
-use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::emitters::{Emitters, Weights};
 use super::luminaires;
 use crate::progress::BatchSizer;
+use crate::sampling::octaves::Part;
+use crate::sampling::random::random_numbers;
 use crate::scene::{Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
@@ -378,25 +379,10 @@ pub(super) fn nearest_surfaces(
     found
 }
 
-/// Random numbers of their own for everything that `words` tell apart.
-pub(crate) fn random_numbers(words: &[u64]) -> Rng {
-    let hash = |seed, word: &u64| xxh3_64_with_seed(&word.to_le_bytes(), seed);
-    Rng::with_seed(words.iter().fold(0, hash))
-}
-
-/// A point of the part of triangle `t` with these `corners` (weights of its second and third),
-/// uniform over its solid area; where little of it is solid, it may be in a hole.
-pub(super) fn random_point(
-    scene: &Scene,
-    t: usize,
-    corners: [[f64; 2]; 3],
-    rng: &mut Rng,
-) -> DVec3 {
-    let mut random_place = || {
-        let [x, y] = random_barycentric(rng);
-        let [p, q, r] = corners;
-        [0, 1].map(|axis| p[axis] * (1.0 - x - y) + q[axis] * x + r[axis] * y)
-    };
+/// A point of a `part` of triangle `t`, uniform over its solid area; where little of it is solid,
+/// it may be in a hole.
+pub(super) fn random_point(scene: &Scene, t: usize, part: &Part, rng: &mut Rng) -> DVec3 {
+    let mut random_place = || part.place(random_barycentric(rng));
     let place = random_place();
     let others = std::iter::repeat_with(random_place).take(MAX_TRIES);
     let solid = scene.first_solid(t, std::iter::once(place).chain(others));

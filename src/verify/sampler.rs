@@ -5,14 +5,15 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::hidden::{self, Outlook};
-use super::path_tracer::{PathTracer, SurfacePoint, random_numbers};
+use super::path_tracer::{PathTracer, SurfacePoint};
 use super::settings::Settings;
 use super::solution::SolutionLookup;
-use super::statistics::{FLOOR, MeanSquare, PARTS, Sample, SquareError};
+use super::statistics::{Estimate, FLOOR, MeanSquare, PARTS, Sample, SquareError};
 use super::surfaces::ReflectingGroup;
 use super::verification::{GroupError, PointError, Stop, Verification};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::progress::BatchSizer;
+use crate::sampling::random::random_numbers;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
 
@@ -35,6 +36,8 @@ struct Stratum {
     points: Vec<TracedPoint>,
     /// Sum of the weights of the points.
     weight: f64,
+    /// Points that it has at least.
+    least: usize,
 }
 
 /// A point, and the paths that began there.
@@ -57,7 +60,8 @@ struct TracedPoint {
 
 impl<'a> Sampler<'a> {
     pub fn new(scene: &'a Scene, settings: &Settings) -> Result<Sampler<'a>, Error> {
-        let stratum = |surface| Stratum { surface, points: vec![], weight: 0.0 };
+        let least = settings.points_per_group;
+        let stratum = |surface| Stratum { surface, points: vec![], weight: 0.0, least };
         Ok(Sampler {
             strata: ReflectingGroup::all(scene)?.into_iter().map(stratum).collect(),
             tracer: PathTracer::new(scene),
@@ -85,9 +89,9 @@ impl<'a> Sampler<'a> {
                 true => counting(stratum) / whole,
                 false => stratum.surface.share,
             };
-            let Stratum { surface, points: list, weight: of_all } = stratum;
+            let Stratum { surface, points: list, weight: of_all, least } = stratum;
             let by_area = (share * points as f64).ceil() as usize;
-            while list.len() < by_area.max(self.settings.points_per_group) {
+            while list.len() < by_area.max(*least) {
                 let index = list.len();
                 let words = [self.settings.seed, surface.group as u64, index as u64];
                 let (point, weight) = surface.point(self.scene, &mut random_numbers(&words));
@@ -104,6 +108,20 @@ impl<'a> Sampler<'a> {
                 });
             }
         }
+    }
+
+    /// Has the groups whose error `is_open` have twice as many points, from the next
+    /// [`add_points`](Sampler::add_points) on; how many that will be more.
+    pub fn double(&mut self, is_open: impl Fn(&Estimate) -> bool) -> usize {
+        let by_group = self.by_group(self.settings.hidden);
+        let mut more = 0;
+        for (stratum, error) in self.strata.iter_mut().zip(by_group) {
+            if error.is_some_and(|(_, error)| is_open(&error.root())) {
+                more += stratum.points.len();
+                stratum.least = 2 * stratum.points.len();
+            }
+        }
+        more
     }
 
     /// Forgets what a solution told.

@@ -1,0 +1,64 @@
+use std::sync::Arc;
+
+use super::*;
+use crate::mesh::Mesh;
+use crate::scene::{Material, Triangle};
+use crate::verify::octaves_of;
+
+/// A ground from -1000 to 1000 in two triangles, and a cube of 48 on it at the origin; all grey.
+fn wide_ground() -> Scene {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let mut positions: Vec<DVec3> =
+        corners.iter().map(|[x, y]| DVec3::new(1000.0 * x, 1000.0 * y, 0.0)).collect();
+    let mut faces = vec![[0, 1, 2], [0, 2, 3]];
+    for side in 0..24 {
+        let height = 0.04 * f64::from(side) + 0.01;
+        let first = positions.len() as u32;
+        positions.extend(corners.map(|[x, y]| DVec3::new(0.5 * x, 0.5 * y, height)));
+        faces.extend([[0, 1, 2], [0, 2, 3]].map(|face: [u32; 3]| face.map(|k| k + first)));
+    }
+    let triangles = (0..).zip(faces).map(|(k, corners)| Triangle {
+        corners,
+        group: u32::from(k >= 2),
+        ..Default::default()
+    });
+    let names = vec!["ground".into(), "cube".into()];
+    let bright = Material { exitance: Rgb::ONE, ..Material::grey("bright", 0.5) };
+    Scene::new(positions, triangles.collect(), names, vec![bright]).unwrap()
+}
+
+#[test]
+fn points_lie_in_every_octave_of_a_wide_ground() {
+    let mesh = Mesh::new(Arc::new(wide_ground()), f64::INFINITY).unwrap();
+    let radiosity = vec![Rgb::splat(2.0); mesh.element_count()];
+    let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+    let estimator = ErrorEstimator {
+        light: &light,
+        lit_by: None,
+        element_residual: &[],
+        ledger: &Ledger::default(),
+        bounces: 0.0,
+        diagonal: 1.0,
+        octaves: &octaves_of(mesh.scene()),
+        expected_floor: 0.0,
+        paths: None,
+    };
+    const POINTS: usize = 4096;
+    let counts = SampleCounts { total: POINTS, per_group: 8 };
+    let (strata, samples) = estimator.samples(counts, 1.0);
+    let of_ground = |sample: &&Sample| strata[sample.stratum].group == Some(0);
+    let ground: Vec<&Sample> = samples.iter().filter(of_ground).collect();
+    assert!(ground.len() >= POINTS * 99 / 100);
+    for half in [10.0, 100.0, 1000.0f64] {
+        let within =
+            |sample: &&&Sample| sample.point.point.position.truncate().abs().max_element() <= half;
+        let share: f64 = ground.iter().filter(within).map(|sample| sample.weight).sum();
+        let count = ground.iter().filter(within).count();
+        // Half of the points are in ten octaves, of which the smallest has three; an even spread
+        // has one point in 10 000 there. They stand for the area that they are spread over, known
+        // by as many of them.
+        assert!(count as f64 > 0.1 * POINTS as f64, "{half}: {count}");
+        let area = (half / 1000.0).powi(2);
+        assert!((share / area - 1.0).abs() < 0.2, "{half}: {share}, not {area}");
+    }
+}

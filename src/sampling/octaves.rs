@@ -1,0 +1,165 @@
+//! Parts of triangles for points that are spread over octaves of the distance.
+//!
+//! Where a scene is far larger than the place that most of it is in, as a ground of a kilometre
+//! with a room on it, the light of the ground changes next to the room, where points spread evenly
+//! over area have none:
+//!
+//! ```text
+//!   │       │   │ │room│ │   │       │    as many points in each strip as in the next, and each
+//!   └───────┴───┴─┴────┴─┴───┴───────┘    stands for its part of the area
+//! ```
+
+use glam::DVec3;
+
+use crate::geometry::aabb::Aabb;
+
+/// Share of the triangles that may lie outside of the place that most are in, at either end of each
+/// axis.
+const TRIMMED_SHARE: f64 = 0.1;
+
+/// That place has to be this many times smaller than all of the scene,
+const MIN_CONCENTRATION: f64 = 4.0;
+
+/// but no more than so many: parts that are smaller are lost in the rounding of coordinates.
+const MAX_CONCENTRATION: f64 = 1e9;
+
+/// A triangle from corner to corner, by weights of its second and third.
+const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+/// Where the distances are counted from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Octaves {
+    /// None where nothing is far away: all is one octave.
+    centre: Option<Aabb>,
+}
+
+/// A part of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    /// Weights of the triangle's second and third corner at the part's own.
+    pub corners: [[f64; 2]; 3],
+    /// Length unit squared.
+    pub area: f64,
+    /// The area over the square of the distance: by this each octave gets as many points as the
+    /// next.
+    pub angular: f64,
+}
+
+impl Octaves {
+    /// Of triangles with these `middles`, in a scene with this `diagonal`.
+    pub fn new(middles: impl IntoIterator<Item = DVec3>, diagonal: f64) -> Octaves {
+        let middles: Vec<(DVec3, f64)> = middles.into_iter().map(|middle| (middle, 1.0)).collect();
+        let is_concentrated = |centre: &Aabb| {
+            (MIN_CONCENTRATION..MAX_CONCENTRATION).contains(&(diagonal / centre.diagonal()))
+        };
+        Octaves { centre: Aabb::around_most(&middles, TRIMMED_SHARE).filter(is_concentrated) }
+    }
+
+    /// The parts of a triangle with this `area`: none is longer than it is far away.
+    pub fn parts(&self, triangle: [DVec3; 3], area: f64) -> Vec<Part> {
+        let mut parts = vec![];
+        self.split(&triangle, WHOLE, area, &mut parts);
+        parts
+    }
+
+    /// A triangle with this `area` in one part.
+    pub fn whole(&self, triangle: [DVec3; 3], area: f64) -> Part {
+        let reach = self.reach(triangle);
+        Part { corners: WHOLE, area, angular: area / (reach * reach) }
+    }
+
+    /// How far off the part is, and at least as far as the place in the middle is wide; 1 where all
+    /// is one octave.
+    fn reach(&self, corners: [DVec3; 3]) -> f64 {
+        let Some(centre) = &self.centre else { return 1.0 };
+        let bounds = Aabb::from_points(corners);
+        let gap = (centre.low - bounds.high).max(bounds.low - centre.high).max(DVec3::ZERO);
+        centre.diagonal() + gap.length()
+    }
+
+    fn split(
+        &self,
+        triangle: &[DVec3; 3],
+        corners: [[f64; 2]; 3],
+        area: f64,
+        parts: &mut Vec<Part>,
+    ) {
+        let [a, b, c] = triangle;
+        let [p, q, r] = corners.map(|[u, v]| a * (1.0 - u - v) + b * u + c * v);
+        let longest = (q - p).length().max((r - q).length()).max((p - r).length());
+        let reach = self.reach([p, q, r]);
+        if self.centre.is_none() || longest <= reach {
+            return parts.push(Part { corners, area, angular: area / (reach * reach) });
+        }
+        let middle =
+            |k: usize, l: usize| [0, 1].map(|axis| (corners[k][axis] + corners[l][axis]) / 2.0);
+        let (p, q, r) = (middle(0, 1), middle(1, 2), middle(2, 0));
+        let [a, b, c] = corners;
+        for part in [[a, p, r], [p, b, q], [r, q, c], [p, q, r]] {
+            self.split(triangle, part, area / 4.0, parts);
+        }
+    }
+}
+
+impl Part {
+    /// Weights of the triangle's second and third corner at a place given by those of the part's.
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [p, q, r] = self.corners;
+        [0, 1].map(|axis| p[axis] * (1.0 - x - y) + q[axis] * x + r[axis] * y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    /// Middles of 30 triangles in a unit cube.
+    fn middles() -> Vec<DVec3> {
+        (0..30).map(|k| DVec3::splat(f64::from(k) / 29.0)).collect()
+    }
+
+    const GROUND: [DVec3; 3] = [
+        DVec3::new(-1000.0, -1000.0, 0.0),
+        DVec3::new(1000.0, -1000.0, 0.0),
+        DVec3::new(-1000.0, 1000.0, 0.0),
+    ];
+
+    #[test]
+    fn every_octave_has_its_points_and_parts_add_up() {
+        let octaves = Octaves::new(middles(), 2000.0);
+        let parts = octaves.parts(GROUND, 2e6);
+        assert!((parts.iter().map(|part| part.area).sum::<f64>() / 2e6 - 1.0).abs() < 1e-12);
+        let in_ring = |from: f64, to: f64| -> f64 {
+            let centre_of = |part: &Part| part.corners.map(DVec2::from).iter().sum::<DVec2>() / 3.0;
+            let distance = |part: &Part| {
+                let [u, v] = centre_of(part).to_array();
+                let at = GROUND[0] * (1.0 - u - v) + GROUND[1] * u + GROUND[2] * v;
+                at.x.abs().max(at.y.abs())
+            };
+            let ring = parts.iter().filter(|part| (from..to).contains(&distance(part)));
+            ring.map(|part| part.angular).sum()
+        };
+        // The integral of 1/r² over each ring is alike; parts are as coarse as they are far away,
+        // and reach is the diagonal √3 and more.
+        let rings = [16.0, 32.0, 64.0, 128.0, 256.0].map(|r| in_ring(r, 2.0 * r));
+        for ring in rings {
+            assert!((0.6..1.7).contains(&(ring / rings[0])), "{rings:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_split_where_all_is_near() {
+        for octaves in [
+            Octaves::new(middles(), 3.0),
+            // Of no size: no place at all.
+            Octaves::new([DVec3::ONE; 30], 2000.0),
+        ] {
+            let parts = octaves.parts(GROUND, 2e6);
+            assert_eq!(parts.len(), 1);
+            assert_eq!((parts[0].area, parts[0].angular), (2e6, 2e6));
+            assert_eq!(parts[0].place([0.25, 0.5]), [0.25, 0.5]);
+        }
+    }
+}
