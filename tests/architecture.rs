@@ -31,7 +31,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "error form_factor gather geometry hemicube mesh progress sampling scene visibility",
     ),
     ("camera", "error gather geometry mesh progress sampling scene vertex visibility"),
-    ("verify", "error geometry progress scene vertex visibility"),
+    ("verify", "error geometry progress sampling scene vertex visibility"),
     (
         "bake",
         "backend error form_factor gather geometry mesh progress sampling scene solver verify \
