@@ -470,10 +470,18 @@ fn verify_wants_the_lamps_of_the_bake() {
     assert!(fine, "{said}");
 }
 
-/// Ctrl-C: the work stops, what there is is written, and the exit status says that it was stopped.
+/// Ctrl-C, or the end of a batch system's time: the work stops, what there is is written, and the
+/// exit status says that it was stopped.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_writes_what_there_is() {
+    for signal in ["-INT", "-TERM"] {
+        interrupt_by(signal);
+    }
+}
+
+#[cfg(unix)]
+fn interrupt_by(signal: &str) {
     use std::io::{BufRead, BufReader};
 
     let folder = tempfile::tempdir().unwrap();
@@ -488,7 +496,7 @@ fn an_interrupt_writes_what_there_is() {
     };
     let interrupt = |child: &Child| {
         let id = child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
     };
     let mut child = program(&args);
     // The first line of progress says that the bake has begun.

@@ -118,7 +118,7 @@ Files and devices:
                     light goes along; done unasked where rays are the faster: on software
                     adapters, for many triangles at few pixels
 
-Ctrl-C stops the bake, and what there is is written; again, it ends at once.";
+Ctrl-C or SIGTERM stops the bake, and what there is is written; again, it ends at once.";
 
 /// What an error is given as.
 const SHARE: &str = "a share, such as 0.1 for 10 %";

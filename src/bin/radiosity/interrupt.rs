@@ -1,4 +1,5 @@
-//! Ctrl-C: the first one stops the work at its next progress report, so that what there is can be
+//! Ctrl-C, and what else asks the program to end (SIGTERM, as of a batch system whose time is up;
+//! SIGHUP): the first one stops the work at its next progress report, so that what there is can be
 //! written; the second ends the program at once.
 //!
 //! ```text
@@ -16,7 +17,7 @@ pub const EXIT_STATUS: u8 = 130;
 
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// From here on the first Ctrl-C stops the work.
+/// From here on the first Ctrl-C, SIGTERM or SIGHUP stops the work.
 pub fn catch() {
     let caught = ctrlc::set_handler(|| {
         if STOPPED.swap(true, Ordering::Relaxed) {
@@ -29,7 +30,7 @@ pub fn catch() {
     }
 }
 
-/// Whether Ctrl-C was pressed.
+/// Whether the program was asked to end.
 pub fn stopped() -> bool {
     STOPPED.load(Ordering::Relaxed)
 }

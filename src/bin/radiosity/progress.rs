@@ -136,6 +136,7 @@ fn show(display: &mut Display, progress: &BakeProgress, unshot_goal: f64) {
             display.show("estimating", share(*samples, *of), &text);
         }
         BakeProgress::Estimated(estimate) => {
+            display.error = Some(estimate.total);
             display.note(&format!("estimated error {:.2} %", 100.0 * estimate.total));
         }
         BakeProgress::DeviceFailed(error) => {
@@ -153,6 +154,8 @@ struct Display {
     stage: String,
     /// When the stage began.
     start: Instant,
+    /// The last estimate of the error, a share; none before the first.
+    error: Option<f64>,
 }
 
 impl Display {
@@ -165,7 +168,7 @@ impl Display {
         if lines.is_none() {
             bar.enable_steady_tick(TICK);
         }
-        Display { bar, lines, stage: stage.to_string(), start: Instant::now() }
+        Display { bar, lines, stage: stage.to_string(), start: Instant::now(), error: None }
     }
 
     /// Shows the share of `stage` that is done.
@@ -177,7 +180,7 @@ impl Display {
             self.stage = stage.to_string();
             self.start = Instant::now();
         }
-        let text = with_time_left(text, share, self.start.elapsed());
+        let text = with_time_left(&with_error(text, self.error), share, self.start.elapsed());
         self.bar.set_position((STEPS as f64 * share) as u64);
         if let Some(lines) = &self.lines {
             lines.set(text);
@@ -200,6 +203,14 @@ impl Drop for Display {
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+/// `text`, and the error so far, if it is known.
+fn with_error(text: &str, error: Option<f64>) -> String {
+    match error {
+        Some(error) => format!("{text}, error so far {:.2} %", 100.0 * error),
+        None => text.to_string(),
+    }
 }
 
 /// `text`, and how long the rest of a stage takes of which this share is done.
@@ -275,6 +286,12 @@ mod tests {
         for (share, seconds) in [(0.0, 10), (0.01, 10), (0.5, 0)] {
             assert_eq!(with_time_left("drawing", share, after(seconds)), "drawing");
         }
+    }
+
+    #[test]
+    fn error_is_told_once_it_is_known() {
+        assert_eq!(with_error("gathering", None), "gathering");
+        assert_eq!(with_error("gathering", Some(0.0512)), "gathering, error so far 5.12 %");
     }
 
     #[test]
