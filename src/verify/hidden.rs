@@ -10,6 +10,11 @@ use crate::scene::{Aabb, Scene};
 /// A point is hidden where more than this share of its rays meets backs first,
 const HIDDEN: f64 = 0.95;
 
+/// or more than this share does, and no light comes by so many paths: by reciprocity it is not seen
+/// from where there is light either,
+const HIDDEN_DARK: f64 = 0.05;
+const PATHS_IN_THE_DARK: usize = 64;
+
 /// or more than this share meets backs that are near:
 const HIDDEN_NEAR: f64 = 0.4;
 
@@ -64,10 +69,11 @@ impl Outlook {
     }
 
     /// Whether nobody sees the point, or it sees next to nothing, where the light fills a box of
-    /// this `diagonal` (scene unit).
-    pub fn is_hidden(&self, diagonal: f64) -> bool {
+    /// this `diagonal` (scene unit), and so many paths found that it has `light` or not.
+    pub fn is_hidden(&self, diagonal: f64, (light, paths): (bool, usize)) -> bool {
+        let is_dark = !light && paths >= PATHS_IN_THE_DARK;
         self.covered < OPEN
-            || self.backs > HIDDEN
+            || self.backs > if is_dark { HIDDEN_DARK } else { HIDDEN }
             || self.near_backs < NEAR * diagonal
             || self.inverse_distance * CRACK * diagonal > 1.0
     }

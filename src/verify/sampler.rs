@@ -193,7 +193,8 @@ impl<'a> Sampler<'a> {
         self.paths = paths;
         let diagonal = self.lit_diagonal();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
-            point.hidden = point.outlook.is_hidden(diagonal);
+            let light = point.sample().found() != Rgb::ZERO;
+            point.hidden = point.outlook.is_hidden(diagonal, (light, point.paths));
         }
         ControlFlow::Continue(())
     }
