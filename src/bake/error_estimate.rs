@@ -313,7 +313,8 @@ fn parts(
     let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
     let mesh = interpolation - sampling;
     let area: f64 = strata.iter().map(|s| s.area).sum::<f64>().max(f64::MIN_POSITIVE);
-    let ambient = strata.iter().map(|s| s.stratum.ambient * s.area).sum::<f64>() / area;
+    // Folded from +0: the sum of nothing is -0, which is printed as such.
+    let ambient = strata.iter().fold(0.0, |sum, s| sum + s.stratum.ambient * s.area) / area;
     let unshot = ambient * passed * passed;
     // Light that was not shot is a part of what further bounces add.
     let truncation = (means.of(|d| further.square(d)) - unshot).max(0.0);

@@ -291,3 +291,11 @@ fn a_change_at_one_point_is_as_uncertain_as_it_is_large() {
     assert!(found.truncation > 0.99 * found.total && found.mesh == 0.0, "{found:?}");
     assert!((found.uncertainty / found.total - 0.5).abs() < 0.01, "{found:?}");
 }
+
+#[test]
+fn where_nothing_is_judged_there_is_no_error() {
+    let hidden = estimate_of(|_| Observation { excluded: true, ..exact() });
+    let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, samples, .. } = hidden;
+    let parts = [total, mesh, gaps, sampling, truncation, unshot];
+    assert_eq!((parts.map(f64::to_bits), samples), ([0; 6], 0), "{parts:?}");
+}
