@@ -65,9 +65,10 @@ pub(super) struct MtlMaterial {
 }
 
 impl Library {
-    /// Index of the material that `name` stands for.
+    /// Index of the material that `name` stands for, with its quotes or without.
     pub fn find(&self, name: &str) -> Option<u32> {
-        self.by_name.get(name).copied()
+        let named = |name: &str| self.by_name.get(name).copied();
+        named(name).or_else(|| named(name.trim_matches('"')))
     }
 
     /// Whether no file was found yet.

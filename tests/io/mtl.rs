@@ -33,6 +33,14 @@ fn unknown_materials_are_grey() {
     let text = format!("{SQUARE}usemtl\nf 1 2 3\n");
     let files: [(&str, &[u8]); 1] = [("room.obj", text.as_bytes())];
     repaired(&files, "1 unknown material", "room.obj:5", "newmtl");
+    // Quotes are no part of a name, unless the library has them too.
+    for (used, defined) in [("\"warm white\"", "warm white"), ("\"a\"", "\"a\"")] {
+        let text = format!("mtllib room.mtl\n{SQUARE}usemtl {used}\nf 1 2 3\n");
+        let library = format!("newmtl {defined}\nKd 0.25 0.25 0.25\n");
+        let scene = load(&chalk_files(&text, &library)).unwrap();
+        assert_eq!(scene.material(0).reflectance.to_array(), [0.25; 3], "{used}");
+        assert!(scene.warnings().iter().all(|w| w.kind != WarningKind::UnknownMaterial));
+    }
     // A library may come after those who use it.
     let text = format!("{SQUARE}usemtl chalk\nf 1 2 3\nmtllib room.mtl\n");
     assert_eq!(oddities(&load(&chalk_files(&text, CHALK)).unwrap()), []);
