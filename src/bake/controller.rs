@@ -173,6 +173,27 @@ pub(super) fn refined(
     refined
 }
 
+/// `gather` with all further bounces where these are above the cap that meets the `target` and
+/// nothing else of the estimate can be lowered.
+pub(super) fn with_bounces(
+    gather: &GatherSettings,
+    Judged { whole, by_light, groups }: Judged,
+    target: &ErrorTarget,
+) -> GatherSettings {
+    let needs_bounces = |estimate: &ErrorEstimate| {
+        let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
+        let (bounces, rest) = (truncation.hypot(unshot), mesh.hypot(gaps).hypot(sampling));
+        let allowed = model::allowed_error(target.error);
+        bounces > model::water_filling_cap([bounces], rest, allowed)
+    };
+    let groups = target.judged(groups).map(|group| &group.estimate);
+    let mut refined = gather.clone();
+    if [whole, by_light].into_iter().chain(groups).any(needs_bounces) {
+        refined.refinement.gather_passes += 1;
+    }
+    refined
+}
+
 /// `estimate` with what paths find beyond it: bounces are all counted, so that it is what elements
 /// miss.
 fn with_what_elements_miss(estimate: &ErrorEstimate, sources: f64) -> ErrorEstimate {
@@ -295,6 +316,21 @@ mod tests {
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
         let new = refined(&gather, judged(&met, &[]), &target(0.02, false));
         assert_eq!(new, gather, "0.0112 is below 0.9 · 0.75 · 0.02");
+    }
+
+    #[test]
+    fn bounces_are_lowered_where_nothing_else_can_be() {
+        let gather = settings();
+        // Allowed are 0.0126: of it the least budget is left, 0.1 of the square.
+        let cases = [(0.05, 0.0, false), (0.05, 0.0039, false), (0.05, 0.0041, true)];
+        for (mesh, truncation, wanted) in cases {
+            let estimate = ErrorEstimate { total: 0.5, mesh, truncation, ..Default::default() };
+            let new = with_bounces(&gather, judged(&estimate, &[]), &target(0.02, false));
+            let is_bounce = new != gather && Step::between(&gather, &new) == Step::Bounces;
+            assert_eq!(is_bounce, wanted, "{estimate:?}");
+            let same = GatherSettings { refinement: gather.refinement.clone(), ..new };
+            assert_eq!(same, gather, "nothing else changes");
+        }
     }
 
     #[test]

@@ -157,7 +157,12 @@ impl<'a> GatherPhase<'a> {
         } else if target.is_met(judged) {
             end(Obstacle::Edges)
         } else if light.stop == StopReason::Elements {
-            end(Obstacle::Elements)
+            // Bounces take no elements.
+            let bounces = controller::with_bounces(&self.gather, judged, &target);
+            match self.step_to(bounces, target)? {
+                Some(step) if rounds_left > 0 => Ok(Ok(step)),
+                _ => end(Obstacle::Elements),
+            }
         } else if rounds_left == 0 {
             end(Obstacle::largest_part(judged.whole))
         } else {
@@ -321,6 +326,15 @@ impl<'a> GatherPhase<'a> {
         judged: Judged,
     ) -> Result<Option<Step>, Error> {
         let refined = controller::refined(&self.gather, judged, &target);
+        self.step_to(refined, target)
+    }
+
+    /// Takes the settings `refined`, as far as the overrides let it, and says what is to be done.
+    fn step_to(
+        &mut self,
+        refined: GatherSettings,
+        target: ErrorTarget,
+    ) -> Result<Option<Step>, Error> {
         let settings = BakeSettings { solve: self.solve.clone(), gather: Some(refined) };
         let (solve, Some(gather)) = target.overridden(settings) else { return Ok(None) };
         if (&solve, &gather) == (&self.solve, &self.gather) {
