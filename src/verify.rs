@@ -25,13 +25,14 @@
 //!
 //! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
 //! more than 95 % of their hemisphere, weighted by the cosine; or in more than 5 % of it, and no
-//! light comes to them; or in more than 40 % of it backs nearer than 0.2 % of the diagonal of where
-//! the light is; or whose mean of 1/distance to what they see is above 10 000 over that diagonal.
-//! They lie inside a solid, under what stands on them, right behind a plate or in a crack; nobody
-//! sees them, and bakes tell there what would be seen without it. So are points that see surfaces in less than 1 % of their hemisphere: what the
-//! sky gives them is exact. The mean m is over the points that count: a dark plane of a kilometre
-//! makes nothing on it brighter. The light is in the box around all that reflects, unless all but
-//! 1 % of it at either end of each axis is in one that is four times smaller.
+//! light comes to them by 4096 paths or more; or in more than 40 % of it backs nearer than 0.2 % of
+//! the diagonal of where the light is; or whose mean of 1/distance to what they see is above 10 000
+//! over that diagonal. They lie inside a solid, under what stands on them, right behind a plate or
+//! in a crack; nobody sees them, and bakes tell there what would be seen without it. So are points
+//! that see surfaces in less than 1 % of their hemisphere: what the sky gives them is exact. The
+//! mean m is over the points that count: a dark plane of a kilometre makes nothing on it brighter.
+//! The light is in the box around all that reflects, unless all but 1 % of it at either end of each
+//! axis is in one that is four times smaller.
 //!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
 //! has the mean |B_told − B_true|², however noisy they are.

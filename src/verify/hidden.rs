@@ -10,10 +10,13 @@ use crate::scene::{Aabb, Scene};
 /// A point is hidden where more than this share of its rays meets backs first,
 const HIDDEN: f64 = 0.95;
 
-/// or more than this share does, and no light comes by so many paths: by reciprocity it is not seen
-/// from where there is light either,
+/// or more than this share does, and no light comes: by reciprocity it is not seen from where there
+/// is light either,
 const HIDDEN_DARK: f64 = 0.05;
-const PATHS_IN_THE_DARK: usize = 64;
+
+/// That no light comes takes so many paths: the gap under a roof's boards that is told the light of
+/// their upper side got a thousandth of it, which 64 paths do not find. Fewer tell nothing.
+const PATHS_IN_THE_DARK: usize = 4096;
 
 /// or more than this share meets backs that are near:
 const HIDDEN_NEAR: f64 = 0.4;
@@ -86,5 +89,29 @@ pub(super) fn lit_diagonal(scene: &Scene, points: &[(DVec3, f64)]) -> f64 {
     match Aabb::around_most(points, TRIMMED_SHARE) {
         Some(lit) if lit.diagonal() * MIN_CONCENTRATION < whole => lit.diagonal(),
         _ => whole,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dark_is_hidden_only_where_many_paths_say_so_and_backs_are_seen() {
+        let chamber =
+            Outlook { covered: 1.0, backs: 0.3, near_backs: f64::INFINITY, inverse_distance: 2.0 };
+        let room = Outlook { backs: 0.0, ..chamber };
+        for (outlook, light, paths, hidden) in [
+            (chamber, false, 4096, true),
+            (chamber, false, 2048, false),
+            (chamber, true, 4096, false),
+            (room, false, 4096, false),
+        ] {
+            assert_eq!(
+                outlook.is_hidden(1.0, (light, paths)),
+                hidden,
+                "{outlook:?} {light} {paths}"
+            );
+        }
     }
 }
