@@ -94,12 +94,15 @@ impl Snapping {
             for dy in -1..=1 {
                 for dz in -1..=1 {
                     let [x, y, z] = cell;
+                    // Where elements of no size are asked for, cells are at the end of their range.
+                    let beside =
+                        [(x, dx), (y, dy), (z, dz)].map(|(k, d): (i64, i64)| k.saturating_add(d));
                     let same_sides = |other: LatticePoint| {
                         // A point on a side stays on it.
                         let (a, b) = (sides_of(lattice), sides_of(other));
                         (0..3).all(|k| !a[k] || b[k])
                     };
-                    let near = self.known.get(&[x + dx, y + dy, z + dz]).into_iter().flatten();
+                    let near = self.known.get(&beside).into_iter().flatten();
                     let mut near = near.filter(|(p, other)| {
                         p.distance(position) < self.distance && same_sides(*other)
                     });
