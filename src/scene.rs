@@ -34,6 +34,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
+pub(crate) use crate::geometry::polygon::longest_edge;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
@@ -419,11 +420,6 @@ impl Scene {
     pub(crate) fn warn(&mut self, warning: Warning) {
         self.warnings.push(warning);
     }
-}
-
-/// Length of a triangle's longest edge.
-pub(crate) fn longest_edge([a, b, c]: [DVec3; 3]) -> f64 {
-    (b - a).length().max((c - b).length()).max((a - c).length())
 }
 
 /// Length of the longest edge of `t`, and of the cross product of two edges: twice its area.

@@ -336,35 +336,33 @@ impl ErrorEstimator<'_> {
                 rotation: rotations.at(point.position, point.near),
             })
         };
-        let parts = (0..surface.faces.len()).flat_map(|face| {
+        let mut parts = vec![];
+        for (face, vertices) in surface.faces.iter().enumerate() {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
             if !mesh.scatters(node) {
-                return vec![];
+                continue;
             }
             let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
             let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
             let scale = reflected.max(floor);
             let residual = self.residual(element) / scale;
             let solid = mesh.solid_share(node);
-            let (corners, area) = (corners(&surface.faces[face]), area(&surface.faces[face]));
-            // Where holes are is not known part by part.
-            let parts = match solid < 1.0 {
-                true => vec![self.octaves.whole(corners, solid * area)],
-                false => self.octaves.parts(corners, area),
+            let mut take = |part: Part| {
+                parts.push(SampledPart {
+                    face,
+                    group: mesh.group(node),
+                    part,
+                    error: part.area * residual.powi(2),
+                    flux: part.area * reflected,
+                });
             };
-            let sampled = |part: Part| SampledPart {
-                face,
-                group: mesh.group(node),
-                part,
-                error: part.area * residual.powi(2),
-                flux: part.area * reflected,
-            };
-            parts.into_iter().map(sampled).collect()
-        });
+            let area = (solid * area(vertices), solid < 1.0);
+            self.octaves.for_each_part(corners(vertices), area, &mut take);
+        }
         let mut samples = vec![];
         let mut strata = vec![];
-        for (k, stratum) in strata_of(parts.collect(), counts).into_iter().enumerate() {
+        for (k, stratum) in strata_of(parts, counts).into_iter().enumerate() {
             let sum = |of: fn(&SampledPart) -> f64| stratum.parts.iter().map(of).sum::<f64>();
             let (error, angular) = (sum(|part| part.error), sum(|part| part.part.angular));
             let density = |part: &SampledPart| {

@@ -75,10 +75,9 @@ pub(super) fn strata_of(parts: Vec<SampledPart>, counts: SampleCounts) -> Vec<St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::octaves::Octaves;
 
     fn face(group: u32, area: f64, flux: f64) -> SampledPart {
-        let part = Octaves::new([], 1.0).whole(Default::default(), area);
+        let part = Part { corners: Default::default(), area, angular: area };
         SampledPart { face: group as usize, group, part, error: 0.0, flux }
     }
 

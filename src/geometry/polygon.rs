@@ -156,6 +156,11 @@ pub(crate) fn merge_close_corners(polygon: &mut Vec<DVec3>, tolerance: f64) {
     }
 }
 
+/// Length of a triangle's longest edge.
+pub(crate) fn longest_edge([a, b, c]: [DVec3; 3]) -> f64 {
+    (b - a).length().max((c - b).length()).max((a - c).length())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

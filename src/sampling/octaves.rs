@@ -12,6 +12,7 @@
 use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
+use crate::geometry::polygon::longest_edge;
 
 /// Share of the triangles that may lie outside of the place that most are in, at either end of each
 /// axis.
@@ -55,17 +56,16 @@ impl Octaves {
         Octaves { centre: Aabb::around_most(&middles, TRIMMED_SHARE).filter(is_concentrated) }
     }
 
-    /// The parts of a triangle with this `area`: none is longer than it is far away.
-    pub fn parts(&self, triangle: [DVec3; 3], area: f64) -> Vec<Part> {
-        let mut parts = vec![];
-        self.split(&triangle, WHOLE, area, &mut parts);
-        parts
-    }
-
-    /// A triangle with this `area` in one part.
-    pub fn whole(&self, triangle: [DVec3; 3], area: f64) -> Part {
-        let reach = self.reach(triangle);
-        Part { corners: WHOLE, area, angular: area / (reach * reach) }
+    /// Has `take` the parts of a triangle with this `area`: none is longer than it is far away. One
+    /// with holes stays in one part, since it is not known part by part where they are.
+    pub fn for_each_part(
+        &self,
+        triangle: [DVec3; 3],
+        (area, has_holes): (f64, bool),
+        take: &mut dyn FnMut(Part),
+    ) {
+        let is_split = self.centre.is_some() && !has_holes;
+        self.split(&triangle, WHOLE, (area, is_split), take);
     }
 
     /// How far off the part is, and at least as far as the place in the middle is wide; 1 where all
@@ -81,22 +81,21 @@ impl Octaves {
         &self,
         triangle: &[DVec3; 3],
         corners: [[f64; 2]; 3],
-        area: f64,
-        parts: &mut Vec<Part>,
+        (area, is_split): (f64, bool),
+        take: &mut dyn FnMut(Part),
     ) {
         let [a, b, c] = triangle;
-        let [p, q, r] = corners.map(|[u, v]| a * (1.0 - u - v) + b * u + c * v);
-        let longest = (q - p).length().max((r - q).length()).max((p - r).length());
-        let reach = self.reach([p, q, r]);
-        if self.centre.is_none() || longest <= reach {
-            return parts.push(Part { corners, area, angular: area / (reach * reach) });
+        let places = corners.map(|[u, v]| a * (1.0 - u - v) + b * u + c * v);
+        let reach = self.reach(places);
+        if !is_split || longest_edge(places) <= reach {
+            return take(Part { corners, area, angular: area / (reach * reach) });
         }
         let middle =
             |k: usize, l: usize| [0, 1].map(|axis| (corners[k][axis] + corners[l][axis]) / 2.0);
         let (p, q, r) = (middle(0, 1), middle(1, 2), middle(2, 0));
         let [a, b, c] = corners;
         for part in [[a, p, r], [p, b, q], [r, q, c], [p, q, r]] {
-            self.split(triangle, part, area / 4.0, parts);
+            self.split(triangle, part, (area / 4.0, is_split), take);
         }
     }
 }
@@ -126,10 +125,23 @@ mod tests {
         DVec3::new(-1000.0, 1000.0, 0.0),
     ];
 
+    fn parts_of(octaves: &Octaves, has_holes: bool) -> Vec<Part> {
+        let mut parts = vec![];
+        octaves.for_each_part(GROUND, (2e6, has_holes), &mut |part| parts.push(part));
+        parts
+    }
+
+    #[test]
+    fn one_with_holes_stays_whole() {
+        let octaves = Octaves::new(middles(), 2000.0);
+        assert!(parts_of(&octaves, false).len() > 1);
+        assert_eq!(parts_of(&octaves, true).len(), 1);
+    }
+
     #[test]
     fn every_octave_has_its_points_and_parts_add_up() {
         let octaves = Octaves::new(middles(), 2000.0);
-        let parts = octaves.parts(GROUND, 2e6);
+        let parts = parts_of(&octaves, false);
         assert!((parts.iter().map(|part| part.area).sum::<f64>() / 2e6 - 1.0).abs() < 1e-12);
         let in_ring = |from: f64, to: f64| -> f64 {
             let centre_of = |part: &Part| part.corners.map(DVec2::from).iter().sum::<DVec2>() / 3.0;
@@ -156,7 +168,7 @@ mod tests {
             // Of no size: no place at all.
             Octaves::new([DVec3::ONE; 30], 2000.0),
         ] {
-            let parts = octaves.parts(GROUND, 2e6);
+            let parts = parts_of(&octaves, false);
             assert_eq!(parts.len(), 1);
             assert_eq!((parts[0].area, parts[0].angular), (2e6, 2e6));
             assert_eq!(parts[0].place([0.25, 0.5]), [0.25, 0.5]);

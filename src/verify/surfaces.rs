@@ -77,16 +77,12 @@ pub(crate) fn octaves_of(scene: &Scene) -> Octaves {
 
 /// The parts of a group's `triangles` that points are spread over.
 fn cells(scene: &Scene, triangles: &[usize], octaves: &Octaves) -> Vec<Cell> {
-    let parts_of = |&t: &usize| {
-        let (corners, area) = (scene.corners(t), scene.solid_area(t));
-        // Where holes are is not known part by part.
-        let parts = match area == scene.area(t) {
-            true => octaves.parts(corners, area),
-            false => vec![octaves.whole(corners, area)],
-        };
-        parts.into_iter().map(move |part| (t, part))
-    };
-    let parts: Vec<(usize, Part)> = triangles.iter().flat_map(parts_of).collect();
+    let mut parts: Vec<(usize, Part)> = vec![];
+    for &t in triangles {
+        let (area, solid) = (scene.area(t), scene.solid_area(t));
+        let mut take = |part| parts.push((t, part));
+        octaves.for_each_part(scene.corners(t), (solid, solid != area), &mut take);
+    }
     let area: f64 = parts.iter().map(|(_, part)| part.area).sum();
     let angular: f64 = parts.iter().map(|(_, part)| part.angular).sum();
     let mut up_to = 0.0;
