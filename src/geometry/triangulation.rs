@@ -1,10 +1,11 @@
 //! Polygons in space, convex or not, cut into triangles.
 //!
-//! A fan from the first corner covers every convex outline and some others. Where it does not, ears
-//! are clipped off one by one in the polygon's own plane (D. Eberly, "Triangulation by Ear
-//! Clipping", 2002; the `earcut` crate). Either way the areas of the triangles must sum to that of
-//! the outline (Newell's formula); an outline that crosses itself fails this, and what can be cut
-//! of it is another function's answer.
+//! A convex outline is halved again and again, so that a disc of a thousand corners has no thousand
+//! slivers in one corner, and a few triangles cover most of it. A fan from the first corner covers
+//! some outlines that are not convex. Where neither does, ears are clipped off one by one in the
+//! polygon's own plane (D. Eberly, "Triangulation by Ear Clipping", 2002; the `earcut` crate).
+//! Either way the areas of the triangles must sum to that of the outline (Newell's formula); an
+//! outline that crosses itself fails this, and what can be cut of it is another function's answer.
 
 use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
@@ -19,7 +20,7 @@ const FLAT_HEIGHT: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
 ///
-/// A fan from the first corner where that covers it, else ear clipping. A polygon with fewer than
+/// By halves where these cover it, else a fan from the first corner, else ear clipping. A polygon with fewer than
 /// three corners, or all on a line, gives one triangle without area. `None` when the areas of the
 /// triangles do not sum to that of the outline, as where it crosses itself.
 pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
@@ -45,8 +46,11 @@ pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
         return None;
     }
     let up = newell / doubled_area;
-    if fan_covers(&points, up, flat_height) {
-        return Some((1..n - 1).map(|i| [0, i, i + 1]).collect());
+    let covers = |triangles: &[[usize; 3]]| {
+        triangles.iter().all(|t| turns(t.map(|i| points[i]), up, flat_height))
+    };
+    if let Some(triangles) = [halves(n), fan(n)].into_iter().find(|cut| covers(cut)) {
+        return Some(triangles);
     }
     let (triangles, covered) = ear_clip(&points, up, flat_height)?;
     ((covered - doubled_area).abs() <= rounding).then_some(triangles)
@@ -62,7 +66,7 @@ pub(crate) fn triangulate_anyhow(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let ears = newell.try_normalize().and_then(|up| ear_clip(&points, up, FLAT_HEIGHT));
     match ears {
         Some((triangles, covered)) if covered > 0.0 => triangles,
-        _ => (2..corners.len()).map(|i| [0, i - 1, i]).collect(),
+        _ => fan(corners.len()),
     }
 }
 
@@ -73,13 +77,32 @@ fn on_a_line(points: &[DVec3], flat_height: f64) -> bool {
     points.iter().all(|p| far.cross(*p).length() <= flat_height)
 }
 
-/// Whether each triangle of the fan from the first corner, which is the origin, turns about `up`
-/// and has area.
-fn fan_covers(points: &[DVec3], up: DVec3, flat_height: f64) -> bool {
-    points[1..].windows(2).all(|edge| {
-        let (a, b) = (edge[0], edge[1]);
-        a.cross(b).dot(up) > flat_height * a.length().max(b.length()).max((b - a).length())
-    })
+/// Triangles between the first corner, the last and the middle one of `n`, and of what is left on
+/// both sides: a corner is in at most two of each size.
+fn halves(n: usize) -> Vec<[usize; 3]> {
+    let mut triangles = Vec::with_capacity(n.saturating_sub(2));
+    let mut left = vec![(0, n - 1)];
+    while let Some((first, last)) = left.pop() {
+        if last - first < 2 {
+            continue;
+        }
+        let middle = (first + last).div_ceil(2);
+        triangles.push([first, middle, last]);
+        left.extend([(first, middle), (middle, last)]);
+    }
+    triangles.sort_unstable();
+    triangles
+}
+
+/// Triangles between the first of `n` corners and each edge that it is not on.
+fn fan(n: usize) -> Vec<[usize; 3]> {
+    (2..n).map(|i| [0, i - 1, i]).collect()
+}
+
+/// Whether a triangle turns about `up` and is higher than `flat_height`.
+fn turns([a, b, c]: [DVec3; 3], up: DVec3, flat_height: f64) -> bool {
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    (b - a).cross(c - a).dot(up) > flat_height * longest
 }
 
 /// Ear clipping in the plane across `up`: triangles, and twice the area that they cover there.
@@ -105,7 +128,7 @@ fn ear_clip(points: &[DVec3], up: DVec3, flat_height: f64) -> Option<(Vec<[usize
             triangle.swap(1, 2);
         }
         // Ears can be flat where corners lie within an edge.
-        if turn.abs() > flat_height * (b - a).length().max((c - b).length()).max((a - c).length()) {
+        if turns(triangle.map(|i| DVec3::from_array(points[i])), up, flat_height) {
             triangles.push(triangle);
         }
     }
@@ -178,15 +201,32 @@ mod tests {
     }
 
     #[test]
-    fn convex_outline_becomes_a_fan() {
-        let corner = |i: usize| DVec3::from_array([(i as f64).cos(), (i as f64).sin(), 0.0]);
-        let corners: Vec<DVec3> = (0..6).map(corner).collect();
-        let fan = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
-        assert_eq!(triangulate(&corners), Some(fan));
-        // So is a quad that is a little bent.
+    fn convex_outline_is_halved() {
+        let round = |n: usize| {
+            let angle = |i: usize| 2.0 * std::f64::consts::PI * i as f64 / n as f64;
+            (0..n).map(|i| [angle(i).cos(), angle(i).sin()]).collect::<Vec<_>>()
+        };
+        for n in [3, 4, 5, 6, 7, 12] {
+            covers(&round(n));
+        }
+        let corners: Vec<DVec3> = round(1000).iter().map(|p| DVec3::new(p[0], 0.0, p[1])).collect();
+        let triangles = triangulate(&corners).unwrap();
+        assert_eq!(triangles.len(), 998);
+        // 2 × 500, 2 × 250, ... until an edge: at most two of each of log₂ 1000 < 10 sizes.
+        let at = |corner: usize| triangles.iter().filter(|t| t.contains(&corner)).count();
+        assert!((0..1000).all(|corner| at(corner) <= 20));
+        // A quad that is a little bent has the diagonal of its first corner.
         let mut bent = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
         bent[2].z = 0.1;
         assert_eq!(triangulate(&bent), Some(vec![[0, 1, 2], [0, 2, 3]]));
+    }
+
+    #[test]
+    fn outline_seen_from_its_first_corner_becomes_a_fan() {
+        // A notch before the last corner: the half on its two edges turns the other way.
+        let notched = [[0., 0.], [2., 0.], [2., 2.], [0.5, 0.6], [0., 2.]];
+        let corners = notched.map(|[x, y]| DVec3::new(x, y, 0.0));
+        assert_eq!(triangulate(&corners), Some(fan(5)));
     }
 
     #[test]
