@@ -86,6 +86,23 @@ fn triangles_wound_at_random_are_turned_to_the_light() {
 }
 
 #[test]
+fn the_end_of_a_tunnel_faces_as_its_walls_do() {
+    // Up to the lamp at 40 there is light; the end at 100 has some after more bounces than a walk's.
+    let tunnel = walls([0.0; 3], [1.0, 1.0, 100.0]);
+    let parts = scene(&[(&tunnel, 0.99, 0.0), (&[lamp(-39.0)], 0.0, 1.0)]);
+    // The walls are one group, and so one sheet.
+    let triangles = parts.triangles().iter().map(|t| Triangle { group: t.group / 6, ..*t });
+    let (groups, materials) = (parts.groups().to_vec(), parts.materials().to_vec());
+    let lit = Scene::new(parts.positions().to_vec(), triangles.collect(), groups, materials);
+    let lit = lit.unwrap();
+    for seed in 0..5 {
+        let found = flipped(&lit, seed).0.resolve_sides();
+        let outwards = |&t: &usize| found.normal(t).dot(lit.normal(t)) < 0.0;
+        assert_eq!((0..12).filter(outwards).count(), 0, "{seed}");
+    }
+}
+
+#[test]
 fn scenes_wound_right_stay_as_they_are() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     let given = load_obj(path).unwrap();
