@@ -70,6 +70,10 @@ const MAX_SAMPLES: u32 = 256;
 /// the image. Chosen by hand.
 const VERTICAL_VIEW: f64 = 0.9999;
 
+/// Surfaces met at distances that differ by no more than this share lie in one place: rounding is
+/// far below it but for rays that graze.
+const SAME_PLACE: f64 = 1e-9;
+
 impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
     /// `samples` primary rays on an n-rooks grid: no two in one row or column.
@@ -270,12 +274,18 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// What the ray along `direction` sees first; nothing if that is a back.
+    /// What the ray along `direction` sees first; nothing if that is a back, and no front lies in
+    /// one place with it.
     fn hit(&self, direction: DVec3) -> Option<Seen> {
-        match self.scene.closest_hit(self.eye, direction, 0.0, None) {
-            Some(hit) => hit.front.then_some(Seen::Front(hit)),
-            None => Some(Seen::Sky(direction.normalize())),
+        let Some(first) = self.scene.closest_hit(self.eye, direction, 0.0, None) else {
+            return Some(Seen::Sky(direction.normalize()));
+        };
+        if first.front {
+            return Some(Seen::Front(first));
         }
+        let is_front = |hit: &Hit| hit.front;
+        let front = self.scene.closest_hit_of(self.eye, direction, 0.0, None, is_front)?;
+        (front.distance <= first.distance * (1.0 + SAME_PLACE)).then_some(Seen::Front(front))
     }
 
     /// Values at the surface's vertices, interpolated linearly to a hit.

@@ -65,14 +65,14 @@ impl Obstacle {
                 let count = settings.map_or(0, |s| s.refinement.max_elements);
                 format!("allow more than {count} elements, which takes memory and time")
             }
-            Obstacle::Cancelled => "let it go on".into(),
-            Obstacle::Time => "give it more time, or ask for less".into(),
+            Obstacle::Cancelled => "start it again and give it time".into(),
+            Obstacle::Time => "give it more time, or allow a larger error".into(),
             Obstacle::Settings => "leave settings to the bake".into(),
-            Obstacle::Edges => "ask for less, or look at the worst groups".into(),
+            Obstacle::Edges => "allow a larger error, or look at the worst groups".into(),
             Obstacle::Gaps => "look at surfaces that nearly touch".into(),
             Obstacle::Rays => "look for small bright sources that are no emitters".into(),
             Obstacle::Bounces => "lower reflectances that are near one".into(),
-            Obstacle::Sources => "ask for less, or look at the worst groups".into(),
+            Obstacle::Sources => "smaller errors have finer elements, which may resolve it".into(),
         }
     }
 }

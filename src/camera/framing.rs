@@ -154,12 +154,8 @@ impl Framing<'_> {
     /// The view along `forward`, unit length, from as near as all of `points` are in the picture.
     fn fitted(&self, points: &[DVec3], forward: DVec3) -> Camera {
         let centre = self.scorer.focus.centre();
-        let frame = Camera {
-            eye: centre,
-            target: centre + forward,
-            up: self.up,
-            vertical_fov: OUTSIDE_FOV,
-        };
+        let frame =
+            Camera { eye: DVec3::ZERO, target: forward, up: self.up, vertical_fov: OUTSIDE_FOV };
         let [right, up, _] = frame.frame();
         let half = (OUTSIDE_FOV.to_radians() / 2.0).tan() * (1.0 - 2.0 * MARGIN);
         // A plane of the frustum through the outermost point on its side, for each of two sides:

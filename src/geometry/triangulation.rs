@@ -20,9 +20,9 @@ const FLAT_HEIGHT: f64 = 8.0 * f64::EPSILON;
 
 /// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
 ///
-/// By halves where these cover it, else a fan from the first corner, else ear clipping. A polygon with fewer than
-/// three corners, or all on a line, gives one triangle without area. `None` when the areas of the
-/// triangles do not sum to that of the outline, as where it crosses itself.
+/// By halves where these cover it, else a fan from the first corner, else ear clipping. A polygon
+/// with fewer than three corners, or all on a line, gives one triangle without area. `None` when
+/// the areas of the triangles do not sum to that of the outline, as where it crosses itself.
 pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     let (n, &origin) = (corners.len(), corners.first()?);
     if n == 3 {

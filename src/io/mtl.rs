@@ -220,7 +220,11 @@ impl Library {
         let shown = surfaces != SpecularSurfaces::Ignore;
         let is_opaque = |m: &MtlMaterial| m.transparent && !(shown && is_specular(m));
         let lists = [
-            (WarningKind::Transparency, names(&is_opaque), "not modelled: they are opaque"),
+            (
+                WarningKind::Transparency,
+                names(&is_opaque),
+                "opaque: what passes light has `illum` 4, 6, 7 or 9",
+            ),
             (WarningKind::Specular, names(&is_specular), surfaces.treatment()),
             (
                 WarningKind::RedefinedMaterial,

@@ -63,8 +63,8 @@ impl Atlas {
         let (layout, unusable) = match given {
             Some(Ok(layout)) => (layout, None),
             Some(Err(unusable)) if coordinates == Coordinates::Given => {
-                let remedy = "give each triangle a place of its own in the texture, or have \
-                              surfaces laid out anew";
+                let remedy = "give each triangle a place of its own in the texture, or lay \
+                              surfaces out anew (`Coordinates::Unwrapped`; `--coordinates new`)";
                 let found = unusable.to_string();
                 return Err(Error::new(ErrorKind::Scene, "texture coordinates", found, remedy));
             }

@@ -137,8 +137,11 @@ impl fmt::Display for Warning {
             (None, _) => {}
         }
         write!(f, ": {}", self.done)?;
-        if !self.names.is_empty() {
-            write!(f, " ({})", quoted(&self.names))?;
+        // Where as many were kept as are, nobody knows how many there were.
+        let shown = &self.names[..self.names.len().min(Warning::MAX_NAMES - 1)];
+        let others = if shown.len() < self.names.len() { " and others" } else { "" };
+        if !shown.is_empty() {
+            write!(f, " ({}{others})", quoted(shown))?;
         }
         Ok(())
     }
@@ -240,5 +243,27 @@ impl WarningKind {
             AmbientAsRadiance => "write `Ke` for emitted radiance",
             _ => return None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_were_not_kept_are_not_counted() {
+        let line = |count: usize| {
+            let names = (0..count).map(|k| format!("m{k}"));
+            Warning::new(WarningKind::UnknownMaterial, count, "grey").naming(names).to_string()
+        };
+        assert_eq!(line(2), "2 unknown materials: grey ('m0', 'm1')");
+        let eight = "('m0', 'm1', 'm2', 'm3', 'm4', 'm5', 'm6', 'm7";
+        assert_eq!(line(8), format!("8 unknown materials: grey {eight}')"));
+        for count in [9, 30] {
+            assert_eq!(
+                line(count),
+                format!("{count} unknown materials: grey {eight}' and others)")
+            );
+        }
     }
 }

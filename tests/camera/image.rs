@@ -50,6 +50,29 @@ fn image_shows_fronts_and_black_backs() {
     }
 }
 
+/// A sheet that glows on both sides, each cut into triangles and elements its own way, as those of
+/// a light map are: no ray takes the back of one for what it sees.
+#[test]
+fn image_shows_the_front_of_a_sheet_with_two_sides() {
+    let front = [[-1., -1., 0.3], [1., -1., 0.1], [1., 1., 0.4], [-1., 1., 0.6]];
+    let back = [front[1], front[0], front[3], front[2]];
+    let mesh = Mesh::new(quads(&[(front, Material::grey("a", 0.0))]), 0.13).unwrap();
+    let other = Mesh::new(quads(&[(back, Material::grey("b", 0.0))]), 0.31).unwrap();
+    let mut surface = VertexMesh::new(&other, &vec![Rgb::ONE; other.element_count()]);
+    let more = VertexMesh::new(&mesh, &vec![Rgb::ONE; mesh.element_count()]);
+    let first = surface.positions.len() as u32;
+    surface.faces.extend(more.faces.iter().map(|face| face.map(|v| first + v)));
+    surface.positions.extend(more.positions);
+    surface.radiosity.extend(more.radiosity);
+    for z in [-2.0, 3.0] {
+        let eye = DVec3::new(0.1, 0.2, z);
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, vertical_fov: 20.0 };
+        let image = camera.image(&surface, 64, 64, 1).unwrap();
+        let dark = image.pixels.iter().filter(|pixel| **pixel == Rgb::ZERO).count();
+        assert_eq!(dark, 0, "from {z}");
+    }
+}
+
 /// What lies on the left of an image with +y up is above with −x up.
 #[test]
 fn image_turns_with_its_up_direction() {

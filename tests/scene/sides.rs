@@ -87,7 +87,7 @@ fn triangles_wound_at_random_are_turned_to_the_light() {
 
 #[test]
 fn the_end_of_a_tunnel_faces_as_its_walls_do() {
-    // Up to the lamp at 40 there is light; the end at 100 has some after more bounces than a walk's.
+    // Up to the lamp at 40 there is light; at the end, at 100, after more bounces than walks have.
     let tunnel = walls([0.0; 3], [1.0, 1.0, 100.0]);
     let parts = scene(&[(&tunnel, 0.99, 0.0), (&[lamp(-39.0)], 0.0, 1.0)]);
     // The walls are one group, and so one sheet.
@@ -211,6 +211,10 @@ fn lamps_shine_where_their_light_gets_further() {
     let found = scene(&[(&rest, 0.5, 0.0), (&[window], 0.0, 1.0)]).resolve_sides();
     assert_eq!(done(&found), [0, 2, 0]);
     assert_eq!(found.normal(10), DVec3::X);
+    // A body that shines all around stays, alone in the open too, where no ray meets anything.
+    let body = block([0.2; 3], [0.8; 3]);
+    let found = scene(&[(&body, 0.5, 1.0)]).resolve_sides();
+    assert_eq!(done(&found), [0; 3]);
     // One that lights the ceiling, and reflects below, stays; what it has below emits nothing.
     let uplight = facing_up([0.3, 0.7], [0.3, 0.7], 0.9);
     let found = scene(&[(&room(), 0.5, 0.0), (&[uplight], 0.4, 1.0)]).resolve_sides();

@@ -184,7 +184,7 @@ impl Report {
         let remedy = match baked.outcome {
             Outcome::Missed(Obstacle::Time) => {
                 let seconds = self.limit.unwrap_or_default().as_secs_f64();
-                format!("; give it more than --time {seconds}, or ask for less")
+                format!("; give it more than --time {seconds}, or allow a larger error")
             }
             Outcome::Missed(Obstacle::Elements) => {
                 let most = baked.settings.gather.as_ref().map(|g| g.refinement.max_elements);

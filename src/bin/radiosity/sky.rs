@@ -102,7 +102,16 @@ impl SkyOptions {
     /// [`ErrorKind::Setting`] for numbers that mean no sky, a time that is none, or a sun below the
     /// horizon; those of reading a picture.
     pub fn over(&self, scene: Scene) -> Result<Scene, Error> {
-        if self.is_default() || (matches!(self.kind, Kind::Uniform(_)) && self.sun.is_none()) {
+        let is_even = matches!(self.kind, Kind::Default | Kind::Uniform(_));
+        if is_even && self.zenith.is_some() {
+            let found = "a radiance for a sky that differs by direction, and no such --sky".into();
+            return Err(bad(
+                "zenith",
+                found,
+                "add --sky overcast or another, or write --sky r,g,b",
+            ));
+        }
+        if is_even && self.sun.is_none() {
             return Ok(scene);
         }
         let up = self.up.unwrap_or_else(|| up_axis(&scene));

@@ -26,7 +26,8 @@ fn light_of(boxes: &[([f64; 3], [f64; 3], bool)], up: DVec3) -> GatheredMesh {
     let names = (0..boxes.len()).map(|k| k.to_string()).collect();
     let materials = vec![Material::grey("grey", 0.5)];
     let scene = Scene::new(positions, triangles, names, materials).unwrap();
-    let mesh = Mesh::new(scene, 10.0).unwrap();
+    let size = scene.bounds().diagonal().max(10.0);
+    let mesh = Mesh::new(scene, size).unwrap();
     GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]).unwrap()
 }
 
@@ -38,6 +39,14 @@ fn what_is_lit_is_seen_in_a_dark_tunnel() {
     light.surface.radiosity = light.surface.positions.iter().map(|p| Rgb::splat(lit(p))).collect();
     let camera = Camera::framing(&light, 1.0);
     assert!(camera.eye.x > 90.0, "{camera:?}");
+}
+
+/// A face as far away as 1e18 leaves no room for unit lengths beside coordinates.
+#[test]
+fn what_is_far_away_breaks_no_view() {
+    let light = light_of(&[([0.0; 3], [1.0; 3], false), ([1e18; 3], [2e18; 3], false)], DVec3::Z);
+    let camera = Camera::framing(&light, 1.0);
+    assert!(camera.check(4, 4, 1).is_ok(), "{camera:?}");
 }
 
 fn bounds(light: &GatheredMesh) -> Aabb {

@@ -41,7 +41,7 @@ impl ObjFile<'_> {
                 let statement = TextureStatement::parse(statement);
                 let name = statement.name.as_str();
                 if statement.more {
-                    let done = "other options count";
+                    let done = "`-s`, `-o` and `-clamp` count alone";
                     self.repairs.note_at(WarningKind::TextureOptions, place, name, done)?;
                 }
                 let texture = match images.get(name) {
@@ -211,7 +211,12 @@ fn mask(
     let TextureStatement { name, scale, offset, clamped, more } =
         TextureStatement::parse(statement);
     if more {
-        repairs.note_at(WarningKind::TextureOptions, &place, &name, "other options count")?;
+        repairs.note_at(
+            WarningKind::TextureOptions,
+            &place,
+            &name,
+            "`-s`, `-o` and `-clamp` count alone",
+        )?;
     }
     let colours = mtl.textures[0].as_deref().map(|colours| TextureStatement::parse(colours).name);
     match images.mask(&name, colours.as_deref()) {

@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use super::sheets::{Sheets, SideIndex};
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
-use crate::scene::{Scene, Sides};
+use crate::scene::{Rgb, Scene, Sides};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -22,8 +22,12 @@ const MAX_BOUNCES: usize = 16;
 
 /// A lamp shines from its back if rays from there get so many times as far as from its front.
 /// Lamps right below a ceiling and bulbs wound inside out are far above; one that is made to light
-/// a ceiling, a tenth of the room below it, is not. Chosen by hand.
+/// a ceiling, a tenth of the room below it, is not; rays that meet a lamp light nothing, as those
+/// within a body that shines all around. Chosen by hand.
 const FURTHER: f64 = 16.0;
+
+/// Below this cosine rounding decides whether a lamp in a place's own plane is seen.
+const GRAZES: f64 = 1e-10;
 
 /// Surfaces lie in one place up to this share of the square root of a triangle's area, as for
 /// covered backs, where they face alike by this cosine.
@@ -105,7 +109,8 @@ impl<'a> Walks<'a> {
         let free = sheets.ask(&sides, |side, rng| {
             let start = self.random_start(side, rng)?;
             let direction = self.random_direction(side, rng);
-            self.next(start, side, direction).map(|(at, _)| start.distance(at))
+            let (at, met) = self.next(start, side, direction)?;
+            (self.scene.exitance(met / 2) == Rgb::ZERO).then(|| start.distance(at))
         });
         let shines_from_back = |&t: &usize| {
             let [front, back] = [2 * t, 2 * t + 1].map(|side| free.of_sheet(side).mean());
@@ -246,7 +251,7 @@ impl<'a> Walks<'a> {
         let cosine = self.normal(side).dot(direction);
         let facing = -self.normal(2 * lamp + usize::from(self.shining_backs[&lamp])).dot(direction);
         // Written so that NaN, of a lamp that is met, sees nothing.
-        if !(cosine > 0.0 && facing > 0.0) {
+        if !(cosine > GRAZES && facing > GRAZES) {
             return None;
         }
         let between = self.contact..distance - self.contact;
