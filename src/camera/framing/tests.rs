@@ -26,7 +26,7 @@ fn light_of(boxes: &[([f64; 3], [f64; 3], bool)], up: DVec3) -> GatheredMesh {
     let names = (0..boxes.len()).map(|k| k.to_string()).collect();
     let materials = vec![Material::grey("grey", 0.5)];
     let scene = Scene::new(positions, triangles, names, materials).unwrap();
-    let size = scene.bounds().diagonal().max(10.0);
+    let size = (scene.bounds().diagonal() / 50.0).max(10.0);
     let mesh = Mesh::new(scene, size).unwrap();
     GatheredMesh::from_elements(&mesh, &vec![Rgb::ONE; mesh.element_count()]).unwrap()
 }
