@@ -40,7 +40,8 @@ const MAX_EMITTER_ELEMENTS: usize = 1024;
 /// by hand; no measurement kept.
 const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
 
-/// Viewpoints of one patch that are rejected at most; the next one is taken as it is.
+/// Viewpoints of one patch that are rejected at most. If the next one is no better, the patch is
+/// split, or shoots from there where it is as small as patches may be.
 const MAX_REJECTED_VIEWPOINTS: u32 = 4;
 
 /// An element is lit from this share of its patch's mean radiosity on.
@@ -270,11 +271,17 @@ impl<'m> PatchCut<'m> {
         patch.distances = InverseDistanceMoments::of_row(row, eye, &self.centroids);
         let is_inside = Row::form_factor(row.backface) > buried::VIEWPOINT;
         let is_one_element = indices(&patch.elements).nth(1).is_none();
-        if is_inside && patch.rejected_viewpoints < MAX_REJECTED_VIEWPOINTS && !is_one_element {
-            patch.rejected_viewpoints += 1;
-            patch.viewpoint = None;
-            self.occluded_viewpoints.insert(shot.patch);
-            return false;
+        if is_inside && !is_one_element {
+            if patch.rejected_viewpoints < MAX_REJECTED_VIEWPOINTS {
+                patch.rejected_viewpoints += 1;
+                patch.viewpoint = None;
+                self.occluded_viewpoints.insert(shot.patch);
+                return false;
+            }
+            if !self.replace_by_parts(shot.index).is_empty() {
+                self.occluded_viewpoints.insert(shot.patch);
+                return false;
+            }
         }
         !self.split(shot.index, flux)
     }
@@ -290,24 +297,31 @@ impl<'m> PatchCut<'m> {
         let mut unchecked = vec![k];
         let mut has_split = false;
         while let Some(k) = unchecked.pop() {
-            let ShootingPatch { source, distances, .. } = self.patches[k];
-            let parts = self.parts(source);
-            if parts.is_empty() || self.error(&self.patches[k], flux) < self.tolerance {
-                continue;
-            }
-            has_split = true;
-            unchecked.push(k);
-            for (n, part) in parts.into_iter().enumerate() {
-                let part = self.patch(part, distances);
-                if n == 0 {
-                    self.patches[k] = part;
-                } else {
-                    unchecked.push(self.patches.len());
-                    self.patches.push(part);
-                }
+            if self.error(&self.patches[k], flux) >= self.tolerance {
+                let parts = self.replace_by_parts(k);
+                has_split |= !parts.is_empty();
+                unchecked.extend(parts);
             }
         }
         has_split
+    }
+
+    /// Replaces patch `k` by its parts, the first of which takes its index: returns theirs. None
+    /// where it is as small as patches may be.
+    fn replace_by_parts(&mut self, k: usize) -> Vec<usize> {
+        let ShootingPatch { source, distances, .. } = self.patches[k];
+        let mut places = vec![];
+        for part in self.parts(source) {
+            let part = self.patch(part, distances);
+            if places.is_empty() {
+                self.patches[k] = part;
+                places.push(k);
+            } else {
+                places.push(self.patches.len());
+                self.patches.push(part);
+            }
+        }
+        places
     }
 
     /// Error of a patch, as the tolerance has it.

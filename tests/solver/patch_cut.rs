@@ -131,9 +131,16 @@ fn unevenly_lit_wall_shoots_in_parts() {
     assert!(rows(half) > 1);
 }
 
-/// A large patch is seen from one place. Where something stands on that place, another is taken.
+/// A large patch is seen from one place. Where something stands on that place, another is taken;
+/// where something stands on many of its places, it is split.
 #[test]
-fn viewpoint_under_a_block_is_avoided() {
+fn viewpoints_under_blocks_are_avoided() {
+    no_light_is_lost_under_blocks(1.0, 2);
+    no_light_is_lost_under_blocks(0.25, 12);
+}
+
+/// With elements of this `size`, and blocks on so many of them in the middle of a floor.
+fn no_light_is_lost_under_blocks(size: f64, blocks: usize) {
     let mut walls: Vec<_> = (0..3)
         .flat_map(|k| {
             let axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -145,17 +152,17 @@ fn viewpoint_under_a_block_is_avoided() {
     // The last wall is the ceiling: all of it shines.
     walls[5].1 = lamp(LAMP);
     let empty = quads(&walls);
-    // Blocks without a bottom on the two elements nearest to the middle of the floor, the fifth
-    // wall: each hides its element's centroid and a tenth of its area.
-    let mesh = Mesh::new(empty.clone(), 1.0).unwrap();
+    // Blocks without a bottom on the elements nearest to the middle of the floor, the fifth wall:
+    // each hides its element's centroid and a tenth of its area.
+    let mesh = Mesh::new(empty.clone(), size).unwrap();
     let floor = [8, 9].into_iter().flat_map(|t| mesh.elements_of(mesh.root(t)));
     let mut middles: Vec<DVec3> = floor.map(|e| mesh.centroid(mesh.element(e))).collect();
     let off = |p: &DVec3| p.distance(DVec3::new(1.0, 1.0, 0.0));
     middles.sort_by(|p, q| off(p).total_cmp(&off(q)));
-    for p in &middles[..2] {
+    for p in &middles[..blocks] {
         let corner = |k: usize, z: f64| {
-            let (dx, dy) = [(-0.08, -0.08), (0.08, -0.08), (0.08, 0.08), (-0.08, 0.08)][k % 4];
-            [p.x + dx, p.y + dy, z]
+            let (dx, dy) = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)][k % 4];
+            [p.x + 0.08 * size * dx, p.y + 0.08 * size * dy, z]
         };
         for k in 0..4 {
             let side = [corner(k, 0.0), corner(k + 1, 0.0), corner(k + 1, 0.2), corner(k, 0.2)];
@@ -164,7 +171,7 @@ fn viewpoint_under_a_block_is_avoided() {
         walls.push(([0, 1, 2, 3].map(|k| corner(k, 0.2)), Material::grey("block", 0.6)));
     }
     for scene in [empty, quads(&walls)] {
-        let mesh = Mesh::new(scene, 1.0).unwrap();
+        let mesh = Mesh::new(scene, size).unwrap();
         let s = solve(&mesh, Solver { patch_tolerance: 5.0, ..Default::default() });
         let back = s.ledger.backface_loss.x / s.ledger.emitted.x;
         println!("{back} of the light met backs, {} rows", s.rows_made);
