@@ -502,12 +502,6 @@ mod tests {
         assert!(one([[0.; 3], [1e200, 0., 0.], [0., 1e200, 0.]], m()).is_err());
         let dark = Material { exitance: Rgb::new(0., -1., 0.), ..m() };
         assert!(one(RIGHT, dark).is_err());
-        for (e, is_light) in
-            [(0.0, true), (1e-32, true), (1e32, true), (1e-33, false), (1e33, false)]
-        {
-            let lamp = Material { exitance: Rgb::splat(e), ..m() };
-            assert_eq!(one(RIGHT, lamp).is_ok(), is_light, "{e}");
-        }
         for (corners, group, material) in [([0, 1, 3], 0, 0), ([0, 1, 2], 1, 0), ([0, 1, 2], 0, 1)]
         {
             let t = Triangle { corners, group, material, smoothing: None };

@@ -1,6 +1,6 @@
 //! What is asked of a bake: an error, or a time. All settings follow from it.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -71,8 +71,8 @@ impl BakeTarget {
     /// is returned.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] for an error outside (0, 1) or a time of 0; [`ErrorKind::Device`] and
-    /// [`ErrorKind::Memory`] when the device cannot even start. One that fails later is in
+    /// [`ErrorKind::Setting`] for an error outside (0, 1) or a time of 0; [`ErrorKind::Scene`] for
+    /// light whose squares numbers do not hold; [`ErrorKind::Device`] and [`ErrorKind::Memory`] when the device cannot even start. One that fails later is in
     /// [`BakeResult::device_failure`].
     pub fn bake(
         self,
@@ -105,6 +105,7 @@ impl BakeTarget {
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
         let scene = &lit_sides::resolved(scene.into());
+        check_light(scene)?;
         match self {
             BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => {
                 let each_group = matches!(self, BakeTarget::ErrorEach(_));
@@ -125,6 +126,23 @@ impl BakeTarget {
 fn not_a_time(seconds: f64) -> Error {
     let place = format!("{seconds} seconds");
     Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
+}
+
+/// Light that a bake knows the error of: squares of it, and sums of these, are within what numbers
+/// hold at either end.
+const LIGHT: RangeInclusive<f64> = 1e-32..=1e32;
+
+/// Checks the brightest light of `scene` in any channel, if there is some.
+fn check_light(scene: &Scene) -> Result<(), Error> {
+    let surfaces = (0..scene.triangles().len()).map(|t| scene.exitance(t).max_element());
+    let sun = scene.sky().sun().map_or(0.0, |sun| sun.irradiance.max_element());
+    let brightest = surfaces.fold(scene.sky().brightest().max(sun), f64::max);
+    if brightest == 0.0 || LIGHT.contains(&brightest) {
+        return Ok(());
+    }
+    let found = format!("the brightest is {brightest:e}");
+    let remedy = "give all light in a unit in which it is between 1e-32 and 1e32";
+    Err(Error::new(ErrorKind::Scene, "light", found, remedy))
 }
 
 fn check_error(error: f64) -> Result<(), Error> {

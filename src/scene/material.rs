@@ -1,6 +1,6 @@
 //! What the surfaces of a scene are made of.
 
-use super::rgb::{LIGHT_REMEDY, Rgb, is_light};
+use super::rgb::Rgb;
 use super::sides::Sides;
 use super::specular::Specular;
 use crate::error::{Error, ErrorKind, quoted};
@@ -71,8 +71,8 @@ impl Material {
         }
     }
 
-    /// Reflectance and transmittance in [0, 1) together, exitance 0 or between 1e-32 and 1e32, and
-    /// no more light returned than there is.
+    /// Reflectance and transmittance in [0, 1) together, exitance finite and not negative, no more
+    /// light than there is.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let place = || format!("material {}", quoted(&[&self.name]));
         for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {
@@ -98,12 +98,12 @@ impl Material {
             }
         }
         for (channel, e) in ["r", "g", "b"].iter().zip(self.exitance.to_array()) {
-            if !is_light(Rgb::splat(e)) {
+            if !(e.is_finite() && e >= 0.0) {
                 return Err(Error::new(
                     ErrorKind::Scene,
                     place(),
-                    format!("exitance {e:e} in channel {channel}"),
-                    LIGHT_REMEDY,
+                    format!("exitance {e} in channel {channel}"),
+                    "must be finite and not negative",
                 ));
             }
         }

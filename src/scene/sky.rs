@@ -8,12 +8,11 @@
 //!  ─┴───────┴───────┴─ horizon: skies by distributions send nothing from below it
 //! ```
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 
-use super::rgb::{LIGHT_REMEDY, is_light};
 use super::sky_distribution::SkyDistribution;
 use super::sky_map::SkyMap;
 use super::{Rgb, Scene};
@@ -83,8 +82,8 @@ impl Sky {
     /// It is held in pieces of 0.3° or less.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for a radiance that is neither 0 nor between 1e-32 and 1e32, or a
-    /// direction of no length.
+    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite, or a direction of no
+    /// length.
     pub fn new(
         distribution: SkyDistribution,
         zenith: Rgb,
@@ -126,8 +125,8 @@ impl Sky {
     /// The same sky with this sun before it.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for an irradiance that is neither 0 nor between 1e-32 and 1e32, or a
-    /// direction of no length.
+    /// [`ErrorKind::Scene`] for an irradiance that is negative or not finite, or a direction of no
+    /// length.
     pub fn with_sun(self, sun: Sun) -> Result<Sky, Error> {
         check_light("irradiance of the sun", sun.irradiance)?;
         let sun = Sun { direction: unit("towards the sun", sun.direction)?, ..sun };
@@ -195,7 +194,7 @@ impl Scene {
     /// channel.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for a radiance that is neither 0 nor between 1e-32 and 1e32.
+    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite.
     pub fn with_sky(self, sky: impl Into<Sky>) -> Result<Scene, Error> {
         let sky = sky.into();
         check_light("radiance", sky.uniform)?;
@@ -208,10 +207,11 @@ fn bad(found: String, remedy: String) -> Error {
 }
 
 fn check_light(what: &str, light: Rgb) -> Result<(), Error> {
-    if is_light(light) {
+    if (light * PI).is_finite() && light.min_element() >= 0.0 {
         return Ok(());
     }
-    Err(bad(format!("{what} {:?}", light.to_array()), LIGHT_REMEDY.into()))
+    let remedy = "give at least 0 in every channel, and finite";
+    Err(bad(format!("{what} {light}"), remedy.into()))
 }
 
 fn unit(what: &str, direction: DVec3) -> Result<DVec3, Error> {

@@ -168,6 +168,17 @@ fn dark_and_black_scenes_are_exact() {
 }
 
 #[test]
+fn rejects_light_whose_squares_are_no_numbers() {
+    for (light, is_fine) in [(1e32, true), (1e-32, true), (1e200, false), (1e-300, false)] {
+        let glow = Material { exitance: Rgb::splat(light), ..Material::grey("glow", 0.5) };
+        match BakeTarget::Error(0.1).bake(cube(&glow), &Backend::Cpu, keep_going) {
+            Ok(baked) => assert!(is_fine && baked.estimate.total < 0.1, "{:?}", baked.estimate),
+            Err(e) => assert!(!is_fine && e.kind() == ErrorKind::Scene, "{e}"),
+        }
+    }
+}
+
+#[test]
 fn rejects_targets_out_of_range() {
     for error in [0.0, -0.1, 1.0, 7.0, f64::NAN, f64::INFINITY] {
         let e = BakeTarget::Error(error).bake(furnace(0.5), &Backend::Cpu, keep_going).unwrap_err();
