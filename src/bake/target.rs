@@ -72,7 +72,8 @@ impl BakeTarget {
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for an error outside (0, 1) or a time of 0; [`ErrorKind::Scene`] for
-    /// light whose squares numbers do not hold; [`ErrorKind::Device`] and [`ErrorKind::Memory`] when the device cannot even start. One that fails later is in
+    /// light whose squares numbers do not hold; [`ErrorKind::Device`] and [`ErrorKind::Memory`]
+    /// when the device cannot even start. One that fails later is in
     /// [`BakeResult::device_failure`].
     pub fn bake(
         self,
