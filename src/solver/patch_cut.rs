@@ -278,7 +278,9 @@ impl<'m> PatchCut<'m> {
                 self.occluded_viewpoints.insert(shot.patch);
                 return false;
             }
-            if !self.replace_by_parts(shot.index).is_empty() {
+            let parts = self.parts(self.patches[shot.index].source);
+            if !parts.is_empty() {
+                self.replace(shot.index, parts);
                 self.occluded_viewpoints.insert(shot.patch);
                 return false;
             }
@@ -297,31 +299,29 @@ impl<'m> PatchCut<'m> {
         let mut unchecked = vec![k];
         let mut has_split = false;
         while let Some(k) = unchecked.pop() {
-            if self.error(&self.patches[k], flux) >= self.tolerance {
-                let parts = self.replace_by_parts(k);
-                has_split |= !parts.is_empty();
-                unchecked.extend(parts);
+            let parts = self.parts(self.patches[k].source);
+            if parts.is_empty() || self.error(&self.patches[k], flux) < self.tolerance {
+                continue;
             }
+            has_split = true;
+            let count = self.patches.len();
+            self.replace(k, parts);
+            unchecked.push(k);
+            unchecked.extend(count..self.patches.len());
         }
         has_split
     }
 
-    /// Replaces patch `k` by its parts, the first of which takes its index: returns theirs. None
-    /// where it is as small as patches may be.
-    fn replace_by_parts(&mut self, k: usize) -> Vec<usize> {
-        let ShootingPatch { source, distances, .. } = self.patches[k];
-        let mut places = vec![];
-        for part in self.parts(source) {
+    /// Puts `parts` in the place of patch `k`: the first takes its index, the others come last.
+    fn replace(&mut self, k: usize, parts: Vec<Source>) {
+        let distances = self.patches[k].distances;
+        for (n, part) in parts.into_iter().enumerate() {
             let part = self.patch(part, distances);
-            if places.is_empty() {
-                self.patches[k] = part;
-                places.push(k);
-            } else {
-                places.push(self.patches.len());
-                self.patches.push(part);
+            match n {
+                0 => self.patches[k] = part,
+                _ => self.patches.push(part),
             }
         }
-        places
     }
 
     /// Error of a patch, as the tolerance has it.
