@@ -69,9 +69,9 @@ impl Scene {
     /// Which sides light reaches is found by walks from places on each, the same for the same
     /// scene: at least four a side, of up to 16 bounces. A triangle that none reaches stays as it
     /// is wound, and so do the walls of a closed room around all of the scene; a surface that
-    /// reflects nothing has one side. Of triangles with the same corners,
-    /// material and group, whichever way round, the first is kept. Warnings say how many were
-    /// dropped, turned and doubled.
+    /// reflects nothing has one side. Of triangles with the same corners, material and group,
+    /// whichever way round, the first is kept; of lamps one for each side, unless light from one
+    /// gets much further. Warnings say how many were dropped, turned and doubled.
     #[must_use]
     pub fn resolve_sides(&self) -> Scene {
         if is_resolved(self) {
@@ -157,7 +157,8 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
         let is_dark = walks.sides_of(t) == Sides::Auto && !is_front_lit && !is_back_lit;
         let reflects = scene.material(t).scatters() || scene.material(t).specular.is_some();
         Treatment {
-            dropped: is_dark && !is_glass && walks.has_light() && is_in_the_way(scene, &walks, t),
+            dropped: walks.is_inner_side_of_lamp(t)
+                || is_dark && !is_glass && walks.has_light() && is_in_the_way(scene, &walks, t),
             turned,
             doubled: doubled && reflects,
         }

@@ -104,6 +104,37 @@ fn the_bottom_of_a_well_sees_its_opening() {
 }
 
 #[test]
+fn a_window_lights_the_floor_by_what_is_seen_through_it() {
+    // A room of 4 × 5 × 3 whose wall at y = 0 is four pieces around an opening.
+    const OPENING: [[f64; 2]; 2] = [[1.0, 2.5], [0.9, 2.1]];
+    let [west, east, _, north, floor, ceiling] = walls([0.0; 3], [4.0, 5.0, 3.0]);
+    let piece = |[x0, x1]: [f64; 2], [z0, z1]: [f64; 2]| {
+        [[x0, 0.0, z0], [x0, 0.0, z1], [x1, 0.0, z1], [x1, 0.0, z0]]
+    };
+    let [[left, right], [sill, head]] = OPENING;
+    let mut parts = vec![(floor, 0.5)];
+    parts.extend([west, east, north, ceiling].map(|wall| (wall, 0.0)));
+    parts.extend([[0.0, left], [right, 4.0]].map(|x| (piece(x, [0.0, 3.0]), 0.0)));
+    parts.extend([[0.0, sill], [head, 3.0]].map(|z| (piece([left, right], z), 0.0)));
+    let baked = bake(&under_sky(&parts), 0.05);
+    assert_eq!(baked.outcome, Outcome::Reached);
+    // From a point at distance y to a rectangle at right angles that stands on its plane, as wide
+    // as x to one side and as high as z (Howell, configuration B-3); by differences of four.
+    let standing = |x: f64, y: f64, z: f64| {
+        let slant = y.hypot(z);
+        ((x / y).atan() - y / slant * (x / slant).atan()) / (2.0 * PI)
+    };
+    let factor = |p: DVec3| {
+        let upto = |z: f64| standing(right - p.x, p.y, z) - standing(left - p.x, p.y, z);
+        Some(upto(head) - upto(sill))
+    };
+    // The light below the sill fades to nothing: relative to what the floor gets on average, as
+    // the bake's own measure floors it.
+    let error = floor_error(&baked.light, factor);
+    assert!(error < 0.05, "{error}");
+}
+
+#[test]
 fn light_between_the_walls_of_a_canyon_is_as_path_traced() {
     let scene = canyon(6.0, 0.7);
     let baked = bake(&scene, 0.05);

@@ -106,6 +106,40 @@ fn the_sun_shines_through_a_sheet_by_its_cosine() {
     }
 }
 
+#[test]
+fn a_furnace_is_the_same_on_both_sides_of_a_sheet() {
+    // Everything emits E and keeps ρ + τ, a sheet that is given for both sides among it:
+    // B = E / (1 − ρ − τ) everywhere.
+    const ALBEDO: f64 = 0.9;
+    for through in [0.5, 0.8] {
+        let tau = Rgb::splat(through * ALBEDO);
+        let sheet = Material { transmittance: tau, ..paint(ALBEDO * (1.0 - through), 1.0) };
+        let walls = walls([0.0; 3], [3.0, 2.0, 2.0]).map(|wall| (wall, paint(ALBEDO, 1.0)));
+        let [a, b, c, d] = [[1.2, 0.3, 0.5], [1.4, 1.7, 0.4], [1.4, 1.8, 1.6], [1.2, 0.4, 1.7]];
+        let sides = [([a, b, c, d], sheet.clone()), ([d, c, b, a], sheet)];
+        let scene = quads(&walls.into_iter().chain(sides).collect::<Vec<_>>());
+        let target = BakeTarget::Error(0.05);
+        let baked = target.bake(scene, &Backend::Cpu, keep_going).unwrap();
+        assert_eq!(baked.outcome, Outcome::Reached);
+        // What is reflected and let through, which the error is of.
+        let (light, truth) = (&baked.light, 1.0 / (1.0 - ALBEDO) - 1.0);
+        for is_sheet in [false, true] {
+            let (mut squares, mut area) = (0.0, 0.0);
+            for (e, corners) in light.corners.iter().enumerate() {
+                let node = light.mesh.element(e);
+                if (light.mesh.material(node).transmittance != Rgb::ZERO) == is_sheet {
+                    let sum: Rgb = corners.iter().map(|&v| light.reflected[v as usize]).sum();
+                    let off = (sum / 3.0 / truth - 1.0).abs().max_element();
+                    squares += off * off * light.mesh.area(node);
+                    area += light.mesh.area(node);
+                }
+            }
+            let error = (squares / area).sqrt();
+            assert!(area > 0.0 && error < 0.05, "{through}, sheet {is_sheet}: {error}");
+        }
+    }
+}
+
 /// A room with a lamp behind a curtain from wall to wall, of `curtain`.
 fn room(curtain: Material) -> Scene {
     let mut all: Vec<(Quad, Material)> =

@@ -228,6 +228,43 @@ fn lamps_shine_where_their_light_gets_further() {
 }
 
 #[test]
+fn lamps_given_for_both_sides_shine_on_both() {
+    // A room whose triangles from the thirteenth on are there again, the other way round.
+    let given_for_both = |lamps: &[Quad]| {
+        let once = scene(&[(&room(), 0.5, 0.0), (lamps, 0.4, 1.0)]);
+        let (mut triangles, groups) = (once.triangles().to_vec(), once.groups().to_vec());
+        for t in &once.triangles()[12..] {
+            let [a, b, c] = t.corners;
+            // And a third time, which is left out.
+            triangles.extend([[b, a, c], [c, b, a]].map(|corners| Triangle { corners, ..*t }));
+        }
+        let materials = once.materials().to_vec();
+        Scene::new(once.positions().to_vec(), triangles, groups, materials).unwrap().resolve_sides()
+    };
+    let fluxes = |scene: &Scene| {
+        let towards = |direction: DVec3| {
+            let lamps = (0..scene.triangles().len()).filter(|&t| scene.exitance(t) == Rgb::ONE);
+            lamps.map(|t| scene.area(t) * scene.normal(t).dot(direction).max(0.0)).sum::<f64>()
+        };
+        [DVec3::Z, -DVec3::Z].map(towards)
+    };
+    let sheet = facing_up([0.3, 0.7], [0.3, 0.7], 0.6);
+    let found = given_for_both(&[sheet]);
+    assert_eq!((done(&found), found.triangles().len()), ([2, 0, 0], 16));
+    let off = fluxes(&found).map(|flux| (flux - 0.4 * 0.4).abs());
+    assert!(off[0] < 1e-12 && off[1] < 1e-12, "{off:?}");
+    // Inside of a small body there is nothing to light, whichever way round comes first.
+    for bulb in [block([0.5; 3], [0.52; 3]), walls([0.5; 3], [0.52; 3])] {
+        let found = given_for_both(&bulb);
+        assert_eq!((done(&found), found.triangles().len()), ([24, 0, 0], 24));
+        for t in 12..24 {
+            let outwards = found.corners(t)[0] - DVec3::splat(0.51);
+            assert!(found.normal(t).dot(outwards) > 0.0 && found.exitance(t) == Rgb::ONE);
+        }
+    }
+}
+
+#[test]
 fn triangles_given_again_are_dropped() {
     let sheet = facing_up([0.2, 0.8], [0.2, 0.8], 0.5);
     let lit = |second: Material, group: u32| {

@@ -4,18 +4,20 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use crate::geometry::weld::Weld;
-use crate::scene::{Scene, Sides};
+use crate::scene::{Rgb, Scene, Sides};
 
 /// Per triangle, whether it is translucent or one of [`Sides::Auto`], with the same three
-/// positions, material, group and texture coordinates as one before it.
+/// positions, material, group and texture coordinates as one before it; and the same way round, if
+/// it emits.
 pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
     let mut weld = Weld::default();
-    let mut known: FxHashMap<([u32; 3], u32, u32), usize> = FxHashMap::default();
+    let mut known: FxHashMap<_, usize> = FxHashMap::default();
     let mut is_repeated = |t: usize| {
         let triangle = &scene.triangles()[t];
-        let mut corners = scene.corners(t).map(|p| weld.number(p));
-        corners.sort_unstable();
-        let first = *known.entry((corners, triangle.material, triangle.group)).or_insert(t);
+        let (corners, winding) = sorted(scene.corners(t).map(|p| weld.number(p)));
+        let winding = (scene.exitance(t) != Rgb::ZERO).then_some(winding);
+        let key = (corners, winding, triangle.material, triangle.group);
+        let first = *known.entry(key).or_insert(t);
         let place = |t: usize, p: DVec3| {
             let k = scene.corners(t).iter().position(|&q| q == p);
             k.zip(scene.texture_coordinates(t)).map(|(k, places)| places[k].to_array())
@@ -27,6 +29,29 @@ pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
         is_concerned && first != t && same_texture()
     };
     (0..scene.triangles().len()).map(&mut is_repeated).collect()
+}
+
+/// Of each of `lamps`, the first other one with the same corners the other way round, if any.
+pub fn lamps_of_other_sides(scene: &Scene, lamps: &[usize]) -> FxHashMap<usize, usize> {
+    let mut weld = Weld::default();
+    let mut key = |&t: &usize| (t, sorted(scene.corners(t).map(|p| weld.number(p))));
+    let keys: Vec<_> = lamps.iter().map(&mut key).collect();
+    let mut first: FxHashMap<([u32; 3], bool), usize> = FxHashMap::default();
+    for (t, key) in &keys {
+        first.entry(*key).or_insert(*t);
+    }
+    let other = |(t, (corners, runs_up)): (usize, ([u32; 3], bool))| {
+        Some((t, *first.get(&(corners, !runs_up))?))
+    };
+    keys.into_iter().filter_map(other).collect()
+}
+
+/// Three numbers in ascending order, and whether they run up from the least in the order given.
+fn sorted(mut corners: [u32; 3]) -> ([u32; 3], bool) {
+    let [a, b, c] = corners;
+    let runs_up = (a < b) ^ (b < c) ^ (c < a);
+    corners.sort_unstable();
+    (corners, runs_up)
 }
 
 /// Whether these are the same, bit by bit: places without texture coordinates are no numbers.

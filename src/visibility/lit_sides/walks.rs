@@ -8,6 +8,7 @@ use fastrand::Rng;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+use super::repeated::lamps_of_other_sides;
 use super::sheets::{Sheets, SideIndex};
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
@@ -49,6 +50,8 @@ pub struct Walks<'a> {
     lamps: Vec<usize>,
     /// Whether they do so on their backs.
     shining_backs: FxHashMap<usize, bool>,
+    /// Of lamps that the file has once for each side, the other one.
+    other_sides: FxHashMap<usize, usize>,
     /// Of each lamp, in units of `brightest` times area.
     powers: AreaSampler,
     /// Exitance of the brightest, W/m² summed over the channels.
@@ -74,6 +77,7 @@ impl<'a> Walks<'a> {
             panes: Panes::of_scene(scene),
             normals: (0..count).map(|t| scene.normal(t)).collect(),
             shining_backs: FxHashMap::default(),
+            other_sides: lamps_of_other_sides(scene, &lamps),
             powers: AreaSampler::new(lamps.iter().map(power)),
             brightest,
             fluxes: AreaSampler::new(scene.luminaires().iter().map(|l| l.flux().element_sum())),
@@ -104,6 +108,12 @@ impl<'a> Walks<'a> {
         self.shining_backs.get(&t).copied()
     }
 
+    /// Of a lamp that the file has once for each side, whether the other one is enough: light from
+    /// there gets much further.
+    pub fn is_inner_side_of_lamp(&self, t: usize) -> bool {
+        self.other_sides.contains_key(&t) && self.shines_from_back(t) == Some(true)
+    }
+
     fn find_shining_backs(&self, sheets: &Sheets) -> FxHashMap<usize, bool> {
         let sides: Vec<SideIndex> = self.lamps.iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
         let free = sheets.ask(&sides, |side, rng| {
@@ -113,8 +123,14 @@ impl<'a> Walks<'a> {
             (self.scene.exitance(met / 2) == Rgb::ZERO).then(|| start.distance(at))
         });
         let shines_from_back = |&t: &usize| {
-            let [front, back] = [2 * t, 2 * t + 1].map(|side| free.of_sheet(side).mean());
-            (t, self.sides_of(t) == Sides::Auto && back > FURTHER * front)
+            let other = self.other_sides.get(&t);
+            let sides = [2 * t, other.map_or(2 * t + 1, |other| 2 * other)];
+            let [front, back] = sides.map(|side| free.of_sheet(side).mean());
+            let may_turn = match other {
+                Some(_) => self.sides[self.scene.triangles()[t].material as usize],
+                None => self.sides_of(t),
+            };
+            (t, may_turn == Sides::Auto && back > FURTHER * front)
         };
         self.lamps.iter().map(shines_from_back).collect()
     }
