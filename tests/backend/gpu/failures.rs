@@ -5,20 +5,25 @@ use std::cell::RefCell;
 use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use radiosity::backend::Fallback;
 use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::{GpuLimits, HemicubeGather};
+use radiosity::bake::Outcome;
 use radiosity::form_factor::Row;
 use radiosity::gather::{
     GatherPoint, IrradianceSample, RadiosityField, RefinementSettings, gather_at_vertices,
 };
 use radiosity::mesh::NodeId;
 use radiosity::solver::Method;
+use radiosity::verify::{Settings, verify};
 use radiosity::{
     Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, FormFactors, Gather,
-    GatheredMesh, Gpu, HemicubeRows, Material, Mesh, RayRows, Rgb, Solver, StopReason,
+    GatheredMesh, Gpu, HemicubeRows, Material, Mesh, RayRows, Rgb, Sides, Sky, SkyDistribution,
+    Solver, StopReason, Sun,
 };
 
+use crate::common::scenes::{Quad, facing_up, paint, quads, walls};
 use crate::common::{cornell_box, cube, gpu, keep_going};
 
 /// Pixels along an edge with which hemicubes are drawn on software devices, too.
@@ -244,6 +249,46 @@ fn bake_falls_back_and_reports_failure_once() {
         let drawn: u64 = baked.hemicubes_by_resolution.iter().map(|h| h.1).sum();
         assert!(drawn > 0 && drawn < baked.hemicubes, "{drawn} of {}", baked.hemicubes);
     }
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn bakes_with_two_sides_and_a_sky_outlive_their_device() {
+    // A room that is open to a clear sky and a sun, with a curtain, and a plate that both light.
+    let towards_sun = DVec3::new(0.6, -0.5, 0.6);
+    let zenith = Rgb::new(1.0, 1.5, 2.0);
+    let clear = SkyDistribution::cie(12).unwrap();
+    let sun = Sun { direction: towards_sun, irradiance: Rgb::new(30.0, 25.0, 20.0) };
+    let sky = Sky::new(clear, zenith, DVec3::Z, towards_sun).unwrap().with_sun(sun).unwrap();
+    let [west, _, rest @ ..] = walls([0.0; 3], [3.0, 2.0, 2.0]);
+    let mut parts: Vec<(Quad, Material)> =
+        [west].into_iter().chain(rest).map(|wall| (wall, paint(0.6, 0.0))).collect();
+    let x = 2.8;
+    let hanging = [[x, 0.1, 0.1], [x, 0.1, 1.6], [x, 1.2, 1.6], [x, 1.2, 0.1]];
+    parts.push((hanging, Material { transmittance: Rgb::splat(0.4), ..paint(0.3, 0.0) }));
+    let plate = facing_up([0.8, 1.6], [0.6, 1.4], 0.7);
+    parts.push((plate, Material { sides: Sides::Auto, ..paint(0.5, 0.0) }));
+    let scene = quads(&parts).with_sky(sky).unwrap();
+    let gpu = Gpu::new(None).unwrap();
+    let mut calls = 0;
+    let drawn = |s: &mut BakeSettings| s.solve.hemicube_resolution = MANY_PIXELS;
+    let baked = BakeTarget::Error(0.1)
+        .bake_with(scene.clone(), &Backend::Gpu(gpu.clone()), drawn, |_| {
+            calls += 1;
+            if calls == 20 {
+                gpu.close();
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert_eq!(baked.device_failure.expect("the device failed").kind(), ErrorKind::Device);
+    let drawn: u64 = baked.hemicubes_by_resolution.iter().map(|h| h.1).sum();
+    assert!(drawn > 0 && drawn < baked.hemicubes, "{drawn} of {}", baked.hemicubes);
+    assert!(baked.solution.ledger.imbalance() < 1e-9);
+    assert_eq!(baked.outcome, Outcome::Reached);
+    let found = verify(&scene, &baked.light.surface, &Settings::default(), keep_going).unwrap();
+    let error = found.error.unwrap();
+    assert!(error.value - 2.0 * error.standard_error < 0.1, "{error:?}");
 }
 
 #[test]
