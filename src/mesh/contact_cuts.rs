@@ -230,6 +230,17 @@ mod tests {
     }
 
     #[test]
+    fn walls_are_cut_across_the_sides_of_triangles() {
+        // Next to the floor's corner all but a bit of the foot is on one of its two triangles.
+        for x in [1e-3, 10.0 - 1e-3] {
+            let wall = [[x, 0.0, 0.0], [x, 8.0, 0.0], [x, 8.0, 3.0], [x, 0.0, 3.0]];
+            let (pieces, surfaces) = floor_of(&cut_at_contacts(&quads(&[FLOOR, wall]), 0.1));
+            assert!((area(&pieces) - 80.0).abs() < 1e-9);
+            assert_eq!(surfaces, 2, "{x}: nothing continues around the end of its longer part");
+        }
+    }
+
+    #[test]
     fn surfaces_continue_around_the_end_of_a_wall() {
         let wall = [[4.0, 0.0, 0.0], [4.0, 5.0, 0.0], [4.0, 5.0, 3.0], [4.0, 0.0, 3.0]];
         let cut = cut_at_contacts(&quads(&[FLOOR, wall]), 0.1);
@@ -301,7 +312,20 @@ mod tests {
         let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
         assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
-        // Without its lid people do.
+        // Through a hole in its lid, of which floor beside a wall sees a thirtieth, people do.
+        let lid = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {
+            [[x0, y0, 2.0], [x1, y0, 2.0], [x1, y1, 2.0], [x0, y1, 2.0]]
+        };
+        let frame = [
+            lid([3.0, 6.0], [3.0, 4.0]),
+            lid([3.0, 6.0], [5.0, 6.0]),
+            lid([3.0, 4.0], [4.0, 5.0]),
+            lid([5.0, 6.0], [4.0, 5.0]),
+        ];
+        let holed = quads(&[&solid[..5], &frame].concat());
+        let (pieces, surfaces) = floor_of(&cut_at_contacts(&holed, 0.1));
+        assert!(pieces.len() > 2 && surfaces == 2, "what is within the walls, and without");
+        // And without a lid.
         let open = quads(&solid[..5]);
         assert!(cut_at_contacts(&open, 0.1).triangles().len() > open.triangles().len());
         assert!(Arc::ptr_eq(&open, &cut_at_contacts(&open, 3.1 / SHORTEST_CUT)), "too short");

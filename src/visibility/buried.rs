@@ -12,11 +12,13 @@
 //! | [`OPEN`] | 0.99, of nothing | sample of the error estimate | left out |
 //! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
 //! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
+//! | [`INSIDE`] | 0.995 | side of a contact | no cut along it |
 //!
 //! Why they differ: another viewpoint is cheap, and a left-out sample is guarded by a second
 //! condition, so that more likely than not is enough for both. The sample of a gather point is
 //! replaced by an extrapolation, so that a dark sample is rather kept; without the second condition
-//! only what seams let through, a ray or two, may see a front.
+//! only what seams let through, a ray or two, may see a front. A cut costs some elements, and the
+//! lack of one is an error that no element is small enough for.
 //!
 //! The values were chosen by hand; no measurement was kept. A share of 0.5 is what a point at the
 //! foot of an inverted wall sees of it; [`NEAR_BACKS`] is less, by two standard deviations of what

@@ -196,7 +196,8 @@ impl Report {
             }
             _ => String::new(),
         };
-        let (asked, outcome) = (100.0 * error, baked.outcome);
+        // In the digits that it was asked in.
+        let (asked, outcome) = ((100.0 * error) as f32, baked.outcome);
         Some(format!("{asked} %{each} {outcome} (about {told:.2} %){remedy}"))
     }
 

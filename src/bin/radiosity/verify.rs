@@ -188,7 +188,7 @@ impl Options {
     fn end(&self, found: &Verification, spent: Duration) -> String {
         let why = match (found.stop, self.settings.time) {
             (Reason::Precise, _) => {
-                format!("known to {} % of itself", 100.0 * self.settings.precision)
+                format!("known to {} % of itself", (100.0 * self.settings.precision) as f32)
             }
             (Reason::Negligible, _) => "negligible".into(),
             (Reason::Time, Some(time)) => {

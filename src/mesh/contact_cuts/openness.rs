@@ -1,13 +1,13 @@
 //! Where a cut is worth it: where light may fall on both sides of a contact segment, or into a
 //! slit.
 //!
-//! What is inside a solid that stands on a surface is dark, and nobody sees it; values at vertices
-//! there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor is there
-//! other light, or none, that is seen. But where two solids leave a slit between them, narrower
-//! than elements are, an element would reach from one side past both to the other, and the slit
-//! would be as bright as what is beside the solids.
+//! What is inside a closed solid that stands on a surface is dark, and nobody sees it; values at
+//! vertices there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor,
+//! or where a solid is open, is there other light, or next to none, that is seen. But where two
+//! solids leave a slit between them, narrower than elements are, an element would reach from one
+//! side past both to the other, and the slit would be as bright as what is beside the solids.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::snapping::clipped;
 use crate::mesh::contacts::ContactSegment;
@@ -17,7 +17,7 @@ use crate::visibility::buried;
 use crate::visibility::ray_scene::RayScene;
 
 /// Rays by which it is found out whether a place is inside a solid.
-const OPENNESS_RAYS: u32 = 32;
+const OPENNESS_RAYS: u32 = 128;
 
 /// So many of them at a time, a divisor of that.
 const RAYS_AT_ONCE: u32 = 4;
@@ -42,14 +42,18 @@ impl Openness {
     }
 
     /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
-    /// the triangle with these `corners`, or the side that is not is a slit.
+    /// the triangle with these `corners`, or the side that is not is a slit. What is too short to
+    /// be looked beside counts as the line that it is the end of.
     pub fn is_worth_a_cut(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
         let Some(ends) = clipped(segment.ends) else { return false };
-        let [from, to] = ends.map(|p| a + p.x * (b - a) + p.y * (c - a));
+        let on_plane = |p: DVec2| a + p.x * (b - a) + p.y * (c - a);
+        let line = segment.ends.map(on_plane);
         let normal = (b - a).cross(c - a).normalize();
-        let across = normal.cross(to - from).normalize_or_zero();
-        let mut long_enough = self.beside.iter().filter(|&&beside| from.distance(to) >= beside);
+        let across = normal.cross(line[1] - line[0]).normalize_or_zero();
+        let mut long_enough =
+            self.beside.iter().filter(|&&beside| line[0].distance(line[1]) >= beside);
         long_enough.any(|&beside| {
+            let [from, to] = part_of_length(beside, ends.map(on_plane), line);
             OPENNESS_PLACES.into_iter().any(|share| {
                 let place = from.lerp(to, share) + self.above * beside * normal;
                 let sides = [across, -across].map(|away| (place + beside * away, away));
@@ -71,7 +75,7 @@ impl Openness {
 
     fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
         // Most places are in the open, as the first few rays say already.
-        let most = buried::BURIED * f64::from(OPENNESS_RAYS);
+        let most = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);
         while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
             let directions = self.directions.directions_in(cast..cast + RAYS_AT_ONCE, normal, 0.5);
@@ -82,4 +86,15 @@ impl Openness {
         }
         f64::from(backs) < most
     }
+}
+
+/// The `part` of a `line`, with as much around it as makes it `length` long, if the line is. Of a
+/// line across the side of two triangles the part on one of them may be as short as can be: cut on
+/// the other alone, the surface would continue around its end.
+fn part_of_length(length: f64, part: [DVec3; 2], line: [DVec3; 2]) -> [DVec3; 2] {
+    let (along, whole) = ((line[1] - line[0]).normalize_or_zero(), line[0].distance(line[1]));
+    let [from, to] = part.map(|p| along.dot(p - line[0]));
+    let wanted = (to - from).max(length).min(whole);
+    let start = ((from + to - wanted) / 2.0).clamp(0.0, whole - wanted);
+    [start, start + wanted].map(|at| line[0] + at * along)
 }
