@@ -164,8 +164,16 @@ pub(super) fn patch_tolerance(error: f64) -> f64 {
 }
 
 /// Rays with which an element gathers the light that is not shot: its noise is averaged by those
-/// that gather next.
-pub const RECEIVED_RAYS: u32 = 128;
+/// that gather next, and the more elements there are the better. Chosen by hand.
+const RECEIVED_RAYS: RangeInclusive<f64> = 32.0..=128.0;
+
+/// Rays of all elements together at which each begins to cast fewer. Chosen by hand.
+const RECEIVED_RAYS_OF_ALL: usize = 1 << 22;
+
+/// Rays with which each of so many `points` gathers the light that is not shot.
+pub(super) fn received_rays(points: usize) -> u32 {
+    clamped(RECEIVED_RAYS_OF_ALL as f64 / points.max(1) as f64, RECEIVED_RAYS) as u32
+}
 
 /// Rays with which elements gather in gaps: what they give is averaged by those that gather next.
 pub const GAP_RAYS: u32 = 32;

@@ -142,8 +142,10 @@ fn received(
     let points: Vec<Vec<GatherPoint>> =
         reflecting.iter().map(|&e| received_points(&above, mesh, mesh.element(e))).collect();
     let corners = vec![[0; 3]; mesh.element_count()];
-    let mut gatherer = backend.gather(mesh, model::RECEIVED_RAYS, f64::INFINITY, 0.0)?;
-    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &points.concat())?;
+    let all_points = points.concat();
+    let rays = model::received_rays(all_points.len());
+    let mut gatherer = backend.gather(mesh, rays, f64::INFINITY, 0.0)?;
+    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &all_points)?;
     let mut irradiance = vec![Rgb::ZERO; mesh.element_count()];
     let mut samples = samples.iter();
     for (e, points) in reflecting.into_iter().zip(points) {
