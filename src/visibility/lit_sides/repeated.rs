@@ -40,18 +40,20 @@ pub fn lamps_of_other_sides(scene: &Scene, lamps: &[usize]) -> FxHashMap<usize, 
     for (t, key) in &keys {
         first.entry(*key).or_insert(*t);
     }
-    let other = |(t, (corners, runs_up)): (usize, ([u32; 3], bool))| {
-        Some((t, *first.get(&(corners, !runs_up))?))
+    let other = |(t, (corners, ascends)): (usize, ([u32; 3], bool))| {
+        Some((t, *first.get(&(corners, !ascends))?))
     };
     keys.into_iter().filter_map(other).collect()
 }
 
-/// Three numbers in ascending order, and whether they run up from the least in the order given.
+/// Three different numbers in ascending order, and whether that is the way round that they were
+/// given in.
 fn sorted(mut corners: [u32; 3]) -> ([u32; 3], bool) {
     let [a, b, c] = corners;
-    let runs_up = (a < b) ^ (b < c) ^ (c < a);
+    // Of the three steps around, two go up in ascending order, and one in descending.
+    let ascends = !((a < b) ^ (b < c) ^ (c < a));
     corners.sort_unstable();
-    (corners, runs_up)
+    (corners, ascends)
 }
 
 /// Whether these are the same, bit by bit: places without texture coordinates are no numbers.
