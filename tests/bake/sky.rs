@@ -128,8 +128,6 @@ fn a_window_lights_the_floor_by_what_is_seen_through_it() {
         let upto = |z: f64| standing(right - p.x, p.y, z) - standing(left - p.x, p.y, z);
         Some(upto(head) - upto(sill))
     };
-    // The light below the sill fades to nothing: relative to what the floor gets on average, as
-    // the bake's own measure floors it.
     let error = floor_error(&baked.light, factor);
     assert!(error < 0.05, "{error}");
 }

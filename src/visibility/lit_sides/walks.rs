@@ -100,6 +100,11 @@ impl<'a> Walks<'a> {
         if self.scene.is_back_covered(t) {
             return Sides::Front;
         }
+        self.sides_of_material(t)
+    }
+
+    /// What the material of triangle `t` asks for, wherever the triangle lies.
+    fn sides_of_material(&self, t: usize) -> Sides {
         self.sides[self.scene.triangles()[t].material as usize]
     }
 
@@ -124,13 +129,11 @@ impl<'a> Walks<'a> {
         });
         let shines_from_back = |&t: &usize| {
             let other = self.other_sides.get(&t);
-            let sides = [2 * t, other.map_or(2 * t + 1, |other| 2 * other)];
-            let [front, back] = sides.map(|side| free.of_sheet(side).mean());
-            let may_turn = match other {
-                Some(_) => self.sides[self.scene.triangles()[t].material as usize],
-                None => self.sides_of(t),
-            };
-            (t, may_turn == Sides::Auto && back > FURTHER * front)
+            let both = [2 * t, other.map_or(2 * t + 1, |other| 2 * other)];
+            let [front, back] = both.map(|side| free.of_sheet(side).mean());
+            // The other one covers its back.
+            let asked = if other.is_some() { self.sides_of_material(t) } else { self.sides_of(t) };
+            (t, asked == Sides::Auto && back > FURTHER * front)
         };
         self.lamps.iter().map(shines_from_back).collect()
     }
