@@ -25,6 +25,10 @@ const RAYS_AT_ONCE: u32 = 4;
 /// Shares of a segment's length at which both its sides are looked at.
 const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
 
+/// Distance from a side, share of the triangle's height over it, that is none: about the rounding
+/// of coordinates in single precision.
+const ON_SIDE: f64 = 1e-7;
+
 /// Looks on which side of a contact segment light may fall.
 pub(super) struct Openness {
     rays: RayScene,
@@ -45,7 +49,9 @@ impl Openness {
     /// the triangle with these `corners`, or the side that is not is a slit. What is too short to
     /// be looked beside counts as the line that it is the end of.
     pub fn is_worth_a_cut(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
-        let Some(ends) = clipped(segment.ends) else { return false };
+        let Some(ends) = clipped(segment.ends).filter(|ends| !is_on_side(ends)) else {
+            return false;
+        };
         let on_plane = |p: DVec2| a + p.x * (b - a) + p.y * (c - a);
         let line = segment.ends.map(on_plane);
         let normal = (b - a).cross(c - a).normalize();
@@ -86,6 +92,13 @@ impl Openness {
         }
         f64::from(backs) < most
     }
+}
+
+/// Whether a part of a triangle, by its ends in the triangle's own coordinates, is one of its
+/// sides: there is nothing to cut where a neighbour begins.
+fn is_on_side(ends: &[DVec2; 2]) -> bool {
+    let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < ON_SIDE);
+    from_side(|p| p.x) || from_side(|p| p.y) || from_side(|p| 1.0 - p.x - p.y)
 }
 
 /// The `part` of a `line`, with as much around it as makes it `length` long, if the line is. Of a
