@@ -97,7 +97,7 @@ impl Bench {
             &[4.0, 2.0, 1.0, 0.5],
             |e| e.mesh,
             |gather, factor| {
-                gather.refinement.surplus_tolerance *= factor;
+                gather.refinement.mesh_error *= factor;
                 gather.refinement.min_edge *= factor;
                 gather.refinement.interpolation_tolerance *= factor;
                 gather.rays *= 2;
@@ -165,13 +165,13 @@ impl Bench {
             seconds.push((error, start.elapsed().as_secs_f64()));
             let Some(gather) = baked.settings.gather else { continue };
             rays.push((error, f64::from(gather.rays)));
-            surplus.push((error, gather.refinement.surplus_tolerance));
+            surplus.push((error, gather.refinement.mesh_error));
             edge.push((error, gather.refinement.min_edge / diagonal));
         }
         row("seconds ~ error", &seconds, Some(-model::COST_EXPONENT));
         law("rays", &rays, model::RAYS_TIMES_ERROR, -1.0);
-        let PowerLaw { scale, exponent, .. } = model::SURPLUS_TOLERANCE;
-        law("surplus tolerance", &surplus, scale, exponent);
+        let PowerLaw { scale, exponent, .. } = model::MESH_ERROR;
+        law("error of the mesh", &surplus, scale, exponent);
         let PowerLaw { scale, exponent, .. } = model::MIN_EDGE;
         law("shortest edge", &edge, scale, exponent);
         Ok(())

@@ -28,6 +28,7 @@ mod progress;
 pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
+pub(crate) mod scouts;
 mod surplus;
 pub(crate) mod two_sided;
 pub(crate) mod vertex_rows;

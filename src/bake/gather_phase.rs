@@ -30,6 +30,8 @@ use crate::bake::strata::SampleCounts;
 use crate::error::Error;
 use crate::gather::Gather;
 use crate::gather::adaptive::AdaptiveGather;
+use crate::gather::point_row::PointRows;
+use crate::gather::scouts;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
@@ -183,9 +185,18 @@ impl<'a> GatherPhase<'a> {
     /// Takes `step`, and says why it ended.
     fn gather(&mut self, step: Step, reporter: &mut Reporter) -> Result<StopReason, Error> {
         let refinement = self.gather.refinement.clone();
+        let floor = self.state.radiosity_floor();
+        let (rays, noise) = (scouts::SCOUT_RAYS, scouts::SCOUT_NOISE);
+        let mut scout = self.backend.gather(&self.shot.mesh, rays, noise, floor)?;
+        let scout = Some(&mut *scout as &mut dyn Gather);
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
             Step::AllPasses => {
+                let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
+                let bounces = match (self.target, refinement.gather_passes) {
+                    (Some(_), 0 | 1) => Some(RayGather::new(&self.shot.mesh, rays)?),
+                    _ => None,
+                };
                 let mut coarse = match refinement.gather_passes {
                     0 | 1 => None,
                     _ => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
@@ -194,6 +205,7 @@ impl<'a> GatherPhase<'a> {
                     &refinement,
                     &mut *self.gatherer,
                     coarse.as_mut().map(|coarse| &mut **coarse as &mut dyn Gather),
+                    (scout, bounces.as_ref().map(|rows| rows as &dyn PointRows)),
                     &mut progress,
                 )
             }
@@ -201,14 +213,16 @@ impl<'a> GatherPhase<'a> {
                 if bounce {
                     self.state.promote_to_source();
                 }
-                self.state.gather_pass(&refinement, &mut *self.gatherer, &mut progress)
+                self.state.gather_pass(&refinement, &mut *self.gatherer, scout, &mut progress)
             }
             Step::Bounces => {
                 let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
                 let maker = RayGather::new(&self.shot.mesh, rays)?;
                 Ok(self.state.add_further_bounces(&maker, &mut progress))
             }
-            Step::Split => self.state.refine(&refinement, &mut *self.gatherer, &mut progress),
+            Step::Split => {
+                self.state.refine(&refinement, &mut *self.gatherer, scout, &mut progress)
+            }
         }
     }
 

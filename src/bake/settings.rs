@@ -211,9 +211,7 @@ impl BakeSettings {
         );
         solve.element_size = sizing.size;
         let refinement = RefinementSettings {
-            surplus_tolerance: model::SURPLUS_TOLERANCE
-                .setting(e)
-                .min(model::MAX_SURPLUS_TOLERANCE),
+            mesh_error: model::MESH_ERROR.setting(e),
             interpolation_tolerance: model::INTERPOLATION_TOLERANCE.setting(e),
             gather_passes: model::gather_passes(e),
             gap_factor: 1.0,

@@ -17,6 +17,8 @@
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
+use rayon::prelude::*;
+
 use super::Gather;
 use super::batch::{VertexValues, gather_batch};
 use super::buried::extrapolate_into_buried;
@@ -26,9 +28,10 @@ use super::gathered_mesh::GatheredMesh;
 use super::interpolated_refinement::interpolated_refinement;
 use super::point_row::PointRows;
 use super::progress::Progress;
-use super::refinement_indicator::{ErrorScale, refinement_indicator};
+use super::refinement_indicator::{ErrorScale, counted_area, squared_error};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
+use super::scouts::{self, Scouts};
 use super::surplus::mean_preserving;
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -42,9 +45,17 @@ pub(crate) type ProgressCallback<'a> = dyn FnMut(&Progress) -> ControlFlow<()> +
 /// on it.
 const FIRST_BATCH: usize = 256;
 
-/// Surplus tolerance and smallest edge of a pass, over those of the next one: what a pass gets
+/// Error of the mesh and smallest edge of a pass, over those of the next one: what a pass gets
 /// wrong is averaged over the hemisphere by the next. Chosen by hand; no measurement kept.
 const PASS_COARSENING: f64 = 3.0;
+
+/// Elements that make up this share of the squared error are split at a time (Dörfler 1996): what
+/// the others are off by may be known better then. Chosen by hand.
+const BULK: f64 = 0.8;
+
+/// Share of an element's squared error that splitting it takes away: that of a jump, which its
+/// children have over half of the area.
+const TAKEN: f64 = 0.5;
 
 /// Gathers `source` at the vertices of `mesh`, splits elements, gathers at the new vertices, and so
 /// on: B = E + ρ Σ F_vj B_j.
@@ -71,7 +82,7 @@ pub fn gather_at_vertices(
     settings.check()?;
     source.check_scene(mesh)?;
     let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region);
-    let stop = state.run_passes(settings, gatherer, None, &mut progress)?;
+    let stop = state.run_passes(settings, gatherer, None, (None, None), &mut progress)?;
     let result = if stop == StopReason::Cancelled {
         state.to_gathered_mesh()
     } else {
@@ -88,6 +99,7 @@ pub(crate) struct AdaptiveGather<'a> {
     /// The light that they gathered first: what it has between vertices, they may have missed.
     shot: &'a GatheredMesh,
     samples: SampledMesh,
+    scouts: Scouts,
     scale: ErrorScale,
     /// Change of the values by the last pass, relative.
     relative_change: f64,
@@ -108,6 +120,7 @@ impl<'a> AdaptiveGather<'a> {
         let field = source.radiosity_field();
         let scale = ErrorScale::new(&mesh, &field, region);
         AdaptiveGather {
+            scouts: Scouts::new(mesh.element_count()),
             samples: SampledMesh::new(mesh, &field),
             source: Cow::Borrowed(source),
             shot: source,
@@ -186,25 +199,48 @@ impl<'a> AdaptiveGather<'a> {
         settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         mut coarse_gatherer: Option<&mut dyn Gather>,
+        (mut scout, bounces): (Option<&mut dyn Gather>, Option<&dyn PointRows>),
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
         for remaining in (1..settings.gather_passes).rev() {
-            let coarsening = PASS_COARSENING.powi(remaining as i32);
-            let coarse = RefinementSettings {
-                surplus_tolerance: (settings.surplus_tolerance * coarsening).min(1.0),
-                min_edge: settings.min_edge * coarsening,
-                ..settings.clone()
-            };
+            let coarse = self.coarser(settings, remaining);
             let stop = match &mut coarse_gatherer {
-                Some(coarse_gatherer) => self.gather_pass(&coarse, *coarse_gatherer, progress)?,
-                None => self.gather_pass(&coarse, gatherer, progress)?,
+                Some(coarse_gatherer) => {
+                    self.gather_pass(&coarse, *coarse_gatherer, None, progress)?
+                }
+                None => self.gather_pass(&coarse, gatherer, None, progress)?,
             };
             if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
             self.promote_to_source();
         }
-        self.gather_pass(settings, gatherer, progress)
+        if let Some(maker) = bounces {
+            let coarse = self.coarser(settings, 1);
+            let look: Option<&mut dyn Gather> = match &mut scout {
+                Some(scout) => Some(&mut **scout),
+                None => None,
+            };
+            let stop = self.gather_pass(&coarse, gatherer, look, progress)?;
+            if stop == StopReason::Cancelled {
+                return Ok(stop);
+            }
+            if self.add_further_bounces(maker, progress) == StopReason::Cancelled {
+                return Ok(StopReason::Cancelled);
+            }
+            return self.refine(settings, gatherer, scout, progress);
+        }
+        self.gather_pass(settings, gatherer, scout, progress)
+    }
+
+    /// `settings` for the light that others gather, so many passes later.
+    fn coarser(&self, settings: &RefinementSettings, passes: u32) -> RefinementSettings {
+        let coarsening = PASS_COARSENING.powi(passes as i32);
+        RefinementSettings {
+            mesh_error: (settings.mesh_error * coarsening).min(1.0),
+            min_edge: settings.min_edge * coarsening,
+            ..settings.clone()
+        }
     }
 
     /// Gathers the source at all vertices, then refines.
@@ -212,6 +248,7 @@ impl<'a> AdaptiveGather<'a> {
         &mut self,
         settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
+        scout: Option<&mut dyn Gather>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
         let before = self.samples.reflected.clone();
@@ -219,7 +256,7 @@ impl<'a> AdaptiveGather<'a> {
             return Ok(StopReason::Cancelled);
         }
         self.relative_change = self.samples.relative_change(&before);
-        self.refine(settings, gatherer, progress)
+        self.refine(settings, gatherer, scout, progress)
     }
 
     /// All further bounces: adds what they do to the values, which become the source. `maker` makes
@@ -262,57 +299,108 @@ impl<'a> AdaptiveGather<'a> {
         &mut self,
         settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
+        mut scout: Option<&mut dyn Gather>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
-        let mut candidates = self.all_elements();
-        let mut is_limited = false;
         loop {
             let element_count = self.samples.mesh.element_count();
-            let mut marked = self.mark(&candidates, settings);
-            if marked.is_empty() && candidates.len() < element_count {
-                // Values at buried vertices may have changed with vertices that came later.
-                candidates = self.all_elements();
-                continue;
-            }
+            let mut marked = self.mark(settings);
             if marked.is_empty() {
-                let limited = StopReason::Elements;
-                return Ok(if is_limited { limited } else { StopReason::Converged });
+                let Some(scout) = &mut scout else { return Ok(StopReason::Converged) };
+                match self.look(settings, &mut **scout, progress)? {
+                    ControlFlow::Break(()) => return Ok(StopReason::Cancelled),
+                    ControlFlow::Continue(false) => return Ok(StopReason::Converged),
+                    ControlFlow::Continue(true) => continue,
+                }
             }
             // Each split adds three elements.
             let room = settings.max_elements.saturating_sub(element_count) / 3;
-            if marked.len() > room {
-                is_limited = true;
-                marked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-                marked.truncate(room);
-            }
+            marked.truncate(room);
             if marked.is_empty() {
                 return Ok(StopReason::Elements);
             }
-            let mut elements: Vec<usize> = marked.into_iter().map(|(_, e)| e).collect();
-            elements.sort_unstable();
-            let new = self.samples.split(&elements)?;
+            marked.sort_unstable();
+            let new_vertices = self.samples.split(&marked)?;
+            self.scouts.split(&marked);
             self.refinements += 1;
-            candidates = new.elements;
-            if self.gather(&new.vertices, gatherer, progress)?.is_break() {
+            if self.gather(&new_vertices, gatherer, progress)?.is_break() {
                 return Ok(StopReason::Cancelled);
             }
         }
     }
 
-    /// Those of `candidates` that are to be split, each with its refinement indicator.
-    fn mark(&self, candidates: &[usize], settings: &RefinementSettings) -> Vec<(f64, usize)> {
-        let candidates = candidates.iter().copied();
+    /// Looks at elements that nobody has looked at and that may matter: whether there were any, or
+    /// that `progress` stopped it.
+    fn look(
+        &mut self,
+        settings: &RefinementSettings,
+        scout: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<ControlFlow<(), bool>, Error> {
+        let elements = self.samples.mesh.element_count();
+        let counted = |e| counted_area(&self.samples, &self.scale, settings, e);
+        let mean = (0..elements).map(counted).sum::<f64>() / elements as f64;
+        let matters = |&e: &usize| {
+            let is_unseen = !self.scouts.has_seen(e) && self.samples.is_splittable(e);
+            is_unseen && counted(e) > scouts::LEAST_AREA * mean
+        };
+        let unseen: Vec<usize> = (0..elements).filter(matters).collect();
+        let source = self.source.radiosity_field();
+        let scale = (self.scale.radiosity_floor, self.scale.touching);
+        let mut queue = &unseen[..];
+        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
+        while !queue.is_empty() {
+            let (samples, scouts) = (&self.samples, &mut self.scouts);
+            batch_sizer
+                .next(&mut queue, |batch| scouts.look(samples, batch, &source, scale, scout))?;
+            let report = Progress {
+                pass: self.pass,
+                refinements: self.refinements,
+                elements,
+                gathered: unseen.len() - queue.len(),
+                total: unseen.len(),
+            };
+            if progress(&report).is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(!unseen.is_empty()))
+    }
+
+    /// The elements that are to be split, those with the largest share of the squared error first:
+    /// as many as it takes for the sum to be what `settings` allow, as far as it is known
+    /// beforehand. What is far from the light has a sum of its own, as has each group where these
+    /// have scales of their own.
+    fn mark(&self, settings: &RefinementSettings) -> Vec<usize> {
+        let mesh = &self.samples.mesh;
+        let all = 0..mesh.element_count();
         if self.refinements < settings.initial_subdivisions {
-            return candidates
-                .filter(|&e| self.samples.is_splittable(e))
-                .map(|e| (1.0, e))
-                .collect();
+            return all.filter(|&e| self.samples.is_splittable(e)).collect();
         }
         let shot = self.shot.radiosity_field();
-        candidates
-            .map(|e| (refinement_indicator(&self.samples, &shot, &self.scale, settings, e), e))
-            .filter(|&(indicator, _)| indicator > 1.0)
-            .collect()
+        let judged = |element| {
+            let (samples, scale) = (&self.samples, &self.scale);
+            let found = self.scouts.error(element);
+            let square = squared_error(samples, &shot, scale, settings, (element, found));
+            let area = counted_area(samples, scale, settings, element);
+            let node = mesh.element(element);
+            let pool = match settings.group_scales.is_empty() {
+                true => usize::from(scale.is_far(mesh, node)),
+                false => mesh.group(node) as usize,
+            };
+            (pool, Share { square, area, element })
+        };
+        let shares: Vec<(usize, Share)> = all.into_par_iter().map(judged).collect();
+        let pools = shares.iter().map(|&(pool, _)| pool + 1).max().unwrap_or(0);
+        let mut by_pool: Vec<Vec<Share>> = vec![vec![]; pools];
+        for (pool, share) in shares {
+            by_pool[pool].push(share);
+        }
+        let allowed = settings.mesh_error.powi(2);
+        let mut marked: Vec<(f64, usize)> =
+            by_pool.into_iter().flat_map(|shares| bulk_above(shares, allowed)).collect();
+        marked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        marked.into_iter().map(|(_, element)| element).collect()
     }
 
     /// Gathers the source at `vertices`, and gives buried ones extrapolated values.
@@ -374,10 +462,40 @@ impl<'a> AdaptiveGather<'a> {
     fn all_vertices(&self) -> Vec<u32> {
         (0..self.samples.reflected.len() as u32).collect()
     }
+}
 
-    fn all_elements(&self) -> Vec<usize> {
-        (0..self.samples.mesh.element_count()).collect()
-    }
+/// The share of an element in the error of its mesh.
+#[derive(Clone, Copy)]
+struct Share {
+    /// Squared error times area.
+    square: f64,
+    area: f64,
+    element: usize,
+}
+
+/// Those of the elements that are to be split for the mean square to fall to what is `allowed`,
+/// with their shares in it; of many the worst, which make up most of it.
+fn bulk_above(mut shares: Vec<Share>, allowed: f64) -> Vec<(f64, usize)> {
+    let area: f64 = shares.iter().map(|share| share.area).sum();
+    let known = shares.iter().map(|share| share.square).filter(|square| square.is_finite());
+    let total: f64 = known.sum();
+    shares.retain(|share| share.square > 0.0);
+    let order =
+        |a: &Share, b: &Share| b.square.total_cmp(&a.square).then(a.element.cmp(&b.element));
+    shares.sort_unstable_by(order);
+    let (mut excess, mut bulk) = (total - allowed * area, BULK * total);
+    let is_marked = move |share: &Share| {
+        if share.square.is_finite() {
+            if excess <= 0.0 || bulk <= 0.0 {
+                return false;
+            }
+            excess -= TAKEN * share.square;
+            bulk -= share.square;
+        }
+        true
+    };
+    let marked = shares.into_iter().take_while(is_marked);
+    marked.map(|share| (share.square / area, share.element)).collect()
 }
 
 #[cfg(test)]
@@ -397,7 +515,7 @@ mod tests {
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let mut proceed = |_: &Progress| ControlFlow::Continue(());
         let mut at_once = AdaptiveGather::new(mesh, &light, None);
-        at_once.gather_pass(&settings, &mut rays, &mut proceed).unwrap();
+        at_once.gather_pass(&settings, &mut rays, None, &mut proceed).unwrap();
         let mut by_passes = at_once.clone();
         let first = at_once.samples.reflected.clone();
         let stop = at_once.add_further_bounces(&rays, &mut proceed);

@@ -18,7 +18,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::RadiosityField;
-use super::refinement_indicator::{ErrorScale, source_nonlinearity};
+use super::refinement_indicator::{ErrorScale, counted_area, source_nonlinearity};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::surplus::HierarchicalSurplus;
@@ -66,7 +66,7 @@ pub(super) fn interpolated_refinement(
     let midsides = midside_values(samples, &candidates);
     let split: Vec<usize> = candidates.iter().map(|c| c.element).collect();
     let mut refined = samples.clone();
-    for v in refined.split(&split)?.vertices {
+    for v in refined.split(&split)? {
         let v = v as usize;
         if let Some((sum, count)) = midsides.get(&refined.vertices.keys[v]) {
             refined.reflected[v] = *sum / *count;
@@ -76,33 +76,33 @@ pub(super) fn interpolated_refinement(
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }
 
-/// Elements whose own sides would have a surplus above the tolerance, ascending; as many as there
-/// is room for, the worst of them.
+/// Elements whose own sides would have a surplus above the tolerance, which is less the larger they
+/// are, ascending; as many as there is room for, the worst of them.
 fn candidates(
     samples: &SampledMesh,
     scale: &ErrorScale,
     settings: &RefinementSettings,
 ) -> Vec<Candidate> {
+    let counted = |e| counted_area(samples, scale, settings, e);
+    let count = samples.mesh.element_count();
+    let mean_area = (0..count).map(counted).sum::<f64>() / count as f64;
     let candidate =
         |element: usize| {
             let node = samples.mesh.element(element);
-            let group_scale = settings.group_scale(samples.mesh.group(node));
-            let size =
-                samples.mesh.longest_edge(node) / scale.growth(&samples.mesh, node) / group_scale;
-            let group_factor = settings.group_factor(samples.mesh.group(node));
-            if !samples.is_splittable(element) || size <= settings.min_edge * group_factor {
+            if !samples.is_splittable(element) {
                 return None;
             }
             let interpolant = HierarchicalSurplus::of_parent(samples, element)
-                .filter(super::surplus::HierarchicalSurplus::is_smooth)?;
+                .filter(HierarchicalSurplus::is_smooth)?;
             let emitted = samples.mesh.material(node).exitance;
             let mean = interpolant.corner_mean();
             let radiosity = (mean + emitted).length().max(scale.radiosity_floor);
-            let surplus = interpolant.predicted_child_surplus();
+            let size = (counted(element) / mean_area).sqrt();
+            let surplus = interpolant.predicted_child_surplus() * size;
+            let group_factor = settings.group_factor(samples.mesh.group(node));
             (surplus > settings.interpolation_tolerance * group_factor * radiosity)
                 .then(|| Candidate { element, relative_surplus: surplus / radiosity, interpolant })
         };
-    let count = samples.mesh.element_count();
     let mut candidates: Vec<Candidate> = (0..count).filter_map(candidate).collect();
     candidates.sort_by(|a, b| {
         b.relative_surplus.total_cmp(&a.relative_surplus).then(a.element.cmp(&b.element))

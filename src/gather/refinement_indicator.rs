@@ -1,52 +1,60 @@
-//! Which elements to split: the surplus of their midsides in units of what is allowed.
+//! Which elements to split: those with the largest share of the squared error.
 //!
-//! An element of size h may have a surplus of
+//! An element that is not split is predicted to be off by e, root mean square over its area and
+//! relative to the radiosity of its darkest corner, or to the floor where that is more: what is
+//! between a bright corner and a dark one may be as dark as the latter. Its share of the squared
+//! error of the whole is e² times its area, and least elements are needed where all those not split
+//! have about the same share (Dörfler 1996 marks by that sum).
 //!
-//! ```text
-//!   surplus_tolerance · h_max / h · max(min B, floor)
-//! ```
+//! | what is known of the element | e |
+//! |---|---|
+//! | a parent of smooth light, of surplus s | s/8: a child's own is s/4, and e is half of that |
+//! | a parent with a jump | 0.2 of the largest difference of corners |
+//! | no parent | 1/8 of that, or how far the light before is from linear |
 //!
-//! with min B the radiosity of its darkest corner, and h_max the longest edge of the mesh that
-//! refinement started on, larger away from the region of the light, as elements are. That is the
-//! rule for the least squares of relative errors by a given number of elements: at their minimum,
-//! splitting any element takes the same away from the sum of area times squared error (Dörfler
-//! 1996 marks by that sum too), so errors go as 1/h; and what is between a bright corner and a dark
-//! one may be as dark as the latter, which its error is relative to.
-//!
-//! An element is judged by its parent's midsides, which have gathered. An element of the first mesh
-//! has no parent; it is judged by the differences of its corners, and by the light before the
-//! gather, if that is known more finely there. Nothing is known of the middle of an element whose
-//! corners are all buried, under houses that stand on a ground, say: if there was light before, it
-//! is split.
+//! Elements far from the region of the light count as if they were as much smaller as elements grow
+//! there. Nothing is known of the middle of an element whose corners are all buried, under houses
+//! that stand on a ground, say: if there was light before, it is split.
 
 use glam::DVec2;
 
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
-use super::surplus::{HierarchicalSurplus, NodeValue};
+use super::surplus::{CHILD_SURPLUS, HierarchicalSurplus, NodeValue};
 use super::{RADIOSITY_FLOOR_SHARE, RadiosityField};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
-use crate::scene::{Aabb, Rgb, longest_edge};
+use crate::scene::{Aabb, Rgb};
 use crate::visibility::buried;
 
 /// Steps along an element's side of the lattice at which the source light is compared with its
 /// linear interpolant. Chosen by hand; no measurement kept.
 const SOURCE_SAMPLES: u32 = 4;
 
-/// Ratio of a midside surplus to the root mean square of a quadratic's distance from its linear
-/// interpolant. For 4 λ_i λ_j alone it is 2.4 (one curved side), for two equal surpluses 1.4.
+/// Root mean square of a quadratic's distance from its linear interpolant over the largest surplus
+/// of its midsides. For 4 λ_i λ_j alone it is 0.42 (one curved side), for two equal surpluses 0.71.
 /// Chosen by hand; no measurement kept.
-const PEAK_OVER_RMS: f64 = 2.0;
+const RMS_OVER_SURPLUS: f64 = 0.5;
+
+/// Where the light jumps by 1 across an element, from one corner to the two others, the linear
+/// interpolant is off by this, root mean square over the dark side: a quarter of the element and
+/// the half that is left were off by 0.25 and 0.24 for jumps half-way.
+const RMS_OVER_JUMP: f64 = 0.2;
 
 /// Where nothing was gathered between the ends of a side, its surplus is taken for this share of
 /// their difference: half of the largest that a monotone function can have. Chosen by hand; no
 /// measurement kept.
 const END_DIFFERENCE_SHARE: f64 = 0.25;
 
-/// Indicator of an element that has to be split because nothing is known of its middle: above those
-/// of all that is known.
-const UNKNOWN_INDICATOR: f64 = 1e3;
+/// Squared error of an element that has to be split because nothing is known of its middle.
+pub(super) const UNKNOWN: f64 = f64::INFINITY;
+
+/// Elements that are this many of the shortest edges long are not split, whatever they may be off
+/// by: it is far less than what others leave. Chosen by hand.
+const FINEST: f64 = 0.125;
+
+/// Growth of elements up to which they count as near the light: within its diagonal.
+const NEAR_GROWTH: f64 = 2.0;
 
 /// Elements of the first mesh that are longer than this many of the shortest edges are split once,
 /// whatever their corners say: a beam of light may fall between them.
@@ -60,9 +68,6 @@ pub(crate) const GAP_DIMNESS: f64 = 0.25 / RADIOSITY_FLOOR_SHARE;
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
-    /// Longest edge of an element that reflects in the mesh that refinement starts on, over the
-    /// growth of elements in its place; scene unit.
-    pub max_edge: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
     pub touching: f64,
     /// Distance below which a gap is a crack that nobody looks into; scene unit.
@@ -74,20 +79,18 @@ pub(crate) struct ErrorScale {
 impl ErrorScale {
     /// For a gather of `field` on `mesh`, whose light is mostly in `region`.
     pub fn new(mesh: &Mesh, field: &RadiosityField, region: Option<Aabb>) -> ErrorScale {
-        let reflecting =
-            (0..mesh.element_count()).filter(|&e| mesh.material(mesh.element(e)).scatters());
-        let edge = |e| {
-            let corners = mesh.corners(mesh.element(e));
-            longest_edge(corners) / size_growth(region.as_ref(), &corners)
-        };
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
             touching: buried::NEAR_BACKS_DISTANCE * diagonal,
             crack: buried::CRACK * diagonal,
             radiosity_floor: field.radiosity_floor(),
-            max_edge: reflecting.map(edge).fold(0.0, f64::max),
             region,
         }
+    }
+
+    /// Whether `node` of `mesh` is far from the light.
+    pub fn is_far(&self, mesh: &Mesh, node: NodeId) -> bool {
+        self.growth(mesh, node) > NEAR_GROWTH
     }
 
     /// By how much larger elements are where `node` of `mesh` is.
@@ -96,14 +99,31 @@ impl ErrorScale {
     }
 }
 
-/// Surplus of element `e` in units of its tolerance: above 1 it is to be split; 0 where it may not
-/// be. `source` is the light that the vertices gathered.
-pub(super) fn refinement_indicator(
+/// Area that element `e` counts with in the error of the whole, scene unit squared: 0 where nothing
+/// is reflected.
+pub(super) fn counted_area(
+    samples: &SampledMesh,
+    scale: &ErrorScale,
+    settings: &RefinementSettings,
+    e: usize,
+) -> f64 {
+    let mesh = &samples.mesh;
+    let node = mesh.element(e);
+    if !mesh.scatters(node) {
+        return 0.0;
+    }
+    let lengths = scale.growth(mesh, node) * settings.group_scale(mesh.group(node));
+    mesh.solid_area(node) / (lengths * lengths)
+}
+
+/// Squared relative error that element `e` is predicted to have, times the area that it counts
+/// with; 0 where it may not be split. `source` is the light that the vertices gathered.
+pub(super) fn squared_error(
     samples: &SampledMesh,
     source: &RadiosityField,
     scale: &ErrorScale,
     settings: &RefinementSettings,
-    e: usize,
+    (e, found): (usize, f64),
 ) -> f64 {
     let node = samples.mesh.element(e);
     if !samples.is_splittable(e) {
@@ -111,67 +131,81 @@ pub(super) fn refinement_indicator(
     }
     let edge = samples.mesh.longest_edge(node);
     let group_scale = settings.group_scale(samples.mesh.group(node));
-    let size = edge / scale.growth(&samples.mesh, node) / group_scale;
+    let growth = scale.growth(&samples.mesh, node);
+    let size = edge / growth / group_scale;
     let group_factor = settings.group_factor(samples.mesh.group(node));
     // Half a gap's distance from its mouth, parallel plates see the half of what they see there
     // (Hottel's crossed strings): elements as long as the distance follow that.
     let nearest = samples.nearest_dim(e, GAP_DIMNESS * scale.radiosity_floor);
     let gap_factor = settings.gap_factor * group_factor;
     let in_gap = edge * nearest > gap_factor && nearest * scale.crack < 1.0;
-    if size <= settings.min_edge * group_factor && !in_gap {
+    // What is far from the light has no sharp shadows.
+    let finest = if growth > NEAR_GROWTH { 1.0 } else { FINEST };
+    if size <= finest * settings.min_edge * group_factor && !in_gap {
         return 0.0;
     }
     let emitted = samples.mesh.material(node).exitance;
-    let size_factor = scale.max_edge / size;
     let factor = if in_gap { gap_factor } else { group_factor };
-    let tolerance = settings.surplus_tolerance * factor * size_factor;
+    let weight = counted_area(samples, scale, settings, e) / (factor * factor);
     let open = samples.vertices.corners[e].into_iter().map(|v| v as usize);
     let darkest = open
         .filter(|&v| !samples.buried[v])
         .map(|v| (samples.reflected[v] + emitted).length())
         .fold(f64::INFINITY, f64::min);
     // Difference of two values of reflected radiosity, relative to the first or that of the darkest
-    // corner, over the tolerance.
+    // corner.
     let error = |value: Rgb, other: Rgb| {
         let radiosity = (value + emitted).length().min(darkest).max(scale.radiosity_floor);
-        if radiosity > 0.0 { (value - other).length() / radiosity / tolerance } else { 0.0 }
+        if radiosity > 0.0 { (value - other).length() / radiosity } else { 0.0 }
     };
-    let end_error = |[a, b]: [NodeValue; 2]| error(a.value, b.value) * END_DIFFERENCE_SHARE;
     let corners = samples.vertices.corners[e].map(|v| NodeValue {
         value: samples.reflected[v as usize],
         buried: samples.buried[v as usize],
     });
     let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
+    let largest_difference = |sides: &mut dyn Iterator<Item = [NodeValue; 2]>| {
+        sides.map(|[a, b]| error(a.value, b.value).max(error(b.value, a.value))).fold(0.0, f64::max)
+    };
     let is_scouted = size <= SCOUTED_SIZE * settings.min_edge * group_factor;
-    match HierarchicalSurplus::of_parent(samples, e) {
+    let rms = match HierarchicalSurplus::of_parent(samples, e) {
         // What stands on the corners may leave the middle in the open.
         _ if !is_scouted
             && corners.iter().all(|c| c.buried)
             && brightest(&samples.mesh, source, e) > scale.radiosity_floor =>
         {
-            UNKNOWN_INDICATOR
+            return UNKNOWN;
         }
-        Some(surplus) => {
-            let midsides = surplus.sampled_midsides();
-            let indicator =
-                midsides.map(|m| error(m.value, m.value - m.surplus)).fold(0.0, f64::max);
+        Some(parent) => {
             // A buried corner has an extrapolated value, which should be about that of its element.
-            let extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
-            extrapolated.map(end_error).fold(indicator, f64::max)
+            let mut extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
+            let extrapolated =
+                RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE * largest_difference(&mut extrapolated);
+            let own = if parent.may_jump(scale.radiosity_floor) {
+                let mut gathered = sides.into_iter().filter(|[a, b]| !a.buried && !b.buried);
+                RMS_OVER_JUMP * largest_difference(&mut gathered)
+            } else {
+                let surplus = parent.sampled_midsides();
+                let largest =
+                    surplus.map(|m| error(m.value, m.value - m.surplus)).fold(0.0, f64::max);
+                RMS_OVER_SURPLUS * CHILD_SURPLUS * largest
+            };
+            own.max(extrapolated)
         }
         // Every corner sees something much nearer than the others are: what lies between is
         // unknown.
-        None if gap_factor.is_finite() && samples.is_narrow(e) => UNKNOWN_INDICATOR,
+        None if settings.gap_factor.is_finite() && samples.is_narrow(e) => return UNKNOWN,
         // Corners far apart say little of what lies between them.
-        None if !is_scouted => UNKNOWN_INDICATOR,
+        None if !is_scouted => return UNKNOWN,
         None => {
             let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
             // A vector over the channels as long as the root mean square.
             let rms = Rgb::splat(source_nonlinearity(&samples.mesh, source, e) / 3f64.sqrt());
-            let gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
-            gathered.map(end_error).fold(PEAK_OVER_RMS * error(mean, mean + rms), f64::max)
+            let mut gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
+            let ends = RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE * largest_difference(&mut gathered);
+            ends.max(error(mean, mean + rms))
         }
-    }
+    };
+    weight * rms.max(found).powi(2)
 }
 
 /// How far `source` is from linear over element `e` of `mesh`: root mean square over a lattice,
@@ -240,12 +274,12 @@ mod tests {
         samples.buried.fill(true);
         let indicator = |source: &GatheredMesh, min_edge: f64| {
             let settings = RefinementSettings::new(min_edge);
-            let of =
-                |e| refinement_indicator(&samples, &source.radiosity_field(), &scale, &settings, e);
+            let field = source.radiosity_field();
+            let of = |e| squared_error(&samples, &field, &scale, &settings, (e, 0.0));
             (0..samples.mesh.element_count()).map(of).fold(0.0, f64::max)
         };
         // Their longest edge is 45.3.
-        assert_eq!(indicator(&lit, 1.0), UNKNOWN_INDICATOR);
+        assert_eq!(indicator(&lit, 1.0), UNKNOWN);
         assert_eq!(indicator(&dark, 1.0), 0.0);
         assert_eq!(indicator(&lit, 11.4), 0.0, "no longer than four of the shortest");
     }

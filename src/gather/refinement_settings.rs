@@ -7,12 +7,13 @@ use crate::scene::Aabb;
 /// far, and how often all vertices gather.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinementSettings {
-    /// An element is split where the value gathered in the middle of a side differs from the mean
-    /// of the side's ends by more than this share of the element's radiosity, that of its darkest
-    /// corner where this is less, in (0, 1]. Splitting leaves about a quarter of that. The
-    /// allowance doubles with every halving below the longest edge of the mesh given.
-    pub surplus_tolerance: f64,
-    /// Elements whose longest edge is at most this long are not split; scene unit, above 0.
+    /// The error that the mesh may have, in (0, 1]: relative, root mean square over the area, as
+    /// far as it can be predicted from the values at vertices. Elements are split where most of it
+    /// is until it is no more.
+    pub mesh_error: f64,
+    /// Light may change over this length, and seldom over less: elements of the first mesh that
+    /// are more than four times as long are split whatever their corners say, and none whose
+    /// longest edge is an eighth of it; scene unit, above 0.
     pub min_edge: f64,
     /// After the last pass, an element is split once more where the quadratic interpolant of the
     /// gathered values differs from it by more than this share of its radiosity. The new vertices
@@ -44,9 +45,9 @@ pub struct RefinementSettings {
 }
 
 impl RefinementSettings {
-    /// Default of [`RefinementSettings::surplus_tolerance`]: a share of the radiosity, chosen by
+    /// Default of [`RefinementSettings::mesh_error`]: a share of the radiosity, chosen by
     /// hand; no measurement kept.
-    pub const DEFAULT_SURPLUS_TOLERANCE: f64 = 0.02;
+    pub const DEFAULT_MESH_ERROR: f64 = 0.02;
 
     /// Default of [`RefinementSettings::interpolation_tolerance`]: a share of the radiosity, chosen
     /// by hand; no measurement kept.
@@ -59,7 +60,7 @@ impl RefinementSettings {
     /// default tolerances, no uniform subdivision and one pass.
     pub fn new(min_edge: f64) -> RefinementSettings {
         RefinementSettings {
-            surplus_tolerance: RefinementSettings::DEFAULT_SURPLUS_TOLERANCE,
+            mesh_error: RefinementSettings::DEFAULT_MESH_ERROR,
             min_edge,
             interpolation_tolerance: RefinementSettings::DEFAULT_INTERPOLATION_TOLERANCE,
             max_elements: RefinementSettings::DEFAULT_MAX_ELEMENTS,
@@ -86,14 +87,14 @@ impl RefinementSettings {
     /// asking before a long solve.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] for a surplus tolerance outside (0, 1], or a smallest edge or an
+    /// [`ErrorKind::Setting`] for an error of the mesh outside (0, 1], or a smallest edge or an
     /// interpolation tolerance, or a factor that is not above 0.
     pub fn check(&self) -> Result<(), Error> {
         let bad = |place: String, found: &str, remedy: &str| {
             Err(Error::new(ErrorKind::Setting, place, found, remedy))
         };
-        if !(self.surplus_tolerance > 0.0 && self.surplus_tolerance <= 1.0) {
-            let place = format!("surplus tolerance {}", self.surplus_tolerance);
+        if !(self.mesh_error > 0.0 && self.mesh_error <= 1.0) {
+            let place = format!("error of the mesh {}", self.mesh_error);
             return bad(place, "out of range", "use a share above 0 and up to 1");
         }
         if self.min_edge.is_nan() || self.min_edge <= 0.0 {

@@ -33,14 +33,6 @@ pub(crate) struct SampledMesh {
 /// corners see.
 const MIN_NARROWNESS: f64 = 4.0;
 
-/// What splitting elements made.
-pub(super) struct NewParts {
-    /// Vertices that were not there before, ascending.
-    pub vertices: Vec<u32>,
-    /// The elements in the place of those split, ascending.
-    pub elements: Vec<usize>,
-}
-
 impl SampledMesh {
     /// `mesh` with the values that `field`, of the same scene, has at its vertices.
     pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
@@ -82,8 +74,9 @@ impl SampledMesh {
         corners.into_iter().all(|v| self.inverse_distance[v] * edge > MIN_NARROWNESS)
     }
 
-    /// Splits `elements` (ascending) into four each. Values of old vertices are kept.
-    pub fn split(&mut self, elements: &[usize]) -> Result<NewParts, Error> {
+    /// Splits `elements` (ascending) into four each, which are in the place of the one. Values of
+    /// old vertices are kept; gives those that were not there before, ascending.
+    pub fn split(&mut self, elements: &[usize]) -> Result<Vec<u32>, Error> {
         let finer = self.mesh.split(elements)?;
         let vertices = Vertices::new(&finer, &self.topology);
         let count = vertices.positions.len();
@@ -101,11 +94,9 @@ impl SampledMesh {
                 None => is_new[v] = true,
             }
         }
-        let mut new_elements = vec![];
         for (k, &e) in elements.iter().enumerate() {
             // Each split before this one has put four elements in the place of one.
             let first_child = e + 3 * k;
-            new_elements.extend(first_child..first_child + 4);
             let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
             // The corners of the fourth child are the middles of the sides opposite a, b and c.
             let midsides = vertices.corners[first_child + 3].map(|v| v as usize);
@@ -120,8 +111,7 @@ impl SampledMesh {
         self.reflected = reflected;
         self.buried = buried;
         self.inverse_distance = inverse_distance;
-        let new_vertices = (0..count as u32).filter(|&v| is_new[v as usize]).collect();
-        Ok(NewParts { vertices: new_vertices, elements: new_elements })
+        Ok((0..count as u32).filter(|&v| is_new[v as usize]).collect())
     }
 
     /// Root mean square over the elements of how far the values at their corners are from

@@ -34,6 +34,10 @@ pub(super) const CHILD_SURPLUS: f64 = 0.25;
 /// by hand; no measurement kept.
 const MAX_SMOOTH_SURPLUS: f64 = 0.2;
 
+/// Where a surplus is more than this share of the darkest of the six nodes, most of an element's
+/// error may be where the light jumps. Chosen by hand; no other was tried.
+const MAX_CERTAIN_SURPLUS: f64 = 0.3;
+
 /// A value at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeValue {
@@ -91,10 +95,22 @@ impl HierarchicalSurplus {
     /// Whether the quadratic interpolant describes the light: all six nodes are samples of it, and
     /// none is at a jump.
     pub fn is_smooth(&self) -> bool {
+        self.corners.iter().chain(&self.midsides).all(|node| !node.buried) && !self.has_jump()
+    }
+
+    /// Whether the light jumps: its surplus is too large for a quadratic.
+    pub fn has_jump(&self) -> bool {
         let surplus = self.midside_surplus().iter().sum::<Rgb>();
         let midsides = self.midsides.iter().map(|m| m.value).sum::<Rgb>();
-        self.corners.iter().chain(&self.midsides).all(|node| !node.buried)
-            && surplus.length() < MAX_SMOOTH_SURPLUS * midsides.length()
+        surplus.length() >= MAX_SMOOTH_SURPLUS * midsides.length()
+    }
+
+    /// Whether it may jump next to its darkest node, or to `floor` (W/m²) where this is more.
+    pub fn may_jump(&self, floor: f64) -> bool {
+        let nodes = self.corners.iter().chain(&self.midsides).filter(|n| !n.buried);
+        let darkest = nodes.map(|n| n.value.length()).fold(f64::INFINITY, f64::min).max(floor);
+        let largest = self.midside_surplus().iter().map(|s| s.length()).fold(0.0, f64::max);
+        largest > MAX_CERTAIN_SURPLUS * darkest
     }
 
     /// Mean of the corners' values, W/m² per channel.

@@ -121,7 +121,7 @@ fn time_target_returns_last_finished_attempt() {
 fn every_stage_can_be_cancelled() {
     for at in 0..3 {
         let mut estimates = 0;
-        let baked = BakeTarget::Error(0.05)
+        let baked = BakeTarget::Error(0.02)
             .bake(cornell(), &Backend::Cpu, |stage| {
                 let stop = match stage {
                     BakeProgress::Shooting(_) => at == 0,
@@ -143,7 +143,10 @@ fn every_stage_can_be_cancelled() {
         // By gathers, and held against paths where vertices had gathered.
         let expected = if at == 0 { 1 } else { 2 };
         assert_eq!(estimates, expected, "the error of what was reached is estimated, once");
-        assert_eq!(baked.outcome, Outcome::Missed(Obstacle::Cancelled));
+        // What was estimated before it was stopped may have been good enough.
+        let is_enough = at == 2 && baked.estimate.total <= 0.02;
+        let missed = Outcome::Missed(Obstacle::Cancelled);
+        assert_eq!(baked.outcome, if is_enough { Outcome::Reached } else { missed });
         match at {
             0 => assert_eq!(baked.solution.stop, StopReason::Cancelled),
             1 => assert_eq!(baked.light.stop, StopReason::Cancelled),
@@ -194,7 +197,7 @@ fn rejects_targets_out_of_range() {
     assert_eq!(e.kind(), ErrorKind::Setting);
     let bad = |settings: &mut BakeSettings| {
         if let Some(gather) = &mut settings.gather {
-            gather.refinement.surplus_tolerance = 0.0;
+            gather.refinement.mesh_error = 0.0;
         }
     };
     let e =

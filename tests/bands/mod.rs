@@ -18,7 +18,7 @@ fn bake(scene: Scene, size: f64, rays: u32) -> BakeResult {
     let gather = settings.gather.as_mut().unwrap();
     gather.element_size = size;
     gather.rays = rays;
-    gather.refinement.surplus_tolerance = 1.0;
+    gather.refinement.mesh_error = 1.0;
     gather.refinement.interpolation_tolerance = f64::INFINITY;
     settings.bake(scene, &Backend::Cpu, keep_going).unwrap()
 }

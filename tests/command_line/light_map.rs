@@ -40,7 +40,7 @@ fn light_map_refuses_what_it_cannot_do() {
         (&["--error", "2"], &["error 2"], 1),
         (&["--write", "bmp"], &["exr, glb, ply, png"], 2),
         (&["--out", "/no/such/folder/a"], &["/no/such/folder"], 1),
-        (&["--bend", "1"], &["--bend"], 2),
+        (&["--mesh-error", "1"], &["--mesh-error"], 2),
     ] {
         let out = run("light-map", &[&[cornell(), "--cpu"], args].concat());
         let told = String::from_utf8_lossy(&out.stderr);

@@ -63,9 +63,9 @@ Of vertices that gather:
   --gather-contacts N  levels that these are split which other surfaces touch
   --rays N          rays a vertex gathers with
   --noise T         up to 16 times as many rays where they disagree by this share; inf for never
-  --bend T          split where a side's middle is off by this share of its radiosity
+  --mesh-error E    split until elements are off by this share of their light, by prediction
   --curve T         split once more, without a gather, where parabolas bend by more; inf for nowhere
-  --smallest X      elements with no longer edge are not split
+  --smallest X      length that light seldom changes below; elements are split down to an eighth
   --max-elements N  elements there may be [524288]
   --sweeps N        times that all vertices gather, the last time what they found before
 

@@ -74,7 +74,7 @@ const SETTINGS: [Setting; 22] = [
     setting("gather-contacts", COUNT, |v| gather(v, |g, v| g.contact_levels = v)),
     setting("rays", COUNT, |v| gather(v, |g, v| g.rays = v)),
     setting("noise", NUMBER, |v| gather(v, |g, v| g.noise_tolerance = v)),
-    setting("bend", NUMBER, |v| gather(v, |g, v| g.refinement.surplus_tolerance = v)),
+    setting("mesh-error", NUMBER, |v| gather(v, |g, v| g.refinement.mesh_error = v)),
     setting("curve", NUMBER, |v| gather(v, |g, v| g.refinement.interpolation_tolerance = v)),
     setting("smallest", NUMBER, |v| gather(v, |g, v| g.refinement.min_edge = v)),
     setting("max-elements", COUNT, |v| gather(v, |g, v| g.refinement.max_elements = v)),
@@ -130,7 +130,7 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
     if let Some(gather) = &settings.gather {
         let GatherSettings { element_size, contact_levels, rays, noise_tolerance, .. } = gather;
         let RefinementSettings {
-            surplus_tolerance: tolerance,
+            mesh_error,
             min_edge: smallest,
             interpolation_tolerance: curve,
             max_elements: elements,
@@ -145,7 +145,7 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
         report["gather_contacts"] = json!(contact_levels);
         report["rays"] = json!(rays);
         report["noise"] = json!(noise_tolerance);
-        report["bend"] = json!(tolerance);
+        report["mesh_error"] = json!(mesh_error);
         report["smallest"] = json!(smallest);
         report["curve"] = json!(curve);
         report["max_elements"] = json!(elements);

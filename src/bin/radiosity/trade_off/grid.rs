@@ -67,7 +67,7 @@ const PANELS: [PanelPlan; 6] = [
     ("Unshot share", "of the light, at which shooting stops", &[UNSHOT]),
     ("Rotations", "hemicubes a viewpoint, averaged", &[ROTATIONS]),
     ("Near field", "closed forms within so many patch diameters", &[NEAR_FIELD]),
-    ("Gather", "none; how often; how much a side may bend", &[NO_GATHER, SWEEPS, BEND]),
+    ("Gather", "none; how often; how much elements may be off", &[NO_GATHER, SWEEPS, MESH_ERROR]),
 ];
 
 const RESOLUTION: Variation = Variation {
@@ -157,21 +157,19 @@ const SWEEPS: Variation = Variation {
     },
 };
 
-const BEND: Variation = Variation {
-    knob: "bend",
-    name: "bend",
+const MESH_ERROR: Variation = Variation {
+    knob: "mesh error",
+    name: "mesh",
     values: &[4.0, 2.0, 1.0, 0.5, 0.25],
     quick_values: &[2.0, 1.0, 0.5],
     change: |settings, factor| {
         change_gather(settings, |gather| {
-            let tolerance = &mut gather.refinement.surplus_tolerance;
+            let tolerance = &mut gather.refinement.mesh_error;
             *tolerance = (factor * *tolerance).min(1.0);
             gather.refinement.interpolation_tolerance *= factor;
         });
     },
-    label: |settings| {
-        percent(settings.gather.as_ref().map_or(0.0, |g| g.refinement.surplus_tolerance))
-    },
+    label: |settings| percent(settings.gather.as_ref().map_or(0.0, |g| g.refinement.mesh_error)),
 };
 
 fn change_gather(settings: &mut BakeSettings, change: impl Fn(&mut GatherSettings)) {

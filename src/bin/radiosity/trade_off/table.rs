@@ -101,7 +101,7 @@ fn gather_cells(gather: Option<&GatherSettings>) -> [(&'static str, String); 8] 
         ("gather_size", cell(|g| format!("{:.6}", g.element_size))),
         ("gather_contacts", cell(|g| g.contact_levels.to_string())),
         ("rays", cell(|g| g.rays.to_string())),
-        ("bend", cell(|g| g.refinement.surplus_tolerance.to_string())),
+        ("mesh error", cell(|g| g.refinement.mesh_error.to_string())),
         ("curve", cell(|g| g.refinement.interpolation_tolerance.to_string())),
         ("smallest", cell(|g| format!("{:.6}", g.refinement.min_edge))),
         ("sweeps", cell(|g| g.refinement.gather_passes.to_string())),
