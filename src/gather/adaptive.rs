@@ -504,6 +504,22 @@ mod tests {
     use crate::backend::cpu::RayGather;
 
     #[test]
+    fn worst_elements_are_split_until_rest_is_allowed() {
+        let share =
+            |(element, square): (usize, &f64)| Share { square: *square, area: 1.0, element };
+        let marked = |squares: &[f64], allowed: f64| -> Vec<usize> {
+            let shares = squares.iter().enumerate().map(share).collect();
+            bulk_above(shares, allowed).into_iter().map(|(_, element)| element).collect()
+        };
+        let squares = [1.0, 8.0, 0.0, 4.0, 2.0];
+        // Mean 3: of it 8 and 4 are the bulk, 80 %.
+        assert_eq!(marked(&squares, 0.1), [1, 3]);
+        assert_eq!(marked(&squares, 2.3), [1], "half of 8 is enough: 11 of 15 are left");
+        assert!(marked(&squares, 3.0).is_empty(), "no more than is allowed");
+        assert_eq!(marked(&[1.0, f64::INFINITY], 3.0), [1], "nothing is known of it");
+    }
+
+    #[test]
     fn further_bounces_are_those_of_passes() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
         let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
