@@ -182,19 +182,28 @@ impl<'a> GatherPhase<'a> {
         self.backend.gather(&self.shot.mesh, rays, noise, self.state.radiosity_floor())
     }
 
+    /// The gatherer of few rays that looks between vertices.
+    fn scout(&self) -> Result<Box<dyn Gather + 'a>, Error> {
+        let floor = self.state.radiosity_floor();
+        let (rays, noise) = (scouts::SCOUT_RAYS, scouts::SCOUT_NOISE);
+        self.backend.gather(&self.shot.mesh, rays, noise, floor)
+    }
+
+    /// What makes the rows by which vertices exchange all further bounces.
+    fn bounce_rows(&self) -> Result<RayGather, Error> {
+        let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
+        RayGather::new(&self.shot.mesh, rays)
+    }
+
     /// Takes `step`, and says why it ended.
     fn gather(&mut self, step: Step, reporter: &mut Reporter) -> Result<StopReason, Error> {
         let refinement = self.gather.refinement.clone();
-        let floor = self.state.radiosity_floor();
-        let (rays, noise) = (scouts::SCOUT_RAYS, scouts::SCOUT_NOISE);
-        let mut scout = self.backend.gather(&self.shot.mesh, rays, noise, floor)?;
-        let scout = Some(&mut *scout as &mut dyn Gather);
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
             Step::AllPasses => {
-                let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
+                let mut scout = self.scout()?;
                 let bounces = match (self.target, refinement.gather_passes) {
-                    (Some(_), 0 | 1) => Some(RayGather::new(&self.shot.mesh, rays)?),
+                    (Some(_), 0 | 1) => Some(self.bounce_rows()?),
                     _ => None,
                 };
                 let mut coarse = match refinement.gather_passes {
@@ -205,7 +214,7 @@ impl<'a> GatherPhase<'a> {
                     &refinement,
                     &mut *self.gatherer,
                     coarse.as_mut().map(|coarse| &mut **coarse as &mut dyn Gather),
-                    (scout, bounces.as_ref().map(|rows| rows as &dyn PointRows)),
+                    (Some(&mut *scout), bounces.as_ref().map(|rows| rows as &dyn PointRows)),
                     &mut progress,
                 )
             }
@@ -213,14 +222,17 @@ impl<'a> GatherPhase<'a> {
                 if bounce {
                     self.state.promote_to_source();
                 }
+                let mut scout = self.scout()?;
+                let scout = Some(&mut *scout as &mut dyn Gather);
                 self.state.gather_pass(&refinement, &mut *self.gatherer, scout, &mut progress)
             }
             Step::Bounces => {
-                let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
-                let maker = RayGather::new(&self.shot.mesh, rays)?;
+                let maker = self.bounce_rows()?;
                 Ok(self.state.add_further_bounces(&maker, &mut progress))
             }
             Step::Split => {
+                let mut scout = self.scout()?;
+                let scout = Some(&mut *scout as &mut dyn Gather);
                 self.state.refine(&refinement, &mut *self.gatherer, scout, &mut progress)
             }
         }

@@ -96,7 +96,8 @@ pub const MAX_SHOOTING_ELEMENTS: usize = 1 << 19;
 /// the error slowly, since elements are split where light is not linear.
 pub const GATHER_EDGE: PowerLaw = PowerLaw::new(0.3, 0.3);
 
-/// Edge below which gathering elements are not split, share of the diagonal.
+/// Length that light seldom changes below, share of the diagonal: gathering elements are split down
+/// to an eighth of it.
 pub const MIN_EDGE: PowerLaw = PowerLaw::new(0.1, 0.85);
 
 /// Root mean square of the relative error of elements that are not split, as it is predicted before

@@ -203,7 +203,7 @@ impl<'a> AdaptiveGather<'a> {
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
         for remaining in (1..settings.gather_passes).rev() {
-            let coarse = self.coarser(settings, remaining);
+            let coarse = coarser(settings, remaining);
             let stop = match &mut coarse_gatherer {
                 Some(coarse_gatherer) => {
                     self.gather_pass(&coarse, *coarse_gatherer, None, progress)?
@@ -216,7 +216,7 @@ impl<'a> AdaptiveGather<'a> {
             self.promote_to_source();
         }
         if let Some(maker) = bounces {
-            let coarse = self.coarser(settings, 1);
+            let coarse = coarser(settings, 1);
             let look: Option<&mut dyn Gather> = match &mut scout {
                 Some(scout) => Some(&mut **scout),
                 None => None,
@@ -231,16 +231,6 @@ impl<'a> AdaptiveGather<'a> {
             return self.refine(settings, gatherer, scout, progress);
         }
         self.gather_pass(settings, gatherer, scout, progress)
-    }
-
-    /// `settings` for the light that others gather, so many passes later.
-    fn coarser(&self, settings: &RefinementSettings, passes: u32) -> RefinementSettings {
-        let coarsening = PASS_COARSENING.powi(passes as i32);
-        RefinementSettings {
-            mesh_error: (settings.mesh_error * coarsening).min(1.0),
-            min_edge: settings.min_edge * coarsening,
-            ..settings.clone()
-        }
     }
 
     /// Gathers the source at all vertices, then refines.
@@ -293,8 +283,8 @@ impl<'a> AdaptiveGather<'a> {
         StopReason::Converged
     }
 
-    /// Splits elements whose surplus is above what `settings` allow and gathers at the new
-    /// vertices, until there are no such elements.
+    /// Splits the elements with most of the error and gathers at the new vertices, until what
+    /// `settings` allow is left and the `scout`, if there is one, has looked at all that matter.
     pub fn refine(
         &mut self,
         settings: &RefinementSettings,
@@ -461,6 +451,16 @@ impl<'a> AdaptiveGather<'a> {
 
     fn all_vertices(&self) -> Vec<u32> {
         (0..self.samples.reflected.len() as u32).collect()
+    }
+}
+
+/// `settings` for the light that others gather, so many passes later.
+fn coarser(settings: &RefinementSettings, passes: u32) -> RefinementSettings {
+    let coarsening = PASS_COARSENING.powi(passes as i32);
+    RefinementSettings {
+        mesh_error: (settings.mesh_error * coarsening).min(1.0),
+        min_edge: settings.min_edge * coarsening,
+        ..settings.clone()
     }
 }
 

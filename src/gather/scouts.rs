@@ -30,7 +30,7 @@ pub(super) const LEAST_AREA: f64 = 0.3;
 const RMS_OVER_MIDDLE: f64 = 0.5;
 
 /// The error that each element was found to have, relative, root mean square.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub(super) struct Scouts {
     /// By element; NaN where nobody has looked yet.
     errors: Vec<f32>,
