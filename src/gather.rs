@@ -64,9 +64,13 @@ pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
     /// reflected, and the sky where there is no surface.
     pub irradiance: Rgb,
-    /// The part of `irradiance` from luminaires and from the emission of lights that were sampled
-    /// explicitly, W/m² per channel. Emission that is seen like any other surface is not in it.
+    /// The part of `irradiance` that lights, luminaires and the sun send straight to the point, per
+    /// channel, W/m². By hemicubes, what small lights emit is not in it: they are seen like any
+    /// other surface.
     pub direct: Rgb,
+    /// Standard error of `irradiance` as far as its rays tell, W/m²: a length over the channels;
+    /// where they see two fields, that of the first. 0 by hemicubes.
+    pub noise: f64,
     /// Share of the hemisphere in which nothing is seen, in [0, 1].
     pub escaped: f64,
     /// Share of the hemisphere in which backs of surfaces are seen, in [0, 1].

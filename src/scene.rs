@@ -12,6 +12,7 @@ mod covered_backs;
 mod covers;
 mod cut;
 mod cut_outs;
+mod derived;
 pub(crate) mod glass_bodies;
 mod intensity;
 mod luminaire;
@@ -38,6 +39,7 @@ pub(crate) use crate::geometry::polygon::longest_edge;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
+use derived::Derived;
 pub use intensity::{IntensityDistribution, Pole};
 pub use luminaire::{Luminaire, Opening};
 pub use material::Material;
@@ -95,6 +97,8 @@ pub struct Scene {
     covered_backs: OnceLock<Covers>,
     /// See [`Scene::clear_panes`]; looked for when they are first asked for.
     clear_panes: OnceLock<Option<ClearPanes>>,
+    /// See [`Scene::derived`].
+    derived: Derived,
 }
 
 impl Scene {
@@ -214,6 +218,7 @@ impl Scene {
             crease_degrees: None,
             covered_backs: OnceLock::new(),
             clear_panes: OnceLock::new(),
+            derived: Derived::default(),
         };
         if !textures.is_empty() {
             scene.lay_textures(textures);

@@ -9,6 +9,7 @@
 //! Feixas, Sbert and Heidrich (2001) score views alike, by the entropy of the faces seen.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -47,7 +48,7 @@ const EDGE_LOSS: f64 = 0.5;
 
 /// A scene with its light, as views of it are scored.
 pub(super) struct ViewScorer<'a> {
-    pub rays: RayScene,
+    pub rays: Arc<RayScene>,
     /// Box around what is to be seen; what reflects outside it counts as if on its boundary.
     pub focus: Aabb,
     scene: &'a Scene,

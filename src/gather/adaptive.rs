@@ -404,7 +404,13 @@ impl<'a> AdaptiveGather<'a> {
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
         let SampledMesh {
-            mesh, vertices: mesh_vertices, reflected, buried, inverse_distance, ..
+            mesh,
+            vertices: mesh_vertices,
+            reflected,
+            noise,
+            buried,
+            inverse_distance,
+            ..
         } = &mut self.samples;
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
         let source = self.source.radiosity_field();
@@ -428,7 +434,7 @@ impl<'a> AdaptiveGather<'a> {
                 batch.apply(
                     &points,
                     attempt,
-                    &mut VertexValues { reflected, buried, inverse_distance },
+                    &mut VertexValues { reflected, noise, buried, inverse_distance },
                 );
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {

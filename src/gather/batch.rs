@@ -16,6 +16,8 @@ pub(super) struct Batch<'v> {
 pub(super) struct VertexValues<'s> {
     /// Reflected radiosity, W/m² per channel.
     pub reflected: &'s mut [Rgb],
+    /// Standard errors of that, W/m²: lengths over the channels.
+    pub noise: &'s mut [f64],
     pub buried: &'s mut [bool],
     /// Mean of 1/distance, per scene unit.
     pub inverse_distance: &'s mut [f64],
@@ -50,8 +52,16 @@ impl Batch<'_> {
             }
             // (ρ + τ) E, which is darkness at a buried vertex.
             values.reflected[v as usize] = points.albedo(v) * sample.irradiance;
+            values.noise[v as usize] = reflected_noise(points.albedo(v), sample);
             values.buried[v as usize] = is_buried;
             values.inverse_distance[v as usize] = sample.inverse_distance;
         }
     }
+}
+
+/// Standard error of what a surface of `albedo` reflects of `sample`, W/m²: a length over the
+/// channels, in each of which the noise is the same share of the light.
+fn reflected_noise(albedo: Rgb, sample: &IrradianceSample) -> f64 {
+    let all = sample.irradiance.length();
+    if all > 0.0 { sample.noise * ((albedo * sample.irradiance).length() / all) } else { 0.0 }
 }

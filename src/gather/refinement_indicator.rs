@@ -12,6 +12,7 @@
 //! | a parent with a jump | 0.2 of the largest difference of corners |
 //! | no parent | 1/8 of that, or how far the light before is from linear |
 //!
+//! Differences count as far as they are more than the noise of what they are between.
 //! Elements far from the region of the light count as if they were as much smaller as elements grow
 //! there. Nothing is known of the middle of an element whose corners are all buried, under houses
 //! that stand on a ground, say: if there was light before, it is split.
@@ -20,7 +21,7 @@ use glam::DVec2;
 
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
-use super::surplus::{CHILD_SURPLUS, HierarchicalSurplus, NodeValue};
+use super::surplus::{CHILD_SURPLUS, HierarchicalSurplus, MidsideSurplus, NodeValue, beyond_noise};
 use super::{RADIOSITY_FLOOR_SHARE, RadiosityField};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
@@ -154,17 +155,19 @@ pub(super) fn squared_error(
         .fold(f64::INFINITY, f64::min);
     // Difference of two values of reflected radiosity, relative to the first or that of the darkest
     // corner.
-    let error = |value: Rgb, other: Rgb| {
+    let error = |value: Rgb, other: Rgb, noise: f64| {
         let radiosity = (value + emitted).length().min(darkest).max(scale.radiosity_floor);
-        if radiosity > 0.0 { (value - other).length() / radiosity } else { 0.0 }
+        let difference = beyond_noise((value - other).length(), noise);
+        if radiosity > 0.0 { difference / radiosity } else { 0.0 }
     };
-    let corners = samples.vertices.corners[e].map(|v| NodeValue {
-        value: samples.reflected[v as usize],
-        buried: samples.buried[v as usize],
-    });
+    let corners = samples.vertices.corners[e].map(|v| NodeValue::of(samples, v));
     let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
     let largest_difference = |sides: &mut dyn Iterator<Item = [NodeValue; 2]>| {
-        sides.map(|[a, b]| error(a.value, b.value).max(error(b.value, a.value))).fold(0.0, f64::max)
+        let either = |[a, b]: [NodeValue; 2]| {
+            let noise = a.noise.hypot(b.noise);
+            error(a.value, b.value, noise).max(error(b.value, a.value, noise))
+        };
+        sides.map(either).fold(0.0, f64::max)
     };
     let is_scouted = size <= SCOUTED_SIZE * settings.min_edge * group_factor;
     let rms = match HierarchicalSurplus::of_parent(samples, e) {
@@ -185,8 +188,8 @@ pub(super) fn squared_error(
                 RMS_OVER_JUMP * largest_difference(&mut gathered)
             } else {
                 let surplus = parent.sampled_midsides();
-                let largest =
-                    surplus.map(|m| error(m.value, m.value - m.surplus)).fold(0.0, f64::max);
+                let of_midside = |m: MidsideSurplus| error(m.value, m.value - m.surplus, m.noise);
+                let largest = surplus.map(of_midside).fold(0.0, f64::max);
                 RMS_OVER_SURPLUS * CHILD_SURPLUS * largest
             };
             own.max(extrapolated)
@@ -202,7 +205,7 @@ pub(super) fn squared_error(
             let rms = Rgb::splat(source_nonlinearity(&samples.mesh, source, e) / 3f64.sqrt());
             let mut gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
             let ends = RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE * largest_difference(&mut gathered);
-            ends.max(error(mean, mean + rms))
+            ends.max(error(mean, mean + rms, 0.0))
         }
     };
     weight * rms.max(found).powi(2)
@@ -254,9 +257,8 @@ mod tests {
     use crate::gather::GatheredMesh;
     use crate::scene::{Material, Scene, Triangle};
 
-    /// Ground of 64 × 64 whose elements, children of two triangles, have buried corners only.
-    #[test]
-    fn elements_on_buried_corners_are_split_where_there_was_light() {
+    /// A ground of 64 × 64, in two triangles.
+    fn ground() -> Mesh {
         let positions = [[0.0, 0.0], [64.0, 0.0], [64.0, 64.0], [0.0, 64.0]];
         let triangle = |corners| Triangle { corners, ..Default::default() };
         let scene = Scene::new(
@@ -265,7 +267,57 @@ mod tests {
             vec!["ground".into()],
             vec![Material::grey("grey", 0.5)],
         );
-        let mesh = Mesh::new(Arc::new(scene.unwrap()), 100.0).unwrap();
+        Mesh::new(Arc::new(scene.unwrap()), 100.0).unwrap()
+    }
+
+    #[test]
+    fn noise_is_no_error_of_the_mesh() {
+        let mesh = ground();
+        let even = GatheredMesh::from_elements(&mesh, &[Rgb::ONE; 2]).unwrap();
+        let field = even.radiosity_field();
+        let scale = ErrorScale::new(&mesh, &field, None);
+        let mut samples = SampledMesh::new(mesh, &field);
+        // The longest edge is 90.5: less than four of these, so that corners tell.
+        let settings = RefinementSettings::new(32.0);
+        let worst = |samples: &SampledMesh| {
+            let of = |e| squared_error(samples, &field, &scale, &settings, (e, 0.0));
+            (0..samples.mesh.element_count()).map(of).fold(0.0, f64::max)
+        };
+        // Every other vertex is a tenth darker, or so dark that light may jump; of elements without
+        // a parent first, and then of their children.
+        for (dark, may_jump) in [(0.9, false), (0.2, true)] {
+            let lay = |samples: &mut SampledMesh| {
+                for (v, value) in samples.reflected.iter_mut().enumerate() {
+                    *value = Rgb::splat(if v % 2 == 0 { 1.0 } else { dark });
+                }
+                samples.noise.fill(0.0);
+            };
+            for _ in 0..2 {
+                lay(&mut samples);
+                let certain = worst(&samples);
+                samples.noise.fill(0.1 * (1.0 - dark));
+                assert!(certain > 0.0 && worst(&samples) > 0.8 * certain);
+                // As much as they differ by, a length over the channels.
+                samples.noise.fill((1.0 - dark) * 3f64.sqrt());
+                assert_eq!(worst(&samples), 0.0);
+                let all: Vec<usize> = (0..samples.mesh.element_count()).collect();
+                samples.split(&all).unwrap();
+            }
+            lay(&mut samples);
+            let jumps = |samples: &SampledMesh| {
+                let parent = |e| HierarchicalSurplus::of_parent(samples, e).unwrap();
+                (0..samples.mesh.element_count()).any(|e| parent(e).may_jump(0.0))
+            };
+            assert_eq!(jumps(&samples), may_jump);
+            samples.noise.fill(2.0);
+            assert!(!jumps(&samples));
+        }
+    }
+
+    /// Elements, children of two triangles, have buried corners only.
+    #[test]
+    fn elements_on_buried_corners_are_split_where_there_was_light() {
+        let mesh = ground();
         let [lit, dark] =
             [1.0, 0.0].map(|b| GatheredMesh::from_elements(&mesh, &[Rgb::splat(b); 2]).unwrap());
         let scale = ErrorScale::new(&mesh, &lit.radiosity_field(), None);

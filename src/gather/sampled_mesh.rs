@@ -22,6 +22,8 @@ pub(crate) struct SampledMesh {
     pub vertices: Vertices,
     /// Reflected radiosity B − E at the vertices, W/m² per channel.
     pub reflected: Vec<Rgb>,
+    /// Standard error of `reflected` by the rays of each vertex, W/m²: a length over the channels.
+    pub noise: Vec<f64>,
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
@@ -40,9 +42,10 @@ impl SampledMesh {
         let vertices = Vertices::new(&mesh, &topology);
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
+        let noise = vec![0.0; reflected.len()];
         let buried = vec![false; reflected.len()];
         let inverse_distance = vec![0.0; reflected.len()];
-        SampledMesh { mesh, topology, vertices, reflected, buried, inverse_distance }
+        SampledMesh { mesh, topology, vertices, reflected, noise, buried, inverse_distance }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -81,6 +84,7 @@ impl SampledMesh {
         let vertices = Vertices::new(&finer, &self.topology);
         let count = vertices.positions.len();
         let mut reflected = vec![Rgb::ZERO; count];
+        let mut noise = vec![0.0; count];
         let mut buried = vec![false; count];
         let mut inverse_distance = vec![0.0; count];
         let mut is_new = vec![false; count];
@@ -88,6 +92,7 @@ impl SampledMesh {
             match self.vertices.index_of(key) {
                 Some(old) => {
                     reflected[v] = self.reflected[old as usize];
+                    noise[v] = self.noise[old as usize];
                     buried[v] = self.buried[old as usize];
                     inverse_distance[v] = self.inverse_distance[old as usize];
                 }
@@ -109,6 +114,7 @@ impl SampledMesh {
         self.mesh = finer;
         self.vertices = vertices;
         self.reflected = reflected;
+        self.noise = noise;
         self.buried = buried;
         self.inverse_distance = inverse_distance;
         Ok((0..count as u32).filter(|&v| is_new[v as usize]).collect())

@@ -43,6 +43,8 @@ const MAX_CERTAIN_SURPLUS: f64 = 0.3;
 pub(super) struct NodeValue {
     /// Reflected radiosity, W/m² per channel.
     pub value: Rgb,
+    /// Standard error of the value, W/m²: a length over the channels.
+    pub noise: f64,
     /// Whether the vertex is buried, so that the value is no sample of the light.
     pub buried: bool,
 }
@@ -53,6 +55,20 @@ pub(super) struct MidsideSurplus {
     pub value: Rgb,
     /// Its value less the mean of its side's ends, W/m² per channel.
     pub surplus: Rgb,
+    /// Standard error of the surplus, W/m²: a length over the channels.
+    pub noise: f64,
+}
+
+impl NodeValue {
+    /// That of vertex `v`.
+    pub fn of(samples: &SampledMesh, v: u32) -> NodeValue {
+        let v = v as usize;
+        NodeValue {
+            value: samples.reflected[v],
+            noise: samples.noise[v],
+            buried: samples.buried[v],
+        }
+    }
 }
 
 /// Reflected radiosity over the parent of an element: a six-node triangle.
@@ -69,10 +85,8 @@ impl HierarchicalSurplus {
         let node = samples.mesh.element(e);
         let (t, cell) = (samples.mesh.triangle(node), samples.mesh.cell(node));
         let parent = cell.ancestor(cell.level.checked_sub(1)?);
-        let node_value = |key: &VertexKey| {
-            let v = samples.vertices.index_of(key)? as usize;
-            Some(NodeValue { value: samples.reflected[v], buried: samples.buried[v] })
-        };
+        let node_value =
+            |key: &VertexKey| Some(NodeValue::of(samples, samples.vertices.index_of(key)?));
         let [a, b, c] = corner_keys(&samples.topology, t, parent).each_ref().map(node_value);
         let [d, e, f] = midside_keys(&samples.topology, t, parent)?.each_ref().map(node_value);
         Some(HierarchicalSurplus { corners: [a?, b?, c?], midsides: [d?, e?, f?] })
@@ -84,12 +98,21 @@ impl HierarchicalSurplus {
         [0, 1, 2].map(|k| m[k].value - (c[k].value + c[(k + 1) % 3].value) / 2.0)
     }
 
+    /// Standard error of the surplus of midside `k`, W/m²: a length over the channels.
+    fn surplus_noise(&self, k: usize) -> f64 {
+        let ends = self.corners[k].noise.hypot(self.corners[(k + 1) % 3].noise) / 2.0;
+        self.midsides[k].noise.hypot(ends)
+    }
+
     /// The midsides that are not buried.
     pub fn sampled_midsides(&self) -> impl Iterator<Item = MidsideSurplus> {
-        let midsides = self.midsides.iter().zip(self.midside_surplus());
-        midsides
-            .filter(|(midside, _)| !midside.buried)
-            .map(|(midside, surplus)| MidsideSurplus { value: midside.value, surplus })
+        let surplus = self.midside_surplus();
+        let found = [0, 1, 2].map(|k| MidsideSurplus {
+            value: self.midsides[k].value,
+            surplus: surplus[k],
+            noise: self.surplus_noise(k),
+        });
+        found.into_iter().zip(&self.midsides).filter(|(_, m)| !m.buried).map(|(found, _)| found)
     }
 
     /// Whether the quadratic interpolant describes the light: all six nodes are samples of it, and
@@ -109,7 +132,9 @@ impl HierarchicalSurplus {
     pub fn may_jump(&self, floor: f64) -> bool {
         let nodes = self.corners.iter().chain(&self.midsides).filter(|n| !n.buried);
         let darkest = nodes.map(|n| n.value.length()).fold(f64::INFINITY, f64::min).max(floor);
-        let largest = self.midside_surplus().iter().map(|s| s.length()).fold(0.0, f64::max);
+        let surplus = self.midside_surplus();
+        let certain = |k: usize| beyond_noise(surplus[k].length(), self.surplus_noise(k));
+        let largest = [0, 1, 2].map(certain).into_iter().fold(0.0, f64::max);
         largest > MAX_CERTAIN_SURPLUS * darkest
     }
 
@@ -154,6 +179,13 @@ impl HierarchicalSurplus {
                 - (corner(p) + corner(q)) / 8.0
         })
     }
+}
+
+/// What is left of a difference of this `length` where its standard error is `noise`: the mean of
+/// its square is that of what it is without noise, plus that of the noise. Elements that are split
+/// for noise get corners that are as noisy.
+pub(super) fn beyond_noise(length: f64, noise: f64) -> f64 {
+    (length.powi(2) - noise.powi(2)).max(0.0).sqrt()
 }
 
 /// Values at the vertices of which the linear interpolant has, over every element, about the mean

@@ -106,11 +106,20 @@ fn with_both_sides<const FIELDS: usize>(
     }
     let backs: Vec<GatherPoint> = two_sided.iter().map(|&k| points[k].other_side()).collect();
     for (samples, behind) in samples.iter_mut().zip(gather(&backs)?) {
-        for (&k, back) in two_sided.iter().zip(&behind) {
-            let (sample, share) = (&mut samples[k], points[k].behind);
-            sample.irradiance += share * (back.irradiance - sample.irradiance);
-            sample.direct += share * (back.direct - sample.direct);
+        for (&k, &back) in two_sided.iter().zip(&behind) {
+            samples[k] = mixed(samples[k], back, points[k].behind);
         }
     }
     Ok(samples)
+}
+
+/// `front` with the light of both sides, of which the other one counts with `share`.
+fn mixed(front: IrradianceSample, back: IrradianceSample, share: Rgb) -> IrradianceSample {
+    let mean = share.element_sum() / 3.0;
+    IrradianceSample {
+        irradiance: front.irradiance + share * (back.irradiance - front.irradiance),
+        direct: front.direct + share * (back.direct - front.direct),
+        noise: ((1.0 - mean) * front.noise).hypot(mean * back.noise),
+        ..front
+    }
 }

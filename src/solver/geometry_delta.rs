@@ -8,6 +8,8 @@
 //! - what it sends to where they are: the form factor of each new box × the part of that box that a
 //!   few rays find open to the patch.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
@@ -28,7 +30,7 @@ pub(super) struct GeometryDelta {
     /// Boxes about the moved triangles of each group that has any.
     groups: Vec<MovedBox>,
     /// The scene as it is now; none where nothing has moved.
-    rays: Option<RayScene>,
+    rays: Option<Arc<RayScene>>,
 }
 
 /// A box about triangles, where they were and where they are.

@@ -17,6 +17,7 @@ use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -53,7 +54,7 @@ const ALIKE: f64 = 0.8;
 #[derive(Debug)]
 pub struct PathTracer<'a> {
     scene: &'a Scene,
-    rays: RayScene,
+    rays: Arc<RayScene>,
     panes: Panes,
     normals: Vec<DVec3>,
     emitters: Emitters,

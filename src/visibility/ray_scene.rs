@@ -16,6 +16,7 @@
 //! order of traversal, so that results do not depend on the hierarchy.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 use glam::DVec3;
@@ -77,8 +78,12 @@ impl RayScene {
         RayScene { cut_outs, ..self }
     }
 
-    /// For the triangles of `scene` that block light, by their numbers.
-    pub fn of_scene(scene: &Scene) -> RayScene {
+    /// For the triangles of `scene` that block light, by their numbers: made once for a scene.
+    pub fn of_scene(scene: &Scene) -> Arc<RayScene> {
+        scene.derived(RayScene::made_of)
+    }
+
+    fn made_of(scene: &Scene) -> RayScene {
         let count = scene.triangles().len();
         let met = (0..count as u32).filter(|&t| !scene.is_clear(t as usize)).collect();
         RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
@@ -225,6 +230,7 @@ fn solid_hits(holes: &CutOuts, counts: impl Fn(&Hit) -> bool) -> impl Fn(&Hit) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Material, Rgb, Specular, Triangle};
 
     #[test]
     fn closest_hit_skips_ignored_triangle() {
@@ -335,5 +341,22 @@ mod tests {
         rays.closest_hits(DVec3::ZERO, [DVec3::X, DVec3::Y].into_iter(), 0.0, None, |_, hit| {
             assert_eq!(hit, None);
         });
+    }
+
+    #[test]
+    fn a_scene_has_one_hierarchy() {
+        let at = |z: f64| [DVec3::new(0., 0., z), DVec3::new(1., 0., z), DVec3::new(0., 1., z)];
+        let triangle = Triangle { corners: [0, 1, 2], ..Default::default() };
+        let grey = vec![Material::grey("grey", 0.5)];
+        let scene = Scene::new(at(1.0).to_vec(), vec![triangle], vec!["all".into()], grey).unwrap();
+        let rays = RayScene::of_scene(&scene);
+        assert!(Arc::ptr_eq(&rays, &RayScene::of_scene(&scene)));
+        let glass = Specular::Glass { refractive_index: 1.5, transmittance: Rgb::ONE };
+        let clear = Material { specular: Some(glass), ..Material::grey("clear", 0.0) };
+        let changed = scene.with_materials(vec![clear]).unwrap();
+        let meets = |rays: &RayScene| {
+            rays.closest_hit(DVec3::new(0.2, 0.3, 0.0), DVec3::Z, 0.0, None).is_some()
+        };
+        assert!(meets(&rays) && !meets(&RayScene::of_scene(&changed)));
     }
 }

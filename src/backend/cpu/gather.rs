@@ -7,35 +7,31 @@
 //!                └ shadow rays to luminaires ─► see `LuminaireLight`
 //! ```
 //!
-//! The number of rays doubles until halves of them agree, or the most is reached:
-//!
-//! ```text
-//! error = max(|E_first − E_second|, c_max / n) / 2   ≤   noise · max(E, dim) ?
-//! ```
-//!
-//! E_first and E_second being those of the two halves of the rays, and c_max the largest
-//! contribution of one ray: both halves may miss the same small source.
+//! The number of rays doubles until halves of them agree, or the most is reached: of those over the
+//! hemisphere or of those to lights, whichever disagree more.
 
+mod direct_light;
+mod doubled;
 mod point_rows;
 
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::light_projection::LightProjection;
-use crate::gather::lights::{Light, Lights, NO_LIGHT};
+use crate::gather::lights::{Lights, NO_LIGHT};
 use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
-use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Rgb, Scene, Sun};
-use crate::visibility::offset;
+use crate::scene::{Rgb, Scene};
 use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::visibility::ray_scene::RayScene;
+use direct_light::DirectLight;
+use doubled::{Doubled, Found};
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
 ///
@@ -44,7 +40,7 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 /// share of it that a quarter as many rays find visible, weighted by their form factors.
 #[derive(Debug)]
 pub struct RayGather {
-    scene: RayScene,
+    scene: Arc<RayScene>,
     panes: Panes,
     lights: Lights,
     rotations: CellRotation,
@@ -63,9 +59,6 @@ const MAX_OVERSAMPLING: u32 = 16;
 
 /// Rays over the hemisphere for one shadow ray to each light. Chosen by hand; no measurement kept.
 const RAYS_PER_SHADOW_RAY: u32 = 4;
-
-/// The second rotation is the rest of the first behind its 16 leading bits.
-const SECOND_ROTATION: f64 = (1u32 << 16) as f64;
 
 impl RayGather {
     /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
@@ -126,66 +119,60 @@ impl RayGather {
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
-        let scene = fields[0].mesh.scene();
-        let lights = self.sampled_lights(scene, point);
-        let sun = scene.sky().sun();
-        let luminaires = LuminaireLight {
-            luminaires: scene.luminaires(),
+        let direct_light = DirectLight::new(self, point);
+        let lights = direct_light.lights();
+        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.found(range));
+        let trace = |range| self.trace(fields, point, lights, range);
+        let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
+        let of_luminaires = self.luminaires().irradiance(point);
+        loop {
+            let all = hemisphere.mean() + direct.mean() + of_luminaires;
+            let allowed = self.noise * all.length().max(self.dim);
+            let errors = [direct.error(), hemisphere.error()];
+            if errors[0].hypot(errors[1]) <= allowed {
+                break;
+            }
+            let is_doubled = match errors[0] > errors[1] {
+                true => direct.double() || hemisphere.double(),
+                false => hemisphere.double() || direct.double(),
+            };
+            if !is_doubled {
+                break;
+            }
+        }
+        let (rays, count) = (hemisphere.found(), hemisphere.count());
+        let noise = direct.error().hypot(hemisphere.error());
+        rays.samples(count, direct.mean() + of_luminaires, noise)
+    }
+
+    /// Shadow rays to each light, at least and at most.
+    fn shadow_rays(&self) -> [u32; 2] {
+        [self.min_rays, self.max_rays].map(|rays| (rays / RAYS_PER_SHADOW_RAY).max(2))
+    }
+
+    fn luminaires(&self) -> LuminaireLight<'_> {
+        LuminaireLight {
+            luminaires: self.lights.scene().luminaires(),
             rays: &self.scene,
             panes: &self.panes,
             rotations: &self.rotations,
-        };
-        let of_luminaires = luminaires.irradiance(point);
-        let trace = |range| self.trace(fields, point, &lights, range);
-        let sample = |sums: &RaySums<FIELDS>, count| {
-            self.samples_of(sums, of_luminaires, (point, &lights, sun), count)
-        };
-        let mut count = self.min_rays;
-        let mut sums = trace(0..count / 2);
-        loop {
-            let second = trace(count / 2..count);
-            let [a, b] = [&sums, &second].map(|half| sample(half, count / 2)[0].irradiance);
-            sums.add(&second);
-            let all = sample(&sums, count);
-            let largest_share = sums.max_contribution / f64::from(count);
-            let difference = a.distance(b).max(largest_share);
-            let allowed = self.noise * all[0].irradiance.length().max(self.dim);
-            if difference / 2.0 <= allowed || count == self.max_rays {
-                return all;
-            }
-            count *= 2;
         }
     }
 
-    /// The lights that rays are sent to from `point`, each with its unoccluded form factor. A light
-    /// without a closed form that reaches far around is not among them: it is sampled better by
-    /// rays over the hemisphere than by points spread over its area.
-    fn sampled_lights(&self, scene: &Scene, point: &GatherPoint) -> Vec<(u32, f64)> {
-        let mut lights = self.lights.importance_ranked(point);
-        lights.retain(|&(light, _)| {
-            let light = &self.lights.lights[light as usize];
-            let corner = |&t: &u32| scene.corners(t as usize);
-            light.convex
-                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
-        });
-        lights
-    }
-
-    /// Sums over the rays of `range`.
+    /// What the rays of `range` find. Emission of `lights` is not in it, to which rays are sent.
     fn trace<const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
         lights: &[(u32, f64)],
         range: Range<u32>,
-    ) -> RaySums<FIELDS> {
-        let scene = fields[0].mesh.scene();
+    ) -> HemisphereRays<FIELDS> {
         let rotation = self.rotations.at(point.position, point.near);
         let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
-        let mut sums = RaySums::default();
-        let sky = scene.sky();
-        let out = &mut sums.hemisphere;
-        let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
+        let mut found = HemisphereRays::default();
+        let sky = self.lights.scene().sky();
+        let out = &mut found.of_all_fields;
+        let directions = self.samples.directions_in(range, point.normal, rotation);
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let Some(hit) = hit else {
                 out.escaped += 1.0;
@@ -193,7 +180,7 @@ impl RayGather {
                 let passed = self.panes.transmittance(point.position, direction, reach);
                 let radiosity = PI * sky.radiance(direction) * passed;
                 out.irradiance += radiosity;
-                sums.max_contribution = sums.max_contribution.max(radiosity.length());
+                found.largest = found.largest.max(radiosity.length());
                 return;
             };
             out.inverse_distance += 1.0 / hit.distance;
@@ -205,126 +192,16 @@ impl RayGather {
             let passed = self.panes.transmittance(point.position, direction, reach);
             let reflected =
                 fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v) * passed);
-            sums.max_contribution = sums.max_contribution.max(reflected[0].length());
-            for (sum, reflected) in sums.reflected.iter_mut().zip(reflected) {
+            found.largest = found.largest.max(reflected[0].length());
+            for (sum, reflected) in found.reflected.iter_mut().zip(reflected) {
                 *sum += reflected;
             }
             let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !has_shadow_rays(light) {
-                out.irradiance += self.lights.lights[light as usize].exitance * passed;
+                out.direct += self.lights.lights[light as usize].exitance * passed;
             }
         });
-        let range = shadow_range(range);
-        let visible = |&(light, _): &(u32, f64)| {
-            self.shadow_rays(scene, point, light, range.clone(), rotation)
-        };
-        sums.lights = lights.iter().map(visible).collect();
-        if let Some(sun) = sky.sun() {
-            sums.sun = self.rays_to_sun(point, sun, range, rotation);
-        }
-        sums
-    }
-
-    /// The irradiance from each field by sums over `count` rays, and from luminaires.
-    fn samples_of<const FIELDS: usize>(
-        &self,
-        sums: &RaySums<FIELDS>,
-        of_luminaires: Rgb,
-        (point, lights, sun): (&GatherPoint, &[(u32, f64)], Option<&Sun>),
-        count: u32,
-    ) -> [IrradianceSample; FIELDS] {
-        let (share, mut out) = (1.0 / f64::from(count), sums.hemisphere);
-        out.direct = of_luminaires;
-        out.irradiance *= share;
-        out.escaped *= share;
-        out.backface *= share;
-        out.inverse_distance *= share;
-        for (&(light, factor), visible) in lights.iter().zip(&sums.lights) {
-            let light = &self.lights.lights[light as usize];
-            let share = visible.share_of(light.convex.then_some(factor));
-            out.direct += light.exitance * visible.seen * share;
-        }
-        if let Some(sun) = sun {
-            let Visible { points, seen, all } = sums.sun;
-            out.direct += match sun.unoccluded(point.normal.dot(sun.direction)) {
-                Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
-                None => sun.irradiance * (seen / points.max(1.0)),
-            };
-        }
-        out.irradiance += out.direct;
-        sums.reflected.map(|reflected| {
-            let irradiance = out.irradiance + reflected * share;
-            IrradianceSample { irradiance, ..out }
-        })
-    }
-
-    /// The cosines at `point` of points spread over the sun: of those of `range` that are seen, and
-    /// of all above the horizon.
-    fn rays_to_sun(
-        &self,
-        point: &GatherPoint,
-        sun: &Sun,
-        range: Range<u32>,
-        rotation: f64,
-    ) -> Visible {
-        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        let second_rotation = (rotation * SECOND_ROTATION).fract();
-        for [x, y] in range.map(sobol_02_point) {
-            let direction = sun.towards([(x + second_rotation).fract(), (y + rotation).fract()]);
-            let cosine = point.normal.dot(direction).max(0.0);
-            let reach = point.near..f64::INFINITY;
-            out.all += cosine;
-            let (from, any) = (point.position, |_: &Hit| true);
-            if cosine > 0.0 && !self.scene.occluded(from, direction, reach.clone(), any) {
-                out.seen += cosine * self.panes.transmittance(from, direction, reach);
-            }
-        }
-        out
-    }
-
-    /// The form factor from `point` to what is visible of a light, and to all of it as if nothing
-    /// were in between, both by the same points on it: those of `range`.
-    fn shadow_rays(
-        &self,
-        scene: &Scene,
-        point: &GatherPoint,
-        light: u32,
-        range: Range<u32>,
-        rotation: f64,
-    ) -> Visible {
-        let Light { triangles, surface, .. } = &self.lights.lights[light as usize];
-        let area = surface.total_area();
-        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        // Both coordinates are rotated: where only a strip of the light is seen, points that are
-        // the same for all places would be off in the same direction everywhere.
-        let second_rotation = (rotation * SECOND_ROTATION).fract();
-        for i in range {
-            let [x, y] = sobol_02_point(i);
-            let (k, across) = surface.locate((x + second_rotation).fract());
-            let triangle = triangles[k] as usize;
-            let [a, b, c] = scene.corners(triangle);
-            // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
-            let (root, v) = (across.sqrt(), (y + rotation).fract());
-            let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
-            let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
-            let to = target - point.position;
-            let facing = -scene.normal(triangle).dot(to);
-            let above = point.normal.dot(to);
-            if facing <= 0.0 || above <= 0.0 {
-                continue;
-            }
-            let r2 = to.length_squared();
-            let factor = area * facing * above / (PI * r2 * r2);
-            out.all += factor;
-            // What is met first may be another part of the light, which is as good.
-            let near = point.near / r2.sqrt();
-            let other = |h: &Hit| !(self.lights.of_triangle[h.triangle] == light && h.front);
-            let reach = near..1.0 - offset::SEGMENT_END;
-            if !is_hole && !self.scene.occluded(point.position, to, reach.clone(), other) {
-                out.seen += factor * self.panes.transmittance(point.position, to, reach);
-            }
-        }
-        out
+        found
     }
 }
 
@@ -340,77 +217,62 @@ fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
 
 /// Sums over rays.
 #[derive(Debug)]
-struct RaySums<const FIELDS: usize> {
-    /// Without what surfaces reflect.
-    hemisphere: IrradianceSample,
+struct HemisphereRays<const FIELDS: usize> {
+    /// Without what surfaces reflect; `direct` is not in `irradiance` yet.
+    of_all_fields: IrradianceSample,
     /// What surfaces reflect, by field.
     reflected: [Rgb; FIELDS],
     /// The largest radiosity that one ray found, reflected by the first field or the sky's, W/m².
-    max_contribution: f64,
-    lights: Vec<Visible>,
-    /// Cosines instead of form factors.
-    sun: Visible,
+    largest: f64,
 }
 
-/// Sums of form factors over points on a light.
-#[derive(Debug, Default)]
-struct Visible {
-    points: f64,
-    /// To those that are visible; per channel, what panes let through.
-    seen: Rgb,
-    /// To all that are above the horizon and face the point.
-    all: f64,
-}
-
-impl<const FIELDS: usize> Default for RaySums<FIELDS> {
-    fn default() -> RaySums<FIELDS> {
-        RaySums {
-            hemisphere: IrradianceSample::default(),
+impl<const FIELDS: usize> Default for HemisphereRays<FIELDS> {
+    fn default() -> HemisphereRays<FIELDS> {
+        HemisphereRays {
+            of_all_fields: IrradianceSample::default(),
             reflected: [Rgb::ZERO; FIELDS],
-            max_contribution: 0.0,
-            lights: vec![],
-            sun: Visible::default(),
+            largest: 0.0,
         }
     }
 }
 
-impl<const FIELDS: usize> RaySums<FIELDS> {
-    fn add(&mut self, other: &RaySums<FIELDS>) {
-        let (sum, term) = (&mut self.hemisphere, &other.hemisphere);
+impl<const FIELDS: usize> Found for HemisphereRays<FIELDS> {
+    fn add(&mut self, other: &HemisphereRays<FIELDS>) {
+        let (sum, term) = (&mut self.of_all_fields, &other.of_all_fields);
         sum.irradiance += term.irradiance;
+        sum.direct += term.direct;
         sum.escaped += term.escaped;
         sum.backface += term.backface;
         sum.inverse_distance += term.inverse_distance;
         for (sum, term) in self.reflected.iter_mut().zip(other.reflected) {
             *sum += term;
         }
-        self.max_contribution = self.max_contribution.max(other.max_contribution);
-        for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
-            sum.add(term);
-        }
-        self.sun.add(&other.sun);
+        self.largest = self.largest.max(other.largest);
+    }
+
+    /// From the first field.
+    fn mean(&self, count: u32) -> Rgb {
+        let IrradianceSample { irradiance, direct, .. } = self.of_all_fields;
+        (irradiance + direct + self.reflected[0]) / f64::from(count)
+    }
+
+    fn largest(&self) -> f64 {
+        self.largest
     }
 }
 
-/// The shadow rays that go with the rays of `range`.
-fn shadow_range(range: Range<u32>) -> Range<u32> {
-    range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY)
-}
-
-impl Visible {
-    /// What one unit of `seen` counts: a share of the form factor of all of the light where that is
-    /// known by closed form, else of the points.
-    fn share_of(&self, unoccluded: Option<f64>) -> f64 {
-        match unoccluded {
-            Some(factor) => factor / self.all.max(1e-300),
-            None => 1.0 / self.points.max(1.0),
-        }
-    }
-
-    fn add(&mut self, other: &Visible) {
-        self.points += other.points;
-        self.seen += other.seen;
-        self.all += other.all;
+impl<const FIELDS: usize> HemisphereRays<FIELDS> {
+    /// The irradiance from each field by `count` rays, and what lights send by other rays.
+    fn samples(&self, count: u32, of_lights: Rgb, noise: f64) -> [IrradianceSample; FIELDS] {
+        let (share, mut out) = (1.0 / f64::from(count), self.of_all_fields);
+        out.escaped *= share;
+        out.backface *= share;
+        out.inverse_distance *= share;
+        out.direct = out.direct * share + of_lights;
+        self.reflected.map(|reflected| {
+            let irradiance = (out.irradiance + reflected) * share + out.direct;
+            IrradianceSample { irradiance, noise, ..out }
+        })
     }
 }
 

@@ -5,6 +5,8 @@
 //!       ─► what each meets: an element, a back, nothing ─► sorted, counted ─► row of shares
 //! ```
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -29,7 +31,7 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 /// Rows for patches that shoot little have fewer rays: see [`RayRows::with_full_share`].
 #[derive(Debug)]
 pub struct RayRows {
-    rays: RayScene,
+    rays: Arc<RayScene>,
     panes: Panes,
     count: u32,
     pub(crate) full_share: f64,

@@ -12,6 +12,7 @@
 //! the pixels of the hemicube.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -56,7 +57,7 @@ pub struct HemicubeGather {
     coordinates: SplitFloat,
     rotations: CellRotation,
     /// What rays to luminaires meet and pass; none without luminaires.
-    sight: Option<(RayScene, Panes)>,
+    sight: Option<(Arc<RayScene>, Panes)>,
     /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
     radiance_unit: f64,
     triangles: usize,
@@ -239,6 +240,7 @@ impl HemicubeGather {
         IrradianceSample {
             irradiance: Rgb::new(r, g, b) * self.radiance_unit + direct + uniform * escaped,
             direct,
+            noise: 0.0,
             escaped,
             backface: sums.back.into(),
             inverse_distance: self.coordinates.inverse_length(sums.nearness),

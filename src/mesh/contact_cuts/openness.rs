@@ -7,6 +7,8 @@
 //! solids leave a slit between them, narrower than elements are, an element would reach from one
 //! side past both to the other, and the slit would be as bright as what is beside the solids.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use super::snapping::clipped;
@@ -31,7 +33,7 @@ const ON_SIDE: f64 = 1e-7;
 
 /// Looks on which side of a contact segment light may fall.
 pub(super) struct Openness {
-    rays: RayScene,
+    rays: Arc<RayScene>,
     directions: HemisphereSamples,
     /// How far beside a segment, which is no shorter, scene unit: within and beyond thin walls.
     beside: [f64; 2],

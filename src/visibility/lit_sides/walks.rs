@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 use std::iter::{once, repeat_with};
+use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -43,7 +44,7 @@ pub struct Walks<'a> {
     scene: &'a Scene,
     /// Of each material.
     sides: &'a [Sides],
-    rays: RayScene,
+    rays: Arc<RayScene>,
     panes: Panes,
     normals: Vec<DVec3>,
     /// Triangles that emit.

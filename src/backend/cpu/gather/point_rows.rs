@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::RayGather;
+use super::direct_light::DirectLight;
+use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::lights::NO_LIGHT;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
@@ -11,10 +12,10 @@ use crate::scene::Rgb;
 
 impl PointRows for RayGather {
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow> {
-        let lights = self.sampled_lights(mesh.scene(), point);
+        let light = DirectLight::new(self, point);
         let count = (self.min_rays / parts.max(1)).max(1);
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
-        parts.map(|range| self.row(mesh, point, &lights, range)).collect()
+        parts.map(|range| self.row(mesh, point, &light, range)).collect()
     }
 
     fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
@@ -23,27 +24,25 @@ impl PointRows for RayGather {
 }
 
 impl RayGather {
-    /// The row of `point` by the rays of `range`, with rays to these `lights`, each of which has
-    /// this form factor if nothing hides it.
+    /// The row of `point` by the rays of `range`, with rays to the lights of `direct`.
     fn row(
         &self,
         mesh: &Mesh,
         point: &GatherPoint,
-        lights: &[(u32, f64)],
+        direct: &DirectLight,
         range: Range<u32>,
     ) -> PointRow {
-        let mut row = self.row_of_surfaces(mesh, point, lights, range.clone());
+        let mut row = self.row_of_surfaces(mesh, point, direct.lights(), range.clone());
         let scene = mesh.scene();
-        let rotation = self.rotations.at(point.position, point.near);
-        let range = super::shadow_range(range);
-        for &(light, unoccluded) in lights {
-            let visible = self.shadow_rays(scene, point, light, range.clone(), rotation);
+        let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
+        for &(light, unoccluded) in direct.lights() {
+            let visible = direct.rays_to(light, range.clone());
             let light = &self.lights.lights[light as usize];
             let factor = mean(visible.seen) * visible.share_of(light.convex.then_some(unoccluded));
             row.emitters.push((scene.triangles()[light.triangles[0] as usize].material, factor));
         }
         if let Some(sun) = scene.sky().sun() {
-            let visible = self.rays_to_sun(point, sun, range, rotation);
+            let visible = direct.rays_to_sun(sun, range);
             let cosine = point.normal.dot(sun.direction);
             let unoccluded = sun.unoccluded(cosine).map(|_| cosine);
             row.sun = mean(visible.seen) * visible.share_of(unoccluded);

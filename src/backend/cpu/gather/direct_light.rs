@@ -1,0 +1,190 @@
+//! What comes straight from lights and the sun: by rays to points on them.
+//!
+//! A light's irradiance is its closed form times the share of it that rays find visible, weighted
+//! by their form factors.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use super::RayGather;
+use super::doubled::Found;
+use crate::gather::GatherPoint;
+use crate::gather::light_projection::LightProjection;
+use crate::gather::lights::Light;
+use crate::sampling::low_discrepancy::sobol_02_point;
+use crate::scene::{Rgb, Sun};
+use crate::visibility::offset;
+use crate::visibility::ray_scene::Hit;
+
+/// The second rotation is the rest of the first behind its 16 leading bits.
+const SECOND_ROTATION: f64 = (1u32 << 16) as f64;
+
+/// The lights that rays are sent to from one point, and the sun.
+pub(super) struct DirectLight<'a> {
+    gather: &'a RayGather,
+    point: &'a GatherPoint,
+    /// Each with its unoccluded form factor.
+    lights: Vec<(u32, f64)>,
+    sun: Option<&'a Sun>,
+    rotation: f64,
+}
+
+/// What rays of a range found of each light and of the sun.
+pub(super) struct ShadowRays<'a> {
+    light: &'a DirectLight<'a>,
+    lights: Vec<Visible>,
+    /// Cosines instead of form factors.
+    sun: Visible,
+}
+
+/// Sums of form factors over points on a light.
+#[derive(Debug, Default)]
+pub(super) struct Visible {
+    points: f64,
+    /// To those that are visible; per channel, what panes let through.
+    pub seen: Rgb,
+    /// To all that are above the horizon and face the point.
+    all: f64,
+}
+
+impl<'a> DirectLight<'a> {
+    /// A light without a closed form that reaches far around `point` is not among them: it is
+    /// sampled better by rays over the hemisphere than by points spread over its area.
+    pub fn new(gather: &'a RayGather, point: &'a GatherPoint) -> DirectLight<'a> {
+        let scene = gather.lights.scene();
+        let mut lights = gather.lights.importance_ranked(point);
+        lights.retain(|&(light, _)| {
+            let light = &gather.lights.lights[light as usize];
+            let corner = |&t: &u32| scene.corners(t as usize);
+            light.convex
+                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
+        });
+        let rotation = gather.rotations.at(point.position, point.near);
+        DirectLight { gather, point, lights, sun: scene.sky().sun(), rotation }
+    }
+
+    /// The lights, each with its unoccluded form factor.
+    pub fn lights(&self) -> &[(u32, f64)] {
+        &self.lights
+    }
+
+    /// What the rays of `range` find.
+    pub fn found(&self, range: Range<u32>) -> ShadowRays<'_> {
+        let visible = |&(light, _): &(u32, f64)| self.rays_to(light, range.clone());
+        let sun = |sun: &Sun| self.rays_to_sun(sun, range.clone());
+        ShadowRays {
+            light: self,
+            lights: self.lights.iter().map(visible).collect(),
+            sun: self.sun.map_or_else(Visible::default, sun),
+        }
+    }
+
+    /// The cosines at the point of points spread over the sun: of those of `range` that are seen,
+    /// and of all above the horizon.
+    pub fn rays_to_sun(&self, sun: &Sun, range: Range<u32>) -> Visible {
+        let (gather, point) = (self.gather, self.point);
+        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
+        let second_rotation = (self.rotation * SECOND_ROTATION).fract();
+        for [x, y] in range.map(sobol_02_point) {
+            let at = [(x + second_rotation).fract(), (y + self.rotation).fract()];
+            let direction = sun.towards(at);
+            let cosine = point.normal.dot(direction).max(0.0);
+            let reach = point.near..f64::INFINITY;
+            out.all += cosine;
+            let (from, any) = (point.position, |_: &Hit| true);
+            if cosine > 0.0 && !gather.scene.occluded(from, direction, reach.clone(), any) {
+                out.seen += cosine * gather.panes.transmittance(from, direction, reach);
+            }
+        }
+        out
+    }
+
+    /// The form factor from the point to what is visible of a light, and to all of it as if nothing
+    /// were in between, both by the same points on it: those of `range`.
+    pub fn rays_to(&self, light: u32, range: Range<u32>) -> Visible {
+        let (gather, point) = (self.gather, self.point);
+        let (lights, scene) = (&gather.lights, gather.lights.scene());
+        let Light { triangles, surface, .. } = &lights.lights[light as usize];
+        let area = surface.total_area();
+        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
+        // Both coordinates are rotated: where only a strip of the light is seen, points that are
+        // the same for all places would be off in the same direction everywhere.
+        let second_rotation = (self.rotation * SECOND_ROTATION).fract();
+        for i in range {
+            let [x, y] = sobol_02_point(i);
+            let (k, across) = surface.locate((x + second_rotation).fract());
+            let triangle = triangles[k] as usize;
+            let [a, b, c] = scene.corners(triangle);
+            // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
+            let (root, v) = (across.sqrt(), (y + self.rotation).fract());
+            let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
+            let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
+            let to = target - point.position;
+            let facing = -scene.normal(triangle).dot(to);
+            let above = point.normal.dot(to);
+            if facing <= 0.0 || above <= 0.0 {
+                continue;
+            }
+            let r2 = to.length_squared();
+            let factor = area * facing * above / (PI * r2 * r2);
+            out.all += factor;
+            // What is met first may be another part of the light, which is as good.
+            let near = point.near / r2.sqrt();
+            let other = |h: &Hit| !(lights.of_triangle[h.triangle] == light && h.front);
+            let reach = near..1.0 - offset::SEGMENT_END;
+            if !is_hole && !gather.scene.occluded(point.position, to, reach.clone(), other) {
+                out.seen += factor * gather.panes.transmittance(point.position, to, reach);
+            }
+        }
+        out
+    }
+}
+
+impl Found for ShadowRays<'_> {
+    fn add(&mut self, other: &ShadowRays) {
+        for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
+            sum.add(term);
+        }
+        self.sun.add(&other.sun);
+    }
+
+    fn mean(&self, _: u32) -> Rgb {
+        let DirectLight { gather, point, lights, sun, .. } = self.light;
+        let mut irradiance = Rgb::ZERO;
+        for (&(light, factor), visible) in lights.iter().zip(&self.lights) {
+            let light = &gather.lights.lights[light as usize];
+            let share = visible.share_of(light.convex.then_some(factor));
+            irradiance += light.exitance * visible.seen * share;
+        }
+        if let Some(sun) = sun {
+            let Visible { points, seen, all } = self.sun;
+            irradiance += match sun.unoccluded(point.normal.dot(sun.direction)) {
+                Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
+                None => sun.irradiance * (seen / points.max(1.0)),
+            };
+        }
+        irradiance
+    }
+
+    /// 0: what is hidden of a light is known by as many rays as are sent to it.
+    fn largest(&self) -> f64 {
+        0.0
+    }
+}
+
+impl Visible {
+    /// What one unit of `seen` counts: a share of the form factor of all of the light where that is
+    /// known by closed form, else of the points.
+    pub fn share_of(&self, unoccluded: Option<f64>) -> f64 {
+        match unoccluded {
+            Some(factor) => factor / self.all.max(1e-300),
+            None => 1.0 / self.points.max(1.0),
+        }
+    }
+
+    fn add(&mut self, other: &Visible) {
+        self.points += other.points;
+        self.seen += other.seen;
+        self.all += other.all;
+    }
+}

@@ -1,0 +1,79 @@
+//! Rays that are doubled until they agree.
+//!
+//! ```text
+//! error = max(|E_first − E_second|, c_max / n) / 2
+//! ```
+//!
+//! E_first and E_second being by the two halves of the rays, and c_max the largest contribution of
+//! one ray: both halves may miss the same small source.
+
+use std::ops::Range;
+
+use crate::scene::Rgb;
+
+/// What some rays found.
+pub(super) trait Found {
+    /// Adds what other rays found.
+    fn add(&mut self, other: &Self);
+
+    /// The irradiance by it, where it is that of `count` rays.
+    fn mean(&self, count: u32) -> Rgb;
+
+    /// The largest contribution of one ray.
+    fn largest(&self) -> f64;
+}
+
+/// What rays found, and how to cast more.
+pub(super) struct Doubled<F, T> {
+    found: F,
+    trace: T,
+    count: u32,
+    max: u32,
+    error: f64,
+}
+
+impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
+    /// By as many rays as the first of `limits`, up to the second; `trace` casts those of a range.
+    pub fn new([min, max]: [u32; 2], trace: T) -> Doubled<F, T> {
+        let found = trace(0..min / 2);
+        let mut doubled = Doubled { found, trace, count: min / 2, max, error: f64::INFINITY };
+        doubled.add_half();
+        doubled
+    }
+
+    /// Casts as many rays again; false where there are no more.
+    pub fn double(&mut self) -> bool {
+        let has_more = self.count < self.max;
+        if has_more {
+            self.add_half();
+        }
+        has_more
+    }
+
+    fn add_half(&mut self) {
+        let half = self.count;
+        let second = (self.trace)(half..2 * half);
+        let difference = self.found.mean(half).distance(second.mean(half));
+        self.found.add(&second);
+        self.count = 2 * half;
+        self.error = difference.max(self.found.largest() / f64::from(self.count)) / 2.0;
+    }
+
+    /// The irradiance by all rays.
+    pub fn mean(&self) -> Rgb {
+        self.found.mean(self.count)
+    }
+
+    /// What it may be off by.
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
+    pub fn found(&self) -> &F {
+        &self.found
+    }
+
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+}
