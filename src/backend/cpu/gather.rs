@@ -88,8 +88,9 @@ impl RayGather {
     /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
     /// `noise`·max(E, `dim`), E being the irradiance and `dim` in W/m². The estimate is half the
     /// larger of: the difference between the irradiance of both halves of the rays, and the largest
-    /// contribution of one ray. Few points need more rays, such as those that see a bright spot
-    /// through a gap.
+    /// contribution of one ray. Rays over the hemisphere and rays to lights have one each, whose
+    /// squares add up; the larger says which are doubled. Few points need more rays, such as those
+    /// that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
         let max_rays = if noise.is_finite() {
             (self.min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS)
