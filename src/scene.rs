@@ -28,6 +28,7 @@ pub mod texture;
 mod textured;
 mod warning;
 
+use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
 
@@ -420,6 +421,12 @@ impl Scene {
     /// The same scene with [`Scene::crease_degrees`].
     pub(crate) fn with_crease_degrees(&self, degrees: f64) -> Scene {
         Scene { crease_degrees: Some(degrees), ..self.clone() }
+    }
+
+    /// What `make` makes of the scene, once: the hierarchy that rays are cast at, of which the
+    /// scene knows nothing.
+    pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl Fn(&Scene) -> T) -> Arc<T> {
+        self.derived.get(|| make(self))
     }
 
     pub(crate) fn warn(&mut self, warning: Warning) {

@@ -16,7 +16,7 @@ use glam::DVec3;
 use super::GatherPoint;
 use crate::geometry::quadrature::{GAUSS_LEGENDRE_3, Node};
 use crate::sampling::low_discrepancy::{r2_point, sobol_02_point};
-use crate::sampling::rotation::CellRotation;
+use crate::sampling::rotation::{CellRotation, second_rotation};
 use crate::scene::{Luminaire, Rgb};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
@@ -45,9 +45,6 @@ const MAX_PANELS: f64 = 16.0;
 /// The rule of one point.
 const MIDDLE: [Node; 1] = [Node { x: 0.5, weight: 1.0 }];
 
-/// The second rotation is the rest of the first behind its 16 leading bits.
-const SECOND_ROTATION: f64 = (1u32 << 16) as f64;
-
 impl LuminaireLight<'_> {
     /// Irradiance at `point`, W/m² per channel.
     pub fn irradiance(&self, point: &GatherPoint) -> Rgb {
@@ -71,7 +68,7 @@ impl LuminaireLight<'_> {
     /// The share of the light of an opening that arrives at `point`, per channel.
     fn seen_share(&self, luminaire: &Luminaire, point: &GatherPoint) -> Rgb {
         let rotation = self.rotations.at(point.position, point.near);
-        let second_rotation = (rotation * SECOND_ROTATION).fract();
+        let second_rotation = second_rotation(rotation);
         let (mut seen, mut all) = (Rgb::ZERO, 0.0);
         for (start, end) in [(0, RAYS[0]), (RAYS[0], RAYS[1])] {
             for k in start..end {

@@ -118,14 +118,10 @@ impl HierarchicalSurplus {
     /// Whether the quadratic interpolant describes the light: all six nodes are samples of it, and
     /// none is at a jump.
     pub fn is_smooth(&self) -> bool {
-        self.corners.iter().chain(&self.midsides).all(|node| !node.buried) && !self.has_jump()
-    }
-
-    /// Whether the light jumps: its surplus is too large for a quadratic.
-    pub fn has_jump(&self) -> bool {
         let surplus = self.midside_surplus().iter().sum::<Rgb>();
         let midsides = self.midsides.iter().map(|m| m.value).sum::<Rgb>();
-        surplus.length() >= MAX_SMOOTH_SURPLUS * midsides.length()
+        self.corners.iter().chain(&self.midsides).all(|node| !node.buried)
+            && surplus.length() < MAX_SMOOTH_SURPLUS * midsides.length()
     }
 
     /// Whether it may jump next to its darkest node, or to `floor` (W/m²) where this is more.

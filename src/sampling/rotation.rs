@@ -61,6 +61,12 @@ impl CellRotation {
     }
 }
 
+/// A second rotation, in turns, for the other coordinate: the rest of the first behind its 16
+/// leading bits.
+pub(crate) fn second_rotation(rotation: f64) -> f64 {
+    (rotation * f64::from(1u32 << 16)).fract()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

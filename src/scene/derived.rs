@@ -3,8 +3,6 @@
 use std::any::Any;
 use std::sync::{Arc, OnceLock};
 
-use super::Scene;
-
 /// A value that is made of a scene when it is first needed. A clone has none, since it may become
 /// another scene.
 #[derive(Debug, Default)]
@@ -16,11 +14,11 @@ impl Clone for Derived {
     }
 }
 
-impl Scene {
-    /// What `make` makes of the scene, once: the hierarchy that rays are cast at, of which the
-    /// scene knows nothing. No other type is made so.
-    pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
-        let made = self.derived.0.get_or_init(|| Arc::new(make(self)));
-        Arc::clone(made).downcast().expect("one type is made of scenes")
+impl Derived {
+    /// The value, by `make` if there is none yet; of another type than that which is kept, it is
+    /// made each time.
+    pub fn get<T: Any + Send + Sync>(&self, make: impl Fn() -> T) -> Arc<T> {
+        let kept = self.0.get_or_init(|| Arc::new(make()));
+        Arc::clone(kept).downcast().unwrap_or_else(|_| Arc::new(make()))
     }
 }

@@ -12,12 +12,10 @@ use crate::gather::GatherPoint;
 use crate::gather::light_projection::LightProjection;
 use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
+use crate::sampling::rotation::second_rotation;
 use crate::scene::{Rgb, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
-
-/// The second rotation is the rest of the first behind its 16 leading bits.
-const SECOND_ROTATION: f64 = (1u32 << 16) as f64;
 
 /// The lights that rays are sent to from one point, and the sun.
 pub(super) struct DirectLight<'a> {
@@ -84,7 +82,7 @@ impl<'a> DirectLight<'a> {
     pub fn rays_to_sun(&self, sun: &Sun, range: Range<u32>) -> Visible {
         let (gather, point) = (self.gather, self.point);
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        let second_rotation = (self.rotation * SECOND_ROTATION).fract();
+        let second_rotation = second_rotation(self.rotation);
         for [x, y] in range.map(sobol_02_point) {
             let at = [(x + second_rotation).fract(), (y + self.rotation).fract()];
             let direction = sun.towards(at);
@@ -109,7 +107,7 @@ impl<'a> DirectLight<'a> {
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
         // Both coordinates are rotated: where only a strip of the light is seen, points that are
         // the same for all places would be off in the same direction everywhere.
-        let second_rotation = (self.rotation * SECOND_ROTATION).fract();
+        let second_rotation = second_rotation(self.rotation);
         for i in range {
             let [x, y] = sobol_02_point(i);
             let (k, across) = surface.locate((x + second_rotation).fract());
