@@ -44,6 +44,7 @@
 
 use std::ops::RangeInclusive;
 
+use crate::gather::RefinementSettings;
 use crate::mesh::Mesh;
 
 /// A setting as a power of the error it is for: setting = scale · error^exponent.
@@ -127,6 +128,16 @@ pub const RAYS_TIMES_ERROR: f64 = 20.0;
 /// Halving the error about doubles the pixels of an edge, in powers of two.
 pub const HEMICUBE_RESOLUTIONS: [(f64, u32); 4] =
     [(0.03, 32), (0.006, 64), (0.003, 128), (0.0, 256)];
+
+/// Elements that gather there may be for each triangle of a scene, where that is more than
+/// [`RefinementSettings::DEFAULT_MAX_ELEMENTS`]: a city of 200 000 triangles that was given 2.7 of
+/// them stayed at an error of 12 %. An element takes 1.5 kB.
+const MAX_ELEMENTS_PER_TRIANGLE: usize = 4;
+
+/// Elements that gather there may be at most in a scene of so many `triangles`.
+pub(super) fn max_elements(triangles: usize) -> usize {
+    (MAX_ELEMENTS_PER_TRIANGLE * triangles).max(RefinementSettings::DEFAULT_MAX_ELEMENTS)
+}
 
 /// Levels by which elements at contacts are split.
 pub const CONTACT_LEVELS: u32 = 2;

@@ -216,6 +216,7 @@ impl BakeSettings {
             gather_passes: model::gather_passes(e),
             gap_factor: 1.0,
             region: survey.region,
+            max_elements: model::max_elements(scene.triangles().len()),
             ..RefinementSettings::new(model::MIN_EDGE.times(diagonal).setting(e))
         };
         let gather = GatherSettings {

@@ -112,3 +112,39 @@ fn noise_is_what_points_are_off_by() {
     // the limit of smooth light, some 3 here; and never by far less.
     assert!(told > 0.7 * off && told < 4.0 * off && rest < 0.1 * told);
 }
+
+/// Of a sky that reaches to the horizon, few points spread over its area count.
+#[test]
+fn how_much_of_a_wide_sky_is_hidden_is_seen_by_rays_over_the_hemisphere() {
+    const RAYS: u32 = 256;
+    let sky = |to: f64| {
+        let at = |x: f64, y: f64| DVec3::new(x, y, 10.0);
+        [at(-1000.0, -1000.0), at(-1000.0, 1000.0), at(to, 1000.0), at(to, -1000.0)]
+    };
+    let roof = [[0.0, -1e3, 5.0], [1e3, -1e3, 5.0], [1e3, 1e3, 5.0], [0.0, 1e3, 5.0]];
+    let bright = Material { exitance: Rgb::ONE, ..Material::grey("sky", 0.0) };
+    let sky_quad = (sky(1000.0).map(|p| p.to_array()), bright);
+    let places: Vec<GatherPoint> = (0..100)
+        .map(|k| DVec3::new(0.04 * f64::from(k) - 2.0, 0.3 * f64::from(k), 0.0))
+        .map(|position| GatherPoint { position, normal: DVec3::Z, near: 1e-6 })
+        .collect();
+    let off = |roofs: &[_], end: &dyn Fn(f64) -> f64| {
+        let scene = quads(&[std::slice::from_ref(&sky_quad), roofs].concat());
+        let dark = GivenRadiosity::new(Mesh::new(scene, 1e4).unwrap(), |_, _| Rgb::ZERO);
+        let mut rays = RayGather::new(&dark.mesh, RAYS).unwrap();
+        let found = rays.gather(&dark.sources(), &places).unwrap();
+        let square = |(g, p): (&IrradianceSample, &GatherPoint)| {
+            let truth = point_to_polygon(p.position, p.normal, &sky(end(p.position.x)));
+            (g.direct.x / truth - 1.0).powi(2)
+        };
+        (found.iter().zip(&places).map(square).sum::<f64>() / places.len() as f64).sqrt()
+    };
+    // All of it is its closed form, but for rounding.
+    assert!(off(&[], &|_| 1000.0) < 1e-12);
+    // The roof's edge, at half the height, hides what is beyond the point reflected in it: about
+    // half of the sky. Of n independent rays half are off by 1/√n of that; where half of the sky
+    // hides behind one line, those of n strata are off in √n of them.
+    let hidden = off(&[(roof, Material::grey("roof", 0.0))], &|x| -x);
+    println!("off by {hidden:.4}");
+    assert!(hidden < 0.5 / f64::from(RAYS).sqrt());
+}

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!                ┌ rays over the hemisphere ─► reflected light, escaped, backface, 1/distance
-//! point ─ trace ─┤
+//! point ─ trace ─┤                      └► visible share × closed form of a wide light
 //!                ├ shadow rays to each light ─► visible share × closed form = direct light
 //!                └ shadow rays to luminaires ─► see `LuminaireLight`
 //! ```
@@ -13,6 +13,7 @@
 mod direct_light;
 mod doubled;
 mod point_rows;
+mod wide_light;
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -30,14 +31,16 @@ use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
-use direct_light::DirectLight;
+use direct_light::{DirectLight, Visible};
 use doubled::{Doubled, Found};
+use wide_light::WideLight;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
 ///
 /// Every ray carries the same share of the hemisphere, so what reflected light it finds has the
 /// error of an average over n stratified samples. A light's irradiance is its closed form times the
-/// share of it that a quarter as many rays find visible, weighted by their form factors.
+/// share of it that a quarter as many rays find visible, weighted by their form factors; or that
+/// the rays over the hemisphere find, where the light fills much of it.
 #[derive(Debug)]
 pub struct RayGather {
     scene: Arc<RayScene>,
@@ -121,9 +124,8 @@ impl RayGather {
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
         let direct_light = DirectLight::new(self, point);
-        let lights = direct_light.lights();
         let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.found(range));
-        let trace = |range| self.trace(fields, point, lights, range);
+        let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
         let of_luminaires = self.luminaires().irradiance(point);
         loop {
@@ -160,19 +162,20 @@ impl RayGather {
         }
     }
 
-    /// What the rays of `range` find. Emission of `lights` is not in it, to which rays are sent.
-    fn trace<const FIELDS: usize>(
+    /// What the rays of `range` find. Emission of the lights that `direct` sends rays to is not in
+    /// it, and of wide ones how much is visible.
+    fn trace<'d, const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
-        lights: &[(u32, f64)],
+        direct: &'d DirectLight,
         range: Range<u32>,
-    ) -> HemisphereRays<FIELDS> {
+    ) -> HemisphereRays<'d, FIELDS> {
         let rotation = self.rotations.at(point.position, point.near);
-        let has_shadow_rays = |light: u32| lights.iter().any(|&(k, _)| k == light);
-        let mut found = HemisphereRays::default();
+        let mut found = HemisphereRays::none(direct.wide());
         let sky = self.lights.scene().sky();
         let out = &mut found.of_all_fields;
+        let of_wide = &mut found.of_wide;
         let directions = self.samples.directions_in(range, point.normal, rotation);
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let Some(hit) = hit else {
@@ -184,21 +187,28 @@ impl RayGather {
                 found.largest = found.largest.max(radiosity.length());
                 return;
             };
+            let light = self.lights.of_triangle[hit.triangle];
+            let passed = || {
+                let reach = point.near..hit.distance;
+                self.panes.transmittance(point.position, direction, reach)
+            };
+            for (wide, visible) in direct.wide().iter().zip(&mut *of_wide) {
+                let is_met = hit.front && light == wide.light;
+                wide.add_ray(direction, is_met.then(passed), visible);
+            }
             out.inverse_distance += 1.0 / hit.distance;
             if !hit.front {
                 out.backface += 1.0;
                 return;
             }
-            let reach = point.near..hit.distance;
-            let passed = self.panes.transmittance(point.position, direction, reach);
+            let passed = passed();
             let reflected =
                 fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v) * passed);
             found.largest = found.largest.max(reflected[0].length());
             for (sum, reflected) in found.reflected.iter_mut().zip(reflected) {
                 *sum += reflected;
             }
-            let light = self.lights.of_triangle[hit.triangle];
-            if light != NO_LIGHT && !has_shadow_rays(light) {
+            if light != NO_LIGHT && !direct.knows(light) {
                 out.direct += self.lights.lights[light as usize].exitance * passed;
             }
         });
@@ -217,8 +227,10 @@ fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
 }
 
 /// Sums over rays.
-#[derive(Debug)]
-struct HemisphereRays<const FIELDS: usize> {
+struct HemisphereRays<'d, const FIELDS: usize> {
+    wide: &'d [WideLight],
+    /// By wide light: rays that meet it, and rays towards it.
+    of_wide: Vec<Visible>,
     /// Without what surfaces reflect; `direct` is not in `irradiance` yet.
     of_all_fields: IrradianceSample,
     /// What surfaces reflect, by field.
@@ -227,9 +239,11 @@ struct HemisphereRays<const FIELDS: usize> {
     largest: f64,
 }
 
-impl<const FIELDS: usize> Default for HemisphereRays<FIELDS> {
-    fn default() -> HemisphereRays<FIELDS> {
+impl<'d, const FIELDS: usize> HemisphereRays<'d, FIELDS> {
+    fn none(wide: &'d [WideLight]) -> HemisphereRays<'d, FIELDS> {
         HemisphereRays {
+            wide,
+            of_wide: wide.iter().map(|_| Visible::default()).collect(),
             of_all_fields: IrradianceSample::default(),
             reflected: [Rgb::ZERO; FIELDS],
             largest: 0.0,
@@ -237,8 +251,11 @@ impl<const FIELDS: usize> Default for HemisphereRays<FIELDS> {
     }
 }
 
-impl<const FIELDS: usize> Found for HemisphereRays<FIELDS> {
-    fn add(&mut self, other: &HemisphereRays<FIELDS>) {
+impl<const FIELDS: usize> Found for HemisphereRays<'_, FIELDS> {
+    fn add(&mut self, other: &Self) {
+        for (sum, term) in self.of_wide.iter_mut().zip(&other.of_wide) {
+            sum.add(term);
+        }
         let (sum, term) = (&mut self.of_all_fields, &other.of_all_fields);
         sum.irradiance += term.irradiance;
         sum.direct += term.direct;
@@ -254,7 +271,7 @@ impl<const FIELDS: usize> Found for HemisphereRays<FIELDS> {
     /// From the first field.
     fn mean(&self, count: u32) -> Rgb {
         let IrradianceSample { irradiance, direct, .. } = self.of_all_fields;
-        (irradiance + direct + self.reflected[0]) / f64::from(count)
+        (irradiance + direct + self.reflected[0]) / f64::from(count) + self.of_wide_lights()
     }
 
     fn largest(&self) -> f64 {
@@ -262,14 +279,19 @@ impl<const FIELDS: usize> Found for HemisphereRays<FIELDS> {
     }
 }
 
-impl<const FIELDS: usize> HemisphereRays<FIELDS> {
+impl<const FIELDS: usize> HemisphereRays<'_, FIELDS> {
+    /// The irradiance of wide lights.
+    fn of_wide_lights(&self) -> Rgb {
+        self.wide.iter().zip(&self.of_wide).map(|(wide, seen)| wide.irradiance(seen)).sum()
+    }
+
     /// The irradiance from each field by `count` rays, and what lights send by other rays.
     fn samples(&self, count: u32, of_lights: Rgb, noise: f64) -> [IrradianceSample; FIELDS] {
         let (share, mut out) = (1.0 / f64::from(count), self.of_all_fields);
         out.escaped *= share;
         out.backface *= share;
         out.inverse_distance *= share;
-        out.direct = out.direct * share + of_lights;
+        out.direct = out.direct * share + self.of_wide_lights() + of_lights;
         self.reflected.map(|reflected| {
             let irradiance = (out.irradiance + reflected) * share + out.direct;
             IrradianceSample { irradiance, noise, ..out }

@@ -6,14 +6,17 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use super::RayGather;
+use glam::DVec3;
+
 use super::doubled::Found;
+use super::wide_light::WideLight;
+use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::light_projection::LightProjection;
 use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::second_rotation;
-use crate::scene::{Rgb, Sun};
+use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 
@@ -23,6 +26,8 @@ pub(super) struct DirectLight<'a> {
     point: &'a GatherPoint,
     /// Each with its unoccluded form factor.
     lights: Vec<(u32, f64)>,
+    /// Those that rays over the hemisphere know better.
+    wide: Vec<WideLight>,
     sun: Option<&'a Sun>,
     rotation: f64,
 }
@@ -42,12 +47,13 @@ pub(super) struct Visible {
     /// To those that are visible; per channel, what panes let through.
     pub seen: Rgb,
     /// To all that are above the horizon and face the point.
-    all: f64,
+    pub all: f64,
 }
 
 impl<'a> DirectLight<'a> {
-    /// A light without a closed form that reaches far around `point` is not among them: it is
-    /// sampled better by rays over the hemisphere than by points spread over its area.
+    /// A light that reaches far around `point` is sampled better by rays over the hemisphere than
+    /// by points spread over its area: those with a closed form are [`WideLight`]s, and the others
+    /// like any surface.
     pub fn new(gather: &'a RayGather, point: &'a GatherPoint) -> DirectLight<'a> {
         let scene = gather.lights.scene();
         let mut lights = gather.lights.importance_ranked(point);
@@ -57,13 +63,32 @@ impl<'a> DirectLight<'a> {
             light.convex
                 || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
         });
+        let all = &gather.lights.lights;
+        let rays = [gather.min_rays, RAYS_PER_SHADOW_RAY];
+        let (wide, lights): (Vec<_>, Vec<_>) = lights.into_iter().partition(|&(light, factor)| {
+            WideLight::is_wide(&all[light as usize], factor, scene, point, rays)
+        });
+        let wide = wide
+            .into_iter()
+            .map(|ranked| WideLight::new(&all[ranked.0 as usize], ranked, scene, point));
+        let wide = wide.collect();
         let rotation = gather.rotations.at(point.position, point.near);
-        DirectLight { gather, point, lights, sun: scene.sky().sun(), rotation }
+        DirectLight { gather, point, lights, wide, sun: scene.sky().sun(), rotation }
     }
 
     /// The lights, each with its unoccluded form factor.
     pub fn lights(&self) -> &[(u32, f64)] {
         &self.lights
+    }
+
+    /// Those that rays over the hemisphere see for themselves.
+    pub fn wide(&self) -> &[WideLight] {
+        &self.wide
+    }
+
+    /// Whether what comes straight from `light` is counted apart from what surfaces reflect.
+    pub fn knows(&self, light: u32) -> bool {
+        self.lights.iter().any(|&(k, _)| k == light) || self.wide.iter().any(|w| w.light == light)
     }
 
     /// What the rays of `range` find.
@@ -102,32 +127,21 @@ impl<'a> DirectLight<'a> {
     pub fn rays_to(&self, light: u32, range: Range<u32>) -> Visible {
         let (gather, point) = (self.gather, self.point);
         let (lights, scene) = (&gather.lights, gather.lights.scene());
-        let Light { triangles, surface, .. } = &lights.lights[light as usize];
-        let area = surface.total_area();
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
         // Both coordinates are rotated: where only a strip of the light is seen, points that are
         // the same for all places would be off in the same direction everywhere.
         let second_rotation = second_rotation(self.rotation);
         for i in range {
             let [x, y] = sobol_02_point(i);
-            let (k, across) = surface.locate((x + second_rotation).fract());
-            let triangle = triangles[k] as usize;
-            let [a, b, c] = scene.corners(triangle);
-            // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
-            let (root, v) = (across.sqrt(), (y + self.rotation).fract());
-            let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
-            let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
-            let to = target - point.position;
-            let facing = -scene.normal(triangle).dot(to);
-            let above = point.normal.dot(to);
-            if facing <= 0.0 || above <= 0.0 {
+            let at = [(x + second_rotation).fract(), (y + self.rotation).fract()];
+            let PointOn { to, factor, is_hole } =
+                point_on(&lights.lights[light as usize], scene, point, at);
+            if factor <= 0.0 {
                 continue;
             }
-            let r2 = to.length_squared();
-            let factor = area * facing * above / (PI * r2 * r2);
             out.all += factor;
             // What is met first may be another part of the light, which is as good.
-            let near = point.near / r2.sqrt();
+            let near = point.near / to.length();
             let other = |h: &Hit| !(lights.of_triangle[h.triangle] == light && h.front);
             let reach = near..1.0 - offset::SEGMENT_END;
             if !is_hole && !gather.scene.occluded(point.position, to, reach.clone(), other) {
@@ -136,6 +150,38 @@ impl<'a> DirectLight<'a> {
         }
         out
     }
+}
+
+/// A point on a light.
+pub(super) struct PointOn {
+    /// From the point that gathers, scene unit.
+    pub to: DVec3,
+    /// The form factor of all of the light, by this point; 0 behind it or below the horizon.
+    pub factor: f64,
+    pub is_hole: bool,
+}
+
+/// The point of `light` at a place in the unit square, spread evenly over its area.
+pub(super) fn point_on(
+    light: &Light,
+    scene: &Scene,
+    point: &GatherPoint,
+    [x, y]: [f64; 2],
+) -> PointOn {
+    let (k, across) = light.surface.locate(x);
+    let triangle = light.triangles[k] as usize;
+    let [a, b, c] = scene.corners(triangle);
+    // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
+    let (root, v) = (across.sqrt(), y);
+    let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
+    let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
+    let to = target - point.position;
+    let facing = (-scene.normal(triangle).dot(to)).max(0.0);
+    let above = point.normal.dot(to).max(0.0);
+    let r2 = to.length_squared();
+    let lit = facing > 0.0 && above > 0.0;
+    let factor = light.surface.total_area() * facing * above / (PI * r2 * r2);
+    PointOn { to, factor: if lit { factor } else { 0.0 }, is_hole }
 }
 
 impl Found for ShadowRays<'_> {
@@ -180,7 +226,7 @@ impl Visible {
         }
     }
 
-    fn add(&mut self, other: &Visible) {
+    pub fn add(&mut self, other: &Visible) {
         self.points += other.points;
         self.seen += other.seen;
         self.all += other.all;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::direct_light::DirectLight;
+use super::direct_light::{DirectLight, Visible};
 use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::lights::NO_LIGHT;
@@ -19,7 +19,7 @@ impl PointRows for RayGather {
     }
 
     fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
-        self.row_of_surfaces(mesh, point, &[], 0..self.min_rays)
+        self.row_of_surfaces(mesh, point, None, 0..self.min_rays)
     }
 }
 
@@ -32,14 +32,14 @@ impl RayGather {
         direct: &DirectLight,
         range: Range<u32>,
     ) -> PointRow {
-        let mut row = self.row_of_surfaces(mesh, point, direct.lights(), range.clone());
+        let mut row = self.row_of_surfaces(mesh, point, Some(direct), range.clone());
         let scene = mesh.scene();
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
         for &(light, unoccluded) in direct.lights() {
             let visible = direct.rays_to(light, range.clone());
-            let light = &self.lights.lights[light as usize];
-            let factor = mean(visible.seen) * visible.share_of(light.convex.then_some(unoccluded));
-            row.emitters.push((scene.triangles()[light.triangles[0] as usize].material, factor));
+            let is_convex = self.lights.lights[light as usize].convex;
+            let factor = mean(visible.seen) * visible.share_of(is_convex.then_some(unoccluded));
+            row.emitters.push((self.material_of(light), factor));
         }
         if let Some(sun) = scene.sky().sun() {
             let visible = direct.rays_to_sun(sun, range);
@@ -50,18 +50,22 @@ impl RayGather {
         row
     }
 
-    /// The same without entries for `lights`, to which rays are to be sent, and the sun.
+    /// The same without entries for the sun and the lights of `direct` that rays are sent to. Where
+    /// there is no `direct`, lights are like any surface.
     fn row_of_surfaces(
         &self,
         mesh: &Mesh,
         point: &GatherPoint,
-        lights: &[(u32, f64)],
+        direct: Option<&DirectLight>,
         range: Range<u32>,
     ) -> PointRow {
         let rotation = self.rotations.at(point.position, point.near);
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
         row.hits.reserve_exact((range.end - range.start) as usize);
+        let wide = direct.map_or(&[][..], DirectLight::wide);
+        let has_entry = |light: u32| direct.is_some_and(|direct| direct.knows(light));
+        let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
         let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let passed = |end: f64| {
@@ -72,21 +76,34 @@ impl RayGather {
                 row.sky += share * passed(f64::INFINITY);
                 return;
             };
+            let light = self.lights.of_triangle[hit.triangle];
+            for (wide, visible) in wide.iter().zip(&mut of_wide) {
+                let is_met = hit.front && light == wide.light;
+                let passed = is_met.then(|| Rgb::splat(passed(hit.distance)));
+                wide.add_ray(direction, passed, visible);
+            }
             row.inverse_distance += share / hit.distance;
             if !hit.front {
                 row.backface += share;
                 return;
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
-            let light = self.lights.of_triangle[hit.triangle];
             row.hits.push(SurfaceHit {
                 element: element as u32,
                 barycentric,
                 passed: passed(hit.distance),
-                emits: light == NO_LIGHT || !lights.iter().any(|&(sampled, _)| sampled == light),
+                emits: light == NO_LIGHT || !has_entry(light),
             });
         });
+        for (wide, visible) in wide.iter().zip(&of_wide) {
+            row.emitters.push((self.material_of(wide.light), mean(wide.form_factor(visible))));
+        }
         row
+    }
+
+    fn material_of(&self, light: u32) -> u32 {
+        let first = self.lights.lights[light as usize].triangles[0];
+        self.lights.scene().triangles()[first as usize].material
     }
 }
 
