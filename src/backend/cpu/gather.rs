@@ -180,6 +180,10 @@ impl RayGather {
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let Some(hit) = hit else {
                 out.escaped += 1.0;
+                // Through its holes.
+                for (wide, visible) in direct.wide().iter().zip(&mut *of_wide) {
+                    wide.add_ray(direction, None, visible);
+                }
                 let reach = point.near..f64::INFINITY;
                 let passed = self.panes.transmittance(point.position, direction, reach);
                 let radiosity = PI * sky.radiance(direction) * passed;

@@ -74,6 +74,9 @@ impl RayGather {
             };
             let Some(hit) = hit else {
                 row.sky += share * passed(f64::INFINITY);
+                for (wide, visible) in wide.iter().zip(&mut of_wide) {
+                    wide.add_ray(direction, None, visible);
+                }
                 return;
             };
             let light = self.lights.of_triangle[hit.triangle];
