@@ -13,6 +13,7 @@
 mod direct_light;
 mod doubled;
 mod point_rows;
+mod visible;
 mod wide_light;
 
 use std::f64::consts::PI;
@@ -31,8 +32,9 @@ use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
-use direct_light::{DirectLight, Visible};
+use direct_light::DirectLight;
 use doubled::{Doubled, Found};
+use visible::Visible;
 use wide_light::WideLight;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
@@ -178,40 +180,29 @@ impl RayGather {
         let of_wide = &mut found.of_wide;
         let directions = self.samples.directions_in(range, point.normal, rotation);
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+            let passed =
+                |end: f64| self.panes.transmittance(point.position, direction, point.near..end);
+            direct.add_to_wide(of_wide, direction, hit, passed);
             let Some(hit) = hit else {
                 out.escaped += 1.0;
-                // Through its holes.
-                for (wide, visible) in direct.wide().iter().zip(&mut *of_wide) {
-                    wide.add_ray(direction, None, visible);
-                }
-                let reach = point.near..f64::INFINITY;
-                let passed = self.panes.transmittance(point.position, direction, reach);
-                let radiosity = PI * sky.radiance(direction) * passed;
+                let radiosity = PI * sky.radiance(direction) * passed(f64::INFINITY);
                 out.irradiance += radiosity;
                 found.largest = found.largest.max(radiosity.length());
                 return;
             };
-            let light = self.lights.of_triangle[hit.triangle];
-            let passed = || {
-                let reach = point.near..hit.distance;
-                self.panes.transmittance(point.position, direction, reach)
-            };
-            for (wide, visible) in direct.wide().iter().zip(&mut *of_wide) {
-                let is_met = hit.front && light == wide.light;
-                wide.add_ray(direction, is_met.then(passed), visible);
-            }
             out.inverse_distance += 1.0 / hit.distance;
             if !hit.front {
                 out.backface += 1.0;
                 return;
             }
-            let passed = passed();
+            let passed = passed(hit.distance);
             let reflected =
                 fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v) * passed);
             found.largest = found.largest.max(reflected[0].length());
             for (sum, reflected) in found.reflected.iter_mut().zip(reflected) {
                 *sum += reflected;
             }
+            let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !direct.knows(light) {
                 out.direct += self.lights.lights[light as usize].exitance * passed;
             }

@@ -3,20 +3,19 @@
 //! A light's irradiance is its closed form times the share of it that rays find visible, weighted
 //! by their form factors.
 
-use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::DVec3;
 
 use super::doubled::Found;
+use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
 use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::light_projection::LightProjection;
-use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::second_rotation;
-use crate::scene::{Rgb, Scene, Sun};
+use crate::scene::{Rgb, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 
@@ -38,16 +37,6 @@ pub(super) struct ShadowRays<'a> {
     lights: Vec<Visible>,
     /// Cosines instead of form factors.
     sun: Visible,
-}
-
-/// Sums of form factors over points on a light.
-#[derive(Debug, Default)]
-pub(super) struct Visible {
-    points: f64,
-    /// To those that are visible; per channel, what panes let through.
-    pub seen: Rgb,
-    /// To all that are above the horizon and face the point.
-    pub all: f64,
 }
 
 impl<'a> DirectLight<'a> {
@@ -84,6 +73,22 @@ impl<'a> DirectLight<'a> {
     /// Those that rays over the hemisphere see for themselves.
     pub fn wide(&self) -> &[WideLight] {
         &self.wide
+    }
+
+    /// Counts a ray over the hemisphere in what is `visible` of each wide light: in a `direction`,
+    /// with what it meets first, if anything, and what panes let through up to a distance.
+    pub fn add_to_wide(
+        &self,
+        visible: &mut [Visible],
+        direction: DVec3,
+        hit: Option<Hit>,
+        passed: impl Fn(f64) -> Rgb,
+    ) {
+        let front = hit.filter(|hit| hit.front);
+        for (wide, visible) in self.wide.iter().zip(visible) {
+            let is_met = |hit: &Hit| self.gather.lights.of_triangle[hit.triangle] == wide.light;
+            wide.add_ray(direction, front.filter(is_met).map(|hit| passed(hit.distance)), visible);
+        }
     }
 
     /// Whether what comes straight from `light` is counted apart from what surfaces reflect.
@@ -152,38 +157,6 @@ impl<'a> DirectLight<'a> {
     }
 }
 
-/// A point on a light.
-pub(super) struct PointOn {
-    /// From the point that gathers, scene unit.
-    pub to: DVec3,
-    /// The form factor of all of the light, by this point; 0 behind it or below the horizon.
-    pub factor: f64,
-    pub is_hole: bool,
-}
-
-/// The point of `light` at a place in the unit square, spread evenly over its area.
-pub(super) fn point_on(
-    light: &Light,
-    scene: &Scene,
-    point: &GatherPoint,
-    [x, y]: [f64; 2],
-) -> PointOn {
-    let (k, across) = light.surface.locate(x);
-    let triangle = light.triangles[k] as usize;
-    let [a, b, c] = scene.corners(triangle);
-    // Uniform over a triangle (Pharr, Jakob, Humphreys 2016, 13.6.5).
-    let (root, v) = (across.sqrt(), y);
-    let target = a * (1.0 - root) + (b * (1.0 - v) + c * v) * root;
-    let is_hole = !scene.is_solid(triangle, [root * (1.0 - v), root * v]);
-    let to = target - point.position;
-    let facing = (-scene.normal(triangle).dot(to)).max(0.0);
-    let above = point.normal.dot(to).max(0.0);
-    let r2 = to.length_squared();
-    let lit = facing > 0.0 && above > 0.0;
-    let factor = light.surface.total_area() * facing * above / (PI * r2 * r2);
-    PointOn { to, factor: if lit { factor } else { 0.0 }, is_hole }
-}
-
 impl Found for ShadowRays<'_> {
     fn add(&mut self, other: &ShadowRays) {
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
@@ -213,22 +186,5 @@ impl Found for ShadowRays<'_> {
     /// 0: what is hidden of a light is known by as many rays as are sent to it.
     fn largest(&self) -> f64 {
         0.0
-    }
-}
-
-impl Visible {
-    /// What one unit of `seen` counts: a share of the form factor of all of the light where that is
-    /// known by closed form, else of the points.
-    pub fn share_of(&self, unoccluded: Option<f64>) -> f64 {
-        match unoccluded {
-            Some(factor) => factor / self.all.max(1e-300),
-            None => 1.0 / self.points.max(1.0),
-        }
-    }
-
-    pub fn add(&mut self, other: &Visible) {
-        self.points += other.points;
-        self.seen += other.seen;
-        self.all += other.all;
     }
 }

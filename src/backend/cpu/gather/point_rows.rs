@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::direct_light::{DirectLight, Visible};
+use super::direct_light::DirectLight;
+use super::visible::Visible;
 use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::lights::NO_LIGHT;
@@ -72,25 +73,20 @@ impl RayGather {
                 let reach = point.near..end;
                 mean(self.panes.transmittance(point.position, direction, reach))
             };
+            if let Some(direct) = direct {
+                direct.add_to_wide(&mut of_wide, direction, hit, |end| Rgb::splat(passed(end)));
+            }
             let Some(hit) = hit else {
                 row.sky += share * passed(f64::INFINITY);
-                for (wide, visible) in wide.iter().zip(&mut of_wide) {
-                    wide.add_ray(direction, None, visible);
-                }
                 return;
             };
-            let light = self.lights.of_triangle[hit.triangle];
-            for (wide, visible) in wide.iter().zip(&mut of_wide) {
-                let is_met = hit.front && light == wide.light;
-                let passed = is_met.then(|| Rgb::splat(passed(hit.distance)));
-                wide.add_ray(direction, passed, visible);
-            }
             row.inverse_distance += share / hit.distance;
             if !hit.front {
                 row.backface += share;
                 return;
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
+            let light = self.lights.of_triangle[hit.triangle];
             row.hits.push(SurfaceHit {
                 element: element as u32,
                 barycentric,

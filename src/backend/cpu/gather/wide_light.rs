@@ -18,7 +18,7 @@ use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::scene::{Rgb, Scene};
 
-use super::direct_light::{Visible, point_on};
+use super::visible::{Visible, point_on};
 
 /// A light as seen from a point.
 pub(super) struct WideLight {
