@@ -2,8 +2,9 @@
 //!
 //! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
 //! the reflecting area of each: a quarter of them evenly, a quarter evenly over octaves of distance
-//! (where all is near, that is the same), half where the residuals of the elements say that the
-//! error is, since few places make up most of a root mean square. Each gathers twice what
+//! (where all is near, that is the same), half where elements are expected to be off most of what
+//! is darkest in them, since few places make up most of a root mean square: by their residuals, or
+//! by a jump of the light between their corners. Each gathers twice what
 //! lit the result, the second time from a hair beside, where rays and hemicubes are rotated
 //! otherwise; and once the result itself. The [statistics](super::error_estimate) of that are the
 //! estimate; the share of each vertex follows the residuals of the elements around it.
@@ -22,6 +23,7 @@ use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
+use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, IrradianceSample};
 use crate::progress::BatchSizer;
@@ -345,15 +347,18 @@ impl ErrorEstimator<'_> {
             }
             let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
             let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
-            let scale = reflected.max(floor);
-            let residual = self.residual(element) / scale;
+            let [a, b, c] = light.map(Rgb::length);
+            let (darkest, brightest) = (a.min(b).min(c), a.max(b).max(c));
+            let jump = RMS_OVER_JUMP * (brightest - darkest);
+            let expected = |residual: &f64| residual.max(jump) / darkest.max(floor);
+            let error = self.element_residual.get(element).map_or(0.0, expected);
             let solid = mesh.solid_share(node);
             let mut take = |part: Part| {
                 parts.push(SampledPart {
                     face,
                     group: mesh.group(node),
                     part,
-                    error: part.area * residual.powi(2),
+                    error: part.area * error,
                     flux: part.area * reflected,
                 });
             };

@@ -40,7 +40,7 @@ const RMS_OVER_SURPLUS: f64 = 0.5;
 /// Where the light jumps by 1 across an element, from one corner to the two others, the linear
 /// interpolant is off by this, root mean square over the dark side: a quarter of the element and
 /// the half that is left were off by 0.25 and 0.24 for jumps half-way.
-const RMS_OVER_JUMP: f64 = 0.2;
+pub(crate) const RMS_OVER_JUMP: f64 = 0.2;
 
 /// Where nothing was gathered between the ends of a side, its surplus is taken for this share of
 /// their difference: half of the largest that a monotone function can have. Chosen by hand; no

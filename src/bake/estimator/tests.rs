@@ -62,3 +62,49 @@ fn points_lie_in_every_octave_of_a_wide_ground() {
         assert!((share / area - 1.0).abs() < 0.2, "{half}: {share}, not {area}");
     }
 }
+
+#[test]
+fn points_go_where_light_may_jump() {
+    // One half of the ground is lit, the other not; corners on the diagonal have the mean.
+    let mesh = Mesh::new(Arc::new(wide_ground()), f64::INFINITY).unwrap();
+    let mut radiosity = vec![Rgb::ONE; mesh.element_count()];
+    radiosity[0] += 2.0;
+    let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+    let lengths = |e: usize| light.corners[e].map(|v| light.reflected[v as usize].length());
+    let share_of_dark = |element_residual: &[f64]| {
+        let estimator = ErrorEstimator {
+            light: &light,
+            lit_by: None,
+            element_residual,
+            ledger: &Ledger::default(),
+            bounces: 0.0,
+            diagonal: 1.0,
+            octaves: &octaves_of(mesh.scene()),
+            expected_floor: 0.0,
+            paths: None,
+        };
+        let counts = SampleCounts { total: 4096, per_group: 8 };
+        let (strata, samples) = estimator.samples(counts, 0.5);
+        let on_ground = |sample: &&Sample| strata[sample.stratum].group == Some(0);
+        let ground: Vec<&Sample> = samples.iter().filter(on_ground).collect();
+        let dark = ground.iter().filter(|sample| sample.element == 1).count();
+        dark as f64 / ground.len() as f64
+    };
+    let expected = |e: usize| {
+        let [a, b, c] = lengths(e);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        RMS_OVER_JUMP * (most - least) / least.max(0.5)
+    };
+    let by_jumps = expected(1) / (expected(0) + expected(1));
+    assert!(by_jumps > 0.6, "{by_jumps}");
+    // Half of the points are spread evenly. They are not random: one in a hundred is off at most.
+    let found = share_of_dark(&vec![0.0; mesh.element_count()]);
+    assert!((found - (0.25 + by_jumps / 2.0)).abs() < 0.01, "{found}, {by_jumps}");
+    // Residuals above the jumps count in their place, relative to the darkest corner.
+    let same = share_of_dark(&vec![1e3; mesh.element_count()]);
+    let [dark, bright] =
+        [1, 0].map(|e| 1.0 / lengths(e).into_iter().fold(f64::INFINITY, f64::min).max(0.5));
+    assert!((same - (0.25 + 0.5 * dark / (dark + bright))).abs() < 0.01, "{same}");
+    // Before anything was gathered nothing is known of jumps.
+    assert!((share_of_dark(&[]) - 0.5).abs() < 0.01);
+}
