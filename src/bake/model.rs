@@ -259,8 +259,8 @@ pub const LATER_PATHS: u32 = 16;
 
 /// The estimate has to be below this share of the error asked for, which leaves room for what it
 /// does not see: five rooms to 10, 5 and 2 % were off by 0.4 to 1.0 of what was asked for, at 64 to
-/// 240 points of each; five scenes that others had made, to 10 %, by 0.78 to 0.87 of it, and a sixth
-/// by 1.3 ± 0.3, two thirds of which were three of 15 000 points.
+/// 240 points of each; five scenes that others had made, to 10 %, by 0.78 to 0.87 of it, and a
+/// sixth by 1.3 ± 0.3, two thirds of which were three of 15 000 points.
 pub const SAFETY: f64 = 0.85;
 
 /// Share of [`SAFETY`] that a round aims at, since errors follow the laws only roughly.
