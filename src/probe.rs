@@ -40,6 +40,11 @@ pub struct Probe {
     pub position: DVec3,
     /// Irradiance over the normal, W/m² per channel.
     pub irradiance: Harmonics,
+    /// What `irradiance` is off by, W/m²: the root mean square over all normals, a length over the
+    /// channels, by how far it is from what was gathered in 26 directions. What harmonics of order
+    /// 2 leave out is in it, and the noise of the gathers; what the gathered light itself is off by
+    /// is not.
+    pub deviation: f64,
     /// Share of all directions in which nothing is seen, in [0, 1].
     pub escaped: f64,
     /// Share of all directions in which backs of surfaces are seen, in [0, 1]: next to 1 inside of
@@ -58,9 +63,15 @@ impl Probe {
         let mean = |share: fn(&IrradianceSample) -> f64| {
             DIRECTIONS.iter().zip(samples).map(|(d, sample)| d.weight * share(sample)).sum()
         };
+        let irradiance = Harmonics::of_values(samples.iter().map(|sample| sample.irradiance));
+        let squares = DIRECTIONS.iter().zip(samples).map(|(direction, sample)| {
+            let off = sample.irradiance - irradiance.at(direction.unit());
+            direction.weight * off.length_squared()
+        });
         Probe {
             position,
-            irradiance: Harmonics::of_values(samples.iter().map(|sample| sample.irradiance)),
+            irradiance,
+            deviation: squares.sum::<f64>().sqrt(),
             escaped: mean(|sample| sample.escaped),
             backface: mean(|sample| sample.backface),
         }
@@ -130,5 +141,48 @@ fn check(positions: &[DVec3], size: f64) -> Result<(), Error> {
             let remedy = "give finite coordinates";
             Err(Error::new(ErrorKind::Setting, format!("probe {k}"), found, remedy))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Rgb;
+
+    /// A probe that gathers `irradiance` of the unit normal.
+    fn probe(mut irradiance: impl FnMut(DVec3) -> Rgb) -> Probe {
+        let sample = |direction: &harmonics::Direction| IrradianceSample {
+            irradiance: irradiance(direction.unit()),
+            ..Default::default()
+        };
+        let samples: Vec<IrradianceSample> = DIRECTIONS.iter().map(sample).collect();
+        Probe::new(DVec3::ZERO, &samples)
+    }
+
+    #[test]
+    fn what_harmonics_leave_out_is_told() {
+        let even = probe(|n| Rgb::new(2.0, 1.0 + n.x, 3.0 - n.y * n.z));
+        assert!(even.deviation < 1e-14, "{}", even.deviation);
+        // All light from direction s: E = max(0, n·s) = 1/4 + c/2 + 5/16 P_2(c) + …, with c = n·s
+        // and Legendre's P_2. Of its mean square, 1/6, orders above 2 are
+        // 1/6 − 1/16 − 1/12 − 5/256 = 0.0013. The rule sees the kink at the horizon in 26 places:
+        // by that it found 1.08, 0.89 and 1.39 of the root for these.
+        let wanted = (1.0f64 / 6.0 - 1.0 / 16.0 - 1.0 / 12.0 - 5.0 / 256.0).sqrt();
+        for s in [DVec3::new(0.48, -0.6, 0.64), DVec3::new(0.1, 0.2, -0.9), DVec3::ONE] {
+            let s = s.normalize();
+            let lobe = probe(|n| Rgb::X * n.dot(s).max(0.0));
+            let share = lobe.deviation / wanted;
+            println!("{share:.2} of what is left out");
+            assert!((0.7..1.5).contains(&share), "{s}: {share}");
+        }
+        // Noise of 1 in each direction: of 26 values 9 coefficients are fitted, and √(1 − 9 Σ w²),
+        // 0.80, is left. Of 2 000 probes, each with 17 degrees of freedom, the mean square is known
+        // to one part in 130; three of these.
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut sign = || if random.bool() { 1.0 } else { -1.0 };
+        let squares = (0..2000).map(|_| probe(|_| Rgb::X * sign()).deviation.powi(2));
+        let mean = squares.sum::<f64>() / 2000.0;
+        let fitted = 9.0 * DIRECTIONS.iter().map(|d| d.weight * d.weight).sum::<f64>();
+        assert!((mean / (1.0 - fitted) - 1.0).abs() < 0.025, "{mean}");
     }
 }

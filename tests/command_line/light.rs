@@ -93,16 +93,18 @@ fn probes_are_written_as_json_and_csv() {
     let out = run("probes", &args);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let rows = table(&folder.path().join("ground.probes.csv"));
-    assert_eq!((rows.len(), rows[0].len()), (1 + 48, 6 + 27));
+    assert_eq!((rows.len(), rows[0].len()), (1 + 48, 7 + 27));
     let text = std::fs::read_to_string(folder.path().join("ground.probes.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(json["counts"], serde_json::json!([6, 4, 2]));
     assert_eq!(json["basis"].as_array().unwrap().len(), 9);
     let probes = json["probes"].as_array().unwrap();
     for (row, probe) in rows[1..].iter().zip(probes) {
-        for (word, value) in
-            [(&row[2], &probe["position"][2]), (&row[6 + 3 * 2], &probe["irradiance"][2][0])]
-        {
+        for (word, value) in [
+            (&row[2], &probe["position"][2]),
+            (&row[6], &probe["deviation"]),
+            (&row[7 + 3 * 2], &probe["irradiance"][2][0]),
+        ] {
             // The last digit is read as it comes.
             assert!((number(word) - value.as_f64().unwrap()).abs() <= 1e-12 * number(word).abs());
         }
@@ -113,7 +115,7 @@ fn probes_are_written_as_json_and_csv() {
     let inside = probes.iter().filter(|probe| probe["inside"] == true).count();
     assert_eq!(inside, 2);
     // Over the ground half of all is sky: E(up) is nearly 100 π, E(down) next to none.
-    let last = |k: usize| number(&rows[48][6 + 3 * k]);
+    let last = |k: usize| number(&rows[48][7 + 3 * k]);
     let at = |z: f64| {
         (1.0 / PI).sqrt() / 2.0 * last(0)
             + (3.0 / PI).sqrt() / 2.0 * z * last(2)

@@ -40,6 +40,7 @@ fn furnace_has_constant_harmonics() {
             let radiance = probe.irradiance.radiance_of_irradiance();
             assert!((radiance.at(DVec3::X) * PI / 2.0 - 1.0).length() < 4.0 * tolerance);
             assert!(!probe.is_inside() && probe.escaped == 0.0);
+            assert!(probe.deviation < 2.0 * tolerance, "{}", probe.deviation);
         }
     }
 }
@@ -75,6 +76,10 @@ fn sphere_is_lit_as_by_gathering_at_its_points() {
         // Were all light from one direction, order 4 would be 9 Â_4 / 4π = 9.4 % of the brightest,
         // a third of that root mean square (P_4 is 1/3 so): 3.1 %. Noise is less than 2 %.
         assert!(most < 0.094 && mean_square.sqrt() < 0.04, "{most} {mean_square}");
+        // The probe tells it by 26 directions, between which it is off by other amounts.
+        let told = probe.deviation / brightest / mean_square.sqrt();
+        println!("told {told:.2} of that");
+        assert!((0.5..2.0).contains(&told), "{told}");
     }
 }
 

@@ -151,6 +151,7 @@ fn json(grid: &ProbeGrid, probes: &[Probe]) -> Vec<u8> {
             "inside": probe.is_inside(),
             "backs": probe.backface,
             "escaped": probe.escaped,
+            "deviation": probe.deviation,
             "irradiance": coefficients,
         })
         .to_string()
@@ -164,7 +165,7 @@ fn json(grid: &ProbeGrid, probes: &[Probe]) -> Vec<u8> {
 
 /// A line a probe, with a header.
 fn csv(probes: &[Probe]) -> Vec<u8> {
-    let mut out = b"x,y,z,inside,backs,escaped".to_vec();
+    let mut out = b"x,y,z,inside,backs,escaped,deviation".to_vec();
     for k in 0..9 {
         out.extend(format!(",r{k},g{k},b{k}").bytes());
     }
@@ -172,7 +173,8 @@ fn csv(probes: &[Probe]) -> Vec<u8> {
     for probe in probes {
         let [x, y, z] = probe.position.to_array();
         let inside = u8::from(probe.is_inside());
-        let start = format!("{x},{y},{z},{inside},{},{}", probe.backface, probe.escaped);
+        let Probe { backface, escaped, deviation, .. } = probe;
+        let start = format!("{x},{y},{z},{inside},{backface},{escaped},{deviation}");
         let numbers = probe.irradiance.coefficients.iter().flat_map(DVec3::to_array);
         let line: String = numbers.map(|number| format!(",{number}")).collect();
         out.extend(format!("{start}{line}\n").bytes());
