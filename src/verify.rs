@@ -76,11 +76,6 @@ const VERTICES_PER_POINT: usize = 64;
 /// A standard error below this share of the error leaves it known roughly.
 const ROUGHLY: f64 = 0.25;
 
-/// Paths there may be, at least, where it is in doubt whether an error is met: a second or two.
-/// Chosen by hand: in a gap of a centimetre above a lamp a small box had told 7 %, and was off by
-/// 17.5 ± 2.1 %, which 128 paths at each of 1024 points leave open, and 1024 do not.
-const PATHS_IN_DOUBT: u64 = 1 << 21;
-
 /// An error surely below this share is negligible, however well it is known.
 const NEGLIGIBLE: f64 = 1e-4;
 
@@ -126,6 +121,8 @@ pub(crate) struct Limits {
     pub each_group: bool,
     /// Paths over all points, for all measurements together.
     pub paths: Option<u64>,
+    /// The same where what was found, or its standard error, is above the error that is to be met.
+    pub paths_in_doubt: Option<u64>,
 }
 
 impl<'a> Verifier<'a> {
@@ -217,12 +214,12 @@ impl Limits {
     /// Whether there is no other round after `traced` paths, of twice as many: there may not be, or
     /// it would be in vain. With all that there may be, an error as large as the one to be met, or
     /// as what was surely found, would still not be told from none, at best: where noise falls as
-    /// fast as the number of paths grows. There may be [`PATHS_IN_DOUBT`] where what was found, or
-    /// its standard error, is above the error to be met.
+    /// fast as the number of paths grows.
     fn end_at(&self, traced: u64, error: &Estimate) -> bool {
-        let Some(most) = self.paths else { return false };
         let is_in_doubt = self.error.is_some_and(|e| error.value.max(error.standard_error) > e);
-        let most = if is_in_doubt { most.max(PATHS_IN_DOUBT) } else { most };
+        let Some(most) = (if is_in_doubt { self.paths_in_doubt } else { self.paths }) else {
+            return false;
+        };
         let found = error.value - 2.0 * error.standard_error;
         let off = error.standard_error / (most / traced).max(1) as f64;
         let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(found));
@@ -245,13 +242,19 @@ mod tests {
     #[test]
     fn what_is_in_doubt_has_more_paths() {
         let paths = 1 << 18;
-        let limits = Limits { error: Some(0.1), each_group: false, paths: Some(paths) };
+        let in_doubt = 8 * paths;
+        let limits = Limits {
+            error: Some(0.1),
+            each_group: false,
+            paths: Some(paths),
+            paths_in_doubt: Some(in_doubt),
+        };
         let ends = |traced: u64, value: f64, standard_error: f64| {
             limits.end_at(traced, &Estimate { value, standard_error })
         };
         assert!(!ends(paths / 2, 0.07, 0.03) && ends(paths, 0.07, 0.03), "surely below, or open");
-        assert!(!ends(paths, 0.2, 0.06) && ends(PATHS_IN_DOUBT, 0.2, 0.06), "perhaps above");
-        assert!(!ends(paths, 0.08, 0.17) && ends(PATHS_IN_DOUBT, 0.08, 0.17), "nothing known");
+        assert!(!ends(paths, 0.2, 0.06) && ends(in_doubt, 0.2, 0.06), "perhaps above");
+        assert!(!ends(paths, 0.08, 0.17) && ends(in_doubt, 0.08, 0.17), "nothing known");
         assert!(ends(paths, 0.08, 0.5), "eight times the paths would know nothing either");
         let unasked = Limits { error: None, ..limits };
         assert!(unasked.end_at(paths, &Estimate { value: 0.2, standard_error: 0.06 }));
@@ -295,7 +298,8 @@ mod tests {
                 ..Default::default()
             };
             let mut verifier = Verifier::new(&scene, settings, (64, 2048)).unwrap();
-            let limits = Limits { error: Some(limit), each_group, paths: Some(paths) };
+            let paths = Some(paths);
+            let limits = Limits { error: Some(limit), each_group, paths, paths_in_doubt: paths };
             let found = verifier.measure(&told, limits, &mut |_| ControlFlow::Continue(()));
             found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()
         };

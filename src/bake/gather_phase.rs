@@ -298,7 +298,7 @@ impl<'a> GatherPhase<'a> {
         let Estimated { light, found, mut cancelled } = estimated;
         let was_stopped = cancelled;
         let paths = match was_stopped {
-            true => model::JUDGE_PATHS,
+            true => [model::JUDGE_PATHS; 2],
             false => model::judge_paths(light.gather_count, self.gather.rays),
         };
         let limits = (self.target.map(|target| target.error), paths);

@@ -50,17 +50,23 @@ impl<'a> Judge<'a> {
     }
 
     /// `found`, the estimate of `surface`, held against paths: so many that it is known whether
-    /// `error` is met, but no more than `paths` in all. `progress` is told how many points are done
+    /// `error` is met, but no more than the first of `paths` in all, or the second where that is in
+    /// doubt. `progress` is told how many points are done
     /// of how many; if it stops the measurement, the estimate stays as it is. So it does where
     /// nothing can be measured: in a scene without light, or where next to nothing is reflected.
     pub fn judge(
         &mut self,
         found: EstimatedError,
         surface: &VertexMesh,
-        (error, paths): (Option<f64>, u64),
+        (error, [paths, paths_in_doubt]): (Option<f64>, [u64; 2]),
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> EstimatedError {
-        let limits = Limits { error, each_group: self.each_group, paths: Some(paths) };
+        let limits = Limits {
+            error,
+            each_group: self.each_group,
+            paths: Some(paths),
+            paths_in_doubt: Some(paths_in_doubt),
+        };
         let mut stopped = false;
         let measured = self.verifier().and_then(|verifier| {
             verifier.measure(surface, limits, &mut |p: &Progress| {

@@ -220,7 +220,7 @@ pub(super) fn estimate_elements(
         Some(target) if cancelled => Judge::new(shot.mesh.scene(), target.each_group).judge(
             found,
             &light.surface,
-            (Some(target.error), model::JUDGE_PATHS),
+            (Some(target.error), [model::JUDGE_PATHS; 2]),
             &mut |_, _| ControlFlow::Continue(()),
         ),
         _ => found,
