@@ -218,28 +218,29 @@ impl Steps {
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
         let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
         let bounces = truncation.hypot(unshot);
-        let cap_of_all = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
-        let cap_of_rest = model::water_filling_cap([mesh, gaps, bounces], sampling, allowed);
+        // Where sampling is lowered too, and where it stays.
+        let caps = |bounces: f64| {
+            let all = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
+            (all, model::water_filling_cap([mesh, gaps, bounces], sampling, allowed))
+        };
+        let (cap_of_all, cap_of_rest) = caps(bounces);
         // More rays have every vertex gather again; what is left of the error may cost less.
         let growth = |cap: f64| model::vertex_growth(mesh.max(gaps), cap);
         let all = growth(cap_of_all) * model::ray_factor(sampling, cap_of_all);
         let rest = growth(cap_of_rest) - 1.0;
         let leaves_enough = model::leaves_budget(sampling, allowed);
         let lowers_sampling = sampling > cap_of_all && (all < rest || !leaves_enough);
-        let cap = if lowers_sampling { cap_of_all } else { cap_of_rest };
+        let chosen = |(all, rest): (f64, f64)| if lowers_sampling { all } else { rest };
+        let cap = chosen((cap_of_all, cap_of_rest));
         // Bounces take few rays: where they leave more of the error to the elements, these have
         // less to be split.
-        let without = match lowers_sampling {
-            true => model::water_filling_cap([sampling, mesh, gaps], 0.0, allowed),
-            false => model::water_filling_cap([mesh, gaps], sampling, allowed),
-        };
-        let saves = growth(cap) - growth(without) > model::BOUNCE_COST;
+        let saved = growth(cap) - growth(chosen(caps(0.0)));
         Steps {
             sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
             mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
             gaps: (gaps > cap).then(|| model::mesh_step(gaps, cap)),
-            bounce: bounces > cap || bounces > 0.0 && saves,
+            bounce: bounces > cap || saved > model::BOUNCE_COST,
         }
     }
 

@@ -4,10 +4,10 @@
 //! the reflecting area of each: a quarter of them evenly, a quarter evenly over octaves of distance
 //! (where all is near, that is the same), half where elements are expected to be off most of what
 //! is darkest in them, since few places make up most of a root mean square: by their residuals, or
-//! by a jump of the light between their corners. Each gathers twice what
-//! lit the result, the second time from a hair beside, where rays and hemicubes are rotated
-//! otherwise; and once the result itself. The [statistics](super::error_estimate) of that are the
-//! estimate; the share of each vertex follows the residuals of the elements around it.
+//! by a jump of the light between their corners. Each gathers twice what lit the result, the second
+//! time from a hair beside, where rays and hemicubes are rotated otherwise; and once the result
+//! itself. The [statistics](super::error_estimate) of that are the estimate; the share of each
+//! vertex follows the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 

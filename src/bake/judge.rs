@@ -51,9 +51,9 @@ impl<'a> Judge<'a> {
 
     /// `found`, the estimate of `surface`, held against paths: so many that it is known whether
     /// `error` is met, but no more than the first of `paths` in all, or the second where that is in
-    /// doubt. `progress` is told how many points are done
-    /// of how many; if it stops the measurement, the estimate stays as it is. So it does where
-    /// nothing can be measured: in a scene without light, or where next to nothing is reflected.
+    /// doubt. `progress` is told how many points are done of how many; if it stops the measurement,
+    /// the estimate stays as it is. So it does where nothing can be measured: in a scene without
+    /// light, or where next to nothing is reflected.
     pub fn judge(
         &mut self,
         found: EstimatedError,

@@ -27,31 +27,38 @@ fn wide_ground() -> Scene {
     Scene::new(positions, triangles.collect(), names, vec![bright]).unwrap()
 }
 
+/// Points that samples are asked for.
+const POINTS: usize = 4096;
+
+/// The samples on the ground that an estimate of `light` by these residuals takes, where errors are
+/// relative to no less than `floor`.
+fn samples_on_ground(light: &GatheredMesh, element_residual: &[f64], floor: f64) -> Vec<Sample> {
+    let estimator = ErrorEstimator {
+        light,
+        lit_by: None,
+        element_residual,
+        ledger: &Ledger::default(),
+        bounces: 0.0,
+        diagonal: 1.0,
+        octaves: &octaves_of(light.mesh.scene()),
+        expected_floor: 0.0,
+        paths: None,
+    };
+    let counts = SampleCounts { total: POINTS, per_group: 8 };
+    let (strata, samples) = estimator.samples(counts, floor);
+    samples.into_iter().filter(|sample| strata[sample.stratum].group == Some(0)).collect()
+}
+
 #[test]
 fn points_lie_in_every_octave_of_a_wide_ground() {
     let mesh = Mesh::new(Arc::new(wide_ground()), f64::INFINITY).unwrap();
     let radiosity = vec![Rgb::splat(2.0); mesh.element_count()];
     let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
-    let estimator = ErrorEstimator {
-        light: &light,
-        lit_by: None,
-        element_residual: &[],
-        ledger: &Ledger::default(),
-        bounces: 0.0,
-        diagonal: 1.0,
-        octaves: &octaves_of(mesh.scene()),
-        expected_floor: 0.0,
-        paths: None,
-    };
-    const POINTS: usize = 4096;
-    let counts = SampleCounts { total: POINTS, per_group: 8 };
-    let (strata, samples) = estimator.samples(counts, 1.0);
-    let of_ground = |sample: &&Sample| strata[sample.stratum].group == Some(0);
-    let ground: Vec<&Sample> = samples.iter().filter(of_ground).collect();
+    let ground = samples_on_ground(&light, &[], 1.0);
     assert!(ground.len() >= POINTS * 99 / 100);
     for half in [10.0, 100.0, 1000.0f64] {
         let within =
-            |sample: &&&Sample| sample.point.point.position.truncate().abs().max_element() <= half;
+            |sample: &&Sample| sample.point.point.position.truncate().abs().max_element() <= half;
         let share: f64 = ground.iter().filter(within).map(|sample| sample.weight).sum();
         let count = ground.iter().filter(within).count();
         // Half of the points are in ten octaves, of which the smallest has three; an even spread
@@ -72,21 +79,7 @@ fn points_go_where_light_may_jump() {
     let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
     let lengths = |e: usize| light.corners[e].map(|v| light.reflected[v as usize].length());
     let share_of_dark = |element_residual: &[f64]| {
-        let estimator = ErrorEstimator {
-            light: &light,
-            lit_by: None,
-            element_residual,
-            ledger: &Ledger::default(),
-            bounces: 0.0,
-            diagonal: 1.0,
-            octaves: &octaves_of(mesh.scene()),
-            expected_floor: 0.0,
-            paths: None,
-        };
-        let counts = SampleCounts { total: 4096, per_group: 8 };
-        let (strata, samples) = estimator.samples(counts, 0.5);
-        let on_ground = |sample: &&Sample| strata[sample.stratum].group == Some(0);
-        let ground: Vec<&Sample> = samples.iter().filter(on_ground).collect();
+        let ground = samples_on_ground(&light, element_residual, 0.5);
         let dark = ground.iter().filter(|sample| sample.element == 1).count();
         dark as f64 / ground.len() as f64
     };
