@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::tolerances::SAME_POSITION;
 use crate::geometry::polygon::fan;
 use crate::sampling::hash::split_mix64;
 
@@ -19,35 +20,61 @@ pub(super) fn scrambled_point(k: u32, seed: u64) -> [f64; 4] {
     sobol_burley::sample_4d(k % SET_SIZE, 0, set).map(|x| f64::from(x) + HALF_STEP)
 }
 
-/// A convex polygon that points are spread over.
+/// A convex polygon that points are spread over: the unit square folded onto it piece by piece, so
+/// that what is evenly spread there is so here.
 pub(super) struct PolygonPoints {
-    /// The triangles of its fan, each with the share of the area up to its end.
-    triangles: Vec<([DVec3; 3], f64)>,
+    pieces: Vec<Piece>,
+}
+
+/// A triangle of the fan of a polygon, or a parallelogram.
+struct Piece {
+    origin: DVec3,
+    /// Edges from the origin.
+    edges: [DVec3; 2],
+    is_parallelogram: bool,
+    /// Share of the polygon's area up to its end.
+    end: f64,
 }
 
 impl PolygonPoints {
     /// For a polygon with area.
     pub fn new(polygon: &[DVec3]) -> PolygonPoints {
+        if let &[a, b, c, d] = polygon
+            && (a + c - b - d).length() <= SAME_POSITION * (c - a).length()
+        {
+            let edges = [b - a, d - a];
+            let all = Piece { origin: a, edges, is_parallelogram: true, end: 1.0 };
+            return PolygonPoints { pieces: vec![all] };
+        }
         let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).length();
         let total: f64 = fan(polygon).map(area).sum();
         let mut sum = 0.0;
-        let with_end = |triangle| {
+        let piece = |triangle: [DVec3; 3]| {
             sum += area(triangle);
-            (triangle, sum / total)
+            let [origin, b, c] = triangle;
+            let edges = [b - origin, c - origin];
+            Piece { origin, edges, is_parallelogram: false, end: sum / total }
         };
-        PolygonPoints { triangles: fan(polygon).map(with_end).collect() }
+        PolygonPoints { pieces: fan(polygon).map(piece).collect() }
     }
 
     /// The point that (u, v) in (0, 1)² stands for: equal areas stand for equal areas.
     pub fn at(&self, u: f64, v: f64) -> DVec3 {
-        let before = self.triangles.partition_point(|(_, end)| *end <= u);
-        let k = before.min(self.triangles.len() - 1);
-        let ([a, b, c], end) = self.triangles[k];
-        let start = if k == 0 { 0.0 } else { self.triangles[k - 1].1 };
-        // From the corner of the fan, the share of the area grows as the square of the way.
-        let way = ((u - start) / (end - start)).clamp(0.0, 1.0).sqrt();
-        a + way * ((1.0 - v) * (b - a) + v * (c - a))
+        let before = self.pieces.partition_point(|piece| piece.end <= u);
+        let k = before.min(self.pieces.len() - 1);
+        let Piece { origin, edges: [x, y], is_parallelogram, end } = self.pieces[k];
+        let start = if k == 0 { 0.0 } else { self.pieces[k - 1].end };
+        let u = ((u - start) / (end - start)).clamp(0.0, 1.0);
+        let [u, v] = if is_parallelogram { [u, v] } else { onto_triangle(u, v) };
+        origin + u * x + v * y
     }
+}
+
+/// The square folded onto the triangle of u + v ≤ 1 along its diagonal, where halves meet (E. Heitz,
+/// "A low-distortion map between triangle and square", 2019).
+fn onto_triangle(u: f64, v: f64) -> [f64; 2] {
+    let half = 0.5 * u.min(v);
+    if u > v { [u - half, half] } else { [half, v - half] }
 }
 
 #[cfg(test)]
@@ -74,5 +101,22 @@ mod tests {
         assert!(all.iter().all(|p| (p.z - 2.0).abs() < 1e-15));
         let centroid = all.iter().sum::<DVec3>() / all.len() as f64;
         assert!((centroid.y - 5.0 / 3.0).abs() < 0.01, "{centroid}");
+    }
+
+    #[test]
+    fn a_parallelogram_has_the_cells_of_the_square() {
+        let (x, y) = (DVec3::new(2.0, 0.5, 0.0), DVec3::new(0.3, 0.0, 1.0));
+        let points =
+            PolygonPoints::new(&[DVec3::ONE, DVec3::ONE + x, DVec3::ONE + x + y, DVec3::ONE + y]);
+        // 64 points of a net: one in each of 8 × 8 cells.
+        let mut cells = [0; 64];
+        for k in 0..64 {
+            let [u, v, ..] = scrambled_point(k, 3);
+            let along = points.at(u, v) - DVec3::ONE;
+            let height = along.z;
+            let way = (along.x - 0.3 * height) / 2.0;
+            cells[(8.0 * way) as usize * 8 + (8.0 * height) as usize] += 1;
+        }
+        assert_eq!(cells, [1; 64]);
     }
 }

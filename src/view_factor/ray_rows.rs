@@ -101,6 +101,8 @@ impl<'a> RayCaster<'a> {
         });
         blockers.sort_unstable();
         blockers.dedup();
+        // Of thousands of rays, some hundred blockers.
+        blockers.shrink_to_fit();
         FirstHalf { fronts: counted(met.fronts), back: met.backs, blockers }
     }
 
@@ -202,7 +204,10 @@ impl Met {
 fn counted(mut polygons: Vec<u32>) -> Vec<Count> {
     polygons.sort_unstable();
     let runs = polygons.chunk_by(|a, b| a == b);
-    runs.map(|run| Count { polygon: run[0], rays: run.len() as u32 }).collect()
+    let mut counts: Vec<Count> =
+        runs.map(|run| Count { polygon: run[0], rays: run.len() as u32 }).collect();
+    counts.shrink_to_fit();
+    counts
 }
 
 /// The counts of two ascending lists added up.
