@@ -36,6 +36,15 @@ pub enum Missing {
     Unmet,
 }
 
+/// How large a matrix will be, by [`ViewFactors::predicted_size`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MatrixSize {
+    /// Factors above zero.
+    pub factors: usize,
+    /// Memory that making it takes, beyond the scene.
+    pub bytes: usize,
+}
+
 /// One nonzero of a matrix of view factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {

@@ -176,6 +176,20 @@ fn boundaries_that_say_nothing_are_refused_with_their_line() {
 }
 
 #[test]
+fn what_takes_more_memory_than_allowed_is_refused_beforehand() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let with = |gib| run("view-factors", &[super::cornell(), "--memory", gib, "--out", out]);
+    let refused = with("1e-6");
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1));
+    // Objects: their pairs.
+    assert!(said.contains("--memory: about 64 factors") && said.contains("--error"), "{said}");
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+    assert!(with("1").status.success());
+}
+
+#[test]
 fn rows_of_many_machines_merge_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let cornell = super::cornell();
@@ -210,6 +224,8 @@ fn rows_of_many_machines_merge_to_the_same_bytes() {
         (&["--rows", "0..2", "--enforce"], "radiosity merge"),
         (&["--sampled", "--rows", "0..2"], "--rows"),
         (&["--checkpoint", "x", cornell], "one scene"),
+        (&["--memory", "0"], "GiB"),
+        (&["--sampled", "--memory", "1"], "--memory"),
     ] {
         let out = view_factors(more);
         assert_eq!(out.status.code(), Some(2));

@@ -54,6 +54,24 @@ impl Comparison {
 }
 
 #[test]
+fn sizes_of_matrices_are_predicted() {
+    let scene = town(14);
+    let matrix = ViewFactors::new(&scene, 1e-3, &[], keep_counting).unwrap().unwrap();
+    assert_eq!(matrix.absent, Missing::Unmet, "exact where sparse is to be predicted");
+    let factors = matrix.factors.iter().map(Vec::len).sum::<usize>() as f64;
+    let predicted = ViewFactors::predicted_size(&scene, 1e-3, &[]).unwrap();
+    println!("{factors} factors, predicted {predicted:?}");
+    // 256 of 982 rows are drawn, whose lengths differ by half: 0.5 / √256 are 3 %, and pairs that
+    // are large on one side only are counted by the other.
+    assert!((predicted.factors as f64 / factors - 1.0).abs() < 0.15, "{factors} {predicted:?}");
+    // An exact one has all pairs at most.
+    let scene = load_obj(data("box_4.obj")).unwrap();
+    let groups = scene.groups().len();
+    assert_eq!(ViewFactors::predicted_size(&scene, 1e-3, &[]).unwrap().factors, groups * groups);
+    assert!(ViewFactors::predicted_size(&scene, 0.0, &[]).is_err());
+}
+
+#[test]
 fn enclosure_is_as_good_as_it_says() {
     let scene = load_obj(data("box_4.obj")).unwrap();
     let exact = exact_view_factors(&scene, 1e-4);

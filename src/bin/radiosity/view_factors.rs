@@ -23,7 +23,7 @@ use crate::scene_options::SceneOptions;
 
 pub const USAGE: &str = "\
 usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--check ROWS]
-                    [--checkpoint FILE] [--enforce] [--format F,…] [--out DIR]
+                    [--checkpoint FILE] [--memory GIB] [--enforce] [--format F,…] [--out DIR]
        radiosity view-factors SCENE.obj --rows A..B [--facets] [--error E] [--two-sided NAME]…
                     [--checkpoint FILE] [--out DIR]
        radiosity view-factors SCENE.obj… --sampled [--facets] [--element-size X] [--hemicube N]
@@ -45,6 +45,7 @@ what leaves the scene, `back` what meets the backs of surfaces.
                     `radiosity merge` makes a matrix of all of them
   --checkpoint FILE keep the rows that are done there, every few seconds and at Ctrl-C; go on from
                     it if it is there
+  --memory GIB      predict how many factors there will be, and refuse what would take more
   --enforce         make the matrix keep closure and reciprocity, and say what that changed
   --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
                     SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
@@ -95,11 +96,19 @@ pub struct ToError {
     pub facets: bool,
     /// Where rows that are done are kept.
     pub checkpoint: Option<PathBuf>,
+    /// Memory that it may take, GiB.
+    pub memory: Option<f64>,
 }
 
 impl Default for ToError {
     fn default() -> ToError {
-        ToError { error: DEFAULT_ERROR, two_sided: vec![], facets: false, checkpoint: None }
+        ToError {
+            error: DEFAULT_ERROR,
+            two_sided: vec![],
+            facets: false,
+            checkpoint: None,
+            memory: None,
+        }
     }
 }
 
@@ -127,7 +136,7 @@ impl Options {
         let (mut error, mut two_sided, mut check) = (None, vec![], None);
         let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
         let (mut device, mut facets) = (None, false);
-        let (mut rows, mut checkpoint) = (None, None);
+        let (mut rows, mut checkpoint, mut memory) = (None, None, None);
         let mut reading = SceneOptions::ignoring_specular();
         while let Some(arg) = parser.next()? {
             match arg {
@@ -144,6 +153,7 @@ impl Options {
                     check = Some(args::value(parser, "check", "a whole number of rows")?);
                 }
                 Long("rows") => rows = Some(rows::range(parser)?),
+                Long("memory") => memory = Some(rows::memory(parser)?),
                 Long("checkpoint") => checkpoint = Some(parser.value()?.into()),
                 Long("two-sided") => {
                     two_sided.push(args::value(parser, "two-sided", "a group's name")?);
@@ -181,12 +191,13 @@ impl Options {
             return Err(Stop::usage(needing));
         }
         let is_kept = rows.is_some() || checkpoint.is_some();
-        let only_to_error = error.is_some() || !two_sided.is_empty() || check.is_some() || is_kept;
+        let is_sized = check.is_some() || memory.is_some();
+        let only_to_error = error.is_some() || !two_sided.is_empty() || is_sized || is_kept;
         let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
         let method = if sampled {
             if only_to_error {
-                let not_for = "--error, --two-sided, --check, --rows and --checkpoint are not for \
-                               --sampled";
+                let not_for = "--error, --two-sided, --check, --memory, --rows and --checkpoint are \
+                               not for --sampled";
                 return Err(Stop::usage(not_for));
             }
             let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
@@ -198,7 +209,7 @@ impl Options {
                 return Err(Stop::usage(needing));
             }
             let error = error.unwrap_or(DEFAULT_ERROR);
-            let to_error = ToError { error, two_sided, facets, checkpoint };
+            let to_error = ToError { error, two_sided, facets, checkpoint, memory };
             Method::ToError { to_error, check: check.unwrap_or(0), rows }
         };
         Ok(Options { scenes, reading, out, formats, enforce, method })

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use radiosity::io::view_factors::{read_rows, write_rows};
 use radiosity::ranks::Alone;
 use radiosity::view_factor::PartialMatrix;
-use radiosity::{Error, Scene, ViewFactors};
+use radiosity::{Error, ErrorKind, Scene, ViewFactors};
 
 use super::{ToError, group_indices};
 use crate::args::{self, Stop};
@@ -24,6 +24,13 @@ pub fn range(parser: &mut lexopt::Parser) -> Result<Range<usize>, Stop> {
     let ends = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
     let rising = ends.filter(|range: &Range<usize>| range.start < range.end);
     rising.ok_or_else(|| args::wrong_value("rows", &text, "A..B, from 0, such as 0..500"))
+}
+
+/// The value of `--memory`, GiB.
+pub fn memory(parser: &mut lexopt::Parser) -> Result<f64, Stop> {
+    let text: String = args::value(parser, "memory", "a number of GiB")?;
+    let positive = text.parse().ok().filter(|gib: &f64| *gib > 0.0);
+    positive.ok_or_else(|| args::wrong_value("memory", &text, "GiB, more than 0, such as 8"))
 }
 
 impl ToError {
@@ -46,6 +53,7 @@ impl ToError {
     /// Those of `rows` that are not in the checkpoint, if there is one, and all that is in it.
     fn rows(&self, scene: &Scene, rows: Range<usize>) -> Result<PartialMatrix, Stop> {
         let groups = group_indices(scene, &self.two_sided, self.facets)?;
+        self.check_memory(scene, &groups)?;
         let Some(checkpoint) = &self.checkpoint else {
             let go = |_: &PartialMatrix| ControlFlow::Continue(());
             return Ok(self.make(scene, &groups, rows, None, go)?);
@@ -74,6 +82,21 @@ impl ToError {
         }
         write_rows(checkpoint, &part)?;
         if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(part) }
+    }
+
+    /// Whether the whole matrix will likely do with the memory that it may take.
+    fn check_memory(&self, scene: &Scene, two_sided: &[usize]) -> Result<(), Error> {
+        let Some(allowed) = self.memory else { return Ok(()) };
+        let predict = || ViewFactors::predicted_size(scene, self.error, two_sided);
+        let size = progress::of_stage("predicting the size of the matrix", predict)?;
+        let gib = size.bytes as f64 / f64::from(1 << 30);
+        let predicted = format!("about {} factors, {gib:.2} GiB", size.factors);
+        if gib > allowed {
+            let remedy = "allow more, or ask for a larger --error";
+            return Err(Error::new(ErrorKind::Setting, "--memory", predicted, remedy));
+        }
+        say!("predicted: {predicted}");
+        Ok(())
     }
 
     fn make(
