@@ -70,8 +70,8 @@ impl PolygonPoints {
     }
 }
 
-/// The square folded onto the triangle of u + v ≤ 1 along its diagonal, where halves meet (E. Heitz,
-/// "A low-distortion map between triangle and square", 2019).
+/// The square folded onto the triangle of u + v ≤ 1 along its diagonal, where halves meet
+/// (E. Heitz, "A low-distortion map between triangle and square", 2019).
 fn onto_triangle(u: f64, v: f64) -> [f64; 2] {
     let half = 0.5 * u.min(v);
     if u > v { [u - half, half] } else { [half, v - half] }

@@ -26,8 +26,8 @@ use crate::geometry::polygon::polygon_area;
 /// Parts of the points: each is as evenly spread as such a number of points can be.
 const PARTS: usize = 8;
 
-/// Two standard errors of a mean of eight hold the truth 19 of 20 times if they are this much larger
-/// than those of many: Student's t for 7 degrees of freedom and 95 %, over 2.
+/// Two standard errors of a mean of eight hold the truth 19 of 20 times if they are this much
+/// larger than those of many: Student's t for 7 degrees of freedom and 95 %, over 2.
 const STUDENT_FACTOR: f64 = 2.365 / 2.0;
 
 /// Points of a part at first, and at most: limits time, and the error that is left is told.

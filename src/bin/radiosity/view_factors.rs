@@ -196,8 +196,8 @@ impl Options {
         let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
         let method = if sampled {
             if only_to_error {
-                let not_for = "--error, --two-sided, --check, --memory, --rows and --checkpoint are \
-                               not for --sampled";
+                let not_for = "--error, --two-sided, --check, --memory, --rows and --checkpoint \
+                               are not for --sampled";
                 return Err(Stop::usage(not_for));
             }
             let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
