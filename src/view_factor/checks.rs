@@ -5,6 +5,7 @@
 //! | closure | Σ_j F_ij + open_i + back_i = 1 | [`MatrixChecks::closure`] |
 //! | reciprocity | A_i F_ij = A_j F_ji | [`MatrixChecks::reciprocity`] |
 //! | bounds | 0 ≤ F_ij ≤ min(1, A_j / A_i) | [`MatrixChecks::bounds`] |
+//! | | Σ_j F_ij + back_i ≤ 1 | [`MatrixChecks::row_sums`] |
 //!
 //! The share of a row that is open tells of the scene: more than its error, and the enclosure has a
 //! gap; less than minus its error, and surfaces lie twice in one place.
@@ -24,6 +25,8 @@ pub struct MatrixChecks {
     /// By how much a value is below 0 or above 1, or A_i F_ij above A_j, as a share of A_i; over
     /// all factors.
     pub bounds: ErrorStats,
+    /// By how much the sum of a row and its back is above 1; over all rows.
+    pub row_sums: ErrorStats,
 }
 
 /// Size of an error over many places.
@@ -70,6 +73,7 @@ impl MatrixChecks {
             closure: ErrorStats::of(closure_errors(matrix)),
             reciprocity: ErrorStats::of(reciprocity_errors(matrix)),
             bounds: ErrorStats::of(bound_errors(matrix)),
+            row_sums: ErrorStats::of(row_excesses(matrix)),
         }
     }
 }
@@ -78,10 +82,18 @@ fn closure_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)
     let is_left_over = m.absent != Missing::NotSeen;
     let rows = (0..m.areas.len()).filter(move |&i| !is_left_over || is_closed(m, i));
     rows.map(move |i| {
-        let sum: f64 = m.factors[i].iter().map(|f| f.value).sum();
         let open = if is_left_over { 0.0 } else { m.open[i].value };
-        ((i, i), sum + open + m.back[i].value - 1.0)
+        ((i, i), row_sum(m, i) + open - 1.0)
     })
+}
+
+/// What of the flux of group `i` arrives at fronts and backs.
+fn row_sum(m: &ViewFactors, i: usize) -> f64 {
+    m.factors[i].iter().map(|f| f.value).sum::<f64>() + m.back[i].value
+}
+
+fn row_excesses(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
+    (0..m.areas.len()).map(|i| ((i, i), (row_sum(m, i) - 1.0).max(0.0)))
 }
 
 /// All factors with their rows and columns.

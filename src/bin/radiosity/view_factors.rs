@@ -14,7 +14,7 @@ use files::Format;
 use lexopt::prelude::*;
 use radiosity::backend::AdapterInfo;
 use radiosity::scene::WarningKind;
-use radiosity::view_factor::Estimate;
+use radiosity::view_factor::{ErrorStats, Estimate};
 use radiosity::{BakeSettings, Error, ErrorKind, Mesh, Scene, ViewFactors, Warning};
 
 use crate::args::{self, Device, Stop};
@@ -62,6 +62,9 @@ what leaves the scene, `back` what meets the backs of surfaces.
 
 /// Groups whose factors are printed at most.
 pub const MAX_PRINTED: usize = 16;
+
+/// Above the rounding of a sum of thousands of factors.
+const ROUNDING_OF_SUMS: f64 = 1e-12;
 
 /// Absolute error of a factor where none is asked for.
 const DEFAULT_ERROR: f64 = 1e-4;
@@ -351,6 +354,13 @@ pub fn print_checks(m: &ViewFactors) {
         say!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.max);
     } else {
         say!("bounds: kept");
+    }
+    let ErrorStats { max: excess, at: (row, _), .. } = checks.row_sums;
+    if excess > ROUNDING_OF_SUMS {
+        let error = m.open[row].error;
+        say!("sums of rows: above 1 by up to {excess:.1e} ± {error:.1e}, in {}", name(row));
+    } else {
+        say!("sums of rows: none above 1");
     }
     if let Some(&worst) = m.rows_over_unity().first() {
         eprintln!(
