@@ -1,4 +1,16 @@
 //! Processes that share out work, each with all of the input: as those of MPI do.
+//!
+//! Where all run alike, each calls [`Ranks::all_gather`] itself. Where one drives and others serve:
+//!
+//! ```text
+//! process 0        ask ─ request ─→ all      own share ─┐
+//! the others       serve ←──────────┘        own share ─┴─→ process 0
+//! ```
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, ErrorKind};
 
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
@@ -31,4 +43,80 @@ impl Ranks for Alone {
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         vec![bytes.to_vec()]
     }
+}
+
+/// What process 0 wants of `items`, of which every process does its own share for a request: in
+/// their order. The others [`serve`].
+///
+/// # Errors
+/// Those of `own`, in any process.
+pub(crate) fn ask<Q: Serialize, R: Serialize + DeserializeOwned>(
+    ranks: &mut dyn Ranks,
+    request: &Q,
+    items: usize,
+    own: impl FnOnce(&Q, Share) -> Result<Vec<R>, Error>,
+) -> Result<Vec<R>, Error> {
+    let share = Share::of(ranks);
+    if share.size == 1 {
+        return own(request, share);
+    }
+    ranks.all_gather(&encoded(request));
+    let own = own(request, share).map_err(|e| e.to_string());
+    let mut of_ranks = vec![];
+    for (bytes, rank) in ranks.all_gather(&encoded(&own)).iter().zip(0..) {
+        let results = decoded::<Result<Vec<R>, String>>(bytes).map_err(|found| {
+            let remedy = "see to that process, and go on from the last checkpoint";
+            Error::new(ErrorKind::Device, format!("work of process {rank}"), found, remedy)
+        })?;
+        of_ranks.push(results.into_iter());
+    }
+    Ok((0..items).filter_map(|k| of_ranks[k % share.size].next()).collect())
+}
+
+/// Does this process's share of all that process 0 [`ask`]s for, until it [`dismiss`]es.
+pub(crate) fn serve<Q: DeserializeOwned, R: Serialize>(
+    ranks: &mut dyn Ranks,
+    mut own: impl FnMut(&Q, Share) -> Result<Vec<R>, Error>,
+) {
+    loop {
+        let requests = ranks.all_gather(&[]);
+        if requests[0].is_empty() {
+            return;
+        }
+        let own = own(&decoded(&requests[0]), Share::of(ranks)).map_err(|e| e.to_string());
+        ranks.all_gather(&encoded(&own));
+    }
+}
+
+/// Ends the service of all others.
+pub(crate) fn dismiss(ranks: &mut dyn Ranks) {
+    if ranks.size() > 1 {
+        ranks.all_gather(&[]);
+    }
+}
+
+/// Which of many things fall to one process: they are dealt out one by one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Share {
+    rank: usize,
+    size: usize,
+}
+
+impl Share {
+    fn of(ranks: &dyn Ranks) -> Share {
+        Share { rank: ranks.rank(), size: ranks.size() }
+    }
+
+    /// Those of `items`.
+    pub fn from<T: Clone>(self, items: &[T]) -> Vec<T> {
+        items.iter().skip(self.rank).step_by(self.size).cloned().collect()
+    }
+}
+
+fn encoded(message: &impl Serialize) -> Vec<u8> {
+    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
+}
+
+fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> T {
+    postcard::from_bytes(bytes).expect("all processes run the same program")
 }

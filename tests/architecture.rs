@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MAY_KNOW: &[(&str, &str)] = &[
     ("error", ""),
     ("progress", "error"),
-    ("ranks", ""),
+    ("ranks", "error"),
     ("geometry", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
@@ -20,7 +20,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("vertex", "error form_factor geometry mesh scene"),
     (
         "gather",
-        "error form_factor geometry hemicube mesh progress sampling scene vertex visibility",
+        "error form_factor geometry hemicube mesh progress ranks sampling scene vertex visibility",
     ),
     ("grid", "error gather geometry scene visibility"),
     ("probe", "error gather progress scene visibility"),

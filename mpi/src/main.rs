@@ -24,15 +24,16 @@ const USAGE: &str = "\
 usage: mpirun -n N radiosity-mpi view-factors SCENE [--facets] [--error E] [--two-sided NAME]…
                                  [--checkpoint FILE] --out FILE.npz
        mpirun -n N radiosity-mpi solve SCENE.obj [--element-size X] [--hemicube N] [--cpu]
-                                 [--unshot U] [--state FILE] --out FILE.ply
+                                 [--unshot U] [--gather E] [--state FILE] --out FILE.ply
 
   view-factors     as `radiosity view-factors`, to an .npz file
   solve            the light between the elements of a scene, by hemicubes on a device a process,
-                   as radiosity at the vertices; without final gathering
+                   as radiosity at the vertices
   --element-size X longest edge of an element [diagonal / 32]
   --hemicube N     pixels along an edge of a hemicube's top face, even [128]
   --cpu            rays on the CPU instead, N squared a row
   --unshot U       share of the light that may be left unshot [1e-3]
+  --gather E       then vertices gather that light, as many as a bake to the error E begins with
   --state FILE     keep the solve there, and go on from it if it is there";
 
 /// Why a command ends early.

@@ -11,9 +11,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::{FormFactors, Row, checked_rows};
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
-use crate::ranks::Ranks;
+use crate::ranks::{Ranks, Share, ask, dismiss, serve};
 
 /// Rows that are wanted: of these patches, of this weight.
 #[derive(Serialize, Deserialize)]
@@ -45,36 +45,15 @@ impl<'a, F: FormFactors> SharedRows<'a, F> {
     /// # Panics
     /// When process 0 does not share rows out.
     pub fn serve(source: &mut F, mesh: &Mesh, ranks: &mut dyn Ranks) {
-        loop {
-            let requests = ranks.all_gather(&[]);
-            if requests[0].is_empty() {
-                return;
-            }
-            let request = decoded::<Request>(&requests[0]);
-            let own = own_rows(source, mesh, &request, ranks);
-            ranks.all_gather(&encoded(&own));
-        }
+        serve(ranks, |request, share| own_rows(source, mesh, request, share));
     }
 }
 
 impl<F: FormFactors> FormFactors for SharedRows<'_, F> {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
-        if self.ranks.size() == 1 {
-            return self.source.rows(mesh, patches, weight);
-        }
         let request = Request { weight, patches: patches.to_vec() };
-        self.ranks.all_gather(&encoded(&request));
-        let own = own_rows(&mut self.source, mesh, &request, self.ranks);
-        let mut of_ranks = vec![];
-        for (bytes, rank) in self.ranks.all_gather(&encoded(&own)).iter().zip(0..) {
-            let rows = decoded::<Result<Vec<Row>, String>>(bytes).map_err(|found| {
-                let remedy = "see to that process, and go on from the last checkpoint";
-                Error::new(ErrorKind::Device, format!("rows of process {rank}"), found, remedy)
-            })?;
-            of_ranks.push(rows.into_iter());
-        }
-        let size = of_ranks.len();
-        Ok((0..patches.len()).filter_map(|k| of_ranks[k % size].next()).collect())
+        let own = |request: &Request, share| own_rows(&mut self.source, mesh, request, share);
+        ask(self.ranks, &request, patches.len(), own)
     }
 
     fn preferred_batch_len(&self) -> usize {
@@ -89,28 +68,16 @@ impl<F: FormFactors> FormFactors for SharedRows<'_, F> {
 
 impl<F> Drop for SharedRows<'_, F> {
     fn drop(&mut self) {
-        if self.ranks.size() > 1 {
-            self.ranks.all_gather(&[]);
-        }
+        dismiss(self.ranks);
     }
 }
 
-/// The rows of `request` that fall to this process; of an error, its text.
+/// The rows of `request` that fall to this process.
 fn own_rows(
     source: &mut impl FormFactors,
     mesh: &Mesh,
     request: &Request,
-    ranks: &dyn Ranks,
-) -> Result<Vec<Row>, String> {
-    let own = request.patches.iter().skip(ranks.rank()).step_by(ranks.size());
-    let own: Vec<NodeId> = own.copied().collect();
-    checked_rows(source, mesh, &own, request.weight).map_err(|e| e.to_string())
-}
-
-fn encoded(message: &impl Serialize) -> Vec<u8> {
-    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
-}
-
-fn decoded<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> T {
-    postcard::from_bytes(bytes).expect("all processes run the same program")
+    share: Share,
+) -> Result<Vec<Row>, Error> {
+    checked_rows(source, mesh, &share.from(&request.patches), request.weight)
 }

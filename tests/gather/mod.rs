@@ -1,1 +1,2 @@
 mod point_irradiance;
+mod shared;
