@@ -134,7 +134,7 @@ impl FinalGather {
         world: &mut World,
     ) -> Result<GatheredMesh, Failure> {
         let start = Instant::now();
-        let bytes = radiosity.iter().flat_map(|b| b.to_array()).flat_map(f64::to_le_bytes);
+        let bytes = radiosity.iter().flat_map(Rgb::to_array).flat_map(f64::to_le_bytes);
         world.all_gather(&bytes.collect::<Vec<u8>>());
         let gatherer = backend.gather(&solved.mesh, self.rays)?;
         let mut gatherer = SharedGather::new(gatherer, solved, world);

@@ -45,7 +45,7 @@ fn gathered(
     let mut settings = RefinementSettings::new(50.0);
     settings.gather_passes = passes;
     let found = gather_at_vertices(light, &light.mesh, &settings, gatherer, keep_going)?;
-    Ok(found.reflected.iter().flat_map(|b| b.to_array()).collect())
+    Ok(found.reflected.iter().flat_map(glam::DVec3::to_array).collect())
 }
 
 #[test]
