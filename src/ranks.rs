@@ -68,9 +68,16 @@ pub(crate) fn ask<Q: Serialize, R: Serialize + DeserializeOwned>(
             let remedy = "see to that process, and go on from the last checkpoint";
             Error::new(ErrorKind::Device, format!("work of process {rank}"), found, remedy)
         })?;
-        of_ranks.push(results.into_iter());
+        of_ranks.push(results);
     }
-    Ok((0..items).filter_map(|k| of_ranks[k % share.size].next()).collect())
+    Ok(in_order(of_ranks, items))
+}
+
+/// Results of all ranks in the order of their `items`, which were dealt out one by one.
+pub(crate) fn in_order<R>(of_ranks: Vec<Vec<R>>, items: usize) -> Vec<R> {
+    let size = of_ranks.len();
+    let mut of_ranks: Vec<_> = of_ranks.into_iter().map(Vec::into_iter).collect();
+    (0..items).filter_map(|k| of_ranks[k % size].next()).collect()
 }
 
 /// Does this process's share of all that process 0 [`ask`]s for, until it [`dismiss`]es.
@@ -103,20 +110,22 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    fn of(ranks: &dyn Ranks) -> Share {
+    pub fn of(ranks: &dyn Ranks) -> Share {
         Share { rank: ranks.rank(), size: ranks.size() }
     }
 
     /// Those of `items`.
-    pub fn from<T: Clone>(self, items: &[T]) -> Vec<T> {
-        items.iter().skip(self.rank).step_by(self.size).cloned().collect()
+    pub fn from<T>(self, items: &[T]) -> impl Iterator<Item = &T> {
+        items.iter().skip(self.rank).step_by(self.size)
     }
 }
 
-fn encoded(message: &impl Serialize) -> Vec<u8> {
+/// `message` for other processes.
+pub(crate) fn encoded(message: &impl Serialize) -> Vec<u8> {
     postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
 }
 
-fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> T {
+/// What another process has [`encoded`].
+pub(crate) fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> T {
     postcard::from_bytes(bytes).expect("all processes run the same program")
 }

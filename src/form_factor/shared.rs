@@ -79,5 +79,6 @@ fn own_rows(
     request: &Request,
     share: Share,
 ) -> Result<Vec<Row>, Error> {
-    checked_rows(source, mesh, &share.from(&request.patches), request.weight)
+    let own: Vec<NodeId> = share.from(&request.patches).copied().collect();
+    checked_rows(source, mesh, &own, request.weight)
 }

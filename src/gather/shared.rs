@@ -78,5 +78,6 @@ fn own_samples(
     points: &[GatherPoint],
     share: Share,
 ) -> Result<Vec<IrradianceSample>, Error> {
-    gatherer.gather(&light.radiosity_field(), &share.from(points))
+    let own: Vec<GatherPoint> = share.from(points).copied().collect();
+    gatherer.gather(&light.radiosity_field(), &own)
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::ranks::Ranks;
+use crate::ranks::{Ranks, Share, decoded, encoded, in_order};
 
 /// What `work` makes of all `items`, in their order.
 ///
@@ -14,19 +14,13 @@ pub(super) fn share_out<T: Sync, R: Send + Serialize + DeserializeOwned>(
     ranks: &mut dyn Ranks,
     work: impl Fn(&T) -> R + Sync,
 ) -> Vec<R> {
-    let size = ranks.size();
-    if size == 1 {
+    if ranks.size() == 1 {
         return items.par_iter().map(&work).collect();
     }
-    let own: Vec<&T> = items.iter().skip(ranks.rank()).step_by(size).collect();
+    let own: Vec<&T> = Share::of(ranks).from(items).collect();
     let results: Vec<R> = own.into_par_iter().map(&work).collect();
-    let bytes = postcard::to_extend(&results, vec![]).expect("a vector takes all bytes");
+    let bytes = encoded(&results);
     drop(results);
-    let mut of_ranks = Vec::with_capacity(size);
-    for bytes in ranks.all_gather(&bytes) {
-        let results: Vec<R> =
-            postcard::from_bytes(&bytes).expect("all processes run the same program");
-        of_ranks.push(results.into_iter());
-    }
-    (0..items.len()).filter_map(|k| of_ranks[k % size].next()).collect()
+    let of_ranks = ranks.all_gather(&bytes);
+    in_order(of_ranks.into_iter().map(|bytes| decoded(&bytes)).collect(), items.len())
 }
