@@ -22,15 +22,16 @@ pub use up_axis::up_axis;
 
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::GatheredMesh;
+use crate::mesh::Mesh;
 use crate::scene::Rgb;
-use crate::vertex::VertexMesh;
-use crate::visibility::cut_outs::CutOuts;
+use crate::vertex::{FacePlace, VertexMesh};
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// A pinhole camera.
@@ -91,7 +92,9 @@ impl Camera {
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        let rays = PrimaryRays::new(self, surface, width, height, samples)?;
+        let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
+        let met = Arc::new(RayScene::new(surface.faces.iter().map(corners)));
+        let rays = PrimaryRays::new(self, (surface, None, met), width, height, samples)?;
         let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
         let (pixels, sky) = rays.pixels(0..width * height, &radiosity).unzip();
         Ok(RadianceImage { width, height, pixels, sky })
@@ -153,7 +156,10 @@ enum Seen {
 /// The primary rays through the pixels of an image, and the surface that they meet.
 struct PrimaryRays<'a> {
     surface: &'a VertexMesh,
-    scene: RayScene,
+    /// The mesh whose elements its faces are, if that is known: hits are on triangles of its scene
+    /// then, and else on faces.
+    mesh: Option<&'a Mesh>,
+    met: Arc<RayScene>,
     eye: DVec3,
     /// Direction to the upper left corner of the image, at distance 1 along the view's axis.
     corner: DVec3,
@@ -173,15 +179,13 @@ struct PrimaryRays<'a> {
 impl PrimaryRays<'_> {
     fn new<'a>(
         camera: &Camera,
-        surface: &'a VertexMesh,
+        (surface, mesh, met): (&'a VertexMesh, Option<&'a Mesh>, Arc<RayScene>),
         width: u32,
         height: u32,
         samples: u32,
     ) -> Result<PrimaryRays<'a>, Error> {
         camera.check(width, height, samples)?;
         let [right, up, forward] = camera.frame();
-        let corner = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let scene = RayScene::new(surface.faces.iter().map(corner));
         let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
         let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
         let (right, down) = (right * step, -up * step);
@@ -190,7 +194,8 @@ impl PrimaryRays<'_> {
         let weight = 1.0 / f64::from(samples * samples);
         Ok(PrimaryRays {
             surface,
-            scene,
+            mesh,
+            met,
             eye: camera.eye,
             corner,
             forward,
@@ -211,18 +216,9 @@ impl PrimaryRays<'_> {
         height: u32,
         samples: u32,
     ) -> Result<PrimaryRays<'a>, Error> {
-        let rays = PrimaryRays::new(camera, &light.surface, width, height, samples)?;
         let GatheredMesh { mesh, surface, .. } = light;
-        let triangle = |face: usize| mesh.triangle(mesh.element(surface.elements[face] as usize));
-        let covered = |face| mesh.scene().is_back_covered(triangle(face));
-        let piece = |(face, corners): (usize, &[u32; 3])| {
-            let t = triangle(face);
-            (t, corners.map(|v| mesh.scene().barycentric(t, surface.positions[v as usize])))
-        };
-        let pieces = surface.faces.iter().enumerate().map(piece);
-        let scene = rays.scene.with_covered_backs(covered);
-        let scene = scene.with_cut_outs(CutOuts::new(mesh.scene(), pieces));
-        Ok(PrimaryRays { scene, ..rays })
+        let met = RayScene::with_clear(mesh.scene());
+        PrimaryRays::new(camera, (surface, Some(mesh), met), width, height, samples)
     }
 
     /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.
@@ -277,20 +273,24 @@ impl PrimaryRays<'_> {
     /// What the ray along `direction` sees first; nothing if that is a back, and no front lies in
     /// one place with it.
     fn hit(&self, direction: DVec3) -> Option<Seen> {
-        let Some(first) = self.scene.closest_hit(self.eye, direction, 0.0, None) else {
+        let Some(first) = self.met.closest_hit(self.eye, direction, 0.0, None) else {
             return Some(Seen::Sky(direction.normalize()));
         };
         if first.front {
             return Some(Seen::Front(first));
         }
         let is_front = |hit: &Hit| hit.front;
-        let front = self.scene.closest_hit_of(self.eye, direction, 0.0, None, is_front)?;
+        let front = self.met.closest_hit_of(self.eye, direction, 0.0, None, is_front)?;
         (front.distance <= first.distance * (1.0 + SAME_PLACE)).then_some(Seen::Front(front))
     }
 
     /// Values at the surface's vertices, interpolated linearly to a hit.
     fn interpolate(&self, hit: &Hit, values: &[DVec3]) -> DVec3 {
-        let [a, b, c] = self.surface.faces[hit.triangle].map(|v| values[v as usize]);
-        a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
+        let weights = [hit.u, hit.v];
+        let place = match self.mesh {
+            Some(mesh) => self.surface.face_at(mesh, hit.triangle, weights),
+            None => Some(FacePlace { face: hit.triangle, weights }),
+        };
+        place.map_or(DVec3::ZERO, |place| self.surface.value_at(&place, values))
     }
 }

@@ -1,6 +1,7 @@
 //! Geometry that knows nothing of light.
 
 pub(crate) mod aabb;
+pub(crate) mod barycentric;
 pub(crate) mod bvh;
 pub(crate) mod incidence;
 pub(crate) mod plane;

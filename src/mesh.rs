@@ -28,7 +28,6 @@ mod textured;
 mod topology;
 mod transmission;
 
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -80,8 +79,8 @@ pub struct Mesh {
     /// Deepest level in each triangle.
     depths: Vec<u32>,
     /// Unit normal and area of each triangle.
-    normals: Vec<DVec3>,
-    areas: Vec<f64>,
+    normals: Arc<[DVec3]>,
+    areas: Arc<[f64]>,
     /// Made when they are asked for.
     clusters: Arc<OnceLock<Clusters>>,
     /// See [`Mesh::reflectance`]; empty without textures. Made when they are asked for.
@@ -166,7 +165,9 @@ impl Mesh {
             scene,
         };
         for root in 0..count {
-            mesh.build_subtree(root, &is_inner);
+            mesh.build_subtree(root, (), &|node, ()| {
+                is_inner(node.triangle as usize, node.cell).then_some([(); 4])
+            });
         }
         mesh
     }
@@ -186,24 +187,52 @@ impl Mesh {
                 format!("at most {} elements and {} splits", Mesh::MAX_ELEMENTS, Mesh::MAX_DEPTH);
             return Err(Error::new(ErrorKind::Setting, "mesh to be split", found, remedy));
         }
-        let inner = |n: &&Node| n.children != LEAF;
-        let split = elements.iter().map(|&e| self.node(self.element(e)));
-        let inner = self.nodes.iter().filter(inner).chain(split);
-        let inner: HashSet<(u32, Cell)> = inner.map(|n| (n.triangle, n.cell)).collect();
-        Ok(Mesh::refined_where(self.scene.clone(), |t, cell| inner.contains(&(t as u32, cell))))
+        let mut is_split = vec![false; self.element_count()];
+        elements.iter().for_each(|&e| is_split[e] = true);
+        let count = self.depths.len();
+        let mut nodes = Vec::with_capacity(self.nodes.len() + 4 * elements.len());
+        nodes.extend((0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)));
+        let mut split = Mesh {
+            scene: self.scene.clone(),
+            nodes,
+            elements: Vec::with_capacity(wanted),
+            depths: vec![0; count],
+            normals: self.normals.clone(),
+            areas: self.areas.clone(),
+            clusters: self.clusters.clone(),
+            textured_reflectances: Arc::default(),
+            solid_shares: Arc::default(),
+        };
+        for root in 0..count {
+            // What a cell was before says whether it is split; of one that is new, nothing.
+            split.build_subtree(root, Some(root), &|_, old: Option<usize>| {
+                let Node { children, first_element, .. } = self.nodes[old?];
+                if children != LEAF {
+                    return Some([0, 1, 2, 3].map(|k| Some(children as usize + k)));
+                }
+                is_split[first_element as usize].then_some([None; 4])
+            });
+        }
+        Ok(split)
     }
 
-    /// Builds the subtree of node `n` as far as `is_inner` says, and numbers its elements.
-    fn build_subtree(&mut self, n: usize, is_inner: &impl Fn(usize, Cell) -> bool) {
+    /// Builds the subtree of node `n`, and numbers its elements. `children_of` says what is known of
+    /// the children of a node, given the node and what is known of it; none if it has none.
+    fn build_subtree<T: Copy>(
+        &mut self,
+        n: usize,
+        known: T,
+        children_of: &impl Fn(&Node, T) -> Option<[T; 4]>,
+    ) {
         let Node { triangle, cell, .. } = self.nodes[n];
         let first_element = self.elements.len() as u32;
         self.nodes[n].first_element = first_element;
-        if is_inner(triangle as usize, cell) {
+        if let Some(known) = children_of(&self.nodes[n], known) {
             let children = self.nodes.len();
             self.nodes[n].children = children as u32;
             self.nodes.extend(cell.children().map(|child| Node::leaf(triangle, child)));
-            for child in children..children + 4 {
-                self.build_subtree(child, is_inner);
+            for (child, known) in (children..).zip(known) {
+                self.build_subtree(child, known, children_of);
             }
         } else {
             let depth = &mut self.depths[triangle as usize];

@@ -38,6 +38,7 @@
 //! has the mean |B_told − B_true|², however noisy they are.
 
 mod emitters;
+mod faces;
 mod hidden;
 mod luminaires;
 mod path_tracer;
@@ -57,6 +58,7 @@ use crate::vertex::VertexMesh;
 pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
 pub use settings::Settings;
+pub(crate) use solution::Solution;
 pub use statistics::Estimate;
 pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
@@ -100,6 +102,7 @@ pub fn verify(
     settings.check()?;
     let scene = scene.resolve_sides();
     let mut verifier = Verifier::new(&scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))?;
+    let solution = Solution { surface: solution, mesh: None };
     verifier.measure(solution, Limits::default(), &mut progress)
 }
 
@@ -140,13 +143,13 @@ impl<'a> Verifier<'a> {
     /// See [`verify`].
     pub fn measure(
         &mut self,
-        solution: &VertexMesh,
+        solution: Solution,
         limits: Limits,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Verification, Error> {
         let (sampler, settings) = (&mut self.sampler, &self.settings);
         let start = Instant::now();
-        self.points = self.points.max(solution.positions.len() / VERTICES_PER_POINT);
+        self.points = self.points.max(solution.surface.positions.len() / VERTICES_PER_POINT);
         let solution = sampler.lookup(solution)?;
         sampler.forget();
         let mut verification = sampler.verification();
@@ -300,7 +303,8 @@ mod tests {
             let mut verifier = Verifier::new(&scene, settings, (64, 2048)).unwrap();
             let paths = Some(paths);
             let limits = Limits { error: Some(limit), each_group, paths, paths_in_doubt: paths };
-            let found = verifier.measure(&told, limits, &mut |_| ControlFlow::Continue(()));
+            let solution = Solution { surface: &told, mesh: None };
+            let found = verifier.measure(solution, limits, &mut |_| ControlFlow::Continue(()));
             found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()
         };
         let most = 1 << 22;

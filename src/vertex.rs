@@ -13,6 +13,7 @@
 
 mod boundary_fit;
 mod corner_singularity;
+mod face_at;
 pub(crate) mod hanging_nodes;
 mod irradiance;
 pub(crate) mod keys;
@@ -22,6 +23,7 @@ use glam::DVec3;
 
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::{Rgb, Sky};
+pub(crate) use face_at::FacePlace;
 use hanging_nodes::HangingNodes;
 pub(crate) use irradiance::irradiance;
 use keys::{ElementLoops, Vertices};

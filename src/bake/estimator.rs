@@ -303,8 +303,8 @@ impl ErrorEstimator<'_> {
         let inset = |place: [f64; 2]| place.map(|b| b + (1.0 / 3.0 - b) * INSET);
         let rotations = CellRotation::new(&mesh.scene().bounds());
         let sample = |stratum: usize, weight: f64, part: &SampledPart, barycentric: [f64; 2]| {
-            let element = surface.elements[part.face] as usize;
-            let face = &surface.faces[part.face];
+            let element = surface.elements[part.face as usize] as usize;
+            let face = &surface.faces[part.face as usize];
             let node = mesh.element(element);
             let at =
                 |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
@@ -338,7 +338,7 @@ impl ErrorEstimator<'_> {
                 rotation: rotations.at(point.position, point.near),
             })
         };
-        let mut parts = vec![];
+        let mut parts = Vec::with_capacity(surface.faces.len());
         for (face, vertices) in surface.faces.iter().enumerate() {
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
@@ -354,31 +354,28 @@ impl ErrorEstimator<'_> {
             let error = self.element_residual.get(element).map_or(0.0, expected);
             let solid = mesh.solid_share(node);
             let mut take = |part: Part| {
-                parts.push(SampledPart {
-                    face,
-                    group: mesh.group(node),
-                    part,
-                    error: part.area * error,
-                    flux: part.area * reflected,
-                });
+                let (error, flux) = (part.area * error, part.area * reflected);
+                let (face, group) = (face as u32, mesh.group(node));
+                parts.push(SampledPart { face, group, part, error, flux });
             };
             let area = (solid * area(vertices), solid < 1.0);
             self.octaves.for_each_part(corners(vertices), area, &mut take);
         }
         let mut samples = vec![];
         let mut strata = vec![];
-        for (k, stratum) in strata_of(parts, counts).into_iter().enumerate() {
-            let sum = |of: fn(&SampledPart) -> f64| stratum.parts.iter().map(of).sum::<f64>();
+        for (k, stratum) in strata_of(&mut parts, counts).into_iter().enumerate() {
+            let parts = &parts[stratum.parts];
+            let sum = |of: fn(&SampledPart) -> f64| parts.iter().map(of).sum::<f64>();
             let (error, angular) = (sum(|part| part.error), sum(|part| part.part.angular));
             let density = |part: &SampledPart| {
                 let by_area = part.part.area / stratum.area;
                 let even = (by_area + part.part.angular / angular) / 2.0;
                 if error > 0.0 { (even + part.error / error) / 2.0 } else { even }
             };
-            let sampler = AreaSampler::new(stratum.parts.iter().map(density));
+            let sampler = AreaSampler::new(parts.iter().map(density));
             let places = sampler.spread(stratum.samples, 0.5);
             samples.extend(places.filter_map(|SurfacePoint { triangle, barycentric }| {
-                let part = &stratum.parts[triangle];
+                let part = &parts[triangle];
                 let area = part.part.area / density(part);
                 sample(k, area / stratum.area / stratum.samples as f64, part, barycentric)
             }));

@@ -302,7 +302,7 @@ impl<'a> GatherPhase<'a> {
             false => model::judge_paths(light.gather_count, self.gather.rays),
         };
         let limits = (self.target.map(|target| target.error), paths);
-        let found = self.judge.judge(found, &light.surface, limits, &mut |samples, of| {
+        let found = self.judge.judge(found, &light, limits, &mut |samples, of| {
             cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
             let stop = cancelled && !was_stopped;
             if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -23,12 +23,12 @@ use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::estimator::{EstimatedError, negligible_reflection};
 use crate::bake::model;
 use crate::error::Error;
+use crate::gather::GatheredMesh;
 use crate::scene::Scene;
 use crate::verify::{
-    Estimate as Measured, GroupError as MeasuredGroup, Limits, Progress, Settings, Verification,
-    Verifier,
+    Estimate as Measured, GroupError as MeasuredGroup, Limits, Progress, Settings, Solution,
+    Verification, Verifier,
 };
-use crate::vertex::VertexMesh;
 
 /// Standard errors that a measurement may be off by: of the whole, and of one of many groups, of
 /// which some are off by more than two by chance.
@@ -49,7 +49,7 @@ impl<'a> Judge<'a> {
         Judge { scene, each_group, verifier: None }
     }
 
-    /// `found`, the estimate of `surface`, held against paths: so many that it is known whether
+    /// `found`, the estimate of `light`, held against paths: so many that it is known whether
     /// `error` is met, but no more than the first of `paths` in all, or the second where that is in
     /// doubt. `progress` is told how many points are done of how many; if it stops the measurement,
     /// the estimate stays as it is. So it does where nothing can be measured: in a scene without
@@ -57,7 +57,7 @@ impl<'a> Judge<'a> {
     pub fn judge(
         &mut self,
         found: EstimatedError,
-        surface: &VertexMesh,
+        light: &GatheredMesh,
         (error, [paths, paths_in_doubt]): (Option<f64>, [u64; 2]),
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> EstimatedError {
@@ -67,9 +67,10 @@ impl<'a> Judge<'a> {
             paths: Some(paths),
             paths_in_doubt: Some(paths_in_doubt),
         };
+        let solution = Solution { surface: &light.surface, mesh: Some(&light.mesh) };
         let mut stopped = false;
         let measured = self.verifier().and_then(|verifier| {
-            verifier.measure(surface, limits, &mut |p: &Progress| {
+            verifier.measure(solution, limits, &mut |p: &Progress| {
                 let flow = progress(p.done, p.of);
                 stopped |= flow.is_break();
                 flow

@@ -219,7 +219,7 @@ pub(super) fn estimate_elements(
         // What is told of a bake that was stopped is to hold, too.
         Some(target) if cancelled => Judge::new(shot.mesh.scene(), target.each_group).judge(
             found,
-            &light.surface,
+            &light,
             (Some(target.error), [model::JUDGE_PATHS; 2]),
             &mut |_, _| ControlFlow::Continue(()),
         ),

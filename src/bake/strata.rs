@@ -3,6 +3,8 @@
 //! Every group has some points however small it is, and the rest follow its share of the area or of
 //! the light, whichever is larger. Where there are very many groups the small ones are one stratum.
 
+use std::ops::Range;
+
 use rustc_hash::FxHashMap;
 
 use crate::bake::model;
@@ -17,9 +19,10 @@ pub(super) struct SampleCounts {
     pub per_group: usize,
 }
 
-/// A face that reflects, or a part of it.
+/// A face that reflects, or a part of it. There is one for every face: small, so that they take
+/// less memory than the mesh.
 pub(super) struct SampledPart {
-    pub face: usize,
+    pub face: u32,
     pub group: u32,
     pub part: Part,
     /// The area times the relative error that is expected there. Its square would be what the part
@@ -34,42 +37,49 @@ pub(super) struct SampledPart {
 /// The parts of a stratum, and the points that it gets.
 pub(super) struct StratumParts {
     pub group: Option<u32>,
-    pub parts: Vec<SampledPart>,
+    /// Where its parts are in the list of all.
+    pub parts: Range<usize>,
     pub area: f64,
     pub flux: f64,
     pub samples: usize,
 }
 
-/// The strata of `parts`: the largest groups, and one for all others if there are too many.
-pub(super) fn strata_of(parts: Vec<SampledPart>, counts: SampleCounts) -> Vec<StratumParts> {
+/// The strata of `parts`: the largest groups, and one for all others if there are too many. Brings
+/// the parts of each together, otherwise in the order that they had.
+pub(super) fn strata_of(parts: &mut [SampledPart], counts: SampleCounts) -> Vec<StratumParts> {
     let mut by_group: Vec<StratumParts> = vec![];
     let mut index = FxHashMap::default();
-    for part in parts {
+    for part in &*parts {
         let k = *index.entry(part.group).or_insert_with(|| {
             let group = Some(part.group);
-            let (parts, area, flux) = (vec![], 0.0, 0.0);
-            by_group.push(StratumParts { group, parts, area, flux, samples: 0 });
+            by_group.push(StratumParts { group, parts: 0..0, area: 0.0, flux: 0.0, samples: 0 });
             by_group.len() - 1
         });
         by_group[k].area += part.part.area;
         by_group[k].flux += part.flux;
-        by_group[k].parts.push(part);
+        by_group[k].parts.end += 1;
     }
     let total: f64 = by_group.iter().map(|s| s.area).sum();
     let total_flux: f64 = by_group.iter().map(|s| s.flux).sum::<f64>().max(f64::MIN_POSITIVE);
     by_group.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.group.cmp(&b.group)));
+    let rank_of = |(rank, stratum): (usize, &StratumParts)| Some((stratum.group?, rank));
+    let rank: FxHashMap<u32, usize> = by_group.iter().enumerate().filter_map(rank_of).collect();
+    parts.sort_by_key(|part| rank[&part.group]);
     let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
     if by_group.len() > single.max(1) {
-        let small = by_group.split_off(single.min(by_group.len()));
+        let small = by_group.split_off(single);
         let area = small.iter().map(|s| s.area).sum();
         let flux = small.iter().map(|s| s.flux).sum();
-        let parts = small.into_iter().flat_map(|s| s.parts).collect();
-        by_group.push(StratumParts { group: None, parts, area, flux, samples: 0 });
+        let count = small.iter().map(|s| s.parts.len()).sum();
+        by_group.push(StratumParts { group: None, parts: 0..count, area, flux, samples: 0 });
     }
+    let mut first = 0;
     for stratum in &mut by_group {
         let share = (stratum.area / total).max(stratum.flux / total_flux);
         let even = (share * counts.total as f64).round() as usize;
         stratum.samples = even.max(counts.per_group).max(1);
+        stratum.parts = first..first + stratum.parts.len();
+        first = stratum.parts.end;
     }
     by_group
 }
@@ -79,14 +89,14 @@ mod tests {
     use super::*;
 
     fn face(group: u32, area: f64, flux: f64) -> SampledPart {
-        let part = Part { corners: Default::default(), area, angular: area };
-        SampledPart { face: group as usize, group, part, error: 0.0, flux }
+        let part = Part { corners: None, area, angular: area };
+        SampledPart { face: group, group, part, error: 0.0, flux }
     }
 
     #[test]
     fn small_and_bright_groups_have_points() {
-        let faces = vec![face(0, 1e6, 1.0), face(1, 1.0, 99.0), face(2, 1.0, 0.0)];
-        let strata = strata_of(faces, SampleCounts { total: 200, per_group: 8 });
+        let mut faces = vec![face(0, 1e6, 1.0), face(1, 1.0, 99.0), face(2, 1.0, 0.0)];
+        let strata = strata_of(&mut faces, SampleCounts { total: 200, per_group: 8 });
         let found: Vec<_> = strata.iter().map(|s| (s.group, s.samples)).collect();
         // By area, by light, and the least.
         assert_eq!(found, [(Some(0), 200), (Some(1), 198), (Some(2), 8)]);
@@ -95,14 +105,17 @@ mod tests {
     #[test]
     fn groups_beyond_the_largest_are_one_stratum() {
         let count = model::MAX_GROUPS as u32 + 10;
-        let faces = (0..count).map(|g| face(g, f64::from(g + 1), 1.0)).collect();
-        let strata = strata_of(faces, SampleCounts { total: 100, per_group: 1 });
+        let mut faces: Vec<SampledPart> =
+            (0..count).map(|g| face(g, f64::from(g + 1), 1.0)).collect();
+        let strata = strata_of(&mut faces, SampleCounts { total: 100, per_group: 1 });
         assert_eq!(strata.len(), model::MAX_GROUPS + 1);
         assert_eq!(strata[0].group, Some(count - 1), "the largest first");
         let rest = &strata[model::MAX_GROUPS];
         assert_eq!((rest.group, rest.parts.len(), rest.area), (None, 10, 55.0));
+        let groups = faces[rest.parts.clone()].iter().map(|part| part.group);
+        assert!(groups.eq((0..10).rev()), "the others, in one place");
         let all = strata_of(
-            vec![face(3, 1.0, 0.0), face(4, 1.0, 0.0)],
+            &mut [face(3, 1.0, 0.0), face(4, 1.0, 0.0)],
             SampleCounts { total: 64, per_group: 0 },
         );
         assert_eq!((all.len(), all[0].group, all[0].samples), (1, None, 64), "for a pilot");

@@ -263,7 +263,7 @@ impl GatheredView<'_> {
         let interpolated =
             |seen: &SeenHit| seen.weight * self.lit.radiosity(&seen.hit, &seen.sight);
         let interpolated = hits.iter().map(interpolated).sum();
-        let t = self.lit.triangle(&hits[0].hit);
+        let t = hits[0].hit.triangle;
         if self.lit.scene().textures(t).is_none() {
             let material = self.lit.scene().material(t);
             return (material.albedo(), material.exitance, interpolated);
@@ -307,6 +307,6 @@ impl GatheredView<'_> {
 
     /// The smooth surface that was hit.
     fn smooth_surface(&self, hit: &Hit) -> u32 {
-        self.surfaces[self.lit.triangle(hit)]
+        self.surfaces[hit.triangle]
     }
 }

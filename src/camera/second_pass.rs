@@ -156,7 +156,7 @@ impl SecondPass {
                 all.push(Sighting { seen: Seen::Sky(branch.direction), weight, sight, history });
                 continue;
             };
-            let material = lit.scene().material(lit.triangle(&hit));
+            let material = lit.scene().material(hit.triangle);
             let Some(specular) = material.specular else {
                 // A back is black, and seen.
                 seen_weight += weight;
@@ -187,8 +187,8 @@ impl SecondPass {
     /// fronts of others there are met; so is a front in one place with glass: it lies against it.
     fn next_hit(&self, lit: &LitSurface, branch: &Branch) -> Option<Hit> {
         let Branch { from, direction, history, .. } = *branch;
-        let specular = |hit: &Hit| lit.scene().material(lit.triangle(hit)).specular;
-        let rays = &lit.rays.scene;
+        let specular = |hit: &Hit| lit.scene().material(hit.triangle).specular;
+        let rays = &lit.rays.met;
         let hit = if history == 0 {
             rays.closest_hit(from, direction, 0.0, None)?
         } else {
@@ -207,7 +207,7 @@ impl SecondPass {
     }
 
     fn boundary(&self, lit: &LitSurface, branch: &Branch, hit: &Hit) -> Boundary {
-        let triangle = lit.triangle(hit);
+        let triangle = hit.triangle;
         let side = if hit.front { 1.0 } else { -1.0 };
         let plane = side * lit.scene().normal(triangle);
         let smooth = lit.rays.interpolate(hit, &lit.light.surface.normals);

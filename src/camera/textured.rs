@@ -34,7 +34,7 @@ impl LitSurface<'_> {
 
     /// Albedo per channel and exitance, W/m², at a hit.
     pub fn albedo_and_exitance(&self, hit: &Hit, sight: &Sight) -> [Rgb; 2] {
-        let (scene, t) = (self.scene(), self.triangle(hit));
+        let (scene, t) = (self.scene(), hit.triangle);
         if scene.textures(t).is_none() {
             let material = scene.material(t);
             return [material.albedo(), material.exitance];
@@ -47,7 +47,7 @@ impl LitSurface<'_> {
     /// Radiosity at a hit, W/m²: by the light at the vertices and the texture at the hit.
     pub fn radiosity(&self, hit: &Hit, sight: &Sight) -> Rgb {
         let surface = &self.light.surface;
-        if self.light.mesh.scene().textures(self.triangle(hit)).is_none() {
+        if self.light.mesh.scene().textures(hit.triangle).is_none() {
             return self.rays.interpolate(hit, &surface.radiosity);
         }
         let [albedo, exitance] = self.albedo_and_exitance(hit, sight);
@@ -56,8 +56,7 @@ impl LitSurface<'_> {
 
     /// Radiosity at a hit as if no material were textured, W/m²: it shows the light.
     pub fn untextured_radiosity(&self, hit: &Hit) -> Rgb {
-        let (scene, t, surface) =
-            (self.light.mesh.scene(), self.triangle(hit), &self.light.surface);
+        let (scene, t, surface) = (self.light.mesh.scene(), hit.triangle, &self.light.surface);
         if scene.textures(t).is_none() {
             return self.rays.interpolate(hit, &surface.radiosity);
         }
@@ -66,13 +65,7 @@ impl LitSurface<'_> {
 
     /// The element of the mesh that was hit.
     pub fn element(&self, hit: &Hit) -> usize {
-        self.light.surface.elements[hit.triangle] as usize
-    }
-
-    /// The triangle of the scene that was hit.
-    pub fn triangle(&self, hit: &Hit) -> usize {
-        let mesh = &self.light.mesh;
-        mesh.triangle(mesh.element(self.element(hit)))
+        self.light.mesh.element_at(hit.triangle, hit.u, hit.v).0
     }
 
     /// The scene that is seen.

@@ -160,7 +160,7 @@ impl<'a> AdaptiveGather<'a> {
 
     /// What was reached so far.
     pub fn to_gathered_mesh(&self) -> GatheredMesh {
-        self.gathered_mesh_of(&self.samples)
+        self.gathered_mesh_of(Cow::Borrowed(&self.samples))
     }
 
     /// What was reached, with elements split onto the quadratic interpolant where it leaves them,
@@ -171,15 +171,20 @@ impl<'a> AdaptiveGather<'a> {
     ) -> Result<(GatheredMesh, Vec<f64>), Error> {
         let source = self.source.radiosity_field();
         let refined = interpolated_refinement(&self.samples, &source, &self.scale, settings)?;
-        Ok((self.gathered_mesh_of(&refined.samples), refined.residual_error))
+        Ok((self.gathered_mesh_of(Cow::Owned(refined.samples)), refined.residual_error))
     }
 
-    fn gathered_mesh_of(&self, samples: &SampledMesh) -> GatheredMesh {
+    fn gathered_mesh_of(&self, samples: Cow<SampledMesh>) -> GatheredMesh {
+        let (surface, reflected) = (samples.vertex_mesh(), mean_preserving(&samples));
+        let (mesh, corners) = match samples {
+            Cow::Borrowed(samples) => (samples.mesh.clone(), samples.corners().to_vec()),
+            Cow::Owned(samples) => (samples.mesh, samples.vertices.corners),
+        };
         GatheredMesh {
-            mesh: samples.mesh.clone(),
-            surface: samples.vertex_mesh(),
-            corners: samples.corners().to_vec(),
-            reflected: mean_preserving(samples),
+            mesh,
+            surface,
+            corners,
+            reflected,
             gather_count: self.gather_count,
             relative_change: self.relative_change,
             stop: StopReason::Converged,

@@ -65,8 +65,8 @@ pub(super) fn interpolated_refinement(
     let candidates = candidates(samples, scale, settings);
     let midsides = midside_values(samples, &candidates);
     let split: Vec<usize> = candidates.iter().map(|c| c.element).collect();
-    let mut refined = samples.clone();
-    for v in refined.split(&split)? {
+    let (mut refined, new) = samples.with_split(&split)?;
+    for v in new {
         let v = v as usize;
         if let Some((sum, count)) = midsides.get(&refined.vertices.keys[v]) {
             refined.reflected[v] = *sum / *count;

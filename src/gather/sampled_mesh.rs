@@ -4,6 +4,8 @@
 //! not depend on the mesh (see `vertex::keys`), so values carry over from a mesh to the finer one.
 //! A new vertex starts with the mean of the two it lies between, until it gathers.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::RadiosityField;
@@ -18,7 +20,7 @@ use crate::vertex::keys::Vertices;
 #[derive(Clone)]
 pub(crate) struct SampledMesh {
     pub mesh: Mesh,
-    pub topology: SurfaceTopology,
+    pub topology: Arc<SurfaceTopology>,
     pub vertices: Vertices,
     /// Reflected radiosity B − E at the vertices, W/m² per channel.
     pub reflected: Vec<Rgb>,
@@ -38,7 +40,7 @@ const MIN_NARROWNESS: f64 = 4.0;
 impl SampledMesh {
     /// `mesh` with the values that `field`, of the same scene, has at its vertices.
     pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
-        let topology = SurfaceTopology::new(mesh.scene());
+        let topology = Arc::new(SurfaceTopology::new(mesh.scene()));
         let vertices = Vertices::new(&mesh, &topology);
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
@@ -80,6 +82,13 @@ impl SampledMesh {
     /// Splits `elements` (ascending) into four each, which are in the place of the one. Values of
     /// old vertices are kept; gives those that were not there before, ascending.
     pub fn split(&mut self, elements: &[usize]) -> Result<Vec<u32>, Error> {
+        let (finer, new) = self.with_split(elements)?;
+        *self = finer;
+        Ok(new)
+    }
+
+    /// The same as a mesh of its own.
+    pub fn with_split(&self, elements: &[usize]) -> Result<(SampledMesh, Vec<u32>), Error> {
         let finer = self.mesh.split(elements)?;
         let vertices = Vertices::new(&finer, &self.topology);
         let count = vertices.positions.len();
@@ -111,13 +120,12 @@ impl SampledMesh {
                 }
             }
         }
-        self.mesh = finer;
-        self.vertices = vertices;
-        self.reflected = reflected;
-        self.noise = noise;
-        self.buried = buried;
-        self.inverse_distance = inverse_distance;
-        Ok((0..count as u32).filter(|&v| is_new[v as usize]).collect())
+        let new = (0..count as u32).filter(|&v| is_new[v as usize]).collect();
+        let topology = self.topology.clone();
+        let mesh = finer;
+        let split =
+            SampledMesh { mesh, topology, vertices, reflected, noise, buried, inverse_distance };
+        Ok((split, new))
     }
 
     /// Root mean square over the elements of how far the values at their corners are from

@@ -35,10 +35,11 @@ pub(crate) struct Octaves {
 }
 
 /// A part of a triangle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Part {
-    /// Weights of the triangle's second and third corner at the part's own.
-    pub corners: [[f64; 2]; 3],
+    /// Weights of the triangle's second and third corner at the part's own; none where it is all of
+    /// the triangle.
+    pub corners: Option<Box<[[f64; 2]; 3]>>,
     /// Length unit squared.
     pub area: f64,
     /// The area over the square of the distance: by this each octave gets as many points as the
@@ -88,6 +89,7 @@ impl Octaves {
         let places = corners.map(|[u, v]| a * (1.0 - u - v) + b * u + c * v);
         let reach = self.reach(places);
         if !is_split || longest_edge(places) <= reach {
+            let corners = (corners != WHOLE).then(|| Box::new(corners));
             return take(Part { corners, area, angular: area / (reach * reach) });
         }
         let middle =
@@ -103,7 +105,8 @@ impl Octaves {
 impl Part {
     /// Weights of the triangle's second and third corner at a place given by those of the part's.
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [p, q, r] = self.corners;
+        let Some(corners) = &self.corners else { return [x, y] };
+        let [p, q, r] = **corners;
         [0, 1].map(|axis| p[axis] * (1.0 - x - y) + q[axis] * x + r[axis] * y)
     }
 }
@@ -144,7 +147,7 @@ mod tests {
         let parts = parts_of(&octaves, false);
         assert!((parts.iter().map(|part| part.area).sum::<f64>() / 2e6 - 1.0).abs() < 1e-12);
         let in_ring = |from: f64, to: f64| -> f64 {
-            let centre_of = |part: &Part| part.corners.map(DVec2::from).iter().sum::<DVec2>() / 3.0;
+            let centre_of = |part: &Part| DVec2::from(part.place([1.0 / 3.0; 2]));
             let distance = |part: &Part| {
                 let [u, v] = centre_of(part).to_array();
                 let at = GROUND[0] * (1.0 - u - v) + GROUND[1] * u + GROUND[2] * v;

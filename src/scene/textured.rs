@@ -18,6 +18,7 @@ use rustc_hash::FxHashMap;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
+use crate::geometry::barycentric::barycentric;
 
 /// A piece of a triangle: its index, and the weights of the second and third corner of the triangle
 /// at the three corners of the piece.
@@ -228,11 +229,7 @@ impl Scene {
 
     /// Weights of the second and third corner of triangle `t` at `position` in its plane.
     pub(crate) fn barycentric(&self, t: usize, position: DVec3) -> [f64; 2] {
-        let [a, b, c] = self.corners(t);
-        let normal = self.normal(t);
-        let [ab, ac, to] = [b - a, c - a, position - a];
-        let double_area = ab.cross(ac).dot(normal);
-        [to.cross(ac).dot(normal) / double_area, ab.cross(to).dot(normal) / double_area]
+        barycentric(self.corners(t), self.normal(t), position)
     }
 
     /// Texture coordinates of a point of triangle `t`; not finite where it has none.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::hidden::{self, Outlook};
 use super::path_tracer::{PathTracer, SurfacePoint};
 use super::settings::Settings;
-use super::solution::SolutionLookup;
+use super::solution::{Solution, SolutionLookup};
 use super::statistics::{Estimate, FLOOR, MeanSquare, PARTS, Sample, SquareError};
 use super::surfaces::ReflectingGroup;
 use super::verification::{GroupError, PointError, Stop, Verification};
@@ -15,7 +15,6 @@ use crate::error::{Error, ErrorKind, quoted};
 use crate::progress::BatchSizer;
 use crate::sampling::random::random_numbers;
 use crate::scene::{Rgb, Scene};
-use crate::vertex::VertexMesh;
 
 /// A solution is of another scene if more than this share of the points lie on none of its faces.
 const MISSING_SHARE: f64 = 0.01;
@@ -72,7 +71,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// What is asked of `solution`: it has to be one of the scene.
-    pub fn lookup<'s>(&self, solution: &'s VertexMesh) -> Result<SolutionLookup<'s>, Error> {
+    pub fn lookup<'s>(&self, solution: Solution<'s>) -> Result<SolutionLookup<'s>, Error> {
         let lookup = SolutionLookup::new(solution, self.scene)?;
         lookup.check_emission(self.scene)?;
         Ok(lookup)

@@ -4,11 +4,12 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::path_tracer::{SurfacePoint, nearest_surfaces};
+use super::faces::Faces;
+use super::path_tracer::SurfacePoint;
 use crate::error::{Error, ErrorKind, shortened};
+use crate::mesh::Mesh;
 use crate::scene::{Material, Rgb, Scene};
-use crate::vertex::VertexMesh;
-use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::vertex::{FacePlace, VertexMesh};
 
 /// Places of a material at which it is looked up what the solution emits, at least. Chosen by hand.
 const EMISSION_PLACES: usize = 64;
@@ -57,19 +58,26 @@ fn is_light_of(material: &Material, radiosity: Rgb, irradiance: Rgb) -> bool {
     (radiosity - reflected).abs_diff_eq(material.exitance, noise)
 }
 
+/// What is to be measured.
+#[derive(Clone, Copy)]
+pub(crate) struct Solution<'a> {
+    pub surface: &'a VertexMesh,
+    /// The mesh whose elements the faces are, if that is known; of the scene that it is measured on.
+    pub mesh: Option<&'a Mesh>,
+}
+
 /// A solution that can be asked at points.
 pub(super) struct SolutionLookup<'a> {
     solution: &'a VertexMesh,
-    rays: RayScene,
-    normals: Vec<DVec3>,
-    /// Of the scene, scene unit.
-    diagonal: f64,
+    faces: Faces<'a>,
 }
 
 impl<'a> SolutionLookup<'a> {
     /// Checks `solution`, of `scene`.
-    pub fn new(solution: &'a VertexMesh, scene: &Scene) -> Result<SolutionLookup<'a>, Error> {
-        let diagonal = scene.bounds().diagonal();
+    pub fn new(
+        Solution { surface: solution, mesh }: Solution<'a>,
+        scene: &Scene,
+    ) -> Result<SolutionLookup<'a>, Error> {
         let VertexMesh { positions, radiosity, irradiance, faces, .. } = solution;
         let wrong = |found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Scene, "solution", found, remedy))
@@ -101,15 +109,8 @@ impl<'a> SolutionLookup<'a> {
         if faces.is_empty() {
             return wrong("no faces".into(), "give the whole surface of the scene");
         }
-        let corners = |face: &[u32; 3]| face.map(|v| positions[v as usize]);
-        let normal = |face| {
-            let [a, b, c] = corners(face);
-            let scale = (b - a).abs().max((c - a).abs()).max_element().max(f64::MIN_POSITIVE);
-            ((b - a) / scale).cross((c - a) / scale).normalize_or_zero()
-        };
-        let rays = RayScene::new(faces.iter().map(corners));
-        let normals = faces.iter().map(normal).collect();
-        Ok(SolutionLookup { solution, rays, normals, diagonal })
+        let faces = mesh.map_or_else(|| Faces::any(solution, scene), Faces::OfMesh);
+        Ok(SolutionLookup { solution, faces })
     }
 
     /// Refuses a solution whose surfaces emit something else than those of `scene`: what a vertex
@@ -151,22 +152,21 @@ impl<'a> SolutionLookup<'a> {
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
-            let hit = self.face(scene, &SurfacePoint { triangle: t, position })?;
-            Some(self.light_at(&hit))
+            let place = self.face(scene, &SurfacePoint { triangle: t, position })?;
+            Some(self.light_at(&place))
         })
     }
 
-    /// Where the solution is hit at `point` of `scene`: the nearest face that faces alike. Of
+    /// The place on the solution at `point` of `scene`: the nearest face that faces alike. Of
     /// several in one place it is the first whose light is the material's.
-    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<Hit> {
-        let (position, normal) = (point.position, scene.normal(point.triangle));
-        let faces = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<FacePlace> {
+        let faces = self.faces.at(self.solution, scene, point);
         if faces.len() < 2 || !self.has_irradiance() {
             return faces.into_iter().next();
         }
         let material = scene.material(point.triangle);
-        let is_of_material = |hit: &&Hit| {
-            let (radiosity, irradiance) = self.light_at(hit);
+        let is_of_material = |place: &&FacePlace| {
+            let (radiosity, irradiance) = self.light_at(place);
             is_light_of(material, radiosity, irradiance)
         };
         faces.iter().find(is_of_material).or(faces.first()).copied()
@@ -177,26 +177,22 @@ impl<'a> SolutionLookup<'a> {
         self.solution.irradiance.len() == self.solution.positions.len()
     }
 
-    /// Radiosity and irradiance where the solution is hit, W/m².
-    fn light_at(&self, hit: &Hit) -> (Rgb, Rgb) {
+    /// Radiosity and irradiance at a place of the solution, W/m².
+    fn light_at(&self, place: &FacePlace) -> (Rgb, Rgb) {
         let VertexMesh { radiosity, irradiance, .. } = self.solution;
-        (self.interpolated(hit, radiosity), self.interpolated(hit, irradiance))
-    }
-
-    /// Of one value a vertex, the one where the solution is hit.
-    fn interpolated(&self, hit: &Hit, values: &[Rgb]) -> Rgb {
-        let [a, b, c] = self.solution.faces[hit.triangle].map(|v| values[v as usize]);
-        (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
+        (self.solution.value_at(place, radiosity), self.solution.value_at(place, irradiance))
     }
 
     /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m². None
     /// where the solution has no face.
     pub fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
-        let hit = self.face(scene, point)?;
+        let place = self.face(scene, point)?;
         let material = scene.material(point.triangle);
         Some(match scene.textures(point.triangle) {
-            Some(_) => material.albedo() * self.interpolated(&hit, &self.solution.irradiance),
-            None => self.interpolated(&hit, &self.solution.radiosity) - material.exitance,
+            Some(_) => {
+                material.albedo() * self.solution.value_at(&place, &self.solution.irradiance)
+            }
+            None => self.solution.value_at(&place, &self.solution.radiosity) - material.exitance,
         })
     }
 }

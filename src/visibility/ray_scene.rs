@@ -83,9 +83,22 @@ impl RayScene {
         scene.derived(RayScene::made_of)
     }
 
+    /// The same with the triangles that light goes through as if nothing were there: they are seen.
+    pub fn with_clear(scene: &Scene) -> Arc<RayScene> {
+        let has_clear = (0..scene.triangles().len()).any(|t| scene.is_clear(t));
+        match has_clear {
+            true => Arc::new(RayScene::of_triangles(scene, |_| true)),
+            false => RayScene::of_scene(scene),
+        }
+    }
+
     fn made_of(scene: &Scene) -> RayScene {
+        RayScene::of_triangles(scene, |t| !scene.is_clear(t))
+    }
+
+    fn of_triangles(scene: &Scene, is_met: impl Fn(usize) -> bool) -> RayScene {
         let count = scene.triangles().len();
-        let met = (0..count as u32).filter(|&t| !scene.is_clear(t as usize)).collect();
+        let met = (0..count as u32).filter(|&t| is_met(t as usize)).collect();
         RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
             .with_covered_backs(|t| scene.is_back_covered(t))
             .with_cut_outs(CutOuts::new(scene, (0..count).map(|t| (t, Scene::WHOLE))))
