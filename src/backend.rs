@@ -152,7 +152,8 @@ impl Backend {
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
     /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
     /// doubled where they disagree, up to 16 times; hemicubes are the same everywhere. What is
-    /// darker than a twentieth of the mean reflected radiosity has that share of this instead.
+    /// darker than a twentieth of the mean reflected radiosity has that share of this instead. Where
+    /// the device fails, rays on the CPU go on.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a noise that is not above 0 and at most 1; those of
@@ -167,7 +168,33 @@ impl Backend {
             return Err(Error::new(ErrorKind::Setting, "noise", noise.to_string(), remedy));
         }
         let (rays, noise) = rays_for_noise(noise);
-        self.gather_evenly(&light.mesh, rays, noise, light.radiosity_field().radiosity_floor())
+        let dim = light.radiosity_field().radiosity_floor();
+        self.gather_or_cast_rays(&light.mesh, (rays, noise, dim), |_| ())
+    }
+
+    /// As [`Backend::gather_evenly`], with rays on the CPU from when the device fails, or cannot
+    /// start: `failed` gets the reason.
+    pub(crate) fn gather_or_cast_rays<'a>(
+        &self,
+        mesh: &Mesh,
+        (rays, noise, dim): (u32, f64, f64),
+        mut failed: impl FnMut(Error) + 'a,
+    ) -> Result<Box<dyn Gather + 'a>, Error> {
+        match self.gather_evenly(mesh, rays, noise, dim) {
+            Ok(first) if self.gathers_by_hemicubes() => {
+                let mesh = mesh.clone();
+                Ok(Box::new(Fallback::new(first, move |error| {
+                    failed(error);
+                    Backend::Cpu.gather_evenly(&mesh, rays, noise, dim)
+                })))
+            }
+            Err(e) if e.is_device_error() || e.kind() == ErrorKind::Setting => {
+                let gather = Backend::Cpu.gather_evenly(mesh, rays, noise, dim)?;
+                failed(e);
+                Ok(gather)
+            }
+            result => result.map(|gather| gather as Box<dyn Gather>),
+        }
     }
 
     /// As [`Backend::gather`], with more rays where they disagree: see [`RayGather::with_noise`].

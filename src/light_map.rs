@@ -21,6 +21,7 @@ mod footprint;
 mod gathered;
 mod given_coordinates;
 mod layout;
+mod measured;
 mod sampled;
 mod seams;
 mod texel_points;

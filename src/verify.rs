@@ -38,7 +38,6 @@
 //! has the mean |B_told − B_true|², however noisy they are.
 
 mod emitters;
-mod faces;
 mod hidden;
 mod luminaires;
 mod path_tracer;
@@ -59,6 +58,7 @@ pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;
+use solution::SolutionLookup;
 pub use statistics::Estimate;
 pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
@@ -102,8 +102,8 @@ pub fn verify(
     settings.check()?;
     let scene = scene.resolve_sides();
     let mut verifier = Verifier::new(&scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))?;
-    let solution = Solution { surface: solution, mesh: None };
-    verifier.measure(solution, Limits::default(), &mut progress)
+    let solution = SolutionLookup::new(solution, &scene)?;
+    verifier.measure(&solution, Limits::default(), &mut progress)
 }
 
 /// Measures one solution of a scene after the other at the same points: paths are traced once.
@@ -143,19 +143,18 @@ impl<'a> Verifier<'a> {
     /// See [`verify`].
     pub fn measure(
         &mut self,
-        solution: Solution,
+        solution: &dyn Solution,
         limits: Limits,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Verification, Error> {
         let (sampler, settings) = (&mut self.sampler, &self.settings);
         let start = Instant::now();
-        self.points = self.points.max(solution.surface.positions.len() / VERTICES_PER_POINT);
-        let solution = sampler.lookup(solution)?;
+        self.points = self.points.max(solution.places() / VERTICES_PER_POINT);
         sampler.forget();
         let mut verification = sampler.verification();
         verification.stop = loop {
             sampler.add_points(self.points);
-            sampler.tell(&solution)?;
+            sampler.tell(solution)?;
             let round = |done, of| progress(&Progress { done, of, error: verification.error });
             if sampler.trace(self.paths, round).is_break() {
                 break Stop::Cancelled;
@@ -303,8 +302,8 @@ mod tests {
             let mut verifier = Verifier::new(&scene, settings, (64, 2048)).unwrap();
             let paths = Some(paths);
             let limits = Limits { error: Some(limit), each_group, paths, paths_in_doubt: paths };
-            let solution = Solution { surface: &told, mesh: None };
-            let found = verifier.measure(solution, limits, &mut |_| ControlFlow::Continue(()));
+            let solution = SolutionLookup::new(&told, &scene).unwrap();
+            let found = verifier.measure(&solution, limits, &mut |_| ControlFlow::Continue(()));
             found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()
         };
         let most = 1 << 22;

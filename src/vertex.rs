@@ -143,6 +143,17 @@ impl VertexMesh {
         hanging_nodes: &HangingNodes,
         centre_light: impl Fn(&Self, usize) -> [Rgb; 2],
     ) {
+        let corners = || hanging_nodes.outlines.iter().map(|(_, outline)| outline.len());
+        let fans = corners().filter(|&corners| corners != 3).count();
+        let faces = corners().map(|corners| if corners == 3 { 1 } else { corners }).sum();
+        let more = hanging_nodes.nodes.len() + fans;
+        for values in
+            [&mut self.positions, &mut self.normals, &mut self.radiosity, &mut self.irradiance]
+        {
+            values.reserve_exact(more);
+        }
+        self.faces.reserve_exact(faces);
+        self.elements.reserve_exact(faces);
         for node in &hanging_nodes.nodes {
             let [a, b] = node.between.map(|v| v as usize);
             self.positions.push(node.position);

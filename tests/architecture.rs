@@ -38,7 +38,10 @@ const MAY_KNOW: &[(&str, &str)] = &[
          vertex visibility",
     ),
     ("bands", "backend bake error gather mesh scene vertex visibility"),
-    ("light_map", "backend bake error gather mesh progress scene vertex visibility"),
+    (
+        "light_map",
+        "backend bake error gather geometry mesh progress sampling scene verify vertex visibility",
+    ),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 

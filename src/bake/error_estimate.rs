@@ -80,6 +80,14 @@ pub struct ErrorEstimate {
     pub paths: usize,
 }
 
+impl ErrorEstimate {
+    /// What is left of it for whatever gathers this light anew, as texels do: truncation, unshot
+    /// light and sources, about; none of these is made less by finer places.
+    pub fn of_light(&self) -> f64 {
+        self.truncation.hypot(self.unshot).hypot(self.sources)
+    }
+}
+
 /// The estimated error of one group of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

@@ -22,7 +22,7 @@ use crate::bake::model;
 use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
-use crate::gather::gather_points::SurfaceOffset;
+use crate::gather::gather_points::{SurfaceOffset, is_hidden, is_in_the_open};
 use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, IrradianceSample};
@@ -35,7 +35,6 @@ use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
 use crate::verify::{PathTracer, SurfacePoint as PathStart};
-use crate::visibility::buried;
 use crate::visibility::ray_scene::Hit;
 
 /// Points that are gathered at before progress is reported first: a bake that is stopped uses
@@ -464,7 +463,7 @@ impl Sample {
             later: *later,
             element_residual: estimator.residual(self.element),
             excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal))
-                || (first.escaped + second.escaped) / 2.0 > buried::OPEN,
+                || is_in_the_open([first, second]),
             escaped: first.escaped,
             backface: first.backface,
             inverse_distance: first.inverse_distance,
@@ -477,16 +476,6 @@ impl Sample {
         let step = JITTER * self.size * (0.5 + self.rotation);
         self.point.moved_by(self.inward.normalize_or_zero() * step.min(self.inward.length()))
     }
-}
-
-/// Whether a point is inside a solid, under what nearly touches it, or in a crack; `diagonal` of
-/// where the light is, scene unit.
-fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
-    // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
-    let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
-    sample.backface > buried::HIDDEN
-        || sample.inverse_distance * buried::CRACK * diagonal > 1.0
-        || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
 }
 
 #[cfg(test)]

@@ -83,8 +83,8 @@ impl<'a> ResilientBackend<'a> {
         }))
     }
 
-    /// A gatherer: see [`Backend::gather_evenly`]. A device that cannot start one has failed too:
-    /// light was shot by now.
+    /// A gatherer: see [`Backend::gather_or_cast_rays`]. A device that cannot start one has failed
+    /// too: light was shot by now.
     pub fn gather(
         &self,
         mesh: &Mesh,
@@ -92,20 +92,6 @@ impl<'a> ResilientBackend<'a> {
         noise: f64,
         dim: f64,
     ) -> Result<Box<dyn Gather + '_>, Error> {
-        match self.backend.gather_evenly(mesh, rays, noise, dim) {
-            Ok(first) if self.backend.gathers_by_hemicubes() => {
-                let mesh = mesh.clone();
-                Ok(Box::new(Fallback::new(first, move |error| {
-                    self.record(error);
-                    Backend::Cpu.gather_evenly(&mesh, rays, noise, dim)
-                })))
-            }
-            Err(e) if e.is_device_error() || e.kind() == ErrorKind::Setting => {
-                let gather = Backend::Cpu.gather_evenly(mesh, rays, noise, dim)?;
-                self.record(e);
-                Ok(gather)
-            }
-            result => result.map(|gather| gather as Box<dyn Gather>),
-        }
+        self.backend.gather_or_cast_rays(mesh, (rays, noise, dim), |error| self.record(error))
     }
 }

@@ -19,7 +19,6 @@ use crate::bake::controller::{self, ErrorTarget, Judged, Step};
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError, Pilot};
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::judge::Judge;
-use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
@@ -375,7 +374,7 @@ impl<'a> GatherPhase<'a> {
 
     /// Diagonal of where the light is, scene unit.
     fn diagonal(&self) -> f64 {
-        light_survey::diagonal(self.solve.region.as_ref(), self.shot.mesh.scene())
+        self.solve.light_diagonal(self.shot.mesh.scene())
     }
 
     fn into_result(self, estimated: Estimated, outcome: Outcome) -> BakedLight {

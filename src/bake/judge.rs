@@ -24,10 +24,10 @@ use crate::bake::estimator::{EstimatedError, negligible_reflection};
 use crate::bake::model;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
-use crate::scene::Scene;
+use crate::scene::{Rgb, Scene};
 use crate::verify::{
     Estimate as Measured, GroupError as MeasuredGroup, Limits, Progress, Settings, Solution,
-    Verification, Verifier,
+    SurfacePoint, Verification, Verifier,
 };
 
 /// Standard errors that a measurement may be off by: of the whole, and of one of many groups, of
@@ -67,10 +67,9 @@ impl<'a> Judge<'a> {
             paths: Some(paths),
             paths_in_doubt: Some(paths_in_doubt),
         };
-        let solution = Solution { surface: &light.surface, mesh: Some(&light.mesh) };
         let mut stopped = false;
         let measured = self.verifier().and_then(|verifier| {
-            verifier.measure(solution, limits, &mut |p: &Progress| {
+            verifier.measure(light, limits, &mut |p: &Progress| {
                 let flow = progress(p.done, p.of);
                 stopped |= flow.is_break();
                 flow
@@ -108,6 +107,22 @@ impl<'a> Judge<'a> {
             time: None,
             ..Settings::default()
         }
+    }
+}
+
+impl Solution for GatheredMesh {
+    fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
+        let (surface, t) = (&self.surface, point.triangle);
+        let place = surface.face_at(&self.mesh, t, scene.barycentric(t, point.position))?;
+        let material = scene.material(t);
+        Some(match scene.textures(t) {
+            Some(_) => material.albedo() * surface.value_at(&place, &surface.irradiance),
+            None => surface.value_at(&place, &surface.radiosity) - material.exitance,
+        })
+    }
+
+    fn places(&self) -> usize {
+        self.surface.positions.len()
     }
 }
 

@@ -109,11 +109,6 @@ impl LightSurvey {
     }
 }
 
-/// Diagonal of the `region` of the light or, with none, of all surfaces that reflect; scene unit.
-pub(super) fn diagonal(region: Option<&Aabb>, scene: &Scene) -> f64 {
-    region.map_or_else(|| scene.reflecting_bounds().diagonal(), Aabb::diagonal)
-}
-
 /// All triangles of one material that emits.
 struct MaterialLight {
     material: u32,

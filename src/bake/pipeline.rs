@@ -8,7 +8,6 @@ use crate::bake::controller::ErrorTarget;
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::gather_phase::GatherPhase;
 use crate::bake::light_in_gaps::light_in_gaps;
-use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
 use crate::bake::resolved_light::resolved_light;
@@ -122,7 +121,7 @@ fn light_to_gather(
     if shot.solution.stop == StopReason::Cancelled {
         return Ok(None);
     }
-    let diagonal = light_survey::diagonal(solve.region.as_ref(), shot.mesh.scene());
+    let diagonal = solve.light_diagonal(shot.mesh.scene());
     let footprint = model::pixel_footprint(solve.hemicube_resolution) * diagonal;
     let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Gathering(*p));

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
-use crate::bake::light_survey::{self, LightSurvey};
+use crate::bake::light_survey::LightSurvey;
 use crate::bake::model;
 use crate::error::Error;
 use crate::gather::RefinementSettings;
@@ -106,6 +106,12 @@ impl SolveSettings {
 }
 
 impl SolveSettings {
+    /// Diagonal of where the light is or, where that is not known, of all surfaces that reflect;
+    /// scene unit.
+    pub(crate) fn light_diagonal(&self, scene: &Scene) -> f64 {
+        self.region.map_or_else(|| scene.reflecting_bounds().diagonal(), |region| region.diagonal())
+    }
+
     /// How large elements may be: `size` where the light is. What is black neither receives nor, if
     /// it does not emit or is gathered, shoots.
     pub(super) fn sizing(&self, scene: &Scene, size: f64) -> ElementSizing {
@@ -164,7 +170,7 @@ impl BakeSettings {
     /// Lengths on each group as shares of its own diagonal, where that is smaller than that of
     /// where the light is: for an error that every group is to meet.
     pub(super) fn scale_groups(&mut self, scene: &Scene) {
-        let diagonal = light_survey::diagonal(self.solve.region.as_ref(), scene);
+        let diagonal = self.solve.light_diagonal(scene);
         let mut bounds = vec![Aabb::EMPTY; scene.groups().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
             let bounds = &mut bounds[triangle.group as usize];

@@ -202,7 +202,7 @@ pub(super) fn estimate_elements(
         element_residual: &corner_spread(&light),
         ledger: &shot.solution.ledger,
         bounces: 0.0,
-        diagonal: light_survey::diagonal(settings.solve.region.as_ref(), shot.mesh.scene()),
+        diagonal: settings.solve.light_diagonal(shot.mesh.scene()),
         octaves: &octaves_of(shot.mesh.scene()),
         expected_floor: light.radiosity_field().radiosity_floor(),
         paths: None,

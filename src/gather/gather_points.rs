@@ -161,6 +161,21 @@ impl SurfaceOffset {
     }
 }
 
+/// Whether a point is inside a solid, under what nearly touches it, or in a crack: no place to judge
+/// light by. `diagonal` of where the light is, scene unit.
+pub(crate) fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
+    // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
+    let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
+    sample.backface > buried::HIDDEN
+        || sample.inverse_distance * buried::CRACK * diagonal > 1.0
+        || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
+}
+
+/// Whether a point that gathered these two sees next to nothing.
+pub(crate) fn is_in_the_open([first, second]: [&IrradianceSample; 2]) -> bool {
+    (first.escaped + second.escaped) / 2.0 > buried::OPEN
+}
+
 /// Whether a point lies inside something that touches its surface: it sees almost nothing but
 /// backs, and those nearer than `touching` (scene unit); or nothing else at all.
 pub(crate) fn is_buried(sample: &IrradianceSample, touching: f64) -> bool {

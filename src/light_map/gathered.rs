@@ -30,7 +30,7 @@ pub struct LightMap {
     /// Whether a texel gathered. Others are empty, or have values of their neighbours.
     pub gathered: Vec<bool>,
     /// The triangle of each texel's place, or none.
-    triangles: Vec<u32>,
+    pub(super) triangles: Vec<u32>,
 }
 
 /// Rings of empty texels around charts that get values, for the filters of renderers.
@@ -45,7 +45,8 @@ const RAYS: u32 = 1024;
 
 impl LightMap {
     /// The light of a bake, gathered at the texels of `atlas`: with as many rays as its vertices
-    /// took in the end, so that a texel is as exact as what was asked for.
+    /// took in the end, so that a texel is as exact as what was asked for. Where the device fails,
+    /// rays on the CPU go on.
     ///
     /// Texels inside of solids, and under what stands on their surface, get values of their
     /// neighbours. `progress` is called with the texels done and all of them, several times a
@@ -61,14 +62,7 @@ impl LightMap {
         backend: &Backend,
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<LightMap>, Error> {
-        let light = &baked.light;
-        let dim = light.radiosity_field().radiosity_floor();
-        let (rays, noise) = match &baked.settings.gather {
-            Some(settings) => (settings.rays, settings.noise_tolerance),
-            None => (RAYS, f64::INFINITY),
-        };
-        let mut gatherer = backend.gather_evenly(&light.mesh, rays, noise, dim)?;
-        LightMap::gather(atlas, light, &mut *gatherer, progress)
+        LightMap::gather(atlas, &baked.light, &mut *gatherer(baked, backend)?, progress)
     }
 
     /// The same by a `gatherer` of the caller's, of the scene of `light`.
@@ -143,6 +137,19 @@ impl LightMap {
     }
 }
 
+/// What gathers the light of `baked` as exactly as its last vertices did.
+pub(super) fn gatherer<'a>(
+    baked: &BakeResult,
+    backend: &Backend,
+) -> Result<Box<dyn Gather + 'a>, Error> {
+    let dim = baked.light.radiosity_field().radiosity_floor();
+    let (rays, noise) = match &baked.settings.gather {
+        Some(settings) => (settings.rays, settings.noise_tolerance),
+        None => (RAYS, f64::INFINITY),
+    };
+    backend.gather_or_cast_rays(&baked.light.mesh, (rays, noise, dim), |_| ())
+}
+
 /// Gives empty texels next to charts the values of their neighbours.
 fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
     let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
@@ -151,7 +158,7 @@ fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
 }
 
 /// Checks that `light` is that of the scene of `atlas`, whose triangles a bake may have cut.
-fn check_scene(atlas: &Atlas, light: &GatheredMesh) -> Result<(), Error> {
+pub(super) fn check_scene(atlas: &Atlas, light: &GatheredMesh) -> Result<(), Error> {
     let (scene, other) = (atlas.scene(), light.mesh.scene());
     if scene.groups() == other.groups() && scene.materials() == other.materials() {
         return Ok(());

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::hidden::{self, Outlook};
 use super::path_tracer::{PathTracer, SurfacePoint};
 use super::settings::Settings;
-use super::solution::{Solution, SolutionLookup};
+use super::solution::Solution;
 use super::statistics::{Estimate, FLOOR, MeanSquare, PARTS, Sample, SquareError};
 use super::surfaces::ReflectingGroup;
 use super::verification::{GroupError, PointError, Stop, Verification};
@@ -70,13 +70,6 @@ impl<'a> Sampler<'a> {
         })
     }
 
-    /// What is asked of `solution`: it has to be one of the scene.
-    pub fn lookup<'s>(&self, solution: Solution<'s>) -> Result<SolutionLookup<'s>, Error> {
-        let lookup = SolutionLookup::new(solution, self.scene)?;
-        lookup.check_emission(self.scene)?;
-        Ok(lookup)
-    }
-
     /// Adds points until there are about `points` of them, spread over the area that counts as far
     /// as that is known, and as many in each group as it has at least.
     pub fn add_points(&mut self, points: usize) {
@@ -134,7 +127,7 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] where too many points lie on none of its faces.
-    pub fn tell(&mut self, solution: &SolutionLookup) -> Result<(), Error> {
+    pub fn tell(&mut self, solution: &dyn Solution) -> Result<(), Error> {
         let scene = self.scene;
         let points = self.strata.iter_mut().flat_map(|stratum| &mut stratum.points);
         let unknown: Vec<&mut TracedPoint> = points.filter(|p| p.told.is_none()).collect();

@@ -4,12 +4,11 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::faces::Faces;
-use super::path_tracer::SurfacePoint;
+use super::path_tracer::{SurfacePoint, nearest_surfaces};
 use crate::error::{Error, ErrorKind, shortened};
-use crate::mesh::Mesh;
 use crate::scene::{Material, Rgb, Scene};
-use crate::vertex::{FacePlace, VertexMesh};
+use crate::vertex::VertexMesh;
+use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Places of a material at which it is looked up what the solution emits, at least. Chosen by hand.
 const EMISSION_PLACES: usize = 64;
@@ -58,26 +57,29 @@ fn is_light_of(material: &Material, radiosity: Rgb, irradiance: Rgb) -> bool {
     (radiosity - reflected).abs_diff_eq(material.exitance, noise)
 }
 
-/// What is to be measured.
-#[derive(Clone, Copy)]
-pub(crate) struct Solution<'a> {
-    pub surface: &'a VertexMesh,
-    /// The mesh whose elements the faces are, if that is known; of the scene that it is measured on.
-    pub mesh: Option<&'a Mesh>,
+/// What tells the light of a scene's surfaces.
+pub(crate) trait Solution: Sync {
+    /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m². None
+    /// where nothing is told.
+    fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb>;
+
+    /// Places at which the light was found.
+    fn places(&self) -> usize;
 }
 
-/// A solution that can be asked at points.
+/// Any mesh of vertices as a solution: its faces are found by rays.
 pub(super) struct SolutionLookup<'a> {
     solution: &'a VertexMesh,
-    faces: Faces<'a>,
+    rays: RayScene,
+    normals: Vec<DVec3>,
+    /// Of the scene, scene unit.
+    diagonal: f64,
 }
 
 impl<'a> SolutionLookup<'a> {
-    /// Checks `solution`, of `scene`.
-    pub fn new(
-        Solution { surface: solution, mesh }: Solution<'a>,
-        scene: &Scene,
-    ) -> Result<SolutionLookup<'a>, Error> {
+    /// Checks `solution`, of `scene`: see [`SolutionLookup::check_emission`].
+    pub fn new(solution: &'a VertexMesh, scene: &Scene) -> Result<SolutionLookup<'a>, Error> {
+        let diagonal = scene.bounds().diagonal();
         let VertexMesh { positions, radiosity, irradiance, faces, .. } = solution;
         let wrong = |found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Scene, "solution", found, remedy))
@@ -109,8 +111,17 @@ impl<'a> SolutionLookup<'a> {
         if faces.is_empty() {
             return wrong("no faces".into(), "give the whole surface of the scene");
         }
-        let faces = mesh.map_or_else(|| Faces::any(solution, scene), Faces::OfMesh);
-        Ok(SolutionLookup { solution, faces })
+        let corners = |face: &[u32; 3]| face.map(|v| positions[v as usize]);
+        let normal = |face| {
+            let [a, b, c] = corners(face);
+            let scale = (b - a).abs().max((c - a).abs()).max_element().max(f64::MIN_POSITIVE);
+            ((b - a) / scale).cross((c - a) / scale).normalize_or_zero()
+        };
+        let rays = RayScene::new(faces.iter().map(corners));
+        let normals = faces.iter().map(normal).collect();
+        let lookup = SolutionLookup { solution, rays, normals, diagonal };
+        lookup.check_emission(scene)?;
+        Ok(lookup)
     }
 
     /// Refuses a solution whose surfaces emit something else than those of `scene`: what a vertex
@@ -120,7 +131,7 @@ impl<'a> SolutionLookup<'a> {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] with the material and what it emits in both.
-    pub fn check_emission(&self, scene: &Scene) -> Result<(), Error> {
+    fn check_emission(&self, scene: &Scene) -> Result<(), Error> {
         if !self.has_irradiance() {
             return Ok(());
         }
@@ -152,21 +163,22 @@ impl<'a> SolutionLookup<'a> {
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
-            let place = self.face(scene, &SurfacePoint { triangle: t, position })?;
-            Some(self.light_at(&place))
+            let hit = self.face(scene, &SurfacePoint { triangle: t, position })?;
+            Some(self.light_at(&hit))
         })
     }
 
-    /// The place on the solution at `point` of `scene`: the nearest face that faces alike. Of
+    /// Where the solution is hit at `point` of `scene`: the nearest face that faces alike. Of
     /// several in one place it is the first whose light is the material's.
-    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<FacePlace> {
-        let faces = self.faces.at(self.solution, scene, point);
+    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<Hit> {
+        let (position, normal) = (point.position, scene.normal(point.triangle));
+        let faces = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
         if faces.len() < 2 || !self.has_irradiance() {
             return faces.into_iter().next();
         }
         let material = scene.material(point.triangle);
-        let is_of_material = |place: &&FacePlace| {
-            let (radiosity, irradiance) = self.light_at(place);
+        let is_of_material = |hit: &&Hit| {
+            let (radiosity, irradiance) = self.light_at(hit);
             is_light_of(material, radiosity, irradiance)
         };
         faces.iter().find(is_of_material).or(faces.first()).copied()
@@ -177,22 +189,30 @@ impl<'a> SolutionLookup<'a> {
         self.solution.irradiance.len() == self.solution.positions.len()
     }
 
-    /// Radiosity and irradiance at a place of the solution, W/m².
-    fn light_at(&self, place: &FacePlace) -> (Rgb, Rgb) {
+    /// Radiosity and irradiance where the solution is hit, W/m².
+    fn light_at(&self, hit: &Hit) -> (Rgb, Rgb) {
         let VertexMesh { radiosity, irradiance, .. } = self.solution;
-        (self.solution.value_at(place, radiosity), self.solution.value_at(place, irradiance))
+        (self.interpolated(hit, radiosity), self.interpolated(hit, irradiance))
     }
 
-    /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m². None
-    /// where the solution has no face.
-    pub fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
-        let place = self.face(scene, point)?;
+    /// Of one value a vertex, the one where the solution is hit.
+    fn interpolated(&self, hit: &Hit, values: &[Rgb]) -> Rgb {
+        let [a, b, c] = self.solution.faces[hit.triangle].map(|v| values[v as usize]);
+        (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
+    }
+}
+
+impl Solution for SolutionLookup<'_> {
+    fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
+        let hit = self.face(scene, point)?;
         let material = scene.material(point.triangle);
         Some(match scene.textures(point.triangle) {
-            Some(_) => {
-                material.albedo() * self.solution.value_at(&place, &self.solution.irradiance)
-            }
-            None => self.solution.value_at(&place, &self.solution.radiosity) - material.exitance,
+            Some(_) => material.albedo() * self.interpolated(&hit, &self.solution.irradiance),
+            None => self.interpolated(&hit, &self.solution.radiosity) - material.exitance,
         })
+    }
+
+    fn places(&self) -> usize {
+        self.solution.positions.len()
     }
 }

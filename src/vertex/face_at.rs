@@ -50,3 +50,40 @@ impl VertexMesh {
         (1.0 - u - v) * a + u * b + v * c
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Material, Scene, Triangle};
+
+    #[test]
+    fn every_face_is_found_at_its_points() {
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.3), DVec3::Y];
+        let triangle = |corners| Triangle { corners, ..Default::default() };
+        let triangles = vec![triangle([0, 1, 2]), triangle([0, 2, 3])];
+        let materials = vec![Material::grey("grey", 0.5)];
+        let scene = Scene::new(positions, triangles, vec!["all".into()], materials).unwrap();
+        // Elements of three sizes: those next to smaller ones are fans.
+        let mesh = Mesh::new(scene, 0.8).unwrap();
+        let mesh = mesh.split(&[1, 6]).unwrap();
+        let mesh = mesh.split(&[2]).unwrap();
+        let light: Vec<Rgb> = (0..mesh.element_count()).map(|e| Rgb::splat(e as f64)).collect();
+        let surface = VertexMesh::new(&mesh, &light);
+        assert!(surface.faces.len() > mesh.element_count(), "there are fans");
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        for (face, corners) in surface.faces.iter().enumerate() {
+            let [a, b, c] = corners.map(|v| surface.positions[v as usize]);
+            let t = mesh.triangle(mesh.element(surface.elements[face] as usize));
+            for [u, v] in [[0.2, 0.3], [0.01, 0.01], [0.98, 0.01]] {
+                let at = mesh.scene().barycentric(t, a * (1.0 - u - v) + b * u + c * v);
+                let place = surface.face_at(&mesh, t, at).unwrap();
+                let [x, y] = place.weights;
+                assert!(place.face == face && close(x, u) && close(y, v), "{face}: {place:?}");
+                let position = surface.value_at(&place, &surface.positions);
+                assert!(position.distance(a * (1.0 - u - v) + b * u + c * v) < 1e-12);
+            }
+        }
+    }
+}

@@ -60,6 +60,20 @@ pub fn compare(surface: &VertexMesh, truth: &str) -> BTreeMap<String, Errors> {
     errors.into_iter().map(|(kind, list)| (kind, summary(list))).collect()
 }
 
+/// The root mean square of |B − truth| over |truth|, or over a twentieth of its mean where that is
+/// more, at the points spread evenly over the area.
+pub fn area_error(surface: &VertexMesh, truth: &str) -> f64 {
+    let points = points(truth).expect("a truth file");
+    let area: Vec<_> = points.iter().filter(|p| p.kind == "area").collect();
+    let mean = area.iter().map(|p| p.radiosity.length()).sum::<f64>() / area.len() as f64;
+    let square = |point: &&Point| {
+        let (found, _) = at(surface, point.position, point.normal).expect("a face at the point");
+        let scale = point.radiosity.length().max(0.05 * mean);
+        (found.distance(point.radiosity) / scale).powi(2)
+    };
+    (area.iter().map(square).sum::<f64>() / area.len() as f64).sqrt()
+}
+
 /// |B − truth|/|truth| and (|B| − |truth|)/|truth| at a point, if it lies on a face of `surface`.
 pub fn off(surface: &VertexMesh, point: &Point) -> Option<(f64, f64)> {
     let (got, _) = at(surface, point.position, point.normal)?;

@@ -1,3 +1,4 @@
 mod atlas;
 mod files;
 mod light;
+mod shown_error;

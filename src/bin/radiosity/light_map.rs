@@ -1,6 +1,8 @@
 //! `radiosity light-map`: the irradiance of a scene's surfaces in a texture.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use lexopt::prelude::*;
@@ -9,7 +11,8 @@ use radiosity::io::{
     write_ply_with_tone, write_png_with_tone,
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
-use radiosity::{Backend, BakeResult, BakeTarget, Camera, Error, Scene};
+use radiosity::verify::Estimate;
+use radiosity::{Backend, BakeResult, BakeTarget, Camera, Error, ErrorKind, Scene};
 
 use crate::args::{self, Device, Stop};
 use crate::bake::files::{SAMPLES, camera};
@@ -26,9 +29,11 @@ W/m², linear, and the texels that gathered) and STEM.glb (the scene with its
 places in the map as TEXCOORD_1, and the map's radiosity in the colours of an image). STEM is the
 scene without its ending and with .light-map, unless given.
 
-  --error X         how far the bake, and each texel, may be off: see `radiosity bake --help` [0.05]
+  --error X         how far the bake, and what the map shows, may be off: see `radiosity bake
+                    --help` [0.05]. The last line says whether the map was measured to be so
   --error-each X    the same for each group of the scene, however small
-  --size PIXELS     texels along a side of the map [512]
+  --size PIXELS     texels along a side of the map. Without, 64 to 2048, a power of two: as many as it
+                    takes for what is shown, between texels too, to be as exact as asked
   --texel SIZE      edge of a texel on the surfaces, scene unit
   --coordinates auto  the texture coordinates of the file, where they are within [0, 1] and no two
                     triangles share a texel; else new ones. That is the default
@@ -45,7 +50,10 @@ scene without its ending and with .light-map, unless given.
   --sun-at, --up, --north, --sides, --specular   as in `radiosity bake`
 
 Surfaces that reflect on both sides have texels for each; --sides front makes them one-sided.
-Ctrl-C ends it, and nothing is written.";
+Ctrl-C ends it, and nothing is written but a map of fewer texels, if one was done.";
+
+/// Texels along a side where the error asked for says how many: the fewest and the most.
+const PIXELS: RangeInclusive<u32> = 64..=2048;
 
 /// Pixels of the picture.
 const PICTURE: (u32, u32) = (768, 512);
@@ -67,7 +75,8 @@ struct Options {
     scene: PathBuf,
     reading: SceneOptions,
     target: BakeTarget,
-    resolution: Resolution,
+    /// None for as many texels as it takes.
+    resolution: Option<Resolution>,
     coordinates: Coordinates,
     radiosity: bool,
     stem: PathBuf,
@@ -86,7 +95,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
     })?;
     options.reading.print_warnings(&scene);
     let load = start.elapsed().as_secs_f64();
-    let atlas = options.atlas(scene)?;
+    let atlas = options.first_atlas(scene)?;
     let layout = start.elapsed().as_secs_f64();
     let device = progress::of_stage("opening the device", || options.device.open())?;
     let open = start.elapsed().as_secs_f64();
@@ -96,7 +105,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         options.target.bake(atlas.scene().clone(), &device, report)
     })?;
     let bake = start.elapsed().as_secs_f64();
-    let map = gather(atlas, &baked, &device)?;
+    let (map, shown) = options.map(atlas, &baked, &device)?;
     let texels = start.elapsed().as_secs_f64();
     options.write(&map, &baked)?;
     print_map(&map, &baked);
@@ -111,7 +120,14 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         total - texels
     );
     progress::print_written();
+    options.print_shown(shown);
     Ok(())
+}
+
+/// An error, in words.
+fn said(shown: &Estimate) -> String {
+    let [value, standard_error] = [shown.value, shown.standard_error].map(|x| 100.0 * x);
+    format!("radiosity that is off by {value:.2} ± {standard_error:.2} %")
 }
 
 /// The light of a bake at the texels of `atlas`, unless Ctrl-C stopped either.
@@ -157,7 +173,7 @@ impl Options {
             scene: PathBuf::new(),
             reading: SceneOptions::default(),
             target: BakeTarget::Error(0.05),
-            resolution: Resolution::Pixels(512),
+            resolution: None,
             coordinates: Coordinates::Auto,
             radiosity: false,
             stem: PathBuf::new(),
@@ -178,11 +194,11 @@ impl Options {
                 }
                 Long("size") => {
                     let pixels = args::value(parser, "size", "a whole number of pixels")?;
-                    options.resolution = Resolution::Pixels(pixels);
+                    options.resolution = Some(Resolution::Pixels(pixels));
                 }
                 Long("texel") => {
                     let size = args::value(parser, "texel", "a length")?;
-                    options.resolution = Resolution::TexelSize(size);
+                    options.resolution = Some(Resolution::TexelSize(size));
                 }
                 Long("coordinates") => options.coordinates = coordinates(parser)?,
                 Long("radiosity") => options.radiosity = true,
@@ -210,15 +226,109 @@ impl Options {
         Ok(options)
     }
 
-    /// Lays out the surfaces of `scene`, and tells where the file's coordinates do not do.
-    fn atlas(&self, scene: Scene) -> Result<Atlas, Error> {
+    /// Lays out the surfaces of `scene`: in the fewest texels that they have room in, unless their
+    /// number was given. Tells where the file's coordinates do not do.
+    fn first_atlas(&self, scene: Scene) -> Result<Atlas, Error> {
+        let scene = Arc::new(scene);
         let atlas = progress::of_stage("laying out surfaces", || {
-            Atlas::new(scene, self.resolution, self.coordinates)
+            if let Some(resolution) = self.resolution {
+                return self.atlas(scene, resolution);
+            }
+            let mut pixels = *PIXELS.start();
+            loop {
+                match self.atlas(scene.clone(), Resolution::Pixels(pixels)) {
+                    Err(e) if e.kind() == ErrorKind::Setting && pixels < *PIXELS.end() => {
+                        pixels *= 2;
+                    }
+                    atlas => return atlas,
+                }
+            }
         })?;
         if let Some(unusable) = atlas.unusable() {
             eprintln!("note: surfaces are laid out anew, since texture coordinates are {unusable}");
         }
         Ok(atlas)
+    }
+
+    fn atlas(&self, scene: Arc<Scene>, resolution: Resolution) -> Result<Atlas, Error> {
+        Atlas::new(scene, resolution, self.coordinates)
+    }
+
+    /// The map of `baked`, and how far off it was measured to be; with as many texels as that takes,
+    /// unless their number was given. Ctrl-C leaves the last that was done.
+    fn map(
+        &self,
+        mut atlas: Atlas,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<(LightMap, Option<Estimate>), Stop> {
+        let mut coarser: Option<(LightMap, Estimate)> = None;
+        loop {
+            let (scene, pixels) = (atlas.scene().clone(), atlas.width().max(atlas.height()));
+            let map = gather(atlas, baked, device);
+            let measured = map.and_then(|map| Ok((self.shown_error(&map, baked, device)?, map)));
+            let (shown, map) = match (measured, coarser.take()) {
+                (Err(Stop::Interrupted), Some((map, shown))) => return Ok((map, Some(shown))),
+                (measured, _) => measured?,
+            };
+            let Some(shown) = shown.filter(|_| self.resolution.is_none()) else {
+                return Ok((map, shown));
+            };
+            // What the light itself is off by is for no texel to mend.
+            let is_enough = shown.value <= self.error() || baked.estimate.of_light() > self.error();
+            if is_enough || pixels >= *PIXELS.end() {
+                return Ok((map, Some(shown)));
+            }
+            eprintln!("{pixels} texels along a side show {}", said(&shown));
+            // The error falls no faster than texels become small.
+            let times = (shown.value / self.error()).log2().floor().max(1.0).exp2();
+            let pixels = (f64::from(pixels) * times).min(f64::from(*PIXELS.end()));
+            coarser = Some((map, shown));
+            atlas = progress::of_stage("laying out surfaces", || {
+                self.atlas(scene, Resolution::Pixels(pixels as u32))
+            })?;
+        }
+    }
+
+    /// How far off what `map` shows is; none where nothing is to be measured.
+    fn shown_error(
+        &self,
+        map: &LightMap,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<Option<Estimate>, Stop> {
+        args::end()?;
+        let shown = progress::of_count("points to measure the map", |report| {
+            map.shown_error(baked, device, |done, of| {
+                _ = report(done, of);
+                interrupt::flow()
+            })
+        })?;
+        args::end()?;
+        Ok(shown)
+    }
+
+    /// The error asked for.
+    fn error(&self) -> f64 {
+        match self.target {
+            BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => error,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Says whether the map shows what was asked for.
+    fn print_shown(&self, shown: Option<Estimate>) {
+        let Some(shown) = shown else { return };
+        let asked = 100.0 * self.error();
+        if shown.value <= self.error() {
+            say!("{asked} % reached: the map shows {}", said(&shown));
+        } else {
+            let remedy = match self.resolution {
+                Some(_) => "more texels (--size) or a finer bake (--error) may do",
+                None => "a finer bake (--error), or more texels (--size), may do",
+            };
+            say!("{asked} % missed: the map shows {}; {remedy}", said(&shown));
+        }
     }
 
     fn path(&self, ending: &str) -> PathBuf {

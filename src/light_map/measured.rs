@@ -1,0 +1,243 @@
+//! How far off a map is, as it is shown.
+//!
+//! What a bake estimates is the error of its vertices. A map has another one, since light bends
+//! between its texels. So points of the surfaces gather as texels do, twice, the
+//! second time from a hair beside, and are compared with what the map shows there:
+//!
+//! ```text
+//!   e² = (shown − first) · (shown − second) / max(|mean of both|, floor)²
+//! ```
+//!
+//! Noise of the two is independent, so that it adds nothing to the mean of e². What gathers cannot
+//! know of the light that they gather is taken from the bake's estimate: bounces that are left out,
+//! light that is not shot, and what paths have found beyond.
+
+use std::ops::{ControlFlow, RangeInclusive};
+
+use glam::{DVec2, DVec3};
+
+use super::coverage::NO_TRIANGLE;
+use super::footprint::Footprint;
+use super::gathered::{LightMap, check_scene, gatherer};
+use super::texel_points::TexelPoints;
+use crate::backend::Backend;
+use crate::bake::BakeResult;
+use crate::error::Error;
+use crate::gather::RADIOSITY_FLOOR_SHARE;
+use crate::gather::gather_points::{SurfaceOffset, is_hidden, is_in_the_open};
+use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
+use crate::geometry::barycentric::barycentric;
+use crate::progress::BatchSizer;
+use crate::sampling::low_discrepancy::{golden_ratio_order, r2_point};
+use crate::sampling::rotation::CellRotation;
+use crate::sampling::surface::AreaSampler;
+use crate::scene::Rgb;
+use crate::verify::Estimate;
+
+/// Texels for each point, and points at least and at most. Chosen by hand: a sixteenth of what the
+/// texels took.
+const TEXELS_PER_POINT: usize = 32;
+const POINTS: RangeInclusive<usize> = 2048..=16384;
+
+/// How far beside a point it gathers again, in texels; up to 1.5 times as far: the light is the
+/// same there, but directions are rotated otherwise.
+const JITTER: f64 = 1e-3;
+
+/// Points in the first batch; later ones follow the clock.
+const FIRST_BATCH: usize = 64;
+
+/// A point, and what the map shows there.
+struct ShownPoint {
+    points: [TwoSidedPoint; 2],
+    albedo: Rgb,
+    /// Reflected radiosity, W/m².
+    shown: Rgb,
+    /// What the point stands for, up to a common factor.
+    area: f64,
+}
+
+impl LightMap {
+    /// How far what the map shows is off, between texels too, and the standard error of that: the
+    /// root mean square over the surfaces that reflect of relative errors, with the measure of
+    /// [`ErrorEstimate`](crate::ErrorEstimate). `baked` is what the map was gathered from.
+    ///
+    /// `progress` is called with the points done and all of them, several times a second; where it
+    /// stops the work, the result is `None`, as it is where nothing reflects.
+    ///
+    /// # Errors
+    /// Those of [`LightMap::of_bake`].
+    pub fn shown_error(
+        &self,
+        baked: &BakeResult,
+        backend: &Backend,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<Estimate>, Error> {
+        check_scene(&self.atlas, &baked.light)?;
+        let points = self.shown_points();
+        let mut gatherer = gatherer(baked, backend)?;
+        let field = baked.light.radiosity_field();
+        let diagonal = baked.settings.solve.light_diagonal(self.atlas.scene());
+        let mut found = vec![];
+        let order = golden_ratio_order(points.len());
+        let (mut remaining, mut batches) = (&order[..], BatchSizer::new(FIRST_BATCH));
+        while !remaining.is_empty() {
+            batches.next(&mut remaining, |batch| {
+                let mut gather = |which: usize| {
+                    let places: Vec<TwoSidedPoint> =
+                        batch.iter().map(|&k| points[k].points[which]).collect();
+                    gather_two_sided(&mut *gatherer, &field, &places)
+                };
+                let (first, second) = (gather(0)?, gather(1)?);
+                for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
+                    let ShownPoint { albedo, shown, area, .. } = points[k];
+                    let pair = [first, second];
+                    let is_left_out = pair.iter().any(|g| is_hidden(g, diagonal));
+                    if !is_left_out && !is_in_the_open(pair) {
+                        let gathered = pair.map(|sample| albedo * sample.irradiance);
+                        found.push(Found { shown, gathered, area });
+                    }
+                }
+                Ok::<_, Error>(())
+            })?;
+            if progress(points.len() - remaining.len(), points.len()).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(root_mean_square(&found, baked.estimate.of_light()))
+    }
+
+    /// Half of them evenly over what reflects, half in the cells between four texels, by how far
+    /// these differ as a share of the darkest. Each stands for the area over the density of both
+    /// halves (Veach and Guibas 1995, the balance heuristic).
+    fn shown_points(&self) -> Vec<ShownPoint> {
+        let scene = self.atlas.scene();
+        let areas = (0..scene.triangles().len()).map(|t| match scene.material(t).scatters() {
+            true => scene.area(t),
+            false => 0.0,
+        });
+        let surface = AreaSampler::new(areas);
+        let contrasts = self.contrasts();
+        let cells = AreaSampler::new(contrasts.iter().copied());
+        let gathered = self.gathered.iter().filter(|&&gathered| gathered).count();
+        let count = (gathered / TEXELS_PER_POINT).clamp(*POINTS.start(), *POINTS.end()) / 2;
+        let texels = TexelPoints::new(&self.atlas);
+        let (offset, rotations) = (SurfaceOffset::new(scene), CellRotation::new(&scene.bounds()));
+        let point = |(t, barycentric): (usize, [f64; 2])| {
+            let [u, v] = barycentric;
+            if !scene.material(t).scatters() {
+                return None;
+            }
+            scene.first_solid(t, std::iter::once(barycentric))?;
+            let place = self.atlas.place(t, barycentric);
+            let texel = texels.texel_size(t);
+            let share = match self.triangles_of_cell(place).contains(&(t as u32)) {
+                true => contrasts[self.cell(place)] / cells.total_area().max(f64::MIN_POSITIVE),
+                false => 0.0,
+            };
+            let density = 1.0 / surface.total_area() + share / (texel * texel);
+            let [a, b, c] = scene.corners(t);
+            let position = a * (1.0 - u - v) + b * u + c * v;
+            // Next to a side, another surface may be nearer than what a point of this size sees.
+            let inset = 3.0 * u.min(v).min(1.0 - u - v) * scene.area(t).sqrt();
+            let size = texel.min(inset);
+            let point = offset.gather_point(position, scene.normal(t), size);
+            let point = TwoSidedPoint::new(point, scene.material(t));
+            let inward = ([a, b, c].iter().sum::<DVec3>() / 3.0 - position).normalize_or_zero();
+            let turn = rotations.at(point.point.position, point.point.near);
+            let beside = point.moved_by(inward * JITTER * size * (0.5 + turn));
+            let albedo = scene.material(t).albedo();
+            let shown = albedo * self.irradiance_at(t, barycentric);
+            Some(ShownPoint { points: [point, beside], albedo, shown, area: 1.0 / density })
+        };
+        let even = surface.spread(count, 0.5).map(|place| (place.triangle, place.barycentric));
+        let even: Vec<ShownPoint> = even.filter_map(point).collect();
+        let in_cell = |k: usize| {
+            let (cell, _) = cells.locate((k as f64 + 0.5) / count as f64);
+            let corner = [cell as u32 % self.atlas.width(), cell as u32 / self.atlas.width()];
+            let place = DVec2::from(corner.map(f64::from)) + DVec2::from(r2_point(k, 0.5));
+            let on_triangle = |&t: &u32| {
+                let [a, b, c] = self.atlas.corners(t as usize).map(|p| p.extend(0.0));
+                let [u, v] = barycentric([a, b, c], DVec3::Z, place.extend(0.0));
+                let is_inside = u.min(v).min(1.0 - u - v) >= 0.0;
+                is_inside.then_some((t as usize, [u, v]))
+            };
+            point(self.triangles_of_cell(place).iter().find_map(on_triangle)?)
+        };
+        let count = if cells.total_area() > 0.0 { count } else { 0 };
+        even.into_iter().chain((0..count).filter_map(in_cell)).collect()
+    }
+
+    /// The upper left texel of the cell around a `place` in units of texels.
+    fn cell(&self, place: DVec2) -> usize {
+        Footprint::of(place, self.atlas.size).texels[0] as usize
+    }
+
+    /// The triangles on which the texels around a `place` gather, or none; some more than once.
+    fn triangles_of_cell(&self, place: DVec2) -> [u32; 4] {
+        Footprint::of(place, self.atlas.size).texels.map(|texel| self.triangles[texel as usize])
+    }
+
+    /// How far the four texels of each cell differ, as a share of the darkest, cells by their upper
+    /// left texels; 0 where one of them is no surface's.
+    fn contrasts(&self) -> Vec<f64> {
+        let radiosity: Vec<f64> = self.irradiance.iter().map(|e| e.length()).collect();
+        let gathered = radiosity.iter().zip(&self.gathered).filter(|(_, gathered)| **gathered);
+        let (sum, count) = gathered.fold((0.0, 0), |(sum, count), (e, _)| (sum + e, count + 1));
+        let floor = (RADIOSITY_FLOOR_SHARE * sum / f64::from(count)).max(f64::MIN_POSITIVE);
+        let [width, height] = self.atlas.size;
+        let contrast = |cell: u32| {
+            let [x, y] = [cell % width, cell / width];
+            if x + 1 == width || y + 1 == height {
+                return 0.0;
+            }
+            let texels = [cell, cell + 1, cell + width, cell + width + 1].map(|k| k as usize);
+            if texels.iter().any(|&k| self.triangles[k] == NO_TRIANGLE) {
+                return 0.0;
+            }
+            let values = texels.map(|k| radiosity[k]);
+            let (low, high) = (
+                values.into_iter().fold(f64::INFINITY, f64::min),
+                values.into_iter().fold(0.0, f64::max),
+            );
+            (high - low) / low.max(floor)
+        };
+        (0..width * height).map(contrast).collect()
+    }
+}
+
+/// What was gathered at a point.
+struct Found {
+    /// Reflected radiosity, W/m²: that of the map, and what was gathered twice.
+    shown: Rgb,
+    gathered: [Rgb; 2],
+    /// What it stands for, up to a common factor.
+    area: f64,
+}
+
+impl Found {
+    fn mean(&self) -> Rgb {
+        (self.gathered[0] + self.gathered[1]) / 2.0
+    }
+
+    /// The square of the relative error.
+    fn square(&self, floor: f64) -> f64 {
+        let scale = self.mean().length().max(floor);
+        let [a, b] = self.gathered.map(|gathered| (self.shown - gathered) / scale);
+        a.dot(b)
+    }
+}
+
+/// The root mean square of the relative errors that were `found`, and of that of the `light`.
+fn root_mean_square(found: &[Found], light: f64) -> Option<Estimate> {
+    let sum = |of: &dyn Fn(&Found) -> f64| found.iter().map(of).sum::<f64>();
+    let area = sum(&|point| point.area);
+    let brightness = sum(&|point| point.area * point.mean().length()) / area;
+    // Where nothing arrives, nothing is wrong.
+    let floor = (RADIOSITY_FLOOR_SHARE * brightness).max(f64::MIN_POSITIVE);
+    let mean = sum(&|point| point.area * point.square(floor)) / area;
+    let off = |point: &Found| (point.area * (point.square(floor) - mean)).powi(2);
+    let deviation = sum(&off).sqrt() / area;
+    let value = (mean.max(0.0) + light * light).sqrt();
+    let standard_error = deviation / (2.0 * value).max(deviation.sqrt());
+    (found.len() > 1).then_some(Estimate { value, standard_error })
+}
