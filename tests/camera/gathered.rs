@@ -62,7 +62,10 @@ fn picture_without_textures_is_that_of_its_surface() {
         ControlFlow::Continue(())
     });
     let plain = CAMERA.image(&light.surface, width, height, samples).unwrap();
-    assert!(image.unwrap().unwrap().pixels == plain.pixels);
+    // Its rays meet triangles of the scene, those of the surface its faces: but for rounding of
+    // weights, some 1e-15, they find the same.
+    let same = image.unwrap().unwrap().pixels.into_iter().zip(&plain.pixels);
+    assert!(same.into_iter().all(|(a, b)| a.distance(*b) < 1e-13 * (1.0 + b.length())));
     let all = (width * height) as usize;
     assert!(counts.len() > 2 && counts.is_sorted(), "{counts:?}");
     assert_eq!(counts.last(), Some(&(all, all)));
