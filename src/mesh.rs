@@ -216,8 +216,8 @@ impl Mesh {
         Ok(split)
     }
 
-    /// Builds the subtree of node `n`, and numbers its elements. `children_of` says what is known of
-    /// the children of a node, given the node and what is known of it; none if it has none.
+    /// Builds the subtree of node `n`, and numbers its elements. `children_of` says what is known
+    /// of the children of a node, given the node and what is known of it; none if it has none.
     fn build_subtree<T: Copy>(
         &mut self,
         n: usize,

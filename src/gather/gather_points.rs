@@ -161,8 +161,8 @@ impl SurfaceOffset {
     }
 }
 
-/// Whether a point is inside a solid, under what nearly touches it, or in a crack: no place to judge
-/// light by. `diagonal` of where the light is, scene unit.
+/// Whether a point is inside a solid, under what nearly touches it, or in a crack: no place to
+/// judge light by. `diagonal` of where the light is, scene unit.
 pub(crate) fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
     // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
     let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
