@@ -152,8 +152,8 @@ impl Backend {
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
     /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
     /// doubled where they disagree, up to 16 times; hemicubes are the same everywhere. What is
-    /// darker than a twentieth of the mean reflected radiosity has that share of this instead. Where
-    /// the device fails, rays on the CPU go on.
+    /// darker than a twentieth of the mean reflected radiosity has that share of this instead.
+    /// Where the device fails, rays on the CPU go on.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a noise that is not above 0 and at most 1; those of

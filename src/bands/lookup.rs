@@ -32,7 +32,8 @@ impl<'a> Lookup<'a> {
         Lookup { bands, corners, emission: (0..mesh.element_count()).map(emission).collect() }
     }
 
-    /// Adds to `irradiance` (W/m² by band) what emitters, the sky and the sun send along `row`.
+    /// Adds to `irradiance` (W/m² by band) what emitters, luminaires, the sky and the sun send
+    /// along `row`.
     pub fn add_emitted(&self, row: &PointRow, irradiance: &mut [f64]) {
         for &(material, factor) in &row.emitters {
             add(irradiance, factor, &self.bands.materials[material as usize].exitance);
@@ -43,6 +44,9 @@ impl<'a> Lookup<'a> {
                 let exitance = &self.bands.materials[material as usize].exitance;
                 add(irradiance, row.share * hit.passed, exitance);
             }
+        }
+        for &(k, factor) in &row.luminaires {
+            add(irradiance, factor, &self.bands.luminaires[k as usize]);
         }
         add(irradiance, PI * row.sky, &self.bands.sky);
         add(irradiance, row.sun, &self.bands.sun);

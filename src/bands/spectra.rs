@@ -41,6 +41,9 @@ pub struct Bands {
     /// Irradiance of a surface that faces the sun, W/m² by band; there is none in a scene without
     /// a sun.
     pub sun: Vec<f64>,
+    /// What the intensities of each luminaire of the scene are multiplied with, by band, in the
+    /// place of its [scale](crate::scene::Luminaire::scale).
+    pub luminaires: Vec<Vec<f64>>,
 }
 
 impl BandMaterial {
@@ -91,7 +94,8 @@ impl Bands {
     /// These bands without a material, under a black sky.
     pub fn dark(bands: Vec<Band>) -> Bands {
         let nothing = vec![0.0; bands.len()];
-        Bands { bands, materials: vec![], sky: nothing.clone(), sun: nothing }
+        let (materials, luminaires) = (vec![], vec![]);
+        Bands { bands, materials, sky: nothing.clone(), sun: nothing, luminaires }
     }
 
     /// The three bands `r`, `g` and `b` that a scene has by itself, its textures left out. The sky
@@ -109,6 +113,7 @@ impl Bands {
             materials: scene.materials().iter().map(material).collect(),
             sky: values(sky.uniform_radiance().unwrap_or_default()),
             sun: values(sky.sun().map_or(Rgb::ZERO, |sun| sun.irradiance)),
+            luminaires: scene.luminaires().iter().map(|lamp| values(lamp.scale)).collect(),
         }
     }
 
@@ -144,11 +149,15 @@ impl Bands {
             let remedy = format!("give one for each of the scene's {wanted}");
             return wrong("materials of bands", format!("{found} of them"), &remedy);
         }
-        if !scene.luminaires().is_empty() {
-            let found = format!("{} in the scene", scene.luminaires().len());
-            return wrong("luminaires", found, "they have no bands: bake without them");
+        let (found, wanted) = (self.luminaires.len(), scene.luminaires().len());
+        if found != wanted {
+            let remedy = format!("give one for each of the scene's {wanted}");
+            return wrong("luminaires of bands", format!("{found} of them"), &remedy);
         }
-        for (values, place) in [(&self.sky, "sky"), (&self.sun, "sun")] {
+        let luminaires = self.luminaires.iter().map(|values| (values, "luminaire"));
+        for (values, place) in
+            [(&self.sky, "sky"), (&self.sun, "sun")].into_iter().chain(luminaires)
+        {
             check_count(values, "values", &self.bands, place)?;
             if let Some(bad) = values.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
                 return wrong(place, format!("{bad} in a band"), "give at least 0, and finite");

@@ -48,9 +48,18 @@ const MIDDLE: [Node; 1] = [Node { x: 0.5, weight: 1.0 }];
 impl LuminaireLight<'_> {
     /// Irradiance at `point`, W/m² per channel.
     pub fn irradiance(&self, point: &GatherPoint) -> Rgb {
-        self.luminaires.iter().map(|luminaire| self.of(luminaire, point)).sum()
+        self.luminaires.iter().map(|luminaire| luminaire.scale * self.of(luminaire, point)).sum()
     }
 
+    /// The luminaires that `point` sees, by their indices, and what they light it with in units of
+    /// their scales, W/m²: a mean of the channels where panes let through less of one.
+    pub fn unscaled(&self, point: &GatherPoint) -> Vec<(u32, f64)> {
+        let of = |luminaire| self.of(luminaire, point).element_sum() / 3.0;
+        let all = (0..).zip(self.luminaires.iter().map(of));
+        all.filter(|&(_, irradiance)| irradiance > 0.0).collect()
+    }
+
+    /// Irradiance at `point` in units of the scale, W/m² per channel.
     fn of(&self, luminaire: &Luminaire, point: &GatherPoint) -> Rgb {
         let GatherPoint { position, normal, .. } = *point;
         let unoccluded = unoccluded(luminaire, position, normal);
@@ -62,7 +71,7 @@ impl LuminaireLight<'_> {
             true => self.passed(point, luminaire.position),
             false => self.seen_share(luminaire, point),
         };
-        luminaire.scale * unoccluded * seen
+        unoccluded * seen
     }
 
     /// The share of the light of an opening that arrives at `point`, per channel.

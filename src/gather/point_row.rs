@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   irradiance = share · Σ_hits passed · B_reflected + Σ_emitters F · E + F_sky · π L + F_sun · S
+//!              + Σ_luminaires E_1 · scale
 //! ```
 //!
 //! A row is of the geometry alone, so light of any number of bands is looked up along it.
@@ -23,6 +24,9 @@ pub(crate) struct PointRow {
     pub sky: f64,
     /// Irradiance from the sun over that of a surface that faces it, all of it seen.
     pub sun: f64,
+    /// Luminaire, by its index, and the irradiance from it in units of its scale, W/m², of each
+    /// that is seen.
+    pub luminaires: Vec<(u32, f64)>,
     /// Form factor of backs.
     pub backface: f64,
     /// Mean of 1/distance over the hemisphere, 1/scene unit.

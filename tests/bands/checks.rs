@@ -44,12 +44,20 @@ fn bad_bands_are_refused() {
 }
 
 #[test]
-fn luminaires_have_no_bands() {
+fn every_luminaire_wants_its_bands() {
     let intensity = IntensityDistribution::isotropic(1.0).unwrap();
     let lamp = Luminaire::new(intensity, DVec3::splat(0.5), -DVec3::Z);
     let scene = cube(&glow()).with_luminaires(vec![lamp]).unwrap();
-    let error = good().check(&scene).unwrap_err().to_string();
-    assert!(error.contains("luminaires: 1 in the scene"), "{error}");
+    for (luminaires, words) in [
+        (vec![], "luminaires of bands: 0 of them; give one for each of the scene's 1"),
+        (vec![vec![1.0]], "luminaire: 1 values; give 2"),
+        (vec![vec![1.0, -1.0]], "luminaire: -1 in a band"),
+    ] {
+        let bands = Bands { luminaires, ..good() };
+        let error = bands.check(&scene).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    Bands { luminaires: vec![vec![0.0, 3.0]], ..good() }.check(&scene).unwrap();
 }
 
 #[test]

@@ -18,6 +18,7 @@ fn selection(bands: &Bands, chosen: &[usize]) -> Bands {
         materials: bands.materials.iter().map(material).collect(),
         sky: values(&bands.sky),
         sun: values(&bands.sun),
+        luminaires: bands.luminaires.iter().map(|lamp| values(lamp)).collect(),
     }
 }
 

@@ -92,3 +92,41 @@ fn wrong_luminaires_are_refused() {
         refused(&[&scene, option, &value], &[words]);
     }
 }
+
+#[test]
+fn luminaires_light_bands_as_the_file_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "room.obj", &room(6));
+    let lamp = write(folder.path(), "bulb.ies", EVEN).display().to_string();
+    let at = format!("{lamp}@0.5,0.4,0.6*4");
+    let file = |luminaires: &str| {
+        let head = r#"{"bands": ["a", "b"], "materials": {"*": {"reflectance": 0.5}}"#;
+        let text = format!("{head}{luminaires}}}");
+        write(folder.path(), "bands.json", &text).display().to_string()
+    };
+    let name = scene.display().to_string();
+    let args = |bands: &str| {
+        let lit = ["--luminaire", &at, "--bands", bands, "--error", "0.1", "--cpu"];
+        let args: Vec<String> = lit.map(String::from).into();
+        args
+    };
+    let with = |args: &[String]| -> Vec<String> {
+        [&[name.clone(), "--write".into(), "csv".into()], args].concat()
+    };
+    let all = with(&args(&file(", \"luminaires\": [0, 0.25]")));
+    let out = run("bake", &all.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let table = std::fs::read_to_string(scene.with_extension("bands.csv")).unwrap();
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| names.iter().position(|n| n.starts_with(name)).unwrap();
+    let (a, b) = (column("irradiance_a"), column("irradiance_b"));
+    for line in lines {
+        let values: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        // 100 cd times 4 times 0.25, straight, from a third of a metre to one, and reflected.
+        assert!(values[a] == 0.0 && (30.0..5000.0).contains(&values[b]), "{line}");
+    }
+    let all = with(&args(&file("")));
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    refused(&all, &["nothing of luminaires", "or 0"]);
+}

@@ -32,8 +32,8 @@ scene without its ending and with .light-map, unless given.
   --error X         how far the bake, and what the map shows, may be off: see `radiosity bake
                     --help` [0.05]. The last line says whether the map was measured to be so
   --error-each X    the same for each group of the scene, however small
-  --size PIXELS     texels along a side of the map. Without, 64 to 2048, a power of two: as many as it
-                    takes for what is shown, between texels too, to be as exact as asked
+  --size PIXELS     texels along a side of the map. Without, 64 to 2048, a power of two: as many
+                    as it takes for what is shown, between texels too, to be as exact as asked
   --texel SIZE      edge of a texel on the surfaces, scene unit
   --coordinates auto  the texture coordinates of the file, where they are within [0, 1] and no two
                     triangles share a texel; else new ones. That is the default
@@ -254,8 +254,8 @@ impl Options {
         Atlas::new(scene, resolution, self.coordinates)
     }
 
-    /// The map of `baked`, and how far off it was measured to be; with as many texels as that takes,
-    /// unless their number was given. Ctrl-C leaves the last that was done.
+    /// The map of `baked`, and how far off it was measured to be; with as many texels as that
+    /// takes, unless their number was given. Ctrl-C leaves the last that was done.
     fn map(
         &self,
         mut atlas: Atlas,

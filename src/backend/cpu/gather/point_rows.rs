@@ -16,7 +16,13 @@ impl PointRows for RayGather {
         let light = DirectLight::new(self, point);
         let count = (self.min_rays / parts.max(1)).max(1);
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
-        parts.map(|range| self.row(mesh, point, &light, range)).collect()
+        // All parts alike: what luminaires send is without noise, or nearly.
+        let luminaires = self.luminaires().unscaled(point);
+        let row = |range| PointRow {
+            luminaires: luminaires.clone(),
+            ..self.row(mesh, point, &light, range)
+        };
+        parts.map(row).collect()
     }
 
     fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use radiosity::bands::{Band, BandError, BandMaterial};
-use radiosity::{BakeResult, BandLight, Bands, Error, ErrorKind, Scene};
+use radiosity::{BakeResult, BandLight, Bands, Error, ErrorKind, Luminaire, Scene};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -27,6 +27,8 @@ struct BandFile {
     sky: Spectrum,
     #[serde(default)]
     sun: Spectrum,
+    /// Of all luminaires alike; none is dark.
+    luminaires: Option<Spectrum>,
 }
 
 #[derive(Deserialize)]
@@ -126,8 +128,8 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         let found = format!("cannot be read: {e}");
         wrong(file.clone(), found, "give a JSON file that can be read").with_source(e)
     })?;
-    let BandFile { bands, materials, sky, sun, .. } =
-        serde_json::from_slice(&bytes).map_err(|e| {
+    let BandFile { bands, materials, sky, sun, luminaires, .. } = serde_json::from_slice(&bytes)
+        .map_err(|e| {
             let place = format!("{file}:{}", e.line());
             let remedy = "give bands, and materials with their reflectance: see docs/bands.md";
             wrong(place, e.to_string(), remedy).with_source(e)
@@ -158,7 +160,21 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         });
     }
     let (sky, sun) = (values(&sky, "sky")?, values(&sun, "sun")?);
-    let bands = Bands { bands, materials: of_bands, sky, sun };
+    let luminaires = match luminaires {
+        Some(spectrum) => values(&spectrum, "luminaires")?,
+        None if scene.luminaires().is_empty() => vec![],
+        None => {
+            let remedy = "give luminaires, what their intensities count in each band, or 0";
+            return Err(wrong(file, "nothing of luminaires".into(), remedy));
+        }
+    };
+    // A scale is for all bands, as a number of three channels is.
+    let of_luminaire = |lamp: &Luminaire| {
+        let scale = lamp.scale.element_sum() / 3.0;
+        luminaires.iter().map(|value| scale * value).collect()
+    };
+    let luminaires = scene.luminaires().iter().map(of_luminaire).collect();
+    let bands = Bands { bands, materials: of_bands, sky, sun, luminaires };
     bands.check(scene)?;
     Ok(bands)
 }
