@@ -120,7 +120,7 @@ pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
         total - texels
     );
     progress::print_written();
-    options.print_shown(shown);
+    options.print_shown(shown, &baked);
     Ok(())
 }
 
@@ -317,15 +317,17 @@ impl Options {
     }
 
     /// Says whether the map shows what was asked for.
-    fn print_shown(&self, shown: Option<Estimate>) {
+    fn print_shown(&self, shown: Option<Estimate>, baked: &BakeResult) {
         let Some(shown) = shown else { return };
-        let asked = 100.0 * self.error();
+        // In the digits that it was asked in.
+        let asked = (100.0 * self.error()) as f32;
+        let of_light = baked.estimate.of_light();
         if shown.value <= self.error() {
             say!("{asked} % reached: the map shows {}", said(&shown));
         } else {
-            let remedy = match self.resolution {
-                Some(_) => "more texels (--size) or a finer bake (--error) may do",
-                None => "a finer bake (--error), or more texels (--size), may do",
+            let remedy = match of_light > self.error() {
+                true => format!("{:.2} % is the light that texels gather", 100.0 * of_light),
+                false => "more texels (--size) would do".into(),
             };
             say!("{asked} % missed: the map shows {}; {remedy}", said(&shown));
         }
