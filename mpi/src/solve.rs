@@ -24,6 +24,14 @@ use crate::world::World;
 /// Between two writings of the state.
 const STATE_INTERVAL: Duration = Duration::from_secs(10);
 
+/// The graphics device; rays on the CPU where the program was built without.
+fn device() -> Result<Backend, radiosity::Error> {
+    #[cfg(feature = "gpu")]
+    return Backend::gpu(None);
+    #[cfg(not(feature = "gpu"))]
+    Ok(Backend::Cpu)
+}
+
 /// Runs the command.
 pub fn run(parser: &mut lexopt::Parser, world: &mut World) -> Result<(), Failure> {
     let (mut scene, mut out, mut state) = (None, None, None);
@@ -49,7 +57,7 @@ pub fn run(parser: &mut lexopt::Parser, world: &mut World) -> Result<(), Failure
     let gather = gather.map(|error| FinalGather::new(error, &scene)).transpose()?;
     let size = size.unwrap_or_else(|| BakeSettings::elements_only(&scene).solve.element_size);
     let mesh = Mesh::new(scene, size)?.split_at_contacts(2);
-    let backend = if on_cpu { Backend::Cpu } else { Backend::gpu(None)? };
+    let backend = if on_cpu { Backend::Cpu } else { device()? };
     let source = backend.rows(&mesh, hemicube, NonZeroU32::MIN)?;
     let mut source = ProximityCorrection::new(source, &mesh, 1.0);
     if world.rank() != 0 {
