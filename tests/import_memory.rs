@@ -15,7 +15,7 @@ fn peak() -> usize {
 }
 
 /// Bytes of each file.
-const BYTES: usize = 8 << 20;
+const BYTES: usize = 4 << 20;
 
 /// The variable that tells a process which file it is to load.
 const CASE: &str = "RADIOSITY_IMPORT_MEMORY_CASE";
