@@ -92,9 +92,7 @@ impl Camera {
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let met = Arc::new(RayScene::new(surface.faces.iter().map(corners)));
-        let rays = PrimaryRays::new(self, (surface, None, met), width, height, samples)?;
+        let rays = PrimaryRays::new(self, (surface, None), width, height, samples)?;
         let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
         let (pixels, sky) = rays.pixels(0..width * height, &radiosity).unzip();
         Ok(RadianceImage { width, height, pixels, sky })
@@ -179,12 +177,17 @@ struct PrimaryRays<'a> {
 impl PrimaryRays<'_> {
     fn new<'a>(
         camera: &Camera,
-        (surface, mesh, met): (&'a VertexMesh, Option<&'a Mesh>, Arc<RayScene>),
+        (surface, mesh): (&'a VertexMesh, Option<&'a Mesh>),
         width: u32,
         height: u32,
         samples: u32,
     ) -> Result<PrimaryRays<'a>, Error> {
         camera.check(width, height, samples)?;
+        let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
+        let met = match mesh {
+            Some(mesh) => RayScene::with_clear(mesh.scene()),
+            None => Arc::new(RayScene::new(surface.faces.iter().map(corners))),
+        };
         let [right, up, forward] = camera.frame();
         let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
         let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
@@ -217,8 +220,7 @@ impl PrimaryRays<'_> {
         samples: u32,
     ) -> Result<PrimaryRays<'a>, Error> {
         let GatheredMesh { mesh, surface, .. } = light;
-        let met = RayScene::with_clear(mesh.scene());
-        PrimaryRays::new(camera, (surface, Some(mesh), met), width, height, samples)
+        PrimaryRays::new(camera, (surface, Some(mesh)), width, height, samples)
     }
 
     /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.

@@ -41,10 +41,6 @@ use crate::visibility::ray_scene::Hit;
 /// these.
 const FIRST_BATCH: usize = 16;
 
-/// How far beside a point it gathers again, in units of the element's size; up to 1.5 times as far.
-/// Small enough that the light is the same, large enough to be another cell of the rotation.
-const JITTER: f64 = 1e-3;
-
 /// How far points are drawn towards the centroid of their face, a share of the way: on a side,
 /// where walls meet, it is undefined what is seen.
 const INSET: f64 = 0.03;
@@ -473,8 +469,7 @@ impl Sample {
 
     /// A point a hair beside.
     fn jittered(&self) -> TwoSidedPoint {
-        let step = JITTER * self.size * (0.5 + self.rotation);
-        self.point.moved_by(self.inward.normalize_or_zero() * step.min(self.inward.length()))
+        self.point.beside(self.inward, self.size, self.rotation)
     }
 }
 

@@ -114,11 +114,7 @@ impl Solution for GatheredMesh {
     fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
         let (surface, t) = (&self.surface, point.triangle);
         let place = surface.face_at(&self.mesh, t, scene.barycentric(t, point.position))?;
-        let material = scene.material(t);
-        Some(match scene.textures(t) {
-            Some(_) => material.albedo() * surface.value_at(&place, &surface.irradiance),
-            None => surface.value_at(&place, &surface.radiosity) - material.exitance,
-        })
+        Some(surface.reflected_at(scene, t, &place))
     }
 
     fn places(&self) -> usize {

@@ -10,6 +10,10 @@ use crate::error::Error;
 use crate::scene::{Material, Rgb};
 use crate::visibility::offset;
 
+/// How far beside a point another one lies, in units of its size; up to 1.5 times as far. Small
+/// enough that the light is the same, large enough to be another cell of the rotation.
+const JITTER: f64 = 1e-3;
+
 /// A gather point, and how much counts what arrives on the other side of its surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TwoSidedPoint {
@@ -35,8 +39,16 @@ impl TwoSidedPoint {
         TwoSidedPoint { point, height, behind: Rgb::ZERO }
     }
 
+    /// A point a hair beside, towards what lies `inward`: the light is the same there, but another
+    /// `turn` of the directions, in [0, 1), goes with another step. `size` is that of what the
+    /// point stands for, scene unit.
+    pub fn beside(self, inward: DVec3, size: f64, turn: f64) -> TwoSidedPoint {
+        let step = (JITTER * size * (0.5 + turn)).min(inward.length());
+        self.moved_by(inward.normalize_or_zero() * step)
+    }
+
     /// The same a `step` further on.
-    pub fn moved_by(self, step: DVec3) -> TwoSidedPoint {
+    fn moved_by(self, step: DVec3) -> TwoSidedPoint {
         let point = GatherPoint { position: self.point.position + step, ..self.point };
         TwoSidedPoint { point, ..self }
     }

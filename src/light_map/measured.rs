@@ -1,8 +1,8 @@
 //! How far off a map is, as it is shown.
 //!
 //! What a bake estimates is the error of its vertices. A map has another one, since light bends
-//! between its texels. So points of the surfaces gather as texels do, twice, the
-//! second time from a hair beside, and are compared with what the map shows there:
+//! between its texels. So points of the surfaces gather as texels do, twice, the second
+//! time from a hair beside, and are compared with what the map shows there:
 //!
 //! ```text
 //!   e² = (shown − first) · (shown − second) / max(|mean of both|, floor)²
@@ -38,10 +38,6 @@ use crate::verify::Estimate;
 /// texels took.
 const TEXELS_PER_POINT: usize = 32;
 const POINTS: RangeInclusive<usize> = 2048..=16384;
-
-/// How far beside a point it gathers again, in texels; up to 1.5 times as far: the light is the
-/// same there, but directions are rotated otherwise.
-const JITTER: f64 = 1e-3;
 
 /// Points in the first batch; later ones follow the clock.
 const FIRST_BATCH: usize = 64;
@@ -142,9 +138,9 @@ impl LightMap {
             let size = texel.min(inset);
             let point = offset.gather_point(position, scene.normal(t), size);
             let point = TwoSidedPoint::new(point, scene.material(t));
-            let inward = ([a, b, c].iter().sum::<DVec3>() / 3.0 - position).normalize_or_zero();
+            let inward = [a, b, c].iter().sum::<DVec3>() / 3.0 - position;
             let turn = rotations.at(point.point.position, point.point.near);
-            let beside = point.moved_by(inward * JITTER * size * (0.5 + turn));
+            let beside = point.beside(inward, size, turn);
             let albedo = scene.material(t).albedo();
             let shown = albedo * self.irradiance_at(t, barycentric);
             Some(ShownPoint { points: [point, beside], albedo, shown, area: 1.0 / density })

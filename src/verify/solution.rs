@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::path_tracer::{SurfacePoint, nearest_surfaces};
 use crate::error::{Error, ErrorKind, shortened};
 use crate::scene::{Material, Rgb, Scene};
-use crate::vertex::VertexMesh;
+use crate::vertex::{FacePlace, VertexMesh};
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Places of a material at which it is looked up what the solution emits, at least. Chosen by hand.
@@ -163,22 +163,24 @@ impl<'a> SolutionLookup<'a> {
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
         let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
         places.filter_map(move |position| {
-            let hit = self.face(scene, &SurfacePoint { triangle: t, position })?;
-            Some(self.light_at(&hit))
+            let place = self.face(scene, &SurfacePoint { triangle: t, position })?;
+            Some(self.light_at(&place))
         })
     }
 
-    /// Where the solution is hit at `point` of `scene`: the nearest face that faces alike. Of
+    /// The place on the solution at `point` of `scene`: the nearest face that faces alike. Of
     /// several in one place it is the first whose light is the material's.
-    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<Hit> {
+    fn face(&self, scene: &Scene, point: &SurfacePoint) -> Option<FacePlace> {
         let (position, normal) = (point.position, scene.normal(point.triangle));
-        let faces = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+        let hits = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+        let place = |hit: &Hit| FacePlace { face: hit.triangle, weights: [hit.u, hit.v] };
+        let faces: Vec<FacePlace> = hits.iter().map(place).collect();
         if faces.len() < 2 || !self.has_irradiance() {
             return faces.into_iter().next();
         }
         let material = scene.material(point.triangle);
-        let is_of_material = |hit: &&Hit| {
-            let (radiosity, irradiance) = self.light_at(hit);
+        let is_of_material = |place: &&FacePlace| {
+            let (radiosity, irradiance) = self.light_at(place);
             is_light_of(material, radiosity, irradiance)
         };
         faces.iter().find(is_of_material).or(faces.first()).copied()
@@ -189,27 +191,17 @@ impl<'a> SolutionLookup<'a> {
         self.solution.irradiance.len() == self.solution.positions.len()
     }
 
-    /// Radiosity and irradiance where the solution is hit, W/m².
-    fn light_at(&self, hit: &Hit) -> (Rgb, Rgb) {
+    /// Radiosity and irradiance at a place of the solution, W/m².
+    fn light_at(&self, place: &FacePlace) -> (Rgb, Rgb) {
         let VertexMesh { radiosity, irradiance, .. } = self.solution;
-        (self.interpolated(hit, radiosity), self.interpolated(hit, irradiance))
-    }
-
-    /// Of one value a vertex, the one where the solution is hit.
-    fn interpolated(&self, hit: &Hit, values: &[Rgb]) -> Rgb {
-        let [a, b, c] = self.solution.faces[hit.triangle].map(|v| values[v as usize]);
-        (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c
+        (self.solution.value_at(place, radiosity), self.solution.value_at(place, irradiance))
     }
 }
 
 impl Solution for SolutionLookup<'_> {
     fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb> {
-        let hit = self.face(scene, point)?;
-        let material = scene.material(point.triangle);
-        Some(match scene.textures(point.triangle) {
-            Some(_) => material.albedo() * self.interpolated(&hit, &self.solution.irradiance),
-            None => self.interpolated(&hit, &self.solution.radiosity) - material.exitance,
-        })
+        let place = self.face(scene, point)?;
+        Some(self.solution.reflected_at(scene, point.triangle, &place))
     }
 
     fn places(&self) -> usize {

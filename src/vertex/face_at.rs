@@ -3,7 +3,7 @@
 use super::VertexMesh;
 use crate::geometry::barycentric::barycentric;
 use crate::mesh::Mesh;
-use crate::scene::Rgb;
+use crate::scene::{Rgb, Scene};
 
 /// A place on a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,16 @@ impl VertexMesh {
         places.max_by(|a, b| a.inside().total_cmp(&b.inside()))
     }
 
+    /// What the surface reflects at `place`, on triangle `t` of `scene`, with the reflectance of
+    /// its material, W/m².
+    pub(crate) fn reflected_at(&self, scene: &Scene, t: usize, place: &FacePlace) -> Rgb {
+        let material = scene.material(t);
+        match scene.textures(t) {
+            Some(_) => material.albedo() * self.value_at(place, &self.irradiance),
+            None => self.value_at(place, &self.radiosity) - material.exitance,
+        }
+    }
+
     /// Of one value a vertex, the one at `place`, between its corners.
     pub(crate) fn value_at(&self, place: &FacePlace, values: &[Rgb]) -> Rgb {
         let [a, b, c] = self.faces[place.face].map(|v| values[v as usize]);
@@ -56,7 +66,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Material, Scene, Triangle};
+    use crate::scene::{Material, Triangle};
 
     #[test]
     fn every_face_is_found_at_its_points() {

@@ -10,38 +10,34 @@ use crate::scene::texture::TextureMap;
 pub(crate) struct CutOuts {
     /// Of each material of the scene.
     masks: Vec<Option<TextureMap>>,
-    /// Of each piece its material, and the texture coordinates of its corners.
+    /// Of each triangle its material, and the texture coordinates of its corners.
     places: Vec<(u32, [DVec2; 3])>,
 }
 
 impl CutOuts {
-    /// Those of pieces of triangles of `scene`: each triangle, and the weights of its second and
-    /// third corner at the corners of the piece. None in a scene without.
-    pub fn new(
-        scene: &Scene,
-        pieces: impl Iterator<Item = (usize, [[f64; 2]; 3])>,
-    ) -> Option<CutOuts> {
+    /// Those of some `triangles` of `scene`, in their order. None in a scene without.
+    pub fn new(scene: &Scene, triangles: impl Iterator<Item = usize>) -> Option<CutOuts> {
         if !scene.has_cut_outs() {
             return None;
         }
         let mut masks = vec![None; scene.materials().len()];
-        let place = |(t, corners): (usize, [[f64; 2]; 3])| {
+        let place = |t: usize| {
             let material = scene.triangles()[t].material;
             let mask = &mut masks[material as usize];
             if mask.is_none() {
                 *mask = scene.mask(t).cloned();
             }
-            (material, corners.map(|corner| scene.texture_place(t, corner)))
+            (material, Scene::WHOLE.map(|corner| scene.texture_place(t, corner)))
         };
-        let places = pieces.map(place).collect();
+        let places = triangles.map(place).collect();
         Some(CutOuts { masks, places })
     }
 
-    /// Whether the piece of this number is there, where its second and third corner have these
+    /// Whether the triangle of this number is there, where its second and third corner have these
     /// weights.
     #[inline]
-    pub fn is_solid(&self, piece: usize, [u, v]: [f64; 2]) -> bool {
-        let (material, [a, b, c]) = self.places[piece];
+    pub fn is_solid(&self, triangle: usize, [u, v]: [f64; 2]) -> bool {
+        let (material, [a, b, c]) = self.places[triangle];
         let mask = self.masks[material as usize].as_ref();
         mask.is_none_or(|mask| mask.is_solid(a * (1.0 - u - v) + b * u + c * v))
     }

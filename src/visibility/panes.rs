@@ -40,8 +40,7 @@ impl Panes {
         let (triangles, transmittance): (Vec<usize>, Vec<Rgb>) =
             (0..scene.triangles().len()).filter_map(clear).unzip();
         let rays = RayScene::new(triangles.iter().map(|&t| scene.corners(t)));
-        let whole = triangles.into_iter().map(|t| (t, Scene::WHOLE));
-        let rays = rays.with_cut_outs(CutOuts::new(scene, whole));
+        let rays = rays.with_cut_outs(CutOuts::new(scene, triangles.into_iter()));
         Panes { rays: Some(rays), transmittance }
     }
 

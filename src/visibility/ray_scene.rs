@@ -101,7 +101,7 @@ impl RayScene {
         let met = (0..count as u32).filter(|&t| is_met(t as usize)).collect();
         RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
             .with_covered_backs(|t| scene.is_back_covered(t))
-            .with_cut_outs(CutOuts::new(scene, (0..count).map(|t| (t, Scene::WHOLE))))
+            .with_cut_outs(CutOuts::new(scene, 0..count))
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and
