@@ -33,6 +33,7 @@ mod error_estimate;
 mod estimator;
 mod fallback;
 mod gather_phase;
+mod in_time;
 mod judge;
 mod light_in_gaps;
 mod light_survey;

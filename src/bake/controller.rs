@@ -70,7 +70,7 @@ impl ErrorTarget<'_> {
 
 /// The error of a group with one standard error added: the largest errors are at rare points. The
 /// whole has it already.
-fn cautious(estimate: &ErrorEstimate) -> f64 {
+pub(super) fn cautious(estimate: &ErrorEstimate) -> f64 {
     estimate.total + estimate.uncertainty
 }
 

@@ -2,15 +2,15 @@
 
 use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::backend::Backend;
-use crate::bake::controller::{ErrorTarget, Judged};
-use crate::bake::outcome::{Obstacle, Outcome};
+use crate::bake::controller::ErrorTarget;
+use crate::bake::in_time::bake_in_time;
+use crate::bake::pipeline;
 use crate::bake::progress::{BakeProgress, ProgressCallback};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
-use crate::bake::{model, pipeline};
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
@@ -38,8 +38,8 @@ pub enum BakeTarget {
     /// The same for every group of the scene, however small its share of the area is.
     ErrorEach(f64),
     /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long
-    /// the one before took, for as long as another fits in. What is not done in time is stopped,
-    /// and the last that was done is returned; if none was, what was reached.
+    /// those before took, for as long as another fits in. What is not done in time is stopped, and
+    /// the one of least estimated error is returned, stopped or not.
     Time(Duration),
     /// An error, but no longer than a wall time: bakes to errors that fit into it, as for
     /// [`BakeTarget::Time`], which end when this one is reached. [`BakeResult::outcome`] tells
@@ -124,7 +124,7 @@ impl BakeTarget {
     }
 }
 
-fn not_a_time(seconds: f64) -> Error {
+pub(super) fn not_a_time(seconds: f64) -> Error {
     let place = format!("{seconds} seconds");
     Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
 }
@@ -146,7 +146,7 @@ fn check_light(scene: &Scene) -> Result<(), Error> {
     Err(Error::new(ErrorKind::Scene, "light", found, remedy))
 }
 
-fn check_error(error: f64) -> Result<(), Error> {
+pub(super) fn check_error(error: f64) -> Result<(), Error> {
     if error > 0.0 && error < 1.0 {
         return Ok(());
     }
@@ -154,7 +154,7 @@ fn check_error(error: f64) -> Result<(), Error> {
     Err(Error::new(ErrorKind::Setting, format!("error {error}"), "out of range", remedy))
 }
 
-fn bake_to_error(
+pub(super) fn bake_to_error(
     target: ErrorTarget,
     scene: &Arc<Scene>,
     backend: &Backend,
@@ -167,73 +167,4 @@ fn bake_to_error(
     }
     (target.overrides)(&mut settings);
     pipeline::run(&settings, scene, backend, Some(target), progress)
-}
-
-/// Bakes to one error after the other until `limit` or, if there is one, until `goal` is reached.
-fn bake_in_time(
-    limit: Duration,
-    goal: Option<ErrorTarget>,
-    scene: &Arc<Scene>,
-    backend: &Backend,
-    overrides: &dyn Fn(&mut BakeSettings),
-    progress: ProgressCallback,
-) -> Result<BakeResult, Error> {
-    if limit.is_zero() {
-        return Err(not_a_time(0.0));
-    }
-    let start = Instant::now();
-    let end = limit.mul_f64(1.0 - model::TIME_FOR_ESTIMATE);
-    let without_checkpoint = |settings: &mut BakeSettings| {
-        overrides(settings);
-        settings.solve.checkpoint = None;
-    };
-    let mut best: Option<BakeResult> = None;
-    let (least, each_group) = goal.map_or((0.0, false), |goal| (goal.error, goal.each_group));
-    if goal.is_some() {
-        check_error(least)?;
-    }
-    let mut error = model::INITIAL_ERROR.max(least);
-    loop {
-        let attempt_start = Instant::now();
-        let (mut stopped, mut cancelled) = (false, false);
-        let target = ErrorTarget { error, each_group, overrides: &without_checkpoint };
-        let attempt = bake_to_error(target, scene, backend, &mut |stage| {
-            cancelled |= progress(stage).is_break();
-            stopped |= cancelled || start.elapsed() >= end;
-            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        let short = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
-        let baked = match (attempt, best.take()) {
-            (Err(error), Some(best)) if error.is_device_error() => {
-                return Ok(BakeResult { device_failure: Some(error), ..best });
-            }
-            (attempt, Some(best)) if stopped => {
-                attempt?;
-                let outcome = goal.map_or(best.outcome, |_| Outcome::Missed(short));
-                return Ok(BakeResult { outcome, ..best });
-            }
-            (attempt, _) => attempt?,
-        };
-        let is_reached = goal.is_some_and(|goal| {
-            let BakeResult { estimate, groups, .. } = &baked;
-            goal.is_reached(Judged { whole: estimate, by_light: estimate, groups }, stopped)
-        });
-        let outcome = match goal {
-            // A time was asked for, and the errors that were tried are nobody's.
-            None => Outcome::Unasked,
-            Some(_) if is_reached => Outcome::Reached,
-            Some(_) if !stopped && error <= least => baked.outcome,
-            Some(_) => Outcome::Missed(short),
-        };
-        let is_done = is_reached || stopped || error <= least;
-        let baked = BakeResult { outcome, ..baked };
-        let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
-        let taken = attempt_start.elapsed().as_secs_f64();
-        let improvement = model::affordable_improvement(remaining, taken);
-        if is_done || improvement < model::MIN_IMPROVEMENT.min(error / least) {
-            return Ok(baked);
-        }
-        best = Some(baked);
-        error = (error / improvement).max(least);
-    }
 }
