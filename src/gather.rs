@@ -30,6 +30,7 @@ mod refinement_settings;
 mod sampled_mesh;
 pub(crate) mod scouts;
 mod shared;
+mod source_light;
 mod surplus;
 pub(crate) mod two_sided;
 pub(crate) mod vertex_rows;

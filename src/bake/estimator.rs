@@ -21,11 +21,10 @@ use crate::bake::error_estimate::{
 use crate::bake::model;
 use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
 use crate::error::Error;
-use crate::gather::GatheredMesh;
 use crate::gather::gather_points::{SurfaceOffset, is_hidden, is_in_the_open};
 use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
-use crate::gather::{Gather, IrradianceSample};
+use crate::gather::{Gather, GatheredMesh, IrradianceSample, RadiosityField};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::octaves::{Octaves, Part};
@@ -67,7 +66,7 @@ pub(super) struct ErrorEstimator<'a> {
     /// The result: what vertices gathered, or the elements' own light.
     pub light: &'a GatheredMesh,
     /// What vertices gathered it from; none if it is the elements' own light.
-    pub lit_by: Option<&'a GatheredMesh>,
+    pub lit_by: Option<RadiosityField<'a>>,
     /// What the middle of each element may be off by, up to a common factor, W/m².
     pub element_residual: &'a [f64],
     pub ledger: &'a Ledger,
@@ -222,8 +221,8 @@ impl ErrorEstimator<'_> {
     }
 
     /// What lights the vertices.
-    fn sources(&self) -> &GatheredMesh {
-        self.lit_by.unwrap_or(self.light)
+    fn sources(&self) -> RadiosityField<'_> {
+        self.lit_by.unwrap_or_else(|| self.light.radiosity_field())
     }
 
     /// Gathers at `samples` in an order whose first few are spread over all; none for those that
@@ -234,7 +233,7 @@ impl ErrorEstimator<'_> {
         gatherer: &mut dyn Gather,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Vec<Option<SampleGathers>>, Error> {
-        let sources = self.sources().radiosity_field();
+        let sources = self.sources();
         let mut gathers = vec![None; samples.len()];
         let order = golden_ratio_order(samples.len());
         let mut remaining = &order[..];
@@ -275,7 +274,7 @@ impl ErrorEstimator<'_> {
     /// L = E + ρF S gathered from S they add Σ (ρF)ⁿ (L − S) over n ≥ 2.
     fn later(&self, sample: &Sample, k: usize) -> Rgb {
         let (Some(lit_by), Some(paths)) = (self.lit_by, self.paths) else { return Rgb::ZERO };
-        let fields = [self.light, lit_by].map(GatheredMesh::radiosity_field);
+        let fields = [self.light.radiosity_field(), lit_by];
         let change = |hit: &Hit| {
             let [now, before] = fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v));
             now - before
@@ -383,7 +382,7 @@ impl ErrorEstimator<'_> {
     /// where that is more, of each of `strata`; and gives [`ErrorEstimate::unshot_bound`].
     fn unshot(&self, floor: f64, strata: &mut [Stratum]) -> f64 {
         let sources = self.sources();
-        let mesh = &sources.mesh;
+        let mesh = sources.mesh;
         let ambient_irradiance = self.ledger.add_ambient(mesh, &mut []);
         let groups = mesh.scene().groups().len().max(1);
         let (mut squares, mut areas) = (vec![0.0; groups], vec![0.0; groups]);

@@ -95,7 +95,7 @@ impl<'a> GatherPhase<'a> {
             octaves,
         };
         if let Some(target) = target {
-            phase.choose_rays(target)?;
+            phase.choose_rays(light, target)?;
         }
         Ok(phase)
     }
@@ -311,11 +311,11 @@ impl<'a> GatherPhase<'a> {
         Estimated { light, found, cancelled }
     }
 
-    /// Chooses how many rays a vertex casts, by how much two gathers disagree at a few points; they
-    /// tell how dim is too dim to matter, too.
-    fn choose_rays(&mut self, target: ErrorTarget) -> Result<(), Error> {
+    /// Chooses how many rays a vertex casts, by how much two gathers of `light` disagree at a few
+    /// points; they tell how dim is too dim to matter, too.
+    fn choose_rays(&mut self, light: &GatheredMesh, target: ErrorTarget) -> Result<(), Error> {
         let pilot = ErrorEstimator {
-            light: self.state.source(),
+            light,
             lit_by: None,
             element_residual: &[],
             ledger: &self.shot.solution.ledger,

@@ -19,7 +19,6 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use super::Gather;
 use super::batch::{VertexValues, gather_batch};
 use super::buried::extrapolate_into_buried;
 use super::further_bounces::GatheredFrom;
@@ -32,7 +31,9 @@ use super::refinement_indicator::{ErrorScale, counted_area, squared_error};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::scouts::{self, Scouts};
+use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
+use super::{Gather, RadiosityField};
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::{BatchSizer, StopReason};
@@ -95,9 +96,7 @@ pub fn gather_at_vertices(
 #[derive(Clone)]
 pub(crate) struct AdaptiveGather<'a> {
     /// The light that vertices gather.
-    source: Cow<'a, GatheredMesh>,
-    /// The light that they gathered first: what it has between vertices, they may have missed.
-    shot: &'a GatheredMesh,
+    source: SourceLight<'a>,
     samples: SampledMesh,
     scouts: Scouts,
     scale: ErrorScale,
@@ -122,8 +121,7 @@ impl<'a> AdaptiveGather<'a> {
         AdaptiveGather {
             scouts: Scouts::new(mesh.element_count()),
             samples: SampledMesh::new(mesh, &field),
-            source: Cow::Borrowed(source),
-            shot: source,
+            source: SourceLight::new(field),
             scale,
             relative_change: 0.0,
             pass: 0,
@@ -134,8 +132,8 @@ impl<'a> AdaptiveGather<'a> {
     }
 
     /// The light that vertices gather.
-    pub fn source(&self) -> &GatheredMesh {
-        &self.source
+    pub fn source(&self) -> RadiosityField<'_> {
+        self.source.field()
     }
 
     /// Vertices there are.
@@ -169,7 +167,7 @@ impl<'a> AdaptiveGather<'a> {
         &self,
         settings: &RefinementSettings,
     ) -> Result<(GatheredMesh, Vec<f64>), Error> {
-        let source = self.source.radiosity_field();
+        let source = self.source.field();
         let refined = interpolated_refinement(&self.samples, &source, &self.scale, settings)?;
         Ok((self.gathered_mesh_of(Cow::Owned(refined.samples)), refined.residual_error))
     }
@@ -193,7 +191,8 @@ impl<'a> AdaptiveGather<'a> {
 
     /// Makes what was reached the light that vertices gather from now on.
     pub fn promote_to_source(&mut self) {
-        self.source = Cow::Owned(self.to_gathered_mesh());
+        let reflected = mean_preserving(&self.samples);
+        self.source.replace_by(self.samples.field(&reflected));
         self.pass += 1;
     }
 
@@ -261,11 +260,11 @@ impl<'a> AdaptiveGather<'a> {
         maker: &dyn PointRows,
         progress: &mut ProgressCallback,
     ) -> StopReason {
-        let light = self.to_gathered_mesh();
+        let reflected = mean_preserving(&self.samples);
         let gathered = GatheredFrom {
             samples: &self.samples,
-            light: light.radiosity_field(),
-            source: self.source.radiosity_field(),
+            light: self.samples.field(&reflected),
+            source: self.source.field(),
         };
         let total = self.samples.reflected.len();
         let (pass, refinements) = (self.pass + 1, self.refinements);
@@ -334,13 +333,14 @@ impl<'a> AdaptiveGather<'a> {
     ) -> Result<ControlFlow<(), bool>, Error> {
         let elements = self.samples.mesh.element_count();
         let counted = |e| counted_area(&self.samples, &self.scale, settings, e);
-        let mean = (0..elements).map(counted).sum::<f64>() / elements as f64;
+        let counted: Vec<f64> = (0..elements).into_par_iter().map(counted).collect();
+        let mean = counted.iter().sum::<f64>() / elements as f64;
         let matters = |&e: &usize| {
             let is_unseen = !self.scouts.has_seen(e) && self.samples.is_splittable(e);
-            is_unseen && counted(e) > scouts::LEAST_AREA * mean
+            is_unseen && counted[e] > scouts::LEAST_AREA * mean
         };
         let unseen: Vec<usize> = (0..elements).filter(matters).collect();
-        let source = self.source.radiosity_field();
+        let source = self.source.field();
         let scale = (self.scale.radiosity_floor, self.scale.touching);
         let mut queue = &unseen[..];
         let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
@@ -372,7 +372,8 @@ impl<'a> AdaptiveGather<'a> {
         if self.refinements < settings.initial_subdivisions {
             return all.filter(|&e| self.samples.is_splittable(e)).collect();
         }
-        let shot = self.shot.radiosity_field();
+        // What it has between vertices, they may have missed.
+        let shot = self.source.shot;
         let judged = |element| {
             let (samples, scale) = (&self.samples, &self.scale);
             let found = self.scouts.error(element);
@@ -418,7 +419,7 @@ impl<'a> AdaptiveGather<'a> {
             ..
         } = &mut self.samples;
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
-        let source = self.source.radiosity_field();
+        let source = self.source.field();
         let gathers = |&v: &u32| points.albedo(v) != Rgb::ZERO;
         let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
         let total = pending.len();

@@ -15,7 +15,8 @@
 //! | without a parent | how far the source light is from linear |
 //! | in a gap, or at its mouth | a quarter of its radiosity, at least |
 
-use std::collections::{HashMap, HashSet};
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::RadiosityField;
 use super::refinement_indicator::{ErrorScale, counted_area, source_nonlinearity};
@@ -47,13 +48,6 @@ pub(super) struct InterpolatedRefinement {
     pub residual_error: Vec<f64>,
 }
 
-/// An element to be split, and the interpolant over its parent.
-struct Candidate {
-    element: usize,
-    relative_surplus: f64,
-    interpolant: HierarchicalSurplus,
-}
-
 /// Splits elements that differ from the quadratic interpolant over their parent by more than
 /// `settings` allow: new vertices lie on it, or on the mean of two, and do not gather.
 pub(super) fn interpolated_refinement(
@@ -62,9 +56,8 @@ pub(super) fn interpolated_refinement(
     scale: &ErrorScale,
     settings: &RefinementSettings,
 ) -> Result<InterpolatedRefinement, Error> {
-    let candidates = candidates(samples, scale, settings);
-    let midsides = midside_values(samples, &candidates);
-    let split: Vec<usize> = candidates.iter().map(|c| c.element).collect();
+    let split = to_be_split(samples, scale, settings);
+    let midsides = midside_values(samples, &split);
     let (mut refined, new) = samples.with_split(&split)?;
     for v in new {
         let v = v as usize;
@@ -76,55 +69,56 @@ pub(super) fn interpolated_refinement(
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }
 
+/// The quadratic interpolant over the parent of element `e`, where it describes the light.
+fn interpolant(samples: &SampledMesh, e: usize) -> Option<HierarchicalSurplus> {
+    HierarchicalSurplus::of_parent(samples, e).filter(HierarchicalSurplus::is_smooth)
+}
+
 /// Elements whose own sides would have a surplus above the tolerance, which is less the larger they
 /// are, ascending; as many as there is room for, the worst of them.
-fn candidates(
+fn to_be_split(
     samples: &SampledMesh,
     scale: &ErrorScale,
     settings: &RefinementSettings,
-) -> Vec<Candidate> {
+) -> Vec<usize> {
     let counted = |e| counted_area(samples, scale, settings, e);
     let count = samples.mesh.element_count();
     let mean_area = (0..count).map(counted).sum::<f64>() / count as f64;
-    let candidate =
-        |element: usize| {
-            let node = samples.mesh.element(element);
-            if !samples.is_splittable(element) {
-                return None;
-            }
-            let interpolant = HierarchicalSurplus::of_parent(samples, element)
-                .filter(HierarchicalSurplus::is_smooth)?;
-            let emitted = samples.mesh.material(node).exitance;
-            let mean = interpolant.corner_mean();
-            let radiosity = (mean + emitted).length().max(scale.radiosity_floor);
-            let size = (counted(element) / mean_area).sqrt();
-            let surplus = interpolant.predicted_child_surplus() * size;
-            let group_factor = settings.group_factor(samples.mesh.group(node));
-            (surplus > settings.interpolation_tolerance * group_factor * radiosity)
-                .then(|| Candidate { element, relative_surplus: surplus / radiosity, interpolant })
-        };
-    let mut candidates: Vec<Candidate> = (0..count).filter_map(candidate).collect();
-    candidates.sort_by(|a, b| {
-        b.relative_surplus.total_cmp(&a.relative_surplus).then(a.element.cmp(&b.element))
-    });
-    candidates.truncate(settings.max_elements.saturating_sub(count) / 3);
-    candidates.sort_by_key(|c| c.element);
-    candidates
+    // Over the radiosity.
+    let surplus = |e: usize| {
+        let node = samples.mesh.element(e);
+        if !samples.is_splittable(e) {
+            return None;
+        }
+        let interpolant = interpolant(samples, e)?;
+        let emitted = samples.mesh.material(node).exitance;
+        let radiosity = (interpolant.corner_mean() + emitted).length().max(scale.radiosity_floor);
+        let size = (counted(e) / mean_area).sqrt();
+        let surplus = interpolant.predicted_child_surplus() * size;
+        let group_factor = settings.group_factor(samples.mesh.group(node));
+        (surplus > settings.interpolation_tolerance * group_factor * radiosity)
+            .then_some((surplus / radiosity, e))
+    };
+    let mut found: Vec<(f64, usize)> = (0..count).into_par_iter().filter_map(surplus).collect();
+    found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    found.truncate(settings.max_elements.saturating_sub(count) / 3);
+    let mut elements: Vec<usize> = found.into_iter().map(|(_, e)| e).collect();
+    elements.sort_unstable();
+    elements
 }
 
-/// Sums and numbers of the values that the interpolants of `candidates` have at their midsides.
-fn midside_values(
-    samples: &SampledMesh,
-    candidates: &[Candidate],
-) -> HashMap<VertexKey, (Rgb, f64)> {
-    let mut sums: HashMap<VertexKey, (Rgb, f64)> = HashMap::new();
-    for Candidate { element, interpolant, .. } in candidates {
-        let node = samples.mesh.element(*element);
+/// Sums and numbers of the values that the interpolants of the elements to be `split` have at their
+/// midsides.
+fn midside_values(samples: &SampledMesh, split: &[usize]) -> FxHashMap<VertexKey, (Rgb, f64)> {
+    let mut sums: FxHashMap<VertexKey, (Rgb, f64)> = FxHashMap::default();
+    for &e in split {
+        let node = samples.mesh.element(e);
         let (t, cell) = (samples.mesh.triangle(node), samples.mesh.cell(node));
         let siblings = cell.ancestor(cell.level - 1).children();
         let child = siblings.iter().position(|c| *c == cell).expect("a child of its parent");
         let keys = midside_keys(&samples.topology, t, cell).expect("an element that can be split");
-        for (key, value) in keys.into_iter().zip(interpolant.child_midsides(child)) {
+        let values = interpolant(samples, e).expect("smooth light").child_midsides(child);
+        for (key, value) in keys.into_iter().zip(values) {
             let (sum, count) = sums.entry(key).or_default();
             *sum += value.max(Rgb::ZERO);
             *count += 1.0;
@@ -141,23 +135,26 @@ fn residual_errors(
     split: &[usize],
 ) -> Vec<f64> {
     let at_boundary = boundary_vertices(samples);
-    let mut split = split.iter().peekable();
-    let mut errors = Vec::with_capacity(samples.mesh.element_count() + 3 * split.len());
-    for (e, corners) in samples.corners().iter().enumerate() {
-        let is_split = split.next_if_eq(&&e).is_some();
+    let is_split = |e: usize| split.binary_search(&e).is_ok();
+    let error = |e: usize| {
         let error = match HierarchicalSurplus::of_parent(samples, e) {
             Some(surplus) => surplus.predicted_sampled_child_surplus(),
             None => source_nonlinearity(&samples.mesh, source, e),
         };
-        let factor = if corners.iter().any(|&v| at_boundary[v as usize]) {
+        let factor = if samples.corners()[e].iter().any(|&v| at_boundary[v as usize]) {
             BOUNDARY_FACTOR
-        } else if is_split {
+        } else if is_split(e) {
             FOLLOWED_SHARE
         } else {
             1.0
         };
-        let children = if is_split { 4 } else { 1 };
-        errors.resize(errors.len() + children, (factor * error).max(gap_error(samples, scale, e)));
+        (factor * error).max(gap_error(samples, scale, e))
+    };
+    let own: Vec<f64> = (0..samples.mesh.element_count()).into_par_iter().map(error).collect();
+    let mut errors = Vec::with_capacity(own.len() + 3 * split.len());
+    for (e, error) in own.into_iter().enumerate() {
+        let children = if is_split(e) { 4 } else { 1 };
+        errors.resize(errors.len() + children, error);
     }
     errors
 }
@@ -188,7 +185,7 @@ fn boundary_vertices(samples: &SampledMesh) -> Vec<bool> {
     }
     // Identities of the sides across which a smooth surface continues.
     let topology = &samples.topology;
-    let shared: HashSet<u32> =
+    let shared: FxHashSet<u32> =
         topology.shared_edges().map(|[(t, k), _]| topology.sides[t][k].id).collect();
     // Where neighbours differ in size, inner sides occur once too: those are on no triangle's side.
     let may_be_outer = |v: u32| match samples.vertices.keys[v as usize] {
@@ -196,15 +193,12 @@ fn boundary_vertices(samples: &SampledMesh) -> Vec<bool> {
         VertexKey::Side { id, .. } => !shared.contains(&id),
         VertexKey::Corner(_) => true,
     };
-    let mut occurrences: HashMap<(u32, u32), u32> = HashMap::new();
-    for corners in samples.corners() {
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            *occurrences.entry((a.min(b), a.max(b))).or_default() += 1;
-        }
-    }
-    for ((a, b), count) in occurrences {
-        if count == 1 && may_be_outer(a) && may_be_outer(b) {
+    let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]].map(|[v, w]| [v.min(w), v.max(w)]);
+    let mut sides: Vec<[u32; 2]> = samples.corners().iter().flat_map(sides).collect();
+    sides.par_sort_unstable();
+    for alike in sides.chunk_by(|side, next| side == next) {
+        let [a, b] = alike[0];
+        if alike.len() == 1 && may_be_outer(a) && may_be_outer(b) {
             at_boundary[a as usize] = true;
             at_boundary[b as usize] = true;
         }

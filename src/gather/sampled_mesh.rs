@@ -42,8 +42,8 @@ impl SampledMesh {
     pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
         let topology = Arc::new(SurfaceTopology::new(mesh.scene()));
         let vertices = Vertices::new(&mesh, &topology);
-        let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
-        let reflected: Vec<Rgb> = vertices.barycentric.iter().map(value).collect();
+        let value = |(t, [u, v]): (usize, [f64; 2])| field.untextured_at(t, u, v);
+        let reflected: Vec<Rgb> = vertices.barycentric().map(value).collect();
         let noise = vec![0.0; reflected.len()];
         let buried = vec![false; reflected.len()];
         let inverse_distance = vec![0.0; reflected.len()];
@@ -53,6 +53,11 @@ impl SampledMesh {
     /// The vertices at the corners of each element, by element.
     pub fn corners(&self) -> &[[u32; 3]] {
         &self.vertices.corners
+    }
+
+    /// These `reflected` values of the vertices as a light to gather, W/m².
+    pub fn field<'a>(&'a self, reflected: &'a [Rgb]) -> RadiosityField<'a> {
+        RadiosityField { mesh: &self.mesh, corners: self.corners(), reflected }
     }
 
     /// Whether element `e` may be split: not at the finest level, and not where nothing is

@@ -22,6 +22,8 @@
 //!   1/12, so that of 4 λ_i λ_j is 1/3: over the parent the interpolant's mean is Σ s_k / 3 above
 //!   the linear one. A child has a quarter of each surplus.
 
+use rayon::prelude::*;
+
 use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
 use crate::vertex::keys::{VertexKey, corner_keys, midside_keys};
@@ -190,12 +192,15 @@ pub(super) fn beyond_noise(length: f64, noise: f64) -> f64 {
 /// Linear interpolation of exact values loses light where it is convex, next to bright spots above
 /// all. Every vertex is raised by the mean of its elements' shifts, weighted by area.
 pub(super) fn mean_preserving(samples: &SampledMesh) -> Vec<Rgb> {
-    let mut sums = vec![(Rgb::ZERO, 0.0); samples.reflected.len()];
-    for (e, corners) in samples.corners().iter().enumerate() {
-        let area = samples.mesh.weight(samples.mesh.element(e));
+    let shift = |e: usize| {
         let surplus =
             HierarchicalSurplus::of_parent(samples, e).filter(HierarchicalSurplus::is_smooth);
-        let shift = surplus.map_or(Rgb::ZERO, |s| s.child_mean_shift());
+        surplus.map_or(Rgb::ZERO, |s| s.child_mean_shift())
+    };
+    let shifts: Vec<Rgb> = (0..samples.mesh.element_count()).into_par_iter().map(shift).collect();
+    let mut sums = vec![(Rgb::ZERO, 0.0); samples.reflected.len()];
+    for (e, (corners, shift)) in samples.corners().iter().zip(shifts).enumerate() {
+        let area = samples.mesh.weight(samples.mesh.element(e));
         for &v in corners {
             sums[v as usize].0 += shift * area;
             sums[v as usize].1 += area;

@@ -15,8 +15,13 @@
 //! The outline of an element is its corners and the vertices that finer neighbours put on its
 //! sides, found by halving each side for as long as there is a vertex in the middle.
 
+use std::hash::BuildHasher;
+use std::ops::Range;
+
 use glam::DVec3;
-use rustc_hash::FxHashMap;
+use hashbrown::HashTable;
+use rayon::prelude::*;
+use rustc_hash::FxBuildHasher;
 
 use crate::mesh::{Cell, Mesh, Side, SurfaceTopology};
 use crate::scene::Scene;
@@ -42,22 +47,25 @@ pub(crate) struct Vertices {
     pub keys: Vec<VertexKey>,
     /// Position of each vertex, scene unit.
     pub positions: Vec<DVec3>,
-    /// A triangle that each vertex lies in, and its barycentric position there: the weights of the
-    /// second and third corner.
-    pub barycentric: Vec<(usize, [f64; 2])>,
+    /// A triangle that each vertex lies in, and where on its lattice.
+    places: Vec<(u32, [u32; 2])>,
     /// The vertices at the corners of each element.
     pub corners: Vec<[u32; 3]>,
     /// All vertices around each element.
     pub outlines: ElementLoops,
-    index: FxHashMap<VertexKey, u32>,
+    /// The vertices by their keys.
+    index: HashTable<u32>,
 }
+
+/// Elements whose vertices are found by one thread at a time. Chosen by hand.
+const ELEMENTS_A_TASK: usize = 4096;
 
 /// The vertices around each element, counter-clockwise: its corners, and those that finer
 /// neighbours put between them.
 #[derive(Clone, Default)]
 pub(crate) struct ElementLoops {
     /// Where each element's vertices end in `vertices`.
-    ends: Vec<usize>,
+    ends: Vec<u32>,
     vertices: Vec<u32>,
 }
 
@@ -65,13 +73,28 @@ impl ElementLoops {
     /// Adds the loop of one more element, which `add` appends.
     pub fn push(&mut self, add: impl FnOnce(&mut Vec<u32>)) {
         add(&mut self.vertices);
-        self.ends.push(self.vertices.len());
+        self.ends.push(self.vertices.len() as u32);
+    }
+
+    /// Adds the loops of further elements.
+    pub fn append(&mut self, other: &ElementLoops) {
+        let start = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(&other.vertices);
+        self.ends.extend(other.ends.iter().map(|end| start + end));
+    }
+
+    /// The same with other numbers of the vertices.
+    pub fn renumbered(mut self, number: impl Fn(u32) -> u32) -> ElementLoops {
+        for v in &mut self.vertices {
+            *v = number(*v);
+        }
+        self
     }
 
     /// The vertices around element `e`.
     pub fn of(&self, e: usize) -> &[u32] {
         let start = if e == 0 { 0 } else { self.ends[e - 1] };
-        &self.vertices[start..self.ends[e]]
+        &self.vertices[start as usize..self.ends[e] as usize]
     }
 
     /// Each element with the vertices around it.
@@ -104,36 +127,54 @@ impl Vertices {
     /// The vertices of `mesh`, whose scene has the smooth surfaces `topology`.
     pub fn new(mesh: &Mesh, topology: &SurfaceTopology) -> Vertices {
         let mut vertices = Vertices::default();
+        vertices.corners.reserve_exact(mesh.element_count());
         for e in 0..mesh.element_count() {
             vertices.add_corners(mesh, topology, e);
         }
-        let mut outlines = ElementLoops::default();
-        for e in 0..mesh.element_count() {
-            outlines.push(|outline| {
-                vertices.add_outline(mesh, topology, e, outline, &mut |_| None);
-            });
+        vertices.keys.shrink_to_fit();
+        vertices.positions.shrink_to_fit();
+        vertices.places.shrink_to_fit();
+        let loops = by_task(mesh.element_count(), |elements| {
+            let mut loops = ElementLoops::default();
+            for e in elements {
+                loops.push(|outline| {
+                    vertices.add_outline(mesh, topology, e, outline, &mut |_| None);
+                });
+            }
+            loops
+        });
+        for loops in loops {
+            vertices.outlines.append(&loops);
         }
-        vertices.outlines = outlines;
         vertices
     }
 
     /// The index of the vertex with this key.
     pub fn index_of(&self, key: &VertexKey) -> Option<u32> {
-        self.index.get(key).copied()
+        self.index.find(hash(key), |&v| self.keys[v as usize] == *key).copied()
+    }
+
+    /// A triangle that each vertex lies in, and its barycentric position there: the weights of the
+    /// second and third corner.
+    pub fn barycentric(&self) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {
+        self.places.iter().map(|&(t, point)| (t as usize, point.map(side_fraction)))
     }
 
     fn add_corners(&mut self, mesh: &Mesh, topology: &SurfaceTopology, e: usize) {
         let node = mesh.element(e);
         let t = mesh.triangle(node);
-        self.corners.push(lattice_corners(mesh.cell(node)).map(|point| {
+        let corners = lattice_corners(mesh.cell(node)).map(|point| {
             let key = vertex_key(topology, t, point);
-            *self.index.entry(key).or_insert_with(|| {
+            self.index_of(&key).unwrap_or_else(|| {
+                let v = self.keys.len() as u32;
                 self.keys.push(key);
                 self.positions.push(lattice_position(mesh.scene(), topology, t, point));
-                self.barycentric.push((t, point.map(side_fraction)));
-                self.positions.len() as u32 - 1
+                self.places.push((t as u32, point));
+                self.index.insert_unique(hash(&key), v, |&v| hash(&self.keys[v as usize]));
+                v
             })
-        }));
+        });
+        self.corners.push(corners);
     }
 
     /// Adds the vertices around element `e` to `outline`: its corners, and those between them,
@@ -171,6 +212,17 @@ impl Vertices {
             }
         }
     }
+}
+
+/// What `work` makes of ranges of `elements` elements, in their order.
+pub(super) fn by_task<T: Send>(elements: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
+    let tasks = (0..elements.div_ceil(ELEMENTS_A_TASK)).into_par_iter();
+    let range = |k: usize| k * ELEMENTS_A_TASK..elements.min((k + 1) * ELEMENTS_A_TASK);
+    tasks.map(|k| work(range(k))).collect()
+}
+
+fn hash(key: &VertexKey) -> u64 {
+    FxBuildHasher.hash_one(key)
 }
 
 /// The keys of the corners of a cell of triangle `t`.

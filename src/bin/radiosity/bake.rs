@@ -66,7 +66,7 @@ Of vertices that gather:
   --mesh-error E    split until elements are off by this share of their light, by prediction
   --curve T         split once more, without a gather, where parabolas bend by more; inf for nowhere
   --smallest X      length that light seldom changes below; elements are split down to an eighth
-  --max-elements N  elements there may be [524288]
+  --max-elements N  elements there may be [524288; of large scenes 20 a triangle, up to 4 million]
   --sweeps N        times that all vertices gather, the last time what they found before
 
 Files and devices:
