@@ -306,6 +306,18 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     let said = run("verify", &args[..4]).stdout;
     let said = String::from_utf8_lossy(&said);
     assert!(said.lines().last().unwrap().ends_with("times further off than it tells"), "{said}");
+    // A file that tells its error itself, beside the report of another bake, and then alone.
+    let told = header.replacen('\n', "\ncomment estimated error 30.001 % of reflected\n", 1);
+    write(folder.path(), "lit.ply", &format!("{told}{corners}{lamp}{faces}"));
+    for has_report in [true, false] {
+        let out = run("verify", &args[..4]);
+        let [said, warned] = [out.stdout, out.stderr].map(|s| String::from_utf8(s).unwrap());
+        let all = said.lines().nth(2).unwrap();
+        assert!(all.split_whitespace().nth(4) == Some("30.00"), "{said}");
+        assert_eq!(warned.contains("lit.json is of another bake"), has_report, "{warned}");
+        let _ = std::fs::remove_file(place("lit.json"));
+    }
+    write(folder.path(), "lit.ply", &format!("{header}{corners}{lamp}{faces}"));
     // What cannot be.
     let wrong = |args: &[&str], words: &[&str]| {
         let out = run("verify", args);

@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 
 use lexopt::prelude::*;
 use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
-use radiosity::{Error, ErrorKind, Rgb, Scene, read_ply};
-use serde_json::Value as Json;
+use radiosity::{Error, ErrorKind, Rgb, Scene, VertexMesh, read_ply};
+use serde_json::{Value as Json, json};
 
 use crate::args::{self, Stop};
+use crate::bake::files::estimated_error;
 use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
 use points::Points;
@@ -160,10 +161,10 @@ impl Options {
 
     fn verify(&self, scene: &Scene, ply: &Path, points_ply: Option<&Path>) -> Result<(), Error> {
         let start = Instant::now();
-        let told = Told::beside(ply);
+        let solution = progress::of_reading(ply, || read_ply(ply))?;
+        let told = Told::of(&solution, ply);
         told.check_sky(scene, self.reading.sky.words(scene), ply)?;
         told.check_luminaires(&self.reading.luminaires.report(), ply)?;
-        let solution = progress::of_reading(ply, || read_ply(ply))?;
         interrupt::catch();
         let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings, |progress| {
@@ -235,15 +236,36 @@ fn time(parser: &mut lexopt::Parser) -> Result<Option<Duration>, Stop> {
     time.map(Some).map_err(|_| args::wrong_value("time", &seconds.to_string(), expected))
 }
 
+/// Twice what an error is rounded by in the comment of a PLY file.
+const COMMENT_ROUNDING: f64 = 1e-5;
+
 /// What the report of a bake says of its error.
 #[derive(Default)]
 struct Told(Json);
 
 impl Told {
-    /// From the JSON file of the same name, if there is one.
-    fn beside(ply: &Path) -> Told {
-        let text = std::fs::read(ply.with_extension("json")).unwrap_or_default();
-        Told(serde_json::from_slice(&text).unwrap_or_default())
+    /// From the JSON file of the same name as `ply`, if it is of the same bake as the `solution`
+    /// there; else what that says itself, if anything.
+    fn of(solution: &VertexMesh, ply: &Path) -> Told {
+        let file = ply.with_extension("json");
+        let text = std::fs::read(&file).unwrap_or_default();
+        let report = Told(serde_json::from_slice(&text).unwrap_or_default());
+        let Some(own) = solution.comments.iter().find_map(|comment| estimated_error(comment))
+        else {
+            return report;
+        };
+        match report.total() {
+            Some(total) if (total - own).abs() <= COMMENT_ROUNDING => return report,
+            Some(total) => eprintln!(
+                "warning: {} is of another bake, with an error of {:.2} %, for {:.2} % here: left \
+                 aside",
+                file.display(),
+                100.0 * total,
+                100.0 * own,
+            ),
+            None => (),
+        }
+        Told(json!({ "error": { "total": own } }))
     }
 
     /// Refuses a solution that was baked under another sky than that of `scene`.

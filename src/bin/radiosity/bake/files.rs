@@ -305,6 +305,15 @@ pub fn camera_value(camera: &Camera) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
+/// How a PLY file begins to tell its error, in per cent.
+const ESTIMATED_ERROR: &str = "estimated error ";
+
+/// The error that the `comment` of a PLY file tells, as a share.
+pub fn estimated_error(comment: &str) -> Option<f64> {
+    let told = comment.strip_prefix(ESTIMATED_ERROR)?;
+    told.split(' ').next()?.parse::<f64>().ok().map(|percent| percent / 100.0)
+}
+
 /// What the PLY file says of itself.
 fn comments(baked: &BakeResult) -> Vec<String> {
     let mut comments = vec![];
@@ -313,7 +322,7 @@ fn comments(baked: &BakeResult) -> Vec<String> {
     }
     let ErrorEstimate { total, samples, .. } = baked.estimate;
     comments.push(format!(
-        "estimated error {:.3} % of reflected radiosity, RMS over area, at {samples} places \
+        "{ESTIMATED_ERROR}{:.3} % of reflected radiosity, RMS over area, at {samples} places \
          ({}); vertices have their own",
         100.0 * total,
         baked.outcome
