@@ -107,8 +107,8 @@ pub(super) fn bake_in_time(
     }
 }
 
-/// How many times smaller the error may be of a bake that takes most of `remaining`
-/// seconds, by what the `last` one took and, if there is one, that before it.
+/// How many times smaller the error may be of a bake that takes most of `remaining` seconds, by
+/// what the `last` one took and, if there is one, that before it.
 fn affordable_improvement(previous: Option<Attempt>, last: Attempt, remaining: f64) -> f64 {
     let exponent = previous.map_or(model::COST_EXPONENT, |previous| {
         model::cost_exponent(previous.error / last.error, last.taken / previous.taken)

@@ -47,6 +47,10 @@ fn luminaires_light_a_room_and_are_told() {
     assert!(!fine && said.contains("baked with 1 luminaires"), "{said}");
     let (fine, said) = verify(&["--luminaire", &at, "--precision", "1"]);
     assert!(fine, "{said}");
+    // Without the report nobody knows.
+    std::fs::remove_file(scene.with_extension("json")).unwrap();
+    let (fine, said) = verify(&["--luminaire", &at, "--precision", "1"]);
+    assert!(fine, "{said}");
     // A list with the lamp twice at half of its light, one aimed somewhere; in millimetres.
     let list = r#"[{"file": "bulb.ies", "at": [500, 400, 600], "scale": 0.5},
                    {"file": "bulb.ies", "at": [500, 400, 600], "aim": [1, 0, 0], "c0": [0, 0, 1],

@@ -302,7 +302,7 @@ impl Told {
     fn check_luminaires(&self, own: &Json, ply: &Path) -> Result<(), Error> {
         let told = &self.0["luminaires"];
         let count = |list: &Json| list.as_array().map_or(0, Vec::len);
-        if self.0.is_null() || told == own || count(told) + count(own) == 0 {
+        if told.is_null() || told == own || count(told) + count(own) == 0 {
             return Ok(());
         }
         let found = format!("baked with {} luminaires, which are not these", count(told));
