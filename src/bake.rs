@@ -48,6 +48,7 @@ mod settings;
 mod shooting_phase;
 mod strata;
 mod target;
+mod to_error;
 
 pub use error_estimate::{ErrorEstimate, GroupError};
 pub use outcome::{Obstacle, Outcome};

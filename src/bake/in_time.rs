@@ -19,7 +19,7 @@ use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::ProgressCallback;
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
-use crate::bake::target::{bake_to_error, check_error, not_a_time};
+use crate::bake::to_error::{bake_to_error, check_error};
 use crate::error::Error;
 use crate::scene::Scene;
 
@@ -41,9 +41,6 @@ pub(super) fn bake_in_time(
     overrides: &dyn Fn(&mut BakeSettings),
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
-    if limit.is_zero() {
-        return Err(not_a_time(0.0));
-    }
     let start = Instant::now();
     let end = limit.mul_f64(1.0 - model::TIME_FOR_ESTIMATE);
     let without_checkpoint = |settings: &mut BakeSettings| {
@@ -66,14 +63,11 @@ pub(super) fn bake_in_time(
             stopped |= cancelled || start.elapsed() >= end;
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        let baked = match (attempt, best.take()) {
+        let (baked, before) = match (attempt, best.take()) {
             (Err(error), Some(best)) if error.is_device_error() => {
                 return Ok(BakeResult { device_failure: Some(error), ..best });
             }
-            (attempt, before) => {
-                best = before;
-                attempt?
-            }
+            (attempt, before) => (attempt?, before),
         };
         let is_reached = goal.is_some_and(|goal| {
             let BakeResult { estimate, groups, .. } = &baked;
@@ -89,7 +83,7 @@ pub(super) fn bake_in_time(
         };
         let is_better =
             |before: &BakeResult| error_of(before, each_group) <= error_of(&baked, each_group);
-        let baked = match best.take() {
+        let baked = match before {
             Some(before) if !is_reached && is_better(&before) => before,
             _ => baked,
         };

@@ -7,10 +7,10 @@ use std::time::Duration;
 use crate::backend::Backend;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::in_time::bake_in_time;
-use crate::bake::pipeline;
-use crate::bake::progress::{BakeProgress, ProgressCallback};
+use crate::bake::progress::BakeProgress;
 use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
+use crate::bake::to_error::bake_to_error;
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
@@ -114,9 +114,11 @@ impl BakeTarget {
                 bake_to_error(target, scene, backend, &mut progress)
             }
             BakeTarget::Time(time) => {
+                check_time(time)?;
                 bake_in_time(time, None, scene, backend, &overrides, &mut progress)
             }
             BakeTarget::Within { error, each_group, time } => {
+                check_time(time)?;
                 let goal = ErrorTarget { error, each_group, overrides: &overrides };
                 bake_in_time(time, Some(goal), scene, backend, &overrides, &mut progress)
             }
@@ -124,7 +126,11 @@ impl BakeTarget {
     }
 }
 
-pub(super) fn not_a_time(seconds: f64) -> Error {
+fn check_time(time: Duration) -> Result<(), Error> {
+    if time.is_zero() { Err(not_a_time(0.0)) } else { Ok(()) }
+}
+
+fn not_a_time(seconds: f64) -> Error {
     let place = format!("{seconds} seconds");
     Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
 }
@@ -144,27 +150,4 @@ fn check_light(scene: &Scene) -> Result<(), Error> {
     let found = format!("the brightest is {brightest:e}");
     let remedy = "give all light in a unit in which it is between 1e-32 and 1e32";
     Err(Error::new(ErrorKind::Scene, "light", found, remedy))
-}
-
-pub(super) fn check_error(error: f64) -> Result<(), Error> {
-    if error > 0.0 && error < 1.0 {
-        return Ok(());
-    }
-    let remedy = "ask for a share above 0 and below 1, such as 0.02";
-    Err(Error::new(ErrorKind::Setting, format!("error {error}"), "out of range", remedy))
-}
-
-pub(super) fn bake_to_error(
-    target: ErrorTarget,
-    scene: &Arc<Scene>,
-    backend: &Backend,
-    progress: ProgressCallback,
-) -> Result<BakeResult, Error> {
-    check_error(target.error)?;
-    let mut settings = BakeSettings::for_error(target.error, scene);
-    if target.each_group {
-        settings.scale_groups(scene);
-    }
-    (target.overrides)(&mut settings);
-    pipeline::run(&settings, scene, backend, Some(target), progress)
 }

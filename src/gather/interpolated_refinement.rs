@@ -117,7 +117,9 @@ fn midside_values(samples: &SampledMesh, split: &[usize]) -> FxHashMap<VertexKey
         let siblings = cell.ancestor(cell.level - 1).children();
         let child = siblings.iter().position(|c| *c == cell).expect("a child of its parent");
         let keys = midside_keys(&samples.topology, t, cell).expect("an element that can be split");
-        let values = interpolant(samples, e).expect("smooth light").child_midsides(child);
+        let values = interpolant(samples, e)
+            .expect("all that are to be split have one")
+            .child_midsides(child);
         for (key, value) in keys.into_iter().zip(values) {
             let (sum, count) = sums.entry(key).or_default();
             *sum += value.max(Rgb::ZERO);
