@@ -1,8 +1,9 @@
-//! The two backends: hemicubes on a graphics device, or rays on the CPU.
+//! The two backends: hemicubes and rays on a graphics device, or rays on the CPU.
 //!
 //! ```text
 //!                 FormFactors (rows)        Gather (light at points)
-//! Backend::Gpu    gpu::HemicubeRows         gpu::HemicubeGather
+//! Backend::Gpu    gpu::HemicubeRows
+//!                 gpu::TracedRows           gpu::TracedGather
 //! Backend::Cpu    cpu::RayRows              cpu::RayGather
 //! ```
 //!
@@ -10,7 +11,8 @@
 //! solver does not know which backend it uses, and [`Fallback`] can go from one to the other in the
 //! middle of a solve. Without the feature `gpu` only the CPU is there.
 //!
-//! A bake takes rays on a device too where [hemicubes cost more](cost): [`Backend::row_maker`].
+//! A bake makes rows with what [costs least](cost): [`Backend::row_maker`]. Light is gathered on
+//! graphics hardware; a software device is slower than rays on the CPU.
 
 mod adapter;
 pub mod cost;
@@ -33,11 +35,10 @@ use crate::gather::point_irradiance::rays_for_noise;
 use crate::gather::{Gather, GatheredMesh};
 use crate::mesh::Mesh;
 use crate::scene::Scene;
-#[cfg(feature = "gpu")]
 use cost::RowCost;
 use cpu::{RayGather, RayRows};
 #[cfg(feature = "gpu")]
-use gpu::{Gpu, HemicubeGather, HemicubeRows};
+use gpu::{Gpu, HemicubeRows, TracedGather, TracedRows};
 
 /// What makes rows and gathers light.
 #[derive(Clone, Debug)]
@@ -71,55 +72,85 @@ impl Backend {
     }
 
     /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
-    /// the top face, or from `rotations`·`resolution`² rays. Rays on the CPU in a scene with clear
-    /// panes or cut-outs, which hemicubes do not see.
+    /// the top face, or from `rotations`·`resolution`² rays in a scene with clear panes or
+    /// cut-outs, which hemicubes do not see, and where there is no device.
     ///
     /// A device draws hemicubes here even where rays would take less time, as they do where many
     /// triangles meet few pixels: bakes ask [`Backend::row_maker`] first.
     ///
     /// # Errors
-    /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new) and [`RayRows::new`].
+    /// Those of [`Backend::rows_by`].
     pub fn rows(
         &self,
         mesh: &Mesh,
         resolution: u32,
         rotations: NonZeroU32,
     ) -> Result<BackendRows, Error> {
-        match self {
+        let maker = match self.row_makers(mesh.scene()) {
+            [RowMaker::Hemicubes, ..] => RowMaker::Hemicubes,
+            _ => self.row_maker(mesh.scene(), resolution),
+        };
+        self.rows_by(maker, mesh, resolution, rotations)
+    }
+
+    /// The same by this maker, of those that the backend has; by rays on the CPU otherwise.
+    ///
+    /// # Errors
+    /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new),
+    /// [`TracedRows::new`](crate::backend::gpu::TracedRows::new) and [`RayRows::new`].
+    pub fn rows_by(
+        &self,
+        maker: RowMaker,
+        mesh: &Mesh,
+        resolution: u32,
+        rotations: NonZeroU32,
+    ) -> Result<BackendRows, Error> {
+        crate::hemicube::check_resolution(resolution)?;
+        let rays = (resolution * resolution).saturating_mul(rotations.get());
+        match (self, maker) {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if mesh.scene().hidden_from_hemicubes().is_none() => {
+            (Backend::Gpu(gpu), RowMaker::Hemicubes) => {
                 let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?;
                 Ok(hemicubes.with_rotations(rotations).into())
             }
-            _ => {
-                crate::hemicube::check_resolution(resolution)?;
-                let rays = (resolution * resolution).saturating_mul(rotations.get());
-                Ok(RayRows::new(mesh, rays)?.into())
+            #[cfg(feature = "gpu")]
+            (Backend::Gpu(gpu), RowMaker::DeviceRays) => {
+                Ok(TracedRows::new(gpu, mesh, rays)?.into())
             }
+            _ => Ok(RayRows::new(mesh, rays)?.into()),
+        }
+    }
+
+    /// What can make rows of `scene`.
+    fn row_makers(&self, scene: &Scene) -> &'static [RowMaker] {
+        #[cfg(not(feature = "gpu"))]
+        let _ = scene;
+        match self {
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(_) if scene.hidden_from_hemicubes().is_none() => {
+                &[RowMaker::Hemicubes, RowMaker::DeviceRays, RowMaker::Rays]
+            }
+            #[cfg(feature = "gpu")]
+            Backend::Gpu(_) => &[RowMaker::DeviceRays, RowMaker::Rays],
+            Backend::Cpu => &[RowMaker::Rays],
         }
     }
 
     /// What a bake of `scene` makes rows with, each of a hemicube with `resolution` pixels along an
     /// edge of the top face or of `resolution`² rays: what [takes less time](cost) on an adapter
-    /// of this kind, to the same error. Where that is rays, they are those of [`Backend::Cpu`].
+    /// of this kind, to the same error.
     ///
     /// It depends on the kind of the adapter, the number of triangles, clear panes, cut-outs and
     /// `resolution` alone, so that every run chooses alike.
     pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
-        #[cfg(not(feature = "gpu"))]
-        let _ = (scene, resolution);
-        match self {
-            #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) if scene.hidden_from_hemicubes().is_none() => {
-                RowCost::of(gpu.adapter().kind).cheaper(scene.triangles().len(), resolution)
-            }
-            _ => RowMaker::Rays,
-        }
+        let (makers, count) = (self.row_makers(scene), scene.triangles().len());
+        let cost = RowCost::of(self.adapter().kind);
+        cost.cheapest(makers.iter().copied(), count, resolution).unwrap_or(RowMaker::Rays)
     }
 
-    /// Whether light is gathered with hemicubes: on graphics hardware. A software device draws them
-    /// more slowly than rays are cast.
-    pub(crate) fn gathers_by_hemicubes(&self) -> bool {
+    /// Whether light is gathered on the device: on graphics hardware. A software device casts rays
+    /// more slowly than the CPU does without it.
+    pub(crate) fn gathers_on_device(&self) -> bool {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) => gpu.adapter().kind != AdapterKind::Cpu,
@@ -127,23 +158,23 @@ impl Backend {
         }
     }
 
-    /// Why rays on the CPU take the place of a device in `scene`, if they do: hemicubes do not see
-    /// clear panes and cut-outs.
+    /// Why rays on the CPU take the place of a software device's hemicubes in `scene`, if they do:
+    /// hemicubes do not see clear panes and cut-outs.
     pub(crate) fn blind_to(&self, scene: &Scene) -> Option<Error> {
         #[cfg(not(feature = "gpu"))]
         let _ = scene;
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(_) => gpu::check_hemicubes_see(scene).err(),
-            Backend::Cpu => None,
+            Backend::Gpu(_) if !self.gathers_on_device() => gpu::check_hemicubes_see(scene).err(),
+            _ => None,
         }
     }
 
-    /// A gatherer over the scene of `mesh` with about `rays` samples a point: hemicubes on graphics
-    /// hardware, rays on the CPU otherwise and in scenes with clear panes or cut-outs.
+    /// A gatherer over the scene of `mesh` with about `rays` rays a point: on graphics hardware, or
+    /// on the CPU.
     ///
     /// # Errors
-    /// Those of [`HemicubeGather::new`](crate::backend::gpu::HemicubeGather::new) and
+    /// Those of [`TracedGather::new`](crate::backend::gpu::TracedGather::new) and
     /// [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
@@ -151,8 +182,7 @@ impl Backend {
 
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
     /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
-    /// doubled where they disagree, up to 16 times; hemicubes are the same everywhere. What is
-    /// darker than a twentieth of the mean reflected radiosity has that share of this instead.
+    /// doubled where they disagree, up to 16 times. What is darker than a twentieth of the mean reflected radiosity has that share of this instead.
     /// Where the device fails, rays on the CPU go on.
     ///
     /// # Errors
@@ -181,7 +211,7 @@ impl Backend {
         mut failed: impl FnMut(Error) + 'a,
     ) -> Result<Box<dyn Gather + 'a>, Error> {
         match self.gather_evenly(mesh, rays, noise, dim) {
-            Ok(first) if self.gathers_by_hemicubes() => {
+            Ok(first) if self.gathers_on_device() => {
                 let mesh = mesh.clone();
                 Ok(Box::new(Fallback::new(first, move |error| {
                     failed(error);
@@ -198,7 +228,6 @@ impl Backend {
     }
 
     /// As [`Backend::gather`], with more rays where they disagree: see [`RayGather::with_noise`].
-    /// Hemicubes are as they are.
     pub(crate) fn gather_evenly(
         &self,
         mesh: &Mesh,
@@ -208,13 +237,8 @@ impl Backend {
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu)
-                if self.gathers_by_hemicubes()
-                    && mesh.scene().hidden_from_hemicubes().is_none() =>
-            {
-                // A pixel of the top face is worth half a ray, or a little less.
-                let resolution = 2 * (f64::from(rays) / 2.0).sqrt().ceil() as u32;
-                Ok(Box::new(HemicubeGather::new(gpu, mesh, resolution.max(16))?))
+            Backend::Gpu(gpu) if self.gathers_on_device() => {
+                Ok(Box::new(TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?))
             }
             _ => Ok(Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim))),
         }

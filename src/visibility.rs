@@ -9,7 +9,7 @@ pub(crate) mod panes;
 mod ray32;
 pub(crate) mod ray_scene;
 mod ray_stream;
-mod sah_tree;
+pub(crate) mod sah_tree;
 mod triangle_pack;
 mod triangle_plane;
 mod wide_bvh;

@@ -1,8 +1,9 @@
 //! What a row costs, by a hemicube and by rays: bakes choose by it.
 //!
 //! ```text
-//! hemicube   hemicube + triangle · T + pixel · 3 N²              T triangles, N pixels an edge
-//! N² rays    ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
+//! hemicube               hemicube + triangle · T + pixel · 3 N²        T triangles, N pixels an edge
+//! N² rays on the device  device_row + device_ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
+//! N² rays on the CPU     ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
 //! ```
 //!
 //! A device sends all triangles through its vertex stage, however few the pixels; a ray descends
@@ -24,23 +25,47 @@ pub struct RowCost {
     pub triangle: f64,
     /// A pixel, drawn and reduced; s.
     pub pixel: f64,
-    /// A ray, on each level of a binary tree of the triangles; s.
+    /// A row by rays on the device, whatever their number: s.
+    pub device_row: f64,
+    /// A ray on the device, on each level of a binary tree of the triangles; s.
+    pub device_ray_level: f64,
+    /// A ray on the CPU, on each level of that tree; s.
     pub ray_level: f64,
 }
 
 /// Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle cut into
 /// 1 to 4096, at 16 to 256 pixels. Hemicubes are off by up to half of that, rays by up to a factor
 /// of two.
-const SOFTWARE: RowCost =
-    RowCost { hemicube: 1.8e-4, triangle: 1.3e-7, pixel: 5.8e-9, ray_level: 8.5e-9 };
+const SOFTWARE: RowCost = RowCost {
+    hemicube: 1.8e-4,
+    triangle: 1.3e-7,
+    pixel: 5.8e-9,
+    device_row: 1e-3,
+    device_ray_level: 1e-7,
+    ray_level: 8.5e-9,
+};
 
 /// Not measured: as fast as such devices can be, a triangle a clock and nothing for the rest of a
 /// hemicube but its pixels, against rays on two cores. So rays take their place only where they
 /// are faster for certain.
-const INTEGRATED: RowCost = RowCost { hemicube: 0.0, triangle: 1e-9, pixel: 1e-10, ..SOFTWARE };
+const INTEGRATED: RowCost = RowCost {
+    hemicube: 1e-5,
+    triangle: 1e-8,
+    pixel: 1e-10,
+    device_row: 1e-5,
+    device_ray_level: 2e-10,
+    ..SOFTWARE
+};
 
 /// Not measured: the same of larger devices.
-const DISCRETE: RowCost = RowCost { hemicube: 0.0, triangle: 5e-10, pixel: 2e-11, ..SOFTWARE };
+const DISCRETE: RowCost = RowCost {
+    hemicube: 6e-6,
+    triangle: 1.3e-8,
+    pixel: 2e-10,
+    device_row: 1.5e-6,
+    device_ray_level: 3e-11,
+    ..SOFTWARE
+};
 
 /// Rays that a row takes for the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
 /// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
@@ -72,15 +97,27 @@ impl RowCost {
         self.ray_level * tree_levels(triangles) * rays
     }
 
-    /// What makes a row in less time, to the error of a hemicube of `resolution`.
-    pub fn cheaper(&self, triangles: usize, resolution: u32) -> RowMaker {
+    /// Seconds of a row of `rays` rays on the device.
+    pub fn device_ray_seconds(&self, triangles: usize, rays: f64) -> f64 {
+        self.device_row + self.device_ray_level * tree_levels(triangles) * rays
+    }
+
+    /// Of `makers` the one that makes a row in the least time, to the error of a hemicube of
+    /// `resolution`.
+    pub fn cheapest(
+        &self,
+        makers: impl IntoIterator<Item = RowMaker>,
+        triangles: usize,
+        resolution: u32,
+    ) -> Option<RowMaker> {
         let triangles = triangles.max(MIN_TRIANGLES);
         let rays = RAYS_AT_EQUAL_ERROR * f64::from(resolution).powi(2);
-        if self.ray_seconds(triangles, rays) < self.hemicube_seconds(triangles, resolution) {
-            RowMaker::Rays
-        } else {
-            RowMaker::Hemicubes
-        }
+        let seconds = |maker: &RowMaker| match maker {
+            RowMaker::Hemicubes => self.hemicube_seconds(triangles, resolution),
+            RowMaker::DeviceRays => self.device_ray_seconds(triangles, rays),
+            RowMaker::Rays => self.ray_seconds(triangles, rays),
+        };
+        makers.into_iter().min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
     }
 }
 

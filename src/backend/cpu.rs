@@ -24,7 +24,7 @@ pub(super) mod radiance;
 pub(super) mod rasterizer;
 #[cfg(all(test, feature = "gpu"))]
 pub(super) mod reduce;
-mod rows;
+pub(crate) mod rows;
 #[cfg(all(test, feature = "gpu"))]
 mod shared;
 #[cfg(all(test, feature = "gpu"))]

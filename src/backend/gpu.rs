@@ -5,6 +5,7 @@ mod adapters;
 mod device;
 mod draw_list;
 mod error;
+mod field;
 mod gather;
 mod hemisphere_sum;
 mod item_buffer;
@@ -23,6 +24,10 @@ mod shaders;
 mod sky;
 mod sources;
 mod split_float;
+mod traced_gather;
+mod traced_rows;
+mod traced_scene;
+mod tracing;
 #[cfg(test)]
 mod test_support;
 
@@ -32,3 +37,5 @@ pub(crate) use error::check_hemicubes_see;
 pub use gather::HemicubeGather;
 pub use limits::GpuLimits;
 pub use rows::HemicubeRows;
+pub use traced_gather::TracedGather;
+pub use traced_rows::TracedRows;

@@ -2,11 +2,13 @@
 
 use std::fmt;
 
-/// What makes rows of form factors. Shown as `hemicubes` or `rays`.
+/// What makes rows of form factors. Shown as `hemicubes`, `rays on the device` or `rays`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowMaker {
     /// Hemicubes on a graphics device: `gpu::HemicubeRows`.
     Hemicubes,
+    /// Rays on a graphics device: `gpu::TracedRows`.
+    DeviceRays,
     /// Rays on the CPU: [`RayRows`](crate::RayRows).
     Rays,
 }
@@ -15,6 +17,7 @@ impl fmt::Display for RowMaker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             RowMaker::Hemicubes => "hemicubes",
+            RowMaker::DeviceRays => "rays on the device",
             RowMaker::Rays => "rays",
         })
     }

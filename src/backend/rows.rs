@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::cpu::RayRows;
 #[cfg(feature = "gpu")]
-use super::gpu::HemicubeRows;
+use super::gpu::{HemicubeRows, TracedRows};
 use super::row_maker::RowMaker;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
@@ -56,6 +56,13 @@ impl RowSource for HemicubeRows {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl RowSource for TracedRows {
+    fn set_full_share(&mut self, full_share: f64) {
+        self.full_share = full_share;
+    }
+}
+
 impl From<RayRows> for BackendRows {
     fn from(rows: RayRows) -> BackendRows {
         BackendRows { source: Box::new(rows), maker: RowMaker::Rays, seconds: 0.0 }
@@ -66,6 +73,13 @@ impl From<RayRows> for BackendRows {
 impl From<HemicubeRows> for BackendRows {
     fn from(rows: HemicubeRows) -> BackendRows {
         BackendRows { source: Box::new(rows), maker: RowMaker::Hemicubes, seconds: 0.0 }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<TracedRows> for BackendRows {
+    fn from(rows: TracedRows) -> BackendRows {
+        BackendRows { source: Box::new(rows), maker: RowMaker::DeviceRays, seconds: 0.0 }
     }
 }
 

@@ -46,17 +46,17 @@ impl<'a> ResilientBackend<'a> {
         let _ = self.failure.set(error);
     }
 
-    /// A source of rows as `settings` ask for: on the CPU if rays are faster
-    /// ([`Backend::row_maker`]), or if `mesh` is too large for the device or has clear panes or
-    /// cut-outs.
+    /// A source of rows as `settings` ask for: by what is fastest ([`Backend::row_maker`]), or by
+    /// rays on the CPU if `mesh` is too large for the device.
     /// What else keeps the device from starting is an error, since nothing is lost then.
     pub fn rows<'m>(
         &'m self,
         mesh: &'m Mesh,
         settings: &'m SolveSettings,
     ) -> Result<ResilientRows<'m>, Error> {
-        let rows = |backend: &Backend| -> Result<BackendRows, Error> {
-            let rows = backend.rows(mesh, settings.hemicube_resolution, settings.rotations)?;
+        let resolution = settings.hemicube_resolution;
+        let rows = move |maker: RowMaker| -> Result<BackendRows, Error> {
+            let rows = self.backend.rows_by(maker, mesh, resolution, settings.rotations)?;
             Ok(match settings.full_resolution_share {
                 Some(share) => rows.with_full_share(share),
                 None => rows,
@@ -66,20 +66,16 @@ impl<'a> ResilientBackend<'a> {
             self.record(e);
         }
         // All rows alike: most are at full resolution.
-        let backend = match self.backend.row_maker(mesh.scene(), settings.hemicube_resolution) {
-            RowMaker::Hemicubes => self.backend,
-            RowMaker::Rays => &Backend::Cpu,
-        };
-        let first = match rows(backend) {
+        let first = match rows(self.backend.row_maker(mesh.scene(), resolution)) {
             Err(e) if e.kind() == ErrorKind::Memory => {
                 self.record(e);
-                rows(&Backend::Cpu)?
+                rows(RowMaker::Rays)?
             }
             result => result?,
         };
         Ok(Fallback::new(first, move |error| {
             self.record(error);
-            rows(&Backend::Cpu)
+            rows(RowMaker::Rays)
         }))
     }
 

@@ -72,6 +72,11 @@ impl HemisphereSamples {
         HemisphereSamples { directions: (0..count).map(direction).collect() }
     }
 
+    /// All of them, by components along two tangents and the normal.
+    pub fn local(&self) -> &[[f64; 3]] {
+        &self.directions
+    }
+
     /// All unit directions above a surface with unit `normal`, rotated about it by `rotation`, in
     /// turns.
     pub fn directions(&self, normal: DVec3, rotation: f64) -> impl Iterator<Item = DVec3> + '_ {

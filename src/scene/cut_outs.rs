@@ -112,6 +112,20 @@ impl TextureMap {
         !uv.is_finite() || self.texel(uv) != Rgb::ZERO
     }
 
+    /// Where texture coordinates, as the file has them, lie in texels, rows from the top.
+    pub(crate) fn in_texels(&self, uv: DVec2) -> DVec2 {
+        let [width, height] = self.texture.size().map(f64::from);
+        let place = uv * self.scale + self.offset;
+        DVec2::new(place.x * width, (1.0 - place.y) * height)
+    }
+
+    /// Whether each texel is solid, rows from the top.
+    pub(crate) fn solid_texels(&self) -> impl Iterator<Item = bool> + '_ {
+        let [width, height] = self.texture.size();
+        let texels = (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]));
+        texels.map(|at| self.value(self.texture.texel(at)) != Rgb::ZERO)
+    }
+
     /// The share of a mask that is solid over a triangle with these texture coordinates, in [0, 1];
     /// with so many cells of the image along the triangle's outline.
     fn solid_share(&self, corners: [DVec2; 3], cells: f64) -> f64 {

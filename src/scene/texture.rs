@@ -84,6 +84,11 @@ impl Texture {
         self.cell(0, x, y)
     }
 
+    /// Linear colour of a texel, by column and row.
+    pub(super) fn texel(&self, [x, y]: [u32; 2]) -> Rgb {
+        self.cell(0, x, y)
+    }
+
     /// Whether both are the same image.
     pub(super) fn has_texels_of(&self, other: &Texture) -> bool {
         std::ptr::eq(self, other) || self.width == other.width && self.texels == other.texels
@@ -322,7 +327,7 @@ impl TextureMap {
         self.value(self.texture.whole_mean())
     }
 
-    fn value(&self, colour: Rgb) -> Rgb {
+    pub(super) fn value(&self, colour: Rgb) -> Rgb {
         self.factor * colour
     }
 

@@ -49,6 +49,12 @@ impl Panes {
         self.rays.is_none()
     }
 
+    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and the share
+    /// per channel that passes each.
+    pub fn hierarchy(&self) -> Option<(&RayScene, &[Rgb])> {
+        Some((self.rays.as_ref()?, &self.transmittance))
+    }
+
     /// The share per channel of light along `direction` (any length) from `from` that passes all
     /// panes within `reach` in units of it; all where there are none. A pane right at its end does
     /// not count.

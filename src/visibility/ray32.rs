@@ -64,6 +64,11 @@ impl LocalUnit {
         (point - self.origin) * self.scale
     }
 
+    /// A position in the hierarchy's unit, in that of the scene.
+    pub fn in_scene_unit(&self, position: DVec3) -> DVec3 {
+        position / self.scale + self.origin
+    }
+
     /// Around a triangle, with the margin.
     pub fn bounds(&self, corners: [DVec3; 3]) -> Aabb32 {
         let [a, b, c] = corners.map(|corner| self.place(corner).as_vec3a());

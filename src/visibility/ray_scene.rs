@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use arrayvec::ArrayVec;
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
@@ -38,6 +38,7 @@ pub(crate) use super::triangle_plane::Hit;
 #[derive(Debug)]
 pub(crate) struct RayScene {
     bvh: WideBvh,
+    tree: SahTree,
     /// In the order of the hierarchy.
     triangles: Vec<TrianglePlane>,
     unit: LocalUnit,
@@ -62,7 +63,7 @@ impl RayScene {
         let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.place(corner)));
         let plane = |&k: &u32| TrianglePlane::new(met[k as usize], corners(k));
         let triangles = tree.order.iter().map(plane).collect();
-        RayScene { bvh, triangles, unit, cut_outs: None }
+        RayScene { bvh, tree, triangles, unit, cut_outs: None }
     }
 
     /// The same, where nothing meets the backs of triangles that are `covered`.
@@ -102,6 +103,22 @@ impl RayScene {
         RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
             .with_covered_backs(|t| scene.is_back_covered(t))
             .with_cut_outs(CutOuts::new(scene, 0..count))
+    }
+
+    /// The binary tree that the hierarchy was made of, in its own unit: see
+    /// [`RayScene::in_scene_unit`].
+    pub fn tree(&self) -> &SahTree {
+        &self.tree
+    }
+
+    /// A position in the hierarchy's unit, in that of the scene.
+    pub fn in_scene_unit(&self, position: Vec3A) -> DVec3 {
+        self.unit.in_scene_unit(position.as_dvec3())
+    }
+
+    /// The triangles by their numbers, in the order of the tree.
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
+        self.triangles.iter().map(|plane| plane.triangle as usize)
     }
 
     /// The nearest triangle along `direction` (any length) from `from`, further than `start` and

@@ -14,7 +14,7 @@ use std::ops::Range;
 use glam::Vec3A;
 
 /// Levels below the root, at most: enough to halve any number of boxes that 32 bits count.
-pub(super) const MAX_LEVELS: u32 = 31;
+pub(crate) const MAX_LEVELS: u32 = 31;
 
 /// Boxes in a leaf, at most.
 pub(super) const MAX_LEAF_SIZE: usize = 4;
@@ -29,7 +29,7 @@ const SAH_BINS: usize = 32;
 
 /// An axis-aligned box in 32 bits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Aabb32 {
+pub(crate) struct Aabb32 {
     pub low: Vec3A,
     pub high: Vec3A,
 }
@@ -57,7 +57,7 @@ impl Aabb32 {
 
 /// A binary tree over boxes that are numbers.
 #[derive(Debug)]
-pub(super) struct SahTree {
+pub(crate) struct SahTree {
     /// All boxes, those of a node side by side.
     pub order: Vec<u32>,
     /// The root first; parents before their children. One empty leaf if there are no boxes.
@@ -65,7 +65,7 @@ pub(super) struct SahTree {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct SahNode {
+pub(crate) struct SahNode {
     /// Around all boxes below.
     pub bounds: Aabb32,
     /// Where the boxes below are in the order.

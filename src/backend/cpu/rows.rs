@@ -74,7 +74,7 @@ impl RayRows {
     fn row(&self, mesh: &Mesh, patch: NodeId, samples: &HemisphereSamples) -> Row {
         let (eye, own) = (mesh.viewpoint(patch), mesh.triangle(patch));
         let start = offset::RAY_START * mesh.area(patch).sqrt();
-        let rotation = f64::from(low_bias32(patch.0)) / 2f64.powi(32);
+        let rotation = rotation(patch);
         let directions = samples.directions(mesh.normal(patch), rotation);
         if !self.panes.is_none() {
             return self.row_through_panes(mesh, patch, directions, start);
@@ -118,6 +118,11 @@ impl RayRows {
     }
 }
 
+/// Turn of a patch's rays about its normal, in turns: a hash of its number.
+pub(crate) fn rotation(patch: NodeId) -> f64 {
+    f64::from(low_bias32(patch.0)) / 2f64.powi(32)
+}
+
 /// What a ray that ends at `hit` meets.
 fn item(mesh: &Mesh, hit: Option<Hit>) -> u32 {
     match hit {
@@ -129,14 +134,19 @@ fn item(mesh: &Mesh, hit: Option<Hit>) -> u32 {
 
 /// The row of rays that met these items, in ascending order.
 fn row_of(hits: &[u32]) -> Row {
+    row_of_counts(hits.chunk_by(|a, b| a == b).map(|run| (run[0], run.len() as u32)), hits.len())
+}
+
+/// The row of so many `rays` of which each of these items, in ascending order, was met by some.
+pub(crate) fn row_of_counts(items: impl Iterator<Item = (u32, u32)>, rays: usize) -> Row {
     // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
-    let share_of_first = |k: usize| (k as u64 * u64::from(Row::TOTAL) / hits.len() as u64) as u32;
+    let share_of_first = |k: u64| (k * u64::from(Row::TOTAL) / rays as u64) as u32;
     let mut row = Row::default();
     let (mut shares, mut counted) = (Apportion::default(), 0);
-    for run in hits.chunk_by(|a, b| a == b) {
-        counted += run.len();
+    for (item, count) in items {
+        counted += u64::from(count);
         let share = shares.part_up_to(share_of_first(counted));
-        match run[0] {
+        match item {
             OPEN => row.escaped = share,
             BACK => row.backface = share,
             element => row.entries.push(Entry { element, share }),
@@ -145,12 +155,17 @@ fn row_of(hits: &[u32]) -> Row {
     row
 }
 
+/// Rays of a patch that shoots `weight` of the emitted flux: all `count` where it is `full_share`,
+/// a quarter or a sixteenth of them below, as [`RayRows::with_full_share`] has it.
+pub(crate) fn rays_for_importance(count: u32, weight: f64, full_share: f64) -> u32 {
+    let halvings = resolution_policy::halvings_for_importance(weight, full_share);
+    let least = resolution_policy::MIN_HALVED_RESOLUTION.pow(2);
+    (count >> (2 * halvings)).max(least).min(count)
+}
+
 impl FormFactors for RayRows {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
-        let halvings = resolution_policy::halvings_for_importance(weight, self.full_share);
-        let count = (self.count >> (2 * halvings))
-            .max(resolution_policy::MIN_HALVED_RESOLUTION.pow(2))
-            .min(self.count);
+        let count = rays_for_importance(self.count, weight, self.full_share);
         let samples = HemisphereSamples::new(count)?;
         Ok(patches.par_iter().map(|&p| self.row(mesh, p, &samples)).collect())
     }
@@ -166,5 +181,5 @@ impl FormFactors for RayRows {
 }
 
 /// What a ray meets that meets nothing, or a back; all else is an element.
-const OPEN: u32 = u32::MAX;
-const BACK: u32 = u32::MAX - 1;
+pub(crate) const OPEN: u32 = u32::MAX;
+pub(crate) const BACK: u32 = u32::MAX - 1;

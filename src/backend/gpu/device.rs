@@ -16,7 +16,8 @@ use super::adapters;
 use super::error::{device_error, invalid_result, message};
 use super::limits::{self, GpuLimits};
 use super::memory::{Memory, MemoryBudget};
-use crate::backend::adapter::AdapterInfo;
+use super::tracing::Tracing;
+use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
 
 /// An open graphics device. Clones are the same device.
@@ -29,6 +30,7 @@ pub struct Gpu {
     /// Why the device is lost, or what went wrong outside of any error scope.
     lost: Arc<Mutex<Option<String>>>,
     budget: Arc<MemoryBudget>,
+    pub(super) tracing: Arc<Tracing>,
 }
 
 /// A device that takes longer than this over a batch counts as lost. A batch takes a fraction of a
@@ -98,12 +100,27 @@ impl Gpu {
         let adapter = adapters::describe(device.adapter_info());
         let limits = limits.within(&device.limits());
         let budget = Arc::new(MemoryBudget::new(limits.memory));
-        Gpu { device, queue, adapter, limits, lost: Arc::default(), budget }
+        Gpu {
+            device,
+            queue,
+            adapter,
+            limits,
+            lost: Arc::default(),
+            budget,
+            tracing: Arc::default(),
+        }
     }
 
     /// What the device runs on.
     pub fn adapter(&self) -> &AdapterInfo {
         &self.adapter
+    }
+
+    /// The same, with what makes rows and gathers light chosen as on an adapter of this `kind`: to
+    /// have a software device do what hardware does, which takes longer.
+    pub fn assuming(mut self, kind: AdapterKind) -> Gpu {
+        self.adapter.kind = kind;
+        self
     }
 
     /// Gives the device back. All clones, and all that uses it, get [`ErrorKind::Device`] from now
@@ -170,9 +187,15 @@ impl Gpu {
 
     /// Waits until all that was submitted is done.
     pub(super) fn wait(&self) -> Result<(), Error> {
+        self.wait_for(None)
+    }
+
+    /// Waits until this submission is done, and all before it; until all is, with none.
+    pub(super) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<(), Error> {
         let poll = || {
             let timeout = Some(DEVICE_TIMEOUT);
-            self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout })
+            let submission_index = submission.clone();
+            self.device.poll(wgpu::PollType::Wait { submission_index, timeout })
         };
         self.check()?;
         // wgpu 30 panics when the device is lost while it is waited for.
@@ -185,6 +208,25 @@ impl Gpu {
         };
         record(&self.lost, found);
         self.check()
+    }
+
+    /// Gives the bytes that `submission` has copied to a mappable buffer to `read`. The caller
+    /// unmaps it.
+    pub(super) fn read_mapped<T>(
+        &self,
+        slice: wgpu::BufferSlice,
+        submission: wgpu::SubmissionIndex,
+        read: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, Error> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
+        self.wait_for(Some(submission))?;
+        let failed = |found: String| self.device_error(ErrorKind::Device, found);
+        if !matches!(receiver.try_recv(), Ok(Ok(()))) {
+            return Err(failed("results could not be read back".into()));
+        }
+        let view = slice.get_mapped_range().map_err(|e| failed(e.to_string()))?;
+        Ok(read(&view))
     }
 
     /// An error if the device was lost.

@@ -138,6 +138,178 @@ pub struct Sums {
     pub lights: [[f32; 2]; MAX_EXPLICIT_LIGHTS],
 }
 
+/// Two boxes of the hierarchy that rays descend, and what is in them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TraceNode {
+    pub low_a: [f32; 3],
+    pub child_a: u32,
+    pub high_a: [f32; 3],
+    pub child_b: u32,
+    pub low_b: [f32; 3],
+    pub padding: u32,
+    pub high_b: [f32; 3],
+    pub padding_2: u32,
+}
+
+/// A triangle as rays meet it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TracedTriangle {
+    pub corner: [f32; 3],
+    pub index: u32,
+    pub corner_low: [f32; 3],
+    pub flags: u32,
+    pub edge_u: [f32; 3],
+    pub light: u32,
+    pub edge_v: [f32; 3],
+    pub extent: f32,
+}
+
+/// What there is one of in a scene that rays are cast in.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TracedSceneInfo {
+    pub panes: u32,
+    pub lights: u32,
+    pub sky_side: u32,
+    pub has_sun: u32,
+    pub sky: [f32; 3],
+    pub padding: u32,
+    pub sky_x: [f32; 3],
+    pub padding_2: u32,
+    pub sky_y: [f32; 3],
+    pub padding_3: u32,
+    pub sky_z: [f32; 3],
+    pub padding_4: u32,
+    pub sun: [f32; 3],
+    pub padding_5: u32,
+    pub sun_middle: [f32; 3],
+    pub padding_6: u32,
+    pub sun_right: [f32; 3],
+    pub padding_7: u32,
+    pub sun_up: [f32; 3],
+    pub padding_8: u32,
+}
+
+/// A light, or what a pane lets through.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TracedLight {
+    pub exitance: [f32; 3],
+    pub is_convex: u32,
+    pub first: u32,
+    pub count: u32,
+    pub area: f32,
+    pub padding: u32,
+}
+
+/// A triangle of a light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Lamp {
+    pub triangle: u32,
+    pub end: f32,
+}
+
+/// A point that light is gathered at.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TracedPoint {
+    pub position: [f32; 3],
+    pub near: f32,
+    pub position_low: [f32; 3],
+    pub rotation: f32,
+    pub normal: [f32; 3],
+    pub second_rotation: f32,
+    pub luminaires: [f32; 3],
+    pub padding: u32,
+}
+
+/// How many rays a gather casts.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct GatherSettings {
+    pub min_rays: u32,
+    pub max_rays: u32,
+    pub noise: f32,
+    pub dim: f32,
+    pub points: u32,
+    pub first: u32,
+    pub pass_rays: u32,
+    pub padding: u32,
+}
+
+/// What was gathered at a point.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Sample {
+    pub irradiance: [f32; 3],
+    pub noise: f32,
+    pub direct: [f32; 3],
+    pub escaped: f32,
+    pub back: f32,
+    pub inverse_distance: f32,
+    pub rays: u32,
+    pub shadow_rays: u32,
+}
+
+/// A patch that a row is made of.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TracedPatch {
+    pub position: [f32; 3],
+    pub near: f32,
+    pub position_low: [f32; 3],
+    pub own_triangle: u32,
+    pub normal: [f32; 3],
+    pub rotation: f32,
+}
+
+/// What a row is made with.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RowSettings {
+    pub rays: u32,
+    pub slots: u32,
+    pub unit: f32,
+    pub entries: u32,
+}
+
+/// A slot of a row that rays have met.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RowEntry {
+    pub patch_: u32,
+    pub slot: u32,
+    pub count: u32,
+    pub padding: u32,
+    pub passed: [u32; 3],
+    pub padding_2: u32,
+}
+
+/// Bytes before the entries of `RowEntries`.
+pub const ROW_ENTRIES_HEADER_BYTES: u64 = 16;
+
+/// Bytes of a `PointState`, which the host never looks into.
+pub const POINT_STATE_BYTES: u64 = 544;
+
+/// Bytes of the workgroup counts at the beginning of `Work`: those of rays, those of shadow rays.
+pub const WORK_HEADER_BYTES: u64 = 32;
+
+/// In place of a node or a triangle: none.
+pub const NOTHING: u32 = u32::MAX;
+
+/// A leaf of the hierarchy: this, its triangles less one << 29, and the first of them.
+pub const LEAF: u32 = 1 << 31;
+
+/// Flags of a traced triangle.
+pub const BACK_IS_COVERED: u32 = 1;
+pub const HAS_HOLES: u32 = 2;
+
+/// Texels side by side in textures that are read as arrays.
+pub const TEXELS_A_LINE: u32 = 2048;
+
 /// Pixels along an edge of a light's tile.
 pub const TILE: u32 = 32;
 

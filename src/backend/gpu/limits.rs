@@ -25,7 +25,11 @@ impl GpuLimits {
 
     /// What to ask of an adapter that has so much.
     pub(super) fn requested(&self, available: &wgpu::Limits) -> wgpu::Limits {
-        let least = wgpu::Limits::downlevel_defaults();
+        // Those of WebGPU, but for textures, of which adapters without it have less.
+        let least = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: 8,
+            ..wgpu::Limits::downlevel_defaults()
+        };
         let binding = available.max_storage_buffer_binding_size;
         wgpu::Limits {
             max_texture_dimension_2d: available.max_texture_dimension_2d.min(self.texture),

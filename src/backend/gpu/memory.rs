@@ -3,7 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use bytemuck::Pod;
+
 use super::error::device_error;
+use super::layout::TEXELS_A_LINE;
 use crate::error::{Error, ErrorKind};
 
 /// Bytes that all users of a device may take together, and those taken.
@@ -121,6 +124,18 @@ impl Memory {
         }))
     }
 
+    /// A texture that shaders read as an array of any length, [`TEXELS_A_LINE`] a line.
+    pub fn lines(&self, label: &str, texels: &[[f32; 4]]) -> Result<wgpu::TextureView, Error> {
+        let (padded, size) = padded_to_lines(texels);
+        self.texels(label, &padded, size)
+    }
+
+    /// The same of words.
+    pub fn words(&self, label: &str, words: &[u32]) -> Result<wgpu::TextureView, Error> {
+        let (padded, size) = padded_to_lines(words);
+        self.texels_of(label, &padded, size, wgpu::TextureFormat::R32Uint)
+    }
+
     /// A texture of these texels, line by line, for shaders to read: width and height.
     ///
     /// # Errors
@@ -129,14 +144,23 @@ impl Memory {
         &self,
         label: &str,
         texels: &[[f32; 4]],
+        size: [u32; 2],
+    ) -> Result<wgpu::TextureView, Error> {
+        self.texels_of(label, texels, size, wgpu::TextureFormat::Rgba32Float)
+    }
+
+    fn texels_of<T: Pod>(
+        &self,
+        label: &str,
+        texels: &[T],
         [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
     ) -> Result<wgpu::TextureView, Error> {
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let format = wgpu::TextureFormat::Rgba32Float;
         let texture = self.texture(label, [width, height, 1], format, usage)?;
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
-            bytes_per_row: Some(16 * width),
+            bytes_per_row: Some(size_of::<T>() as u32 * width),
             rows_per_image: None,
         };
         let bytes = bytemuck::cast_slice(texels);
@@ -153,6 +177,16 @@ impl Memory {
         self.held.fetch_add(bytes, Ordering::Relaxed);
         Ok(())
     }
+}
+
+/// Texels in whole lines, at least one, and how many columns and lines these are.
+fn padded_to_lines<T: Pod>(texels: &[T]) -> (Vec<T>, [u32; 2]) {
+    let line = TEXELS_A_LINE as usize;
+    let width = texels.len().clamp(1, line);
+    let height = texels.len().div_ceil(line).max(1);
+    let mut padded = texels.to_vec();
+    padded.resize(width * height, T::zeroed());
+    (padded, [width as u32, height as u32])
 }
 
 impl Drop for Memory {

@@ -94,9 +94,23 @@ pub fn bind_group(
     first: u32,
     resources: &[wgpu::BindingResource],
 ) -> wgpu::BindGroup {
-    let entries: Vec<_> = (first..)
-        .zip(resources.iter().cloned())
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+    let numbered: Vec<_> = (first..).zip(resources.iter().cloned()).collect();
+    bind_group_of(device, label, layout, &numbered)
+}
+
+/// A bind group of `resources` by their bindings.
+pub fn bind_group_of(
+    device: &wgpu::Device,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[(u32, wgpu::BindingResource)],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = resources
+        .iter()
+        .map(|(binding, resource)| wgpu::BindGroupEntry {
+            binding: *binding,
+            resource: resource.clone(),
+        })
         .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some(label),

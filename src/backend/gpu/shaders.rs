@@ -16,3 +16,28 @@ pub const RADIANCE_WGSL: &str =
     draw_shader!("radiance.wgsl", "corner.wgsl", "lattice.wgsl", "view.wgsl");
 pub const SKY_WGSL: &str = draw_shader!("sky.wgsl", "view.wgsl");
 pub const HEMISPHERE_SUM_WGSL: &str = include_str!("../../../shaders/hemisphere_sum.wgsl");
+
+/// Shaders that cast rays begin with how these meet the scene.
+macro_rules! ray_shader {
+    ($file:literal $(, $shared:literal)*) => {
+        draw_shader!(
+            $file,
+            "trace.wgsl",
+            "lights.wgsl"
+            $(, $shared)*
+        )
+    };
+}
+
+pub const RANK_LIGHTS_WGSL: &str = ray_shader!("rank_lights.wgsl", "gather_state.wgsl");
+pub const HEMISPHERE_RAYS_WGSL: &str = ray_shader!(
+    "hemisphere_rays.wgsl",
+    "gather_state.wgsl",
+    "lattice.wgsl",
+    "element.wgsl",
+    "field.wgsl"
+);
+pub const LIGHT_RAYS_WGSL: &str = ray_shader!("light_rays.wgsl", "gather_state.wgsl");
+pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl");
+pub const ROW_RAYS_WGSL: &str = ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl");
+pub const COMPACT_ROWS_WGSL: &str = include_str!("../../../shaders/compact_rows.wgsl");

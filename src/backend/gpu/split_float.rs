@@ -47,6 +47,16 @@ impl SplitFloat {
         triangles.iter().flat_map(corners).collect()
     }
 
+    /// One unit of the scene, in that of the device.
+    pub fn length_unit(&self) -> f64 {
+        1.0 / self.unit
+    }
+
+    /// An area.
+    pub fn area(&self, area: f64) -> f32 {
+        (area / self.unit / self.unit) as f32
+    }
+
     /// A length.
     pub fn length(&self, length: f64) -> f32 {
         (length / self.unit) as f32

@@ -233,6 +233,7 @@ impl Report {
                 baked.hemicubes,
                 match baked.row_maker {
                     RowMaker::Hemicubes => "hemicubes",
+                    RowMaker::DeviceRays => "rows of rays on the device",
                     RowMaker::Rays => "rows of rays",
                 },
                 baked.solution.stop

@@ -1,0 +1,161 @@
+// Cosine-distributed rays from each point, and the sums of what they find: a workgroup a point, a
+// ray a lane. Needs shared/trace.wgsl, shared/lights.wgsl, shared/gather_state.wgsl,
+// shared/lattice.wgsl and shared/field.wgsl before it.
+
+@group(0) @binding(7) var sky_pieces: texture_2d<f32>;
+// Unit vectors along two tangents and the normal, ray by ray.
+@group(1) @binding(2) var directions: texture_2d<f32>;
+@group(1) @binding(4) var<storage, read> work: WorkRead;
+
+struct WorkRead {
+    groups: array<u32, 8>,
+    points: array<u32>,
+}
+
+var<private> light_sums: array<Visible, 16>;
+
+// All points.
+@compute @workgroup_size(64)
+fn hemisphere_rays(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    cast_rays(group.x, lane);
+}
+
+// Those whose rays are doubled.
+@compute @workgroup_size(64)
+fn more_hemisphere_rays(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    cast_rays(work.points[group.x], lane);
+}
+
+// Light that the sky sends along a direction, as the radiosity of a surface.
+fn from_sky(direction: vec3f) -> vec3f {
+    if scene.sky_side == 0u {
+        return scene.sky;
+    }
+    let along = vec3f(
+        dot(scene.sky_x, direction),
+        dot(scene.sky_y, direction),
+        dot(scene.sky_z, direction),
+    );
+    let d = along / dot(abs(along), vec3f(1.0));
+    let side = f32(scene.sky_side);
+    let last = scene.sky_side - 1u;
+    let column = min(u32(max((d.x + d.y + 1.0) * 0.5 * side, 0.0)), last);
+    let line = min(u32(max((d.x - d.y + 1.0) * 0.5 * side, 0.0)), last);
+    let square = select(0u, scene.sky_side, d.z < 0.0);
+    return textureLoad(sky_pieces, vec2u(column, square + line), 0).rgb;
+}
+
+fn cast_rays(p: u32, lane: u32) {
+    let point = points[p];
+    let total = states[p].ray_count;
+    let light_count = states[p].light_count;
+    // The first time all rays, in two halves; then as many again, which are the second half.
+    let is_first = states[p].pending == 3u;
+    let start = select(total, 0u, is_first);
+    let middle = select(total, total / 2u, is_first);
+    let end = select(2u * total, total, is_first);
+    let from_ray = start + settings.first;
+    let to_ray = min(from_ray + settings.pass_rays, end);
+    for (var k = 0u; k < 2u * light_count; k++) {
+        light_sums[k] = Visible();
+    }
+    var found = array<RaySums, 2>();
+    for (var k = from_ray + lane; k < to_ray; k += LANES) {
+        let local = textureLoad(directions, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0).xyz;
+        let direction = turned(local, point.normal, point.rotation);
+        let half = select(0u, 1u, k >= middle);
+        cast_ray(p, point, direction, light_count, half, &found);
+    }
+    if from_ray >= end {
+        return;
+    }
+    for (var half = 0u; half < 2u; half++) {
+        let light = added_up(lane, vec4f(found[half].light, found[half].escaped));
+        let emitted = added_up(lane, vec4f(found[half].lamps, found[half].back));
+        let rest = added_up(lane, vec4f(found[half].inverse_distance, 0.0, 0.0, 0.0));
+        let largest = largest_of(lane, found[half].largest);
+        if lane == 0u {
+            states[p].rays[half].light += light.xyz;
+            states[p].rays[half].escaped += light.w;
+            states[p].rays[half].lamps += emitted.xyz;
+            states[p].rays[half].back += emitted.w;
+            states[p].rays[half].inverse_distance += rest.x;
+            states[p].rays[half].largest = max(states[p].rays[half].largest, largest);
+        }
+        for (var k = 0u; k < light_count; k++) {
+            let sum = light_sums[half * light_count + k];
+            let of_light = added_up(lane, vec4f(sum.seen, sum.all));
+            if lane == 0u && states[p].lights[k].is_wide != 0u {
+                states[p].visible[9u * half + k].seen += of_light.xyz;
+                states[p].visible[9u * half + k].all += of_light.w;
+            }
+        }
+    }
+}
+
+// Adds what one ray finds.
+fn cast_ray(
+    p: u32,
+    point: TracedPoint,
+    direction: vec3f,
+    light_count: u32,
+    half: u32,
+    found: ptr<function, array<RaySums, 2>>,
+) {
+    let ray = Ray(point.position, point.position_low, direction, point.near);
+    let hit = nearest(ray);
+    let is_surface = hit.triangle != NOTHING;
+    let share = passed(ray, select(FAR, hit.distance, is_surface));
+    var of_light = NO_LIGHT;
+    if is_surface && hit.front {
+        of_light = triangles[hit.triangle].light;
+    }
+    var is_known = false;
+    for (var k = 0u; k < light_count; k++) {
+        let ranked = states[p].lights[k];
+        let is_met = ranked.light == of_light;
+        is_known |= is_met;
+        if ranked.is_wide != 0u {
+            let at = half * light_count + k;
+            if is_met {
+                light_sums[at].seen += share;
+            }
+            light_sums[at].all += f32(is_met || is_towards(ray, lights[ranked.light]));
+        }
+    }
+    if !is_surface {
+        let light = from_sky(direction) * share;
+        (*found)[half].escaped += 1.0;
+        (*found)[half].light += light;
+        (*found)[half].largest = max((*found)[half].largest, length(light));
+        return;
+    }
+    (*found)[half].inverse_distance += 1.0 / hit.distance;
+    if !hit.front {
+        (*found)[half].back += 1.0;
+        return;
+    }
+    let light = reflected(triangles[hit.triangle].index, vec2f(hit.u, hit.v)) * share;
+    (*found)[half].light += light;
+    (*found)[half].largest = max((*found)[half].largest, length(light));
+    if of_light != NO_LIGHT && !is_known {
+        (*found)[half].lamps += lights[of_light].exitance * share;
+    }
+}
+
+// Whether a light lies along the ray, behind whatever hides it.
+fn is_towards(ray: Ray, light: TracedLight) -> bool {
+    for (var k = light.first; k < light.first + light.count; k++) {
+        let hit = meet(lamps[k].triangle, ray, FAR, 1.0);
+        if hit.triangle != NOTHING && hit.front {
+            return true;
+        }
+    }
+    return false;
+}

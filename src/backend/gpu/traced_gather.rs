@@ -1,0 +1,541 @@
+//! Irradiance gathered with rays on the device: batches of points, several in flight.
+//!
+//! ```text
+//! points ─► rank lights ─► rays over the hemisphere ─► settle ─┬─► samples ─► readback
+//!                      └─► rays to lights ────────────┘   ▲    │
+//!                                                         └────┘ more rays, where halves disagree
+//! ```
+//!
+//! What is summed is what [`RayGather`](crate::backend::cpu::RayGather) sums, in 32 bits. Lists of
+//! the points that need more rays are made on the device: the host waits for samples alone.
+//! Luminaires are looked for by rays on the CPU.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::device::Gpu;
+use super::field::{self, FieldBuffers};
+use super::layout::{
+    GatherSettings, POINT_STATE_BYTES, Sample, TracedPoint, WORK_HEADER_BYTES,
+};
+use super::memory::Memory;
+use super::pipeline::bind_group_of;
+use super::traced_scene::TracedScene;
+use crate::backend::adapter::AdapterKind;
+use crate::error::{Error, ErrorKind};
+use crate::gather::lights::Lights;
+use crate::gather::luminaire_light::LuminaireLight;
+use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+use crate::mesh::Mesh;
+use crate::sampling::hemisphere::{self, HemisphereSamples};
+use crate::sampling::rotation::{CellRotation, second_rotation};
+use crate::scene::Rgb;
+use crate::visibility::panes::Panes;
+use crate::visibility::ray_scene::RayScene;
+
+/// Gathers by casting cosine-distributed rays on a graphics device, in compute passes.
+///
+/// Every ray carries the same share of the hemisphere. A light's irradiance is its closed form
+/// times the share of it that is visible: by rays to points on it or, where it fills much of the
+/// hemisphere, by the rays over that.
+#[derive(Debug)]
+pub struct TracedGather {
+    gpu: Gpu,
+    lights: Arc<Lights>,
+    scene: Arc<TracedScene>,
+    rotations: CellRotation,
+    /// What rays to luminaires meet and pass; none without luminaires.
+    sight: Option<(Arc<RayScene>, Panes)>,
+    triangles: usize,
+    min_rays: u32,
+    max_rays: u32,
+    noise: f64,
+    dim: f64,
+    batches: Batches,
+    rays: u64,
+    seconds: f64,
+}
+
+/// What is made anew where the number of rays changes.
+#[derive(Debug)]
+struct Batches {
+    directions: wgpu::TextureView,
+    /// The first half of `Work` with no points in its lists.
+    no_work: wgpu::Buffer,
+    slots: Vec<Slot>,
+    /// Points at once, at most.
+    max_points: u32,
+    memory: Memory,
+}
+
+/// Buffers of a batch, used again once its samples are read.
+#[derive(Debug)]
+struct Slot {
+    points: wgpu::Buffer,
+    states: wgpu::Buffer,
+    samples: wgpu::Buffer,
+    work: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    /// By the number of passes before that have cast rays of the same half.
+    settings: Vec<wgpu::Buffer>,
+}
+
+/// A batch under way.
+struct InFlight {
+    slot: usize,
+    points: usize,
+    submission: wgpu::SubmissionIndex,
+}
+
+/// Most times as many rays as at first, where they disagree: as on the CPU.
+const MAX_OVERSAMPLING: u32 = 16;
+
+/// Batches under way at once: one is read while one runs and one is ready. With two the device
+/// waits for the host between batches.
+const IN_FLIGHT: usize = 3;
+
+/// Rays of a point that one pass casts at most, 64 a lane: lavapipe (Mesa 22.3) leaves all loops of
+/// an invocation after 65 535 rounds in total, and a ray takes some hundred.
+const PASS_RAYS: u32 = 4096;
+
+/// Points of a batch at most: beyond that an H200 gets no faster.
+const MAX_POINTS: u32 = 32_768;
+
+/// Seconds that one dispatch may take: drivers end those of seconds, and a desktop stands still
+/// meanwhile.
+const DISPATCH_SECONDS: f64 = 0.02;
+
+/// Rays to lights for one over the hemisphere, as `shared/gather_state.wgsl` has it.
+const RAYS_PER_SHADOW_RAY: u32 = 4;
+
+impl TracedGather {
+    /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰, or for a scene that does not fit the
+    /// device; [`ErrorKind::Memory`] when there is no memory; [`ErrorKind::Device`] when the device
+    /// fails.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, count: u32) -> Result<TracedGather, Error> {
+        TracedGather::with_noise(gpu, mesh, count, (f64::INFINITY, 0.0))
+    }
+
+    /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
+    /// `noise`·max(E, `dim`): see [`RayGather::with_noise`](crate::RayGather::with_noise).
+    ///
+    /// # Errors
+    /// Those of [`TracedGather::new`].
+    pub fn with_noise(
+        gpu: &Gpu,
+        mesh: &Mesh,
+        count: u32,
+        (noise, dim): (f64, f64),
+    ) -> Result<TracedGather, Error> {
+        if count == 0 || count > hemisphere::MAX_RAYS {
+            let place = format!("{count} rays a place");
+            let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
+            return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
+        }
+        let min_rays = 1 << f64::from(count).log2().round().max(1.0) as u32;
+        let max_rays = match noise.is_finite() {
+            true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
+            false => min_rays,
+        };
+        let scene = mesh.scene();
+        let lights = Arc::new(Lights::new(mesh.shared_scene()));
+        let traced = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
+        let samples = match scene.sky().uniform_radiance() {
+            Some(_) => HemisphereSamples::progressive(max_rays),
+            None => HemisphereSamples::centred(max_rays, min_rays),
+        };
+        let directions = ordered_directions(&samples, min_rays);
+        let batches = gpu.with_error_scopes(|| {
+            Batches::new(gpu.memory(), &directions, [min_rays, max_rays])
+        })?;
+        Ok(TracedGather {
+            gpu: gpu.clone(),
+            lights,
+            scene: traced,
+            rotations: CellRotation::new(&scene.bounds()),
+            sight: (!scene.luminaires().is_empty())
+                .then(|| (RayScene::of_scene(scene), Panes::of_scene(scene))),
+            triangles: scene.triangles().len(),
+            min_rays,
+            max_rays,
+            noise,
+            dim,
+            batches,
+            rays: 0,
+            seconds: 0.0,
+        })
+    }
+
+    /// Rays cast so far, those to lights included.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Seconds that gathers took so far, as the host sees it.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    fn traced_point(&self, point: &GatherPoint) -> TracedPoint {
+        let [position, position_low] = self.scene.coordinates.parts(point.position);
+        let rotation = self.rotations.at(point.position, point.near);
+        let luminaires = self.luminaires(point) / self.scene.radiance_unit;
+        TracedPoint {
+            position,
+            near: self.scene.coordinates.length(point.near),
+            position_low,
+            rotation: rotation as f32,
+            normal: point.normal.as_vec3().to_array(),
+            second_rotation: second_rotation(rotation) as f32,
+            luminaires: luminaires.as_vec3().to_array(),
+            padding: 0,
+        }
+    }
+
+    /// What comes straight from luminaires, W/m².
+    fn luminaires(&self, point: &GatherPoint) -> Rgb {
+        let Some((rays, panes)) = &self.sight else { return Rgb::ZERO };
+        let (luminaires, rotations) = (self.lights.scene().luminaires(), &self.rotations);
+        LuminaireLight { luminaires, rays, panes, rotations }.irradiance(point)
+    }
+
+    fn sample(&self, sample: &Sample) -> Result<IrradianceSample, String> {
+        let unit = self.scene.radiance_unit;
+        let light = |c: [f32; 3]| Rgb::from_array(c.map(f64::from)) * unit;
+        let sample = IrradianceSample {
+            irradiance: light(sample.irradiance),
+            direct: light(sample.direct),
+            noise: f64::from(sample.noise) * unit,
+            escaped: sample.escaped.into(),
+            backface: sample.back.into(),
+            inverse_distance: self.scene.coordinates.inverse_length(sample.inverse_distance),
+        };
+        let share = |x: f64| (0.0..=1.0).contains(&x);
+        let is_light = |c: Rgb| c.is_finite() && c.min_element() >= 0.0;
+        let is_sound = is_light(sample.irradiance)
+            && is_light(sample.direct)
+            && sample.noise >= 0.0
+            && share(sample.escaped)
+            && share(sample.backface)
+            && sample.inverse_distance >= 0.0
+            && sample.inverse_distance.is_finite();
+        if is_sound { Ok(sample) } else { Err(format!("{sample:?}")) }
+    }
+
+    /// Points of one batch: as many as a dispatch may take time for.
+    fn batch_len(&self) -> u32 {
+        let per_ray = match (self.gpu.adapter().kind, self.rays) {
+            (AdapterKind::Cpu, 0) => 1e-6,
+            (_, 0) => 2e-8,
+            (_, rays) => self.seconds / rays as f64,
+        };
+        let seconds = per_ray * f64::from(self.min_rays.min(PASS_RAYS));
+        ((DISPATCH_SECONDS / seconds) as u32).clamp(64, self.batches.max_points)
+    }
+
+    fn gather_all(
+        &mut self,
+        field: &FieldBuffers,
+        points: &[TracedPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        let mut out = Vec::with_capacity(points.len());
+        let mut waiting: VecDeque<InFlight> = VecDeque::new();
+        let bound: Vec<Bound> = (0..IN_FLIGHT).map(|k| self.bind(k, field)).collect();
+        let len = self.batch_len() as usize;
+        for (number, batch) in points.chunks(len).enumerate() {
+            if waiting.len() == IN_FLIGHT
+                && let Some(oldest) = waiting.pop_front()
+            {
+                self.read(&oldest, &mut out)?;
+            }
+            let slot = number % IN_FLIGHT;
+            let submission = self.submit(slot, &bound[slot], batch);
+            waiting.push_back(InFlight { slot, points: batch.len(), submission });
+        }
+        for batch in waiting {
+            self.read(&batch, &mut out)?;
+        }
+        Ok(out)
+    }
+
+    /// Starts a batch.
+    fn submit(&self, slot: usize, bound: &Bound, points: &[TracedPoint]) -> wgpu::SubmissionIndex {
+        let (gpu, batches) = (&self.gpu, &self.batches);
+        let Slot { points: buffer, samples, work, staging, settings, .. } = &batches.slots[slot];
+        let count = points.len() as u32;
+        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(points));
+        for (pass, buffer) in (0..).zip(settings) {
+            let settings = GatherSettings {
+                min_rays: self.min_rays,
+                max_rays: self.max_rays,
+                noise: self.noise as f32,
+                dim: (self.dim / self.scene.radiance_unit) as f32,
+                points: count,
+                first: pass * PASS_RAYS,
+                pass_rays: PASS_RAYS,
+                padding: 0,
+            };
+            gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
+        }
+        let pipelines = gpu.gather_pipelines();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let has_lights = self.has_lights();
+        let passes = |rays: u32| rays.div_ceil(PASS_RAYS) as usize;
+        let shadow_rays = |rays: u32| (rays / RAYS_PER_SHADOW_RAY).max(2);
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            bound.rank_lights.set(&mut pass, &pipelines.rank_lights, 0);
+            pass.dispatch_workgroups(count, 1, 1);
+            for k in 0..passes(self.min_rays) {
+                bound.hemisphere_rays.set(&mut pass, &pipelines.hemisphere_rays, k);
+                pass.dispatch_workgroups(count, 1, 1);
+            }
+            for k in 0..if has_lights { passes(shadow_rays(self.min_rays)) } else { 0 } {
+                bound.light_rays.set(&mut pass, &pipelines.light_rays, k);
+                pass.dispatch_workgroups(count, 1, 1);
+            }
+        }
+        let settle = |encoder: &mut wgpu::CommandEncoder| {
+            encoder.copy_buffer_to_buffer(&batches.no_work, 0, work, 0, WORK_HEADER_BYTES);
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            bound.settle.set(&mut pass, &pipelines.settle, 0);
+            pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+        };
+        settle(&mut encoder);
+        let doublings = (self.max_rays / self.min_rays).ilog2();
+        for round in 0..if has_lights { 2 * doublings } else { doublings } {
+            // Each half is as large as all that there was before: no more than this.
+            let rays = self.min_rays << round.min(doublings - 1);
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for k in 0..passes(rays) {
+                bound.more_hemisphere_rays.set(&mut pass, &pipelines.more_hemisphere_rays, k);
+                pass.dispatch_workgroups_indirect(work, 0);
+            }
+            for k in 0..if has_lights { passes(shadow_rays(rays)) } else { 0 } {
+                bound.more_light_rays.set(&mut pass, &pipelines.more_light_rays, k);
+                pass.dispatch_workgroups_indirect(work, 12);
+            }
+            drop(pass);
+            settle(&mut encoder);
+        }
+        let bytes = size_of::<Sample>() as u64 * u64::from(count);
+        encoder.copy_buffer_to_buffer(samples, 0, staging, 0, bytes);
+        gpu.queue.submit([encoder.finish()])
+    }
+
+    fn has_lights(&self) -> bool {
+        !self.lights.lights.is_empty() || self.lights.scene().sky().sun().is_some()
+    }
+
+    /// Waits for a batch and reads its samples.
+    fn read(&mut self, batch: &InFlight, out: &mut Vec<IrradianceSample>) -> Result<(), Error> {
+        let staging = &self.batches.slots[batch.slot].staging;
+        let slice = staging.slice(..(size_of::<Sample>() * batch.points) as u64);
+        let mut rays = 0;
+        let samples = self.gpu.read_mapped(slice, batch.submission.clone(), |bytes| {
+            let samples: &[Sample] = bytemuck::cast_slice(bytes);
+            rays = samples.iter().map(|s| u64::from(s.rays + s.shadow_rays)).sum();
+            samples.par_iter().map(|s| self.sample(s)).collect::<Result<Vec<_>, String>>()
+        })?;
+        staging.unmap();
+        self.rays += rays;
+        out.extend(samples.map_err(|found| self.gpu.invalid_result(found))?);
+        Ok(())
+    }
+
+    /// Buffers of a slot as the passes bind them.
+    fn bind(&self, slot: usize, field: &FieldBuffers) -> Bound {
+        let (device, scene) = (&self.gpu.device, &*self.scene);
+        let pipelines = self.gpu.gather_pipelines();
+        let Slot { points, states, samples, work, settings, .. } = &self.batches.slots[slot];
+        let view = wgpu::BindingResource::TextureView;
+        let geometry = [
+            (0, scene.nodes.as_entire_binding()),
+            (1, scene.triangles.as_entire_binding()),
+            (2, scene.info.as_entire_binding()),
+            (3, view(&scene.mask_places)),
+            (4, view(&scene.masks)),
+        ];
+        let without_nodes = geometry[1..].to_vec();
+        let lights = [
+            (5, scene.lights.as_entire_binding()),
+            (6, scene.lamps.as_entire_binding()),
+        ];
+        let sky = [(7, view(&scene.sky))];
+        let light_field =
+            vec![(0, field.quadtrees.as_entire_binding()), (1, view(&field.elements))];
+        let point = [(0, points.as_entire_binding()), (1, states.as_entire_binding())];
+        let directions = [(2, view(&self.batches.directions))];
+        let work_list = [(4, work.as_entire_binding())];
+        let bind = |pipeline: &wgpu::ComputePipeline,
+                    fixed: Vec<(u32, Vec<(u32, wgpu::BindingResource)>)>,
+                    batch: Vec<(u32, wgpu::BindingResource)>| {
+            let groups = fixed.into_iter().map(|(group, entries)| {
+                let layout = pipeline.get_bind_group_layout(group);
+                (group, bind_group_of(device, "scene", &layout, &entries))
+            });
+            let layout = pipeline.get_bind_group_layout(1);
+            let batches = settings.iter().map(|settings| {
+                let mut entries = batch.clone();
+                entries.push((3, settings.as_entire_binding()));
+                bind_group_of(device, "batch", &layout, &entries)
+            });
+            BoundPass { groups: groups.collect(), batches: batches.collect() }
+        };
+        fn all<'a>(
+            parts: &[&[(u32, wgpu::BindingResource<'a>)]],
+        ) -> Vec<(u32, wgpu::BindingResource<'a>)> {
+            parts.concat()
+        }
+        let rays = |pipeline, batch| {
+            let scene = all(&[&geometry, &lights, &sky]);
+            bind(pipeline, vec![(0, scene), (2, light_field.clone())], batch)
+        };
+        let to_lights =
+            |pipeline, batch| bind(pipeline, vec![(0, all(&[&geometry, &lights]))], batch);
+        Bound {
+            rank_lights: bind(
+                &pipelines.rank_lights,
+                vec![(0, all(&[&without_nodes, &lights]))],
+                point.to_vec(),
+            ),
+            hemisphere_rays: rays(&pipelines.hemisphere_rays, all(&[&point, &directions])),
+            more_hemisphere_rays: rays(
+                &pipelines.more_hemisphere_rays,
+                all(&[&point, &directions, &work_list]),
+            ),
+            light_rays: to_lights(&pipelines.light_rays, point.to_vec()),
+            more_light_rays: to_lights(&pipelines.more_light_rays, all(&[&point, &work_list])),
+            settle: bind(
+                &pipelines.settle,
+                vec![(0, vec![geometry[2].clone(), lights[0].clone()])],
+                all(&[&point, &[(2, samples.as_entire_binding())], &work_list]),
+            ),
+        }
+    }
+}
+
+/// Bind groups of all passes over one slot.
+struct Bound {
+    rank_lights: BoundPass,
+    hemisphere_rays: BoundPass,
+    more_hemisphere_rays: BoundPass,
+    light_rays: BoundPass,
+    more_light_rays: BoundPass,
+    settle: BoundPass,
+}
+
+struct BoundPass {
+    groups: Vec<(u32, wgpu::BindGroup)>,
+    /// Group 1, by the number of passes before that have cast rays of the same half.
+    batches: Vec<wgpu::BindGroup>,
+}
+
+impl BoundPass {
+    /// Prepares `pass` for a dispatch.
+    fn set(&self, pass: &mut wgpu::ComputePass, pipeline: &wgpu::ComputePipeline, number: usize) {
+        pass.set_pipeline(pipeline);
+        for (group, bindings) in &self.groups {
+            pass.set_bind_group(*group, bindings, &[]);
+        }
+        pass.set_bind_group(1, &self.batches[number], &[]);
+    }
+}
+
+impl Batches {
+    fn new(
+        memory: Memory,
+        directions: &[[f32; 4]],
+        [min_rays, max_rays]: [u32; 2],
+    ) -> Result<Batches, Error> {
+        use wgpu::BufferUsages as Usage;
+        // Of all rays of the first pass, or of the last doubling.
+        let passes = min_rays.max(max_rays / 2).div_ceil(PASS_RAYS).max(1);
+        let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
+        let no_work = memory.buffer("no work", WORK_HEADER_BYTES, Usage::COPY_SRC | Usage::COPY_DST)?;
+        memory.queue.write_buffer(&no_work, 0, bytemuck::cast_slice(&header));
+        let points = u64::from(MAX_POINTS);
+        let storage = Usage::STORAGE | Usage::COPY_DST;
+        let slot = |_| {
+            Ok(Slot {
+                points: memory.buffer("points", points * size_of::<TracedPoint>() as u64, storage)?,
+                states: memory.buffer("states", points * POINT_STATE_BYTES, Usage::STORAGE)?,
+                samples: memory.buffer(
+                    "samples",
+                    points * size_of::<Sample>() as u64,
+                    Usage::STORAGE | Usage::COPY_SRC,
+                )?,
+                work: memory.buffer(
+                    "work",
+                    WORK_HEADER_BYTES + 2 * points * 4,
+                    storage | Usage::INDIRECT,
+                )?,
+                staging: memory.buffer(
+                    "staging",
+                    points * size_of::<Sample>() as u64,
+                    Usage::MAP_READ | Usage::COPY_DST,
+                )?,
+                settings: (0..passes)
+                    .map(|_| memory.uniform("settings", &[0; size_of::<GatherSettings>()]))
+                    .collect::<Result<_, Error>>()?,
+            })
+        };
+        let slots = (0..IN_FLIGHT).map(slot).collect::<Result<_, Error>>()?;
+        let directions = memory.lines("directions", directions)?;
+        Ok(Batches { directions, no_work, slots, max_points: MAX_POINTS, memory })
+    }
+}
+
+/// The directions of `samples`, ray by ray. Those that are cast together, the first half of
+/// `min_rays`, the second, as many again and so on, are in the order of a Z-curve over azimuth and
+/// elevation, so that neighbouring lanes meet much the same.
+fn ordered_directions(samples: &HemisphereSamples, min_rays: u32) -> Vec<[f32; 4]> {
+    let mut directions: Vec<[f32; 4]> =
+        samples.local().iter().map(|&[x, y, z]| [x as f32, y as f32, z as f32, 0.0]).collect();
+    let mut start = 0;
+    let mut end = (min_rays / 2).max(1) as usize;
+    while start < directions.len() {
+        let stop = end.min(directions.len());
+        directions[start..stop].sort_by_key(|&[x, y, _, _]| {
+            let spread = |v: f32| ((v + 1.0) * 32_767.5) as u32;
+            interleaved(spread(x)) | interleaved(spread(y)) << 1
+        });
+        (start, end) = (stop, 2 * stop);
+    }
+    directions
+}
+
+/// 16 bits, a zero before each.
+fn interleaved(bits: u32) -> u32 {
+    let mut x = bits & 0xffff;
+    for (shift, mask) in [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
+impl Gather for TracedGather {
+    fn gather(
+        &mut self,
+        field: &RadiosityField,
+        points: &[GatherPoint],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        let start = Instant::now();
+        field::check(self.gpu.limits(), field, self.triangles)?;
+        let traced: Vec<TracedPoint> = points.par_iter().map(|p| self.traced_point(p)).collect();
+        let gpu = self.gpu.clone();
+        let samples = gpu.with_error_scopes(|| {
+            let field = gpu.field_buffers(&self.scene, field)?;
+            self.gather_all(&field, &traced)
+        });
+        self.seconds += start.elapsed().as_secs_f64();
+        samples
+    }
+}
+

@@ -1,0 +1,350 @@
+//! Form-factor rows from rays on the device: batches of patches, whose hits are counted and
+//! compacted there.
+//!
+//! ```text
+//! patches ─► a ray a lane ─► counts, dense: patch × slot ─► entries of all rows in one list ─► readback
+//!                                                 ▲  zeros  │
+//!                                                 └─────────┘
+//! ```
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::device::Gpu;
+use super::field::quadtrees;
+use super::layout::{
+    BACK, FIRST_ELEMENT, OPEN, ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings, TracedPatch,
+};
+use super::memory::Memory;
+use super::pipeline::bind_group_of;
+use super::traced_scene::TracedScene;
+use crate::backend::cpu::rows::{self as cpu, rays_for_importance, rotation, row_of_counts};
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::{FormFactors, Row};
+use crate::gather::lights::Lights;
+use crate::mesh::{Mesh, NodeId};
+use crate::sampling::hemisphere::HemisphereSamples;
+use crate::scene::Rgb;
+use crate::visibility::offset;
+
+/// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid on a graphics
+/// device: the rows of [`RayRows`](crate::RayRows), but for rays that rounding moves.
+///
+/// Every ray carries the same share of the light, so a form factor is a count: for n rays the
+/// standard error of an entry F is at most √(F(1−F)/n).
+#[derive(Debug)]
+pub struct TracedRows {
+    gpu: Gpu,
+    scene: Arc<TracedScene>,
+    count: u32,
+    /// Directions by number of rays: all, and the fewer ones asked for so far.
+    directions: Vec<(u32, wgpu::TextureView)>,
+    buffers: Buffers,
+    has_panes: bool,
+    slots: u32,
+    pub(crate) full_share: f64,
+    made: u64,
+    rays: u64,
+}
+
+#[derive(Debug)]
+struct Buffers {
+    quadtrees: wgpu::Buffer,
+    patches: wgpu::Buffer,
+    counts: wgpu::Buffer,
+    settings: wgpu::Buffer,
+    found: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    /// Patches of a batch, and entries that there is room for.
+    patches_at_once: u32,
+    entries: u32,
+    memory: Memory,
+}
+
+/// Rows made at once, at most: what a solver asks for. It decides the order of shots.
+const MAX_BATCH: u32 = 256;
+
+/// Counts of a batch take at most this many bytes: what any WebGPU device binds.
+const COUNT_BYTES: u64 = 128 << 20;
+
+/// Bytes of entries that a batch has room for; rows that have more are made again in two batches.
+const ENTRY_BYTES: u64 = 32 << 20;
+
+impl TracedRows {
+    /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰, [`ErrorKind::Memory`] when a row does
+    /// not fit the device or there is no memory, [`ErrorKind::Device`] when the device fails.
+    pub fn new(gpu: &Gpu, mesh: &Mesh, count: u32) -> Result<TracedRows, Error> {
+        let samples = HemisphereSamples::new(count)?;
+        let lights = Lights::new(mesh.shared_scene());
+        let scene = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
+        let has_panes = mesh.scene().clear_panes().is_some();
+        let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
+        let row_bytes = u64::from(slots) * if has_panes { 16 } else { 4 };
+        let most = gpu.limits().buffer.min(COUNT_BYTES);
+        if row_bytes > most {
+            let found = format!("rows of {row_bytes} bytes");
+            let remedy = format!("this device has room for {most}");
+            return Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy));
+        }
+        let patches_at_once = ((most / row_bytes) as u32).min(MAX_BATCH);
+        let buffers = gpu.with_error_scopes(|| {
+            Buffers::new(gpu.memory(), mesh, (row_bytes, count), patches_at_once)
+        })?;
+        let mut rows = TracedRows {
+            gpu: gpu.clone(),
+            scene,
+            count,
+            directions: vec![],
+            buffers,
+            has_panes,
+            slots,
+            full_share: crate::RayRows::FULL_SHARE,
+            made: 0,
+            rays: 0,
+        };
+        rows.add_directions(&samples, count)?;
+        Ok(rows)
+    }
+
+    /// All rays for patches that shoot at least this share of the emitted flux, in [0, 1]: see
+    /// [`RayRows::with_full_share`](crate::RayRows::with_full_share).
+    pub fn with_full_share(self, full_share: f64) -> TracedRows {
+        TracedRows { full_share, ..self }
+    }
+
+    fn add_directions(&mut self, samples: &HemisphereSamples, count: u32) -> Result<usize, Error> {
+        let local = |&[x, y, z]: &[f64; 3]| [x as f32, y as f32, z as f32, 0.0];
+        let directions: Vec<[f32; 4]> = samples.local().iter().map(local).collect();
+        let memory = &self.buffers.memory;
+        let view = self.gpu.with_error_scopes(|| memory.lines("directions", &directions))?;
+        self.directions.push((count, view));
+        Ok(self.directions.len() - 1)
+    }
+
+    fn traced_patch(&self, mesh: &Mesh, patch: NodeId) -> TracedPatch {
+        let [position, position_low] = self.scene.coordinates.parts(mesh.viewpoint(patch));
+        let near = offset::RAY_START * mesh.area(patch).sqrt();
+        TracedPatch {
+            position,
+            near: self.scene.coordinates.length(near),
+            position_low,
+            own_triangle: mesh.triangle(patch) as u32,
+            normal: mesh.normal(patch).as_vec3().to_array(),
+            rotation: rotation(patch) as f32,
+        }
+    }
+
+    /// The rows of a batch by so many `rays` in the directions of number `at`.
+    fn batch(
+        &mut self,
+        mesh: &Mesh,
+        patches: &[NodeId],
+        (rays, at): (u32, usize),
+    ) -> Result<Vec<Row>, Error> {
+        let traced: Vec<TracedPatch> =
+            patches.par_iter().map(|&p| self.traced_patch(mesh, p)).collect();
+        let settings = RowSettings {
+            rays,
+            slots: self.slots,
+            unit: passed_unit(rays) as f32,
+            entries: self.buffers.entries,
+        };
+        let gpu = self.gpu.clone();
+        let entries = gpu.with_error_scopes(|| self.entries(&traced, settings, at))?;
+        let Some(mut entries) = entries else {
+            // There was no room for all entries.
+            let (first, second) = patches.split_at(patches.len() / 2);
+            let mut rows = self.batch(mesh, first, (rays, at))?;
+            rows.extend(self.batch(mesh, second, (rays, at))?);
+            return Ok(rows);
+        };
+        entries.par_sort_unstable_by_key(|e| (e.patch_, item(e.slot)));
+        let of_patches: Vec<&[RowEntry]> =
+            entries.chunk_by(|a, b| a.patch_ == b.patch_).collect();
+        let counted =
+            |row: &&[RowEntry]| row.iter().map(|e| u64::from(e.count)).sum::<u64>() == u64::from(rays);
+        if of_patches.len() != patches.len() || !of_patches.iter().all(counted) {
+            return Err(gpu.invalid_result("rows of another number of rays".into()));
+        }
+        self.made += patches.len() as u64;
+        self.rays += patches.len() as u64 * u64::from(rays);
+        Ok(of_patches.par_iter().map(|row| self.row(row, rays)).collect())
+    }
+
+    /// Entries of all rows; none where there is no room for them.
+    fn entries(
+        &self,
+        patches: &[TracedPatch],
+        settings: RowSettings,
+        at: usize,
+    ) -> Result<Option<Vec<RowEntry>>, Error> {
+        let (gpu, buffers) = (&self.gpu, &self.buffers);
+        let Buffers { counts, found, staging, settings: uniform, .. } = buffers;
+        gpu.queue.write_buffer(&buffers.patches, 0, bytemuck::cast_slice(patches));
+        gpu.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&settings));
+        let pipelines = gpu.row_pipelines();
+        let compact = match self.has_panes {
+            true => &pipelines.compact_rows_through_panes,
+            false => &pipelines.compact_rows,
+        };
+        let device = &gpu.device;
+        let view = wgpu::BindingResource::TextureView;
+        let group = |pipeline: &wgpu::ComputePipeline,
+                     group: u32,
+                     entries: &[(u32, wgpu::BindingResource)]| {
+            let layout = pipeline.get_bind_group_layout(group);
+            bind_group_of(device, "rows", &layout, entries)
+        };
+        let scene = &*self.scene;
+        let geometry = [
+            (0, scene.nodes.as_entire_binding()),
+            (1, scene.triangles.as_entire_binding()),
+            (2, scene.info.as_entire_binding()),
+            (3, view(&scene.mask_places)),
+            (4, view(&scene.masks)),
+            (5, scene.lights.as_entire_binding()),
+        ];
+        let batch = [
+            (0, buffers.patches.as_entire_binding()),
+            (1, counts.as_entire_binding()),
+            (2, view(&self.directions[at].1)),
+            (3, uniform.as_entire_binding()),
+        ];
+        let rays = &pipelines.row_rays;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(found, 0, Some(ROW_ENTRIES_HEADER_BYTES));
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(rays);
+            pass.set_bind_group(0, &group(rays, 0, &geometry), &[]);
+            pass.set_bind_group(1, &group(rays, 1, &batch), &[]);
+            let quadtrees = [(0, buffers.quadtrees.as_entire_binding())];
+            pass.set_bind_group(2, &group(rays, 2, &quadtrees), &[]);
+            pass.dispatch_workgroups(settings.rays.div_ceil(64), patches.len() as u32, 1);
+            pass.set_pipeline(compact);
+            let lists = [batch[1].clone(), batch[3].clone(), (4, found.as_entire_binding())];
+            pass.set_bind_group(1, &group(compact, 1, &lists), &[]);
+            pass.dispatch_workgroups(settings.slots.div_ceil(64), patches.len() as u32, 1);
+        }
+        // As many as there may be, if that is little; else how many there are is asked first.
+        let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
+        let bytes = |entries: u64| ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
+        let guess = most.min(u64::from(settings.entries)).min(FIRST_ENTRIES);
+        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let read = |submission, upto: u64| {
+            let entries = gpu.read_mapped(staging.slice(..bytes(upto)), submission, |bytes| {
+                let count = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+                let list: &[RowEntry] =
+                    bytemuck::cast_slice(&bytes[ROW_ENTRIES_HEADER_BYTES as usize..]);
+                let within = list.get(..count as usize).map(<[RowEntry]>::to_vec);
+                (u64::from(count), within)
+            });
+            staging.unmap();
+            entries
+        };
+        let (count, entries) = read(submission, guess)?;
+        if entries.is_some() || count > u64::from(settings.entries) {
+            return Ok(entries);
+        }
+        let mut encoder = device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(count));
+        let submission = gpu.queue.submit([encoder.finish()]);
+        Ok(read(submission, count)?.1)
+    }
+
+    /// The row of entries in the order of their items.
+    fn row(&self, entries: &[RowEntry], rays: u32) -> Row {
+        let row = row_of_counts(entries.iter().map(|e| (item(e.slot), e.count)), rays as usize);
+        let unit = passed_unit(rays);
+        let mean = |e: &RowEntry| {
+            let sum = Rgb::from_array(e.passed.map(f64::from));
+            (sum / (unit * f64::from(e.count))).min(Rgb::ONE)
+        };
+        // A ray that nothing dims adds the whole unit.
+        let is_clear = |e: &RowEntry| e.passed == [e.count * unit as u32; 3];
+        if !self.has_panes || entries.iter().all(is_clear) {
+            return row;
+        }
+        let of = |item_of: u32| {
+            let entry = entries.iter().find(|e| item(e.slot) == item_of);
+            Row::passed(entry.map_or(Rgb::ONE, mean))
+        };
+        let elements = entries.iter().filter(|e| e.slot >= FIRST_ELEMENT);
+        let passed = elements.map(|e| Row::passed(mean(e)));
+        let passed = passed.chain([of(cpu::OPEN), of(cpu::BACK)]).collect();
+        Row { passed, ..row }
+    }
+}
+
+/// What a ray counts in sums of what panes let through: all rays together stay within 32 bits.
+fn passed_unit(rays: u32) -> f64 {
+    f64::from((u32::MAX / rays).min(1 << 16))
+}
+
+/// Entries that are read back without asking how many there are: 2 MiB of them.
+const FIRST_ENTRIES: u64 = 65_536;
+
+/// What `row_of_counts` calls a slot.
+fn item(slot: u32) -> u32 {
+    match slot {
+        OPEN => cpu::OPEN,
+        BACK => cpu::BACK,
+        element => element - FIRST_ELEMENT,
+    }
+}
+
+impl Buffers {
+    fn new(
+        memory: Memory,
+        mesh: &Mesh,
+        (row_bytes, rays): (u64, u32),
+        patches_at_once: u32,
+    ) -> Result<Buffers, Error> {
+        use wgpu::BufferUsages as Usage;
+        // Those of one row at least.
+        let entries = (ENTRY_BYTES / size_of::<RowEntry>() as u64).max(rays.into());
+        let found = ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
+        let patches = u64::from(patches_at_once);
+        let storage = Usage::STORAGE | Usage::COPY_DST;
+        Ok(Buffers {
+            quadtrees: memory.storage("quadtrees", bytemuck::cast_slice(&quadtrees(mesh)))?,
+            patches: memory.buffer("patches", patches * size_of::<TracedPatch>() as u64, storage)?,
+            // Zero at first, and after each batch.
+            counts: memory.buffer("counts", patches * row_bytes, storage)?,
+            settings: memory.uniform("settings", &[0; size_of::<RowSettings>()])?,
+            found: memory.buffer("entries", found, storage | Usage::COPY_SRC)?,
+            staging: memory.buffer("staging", found, Usage::MAP_READ | Usage::COPY_DST)?,
+            patches_at_once,
+            entries: entries as u32,
+            memory,
+        })
+    }
+}
+
+impl FormFactors for TracedRows {
+    fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
+        let rays = rays_for_importance(self.count, weight, self.full_share);
+        let at = match self.directions.iter().position(|&(count, _)| count == rays) {
+            Some(at) => at,
+            None => self.add_directions(&HemisphereSamples::new(rays)?, rays)?,
+        };
+        let mut rows = Vec::with_capacity(patches.len());
+        for batch in patches.chunks(self.buffers.patches_at_once as usize) {
+            rows.extend(self.batch(mesh, batch, (rays, at))?);
+        }
+        Ok(rows)
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        MAX_BATCH as usize
+    }
+
+    fn fingerprint(&self) -> String {
+        format!("{} rays on the device, all from {}", self.count, self.full_share)
+    }
+}

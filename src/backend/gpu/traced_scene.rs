@@ -1,0 +1,332 @@
+//! A scene on the device as rays meet it: hierarchy, triangles, lights, sky, panes and masks.
+//!
+//! ```text
+//! nodes      [hierarchy of what blocks light][hierarchy of clear panes]
+//! triangles  [those in the first's order][those in the second's][lamps that nothing meets]
+//! lights     [lights of the scene][a row for each pane: what it lets through]
+//! lamps      triangles of each light, and the share of its area up to their ends
+//! ```
+
+use std::f64::consts::PI;
+
+use bytemuck::Zeroable;
+use glam::{DVec2, DVec3, Vec3A};
+
+use super::layout::{
+    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, TEXELS_A_LINE, TraceNode, TracedLight,
+    TracedSceneInfo, TracedTriangle,
+};
+use super::memory::Memory;
+use super::split_float::SplitFloat;
+use crate::error::Error;
+use crate::gather::lights::{Lights, NO_LIGHT};
+use crate::scene::{Rgb, Scene, SkyMap, Sun};
+use crate::visibility::panes::Panes;
+use crate::visibility::ray_scene::RayScene;
+
+/// What rays meet, in buffers of the device.
+#[derive(Debug)]
+pub struct TracedScene {
+    pub coordinates: SplitFloat,
+    /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
+    pub radiance_unit: f64,
+    pub nodes: wgpu::Buffer,
+    pub triangles: wgpu::Buffer,
+    pub info: wgpu::Buffer,
+    pub mask_places: wgpu::TextureView,
+    pub masks: wgpu::TextureView,
+    pub lights: wgpu::Buffer,
+    pub lamps: wgpu::Buffer,
+    pub sky: wgpu::TextureView,
+    _memory: Memory,
+}
+
+/// The same in plain memory, as shaders read it.
+#[derive(Debug)]
+pub struct TracedArrays {
+    pub coordinates: SplitFloat,
+    pub radiance_unit: f64,
+    pub nodes: Vec<TraceNode>,
+    pub triangles: Vec<TracedTriangle>,
+    pub info: TracedSceneInfo,
+    pub mask_places: Vec<[f32; 4]>,
+    pub masks: Vec<u32>,
+    pub lights: Vec<TracedLight>,
+    pub lamps: Vec<Lamp>,
+    pub sky: Vec<[f32; 4]>,
+}
+
+impl TracedScene {
+    /// The scene of `lights` in buffers.
+    pub fn new(memory: Memory, lights: &Lights) -> Result<TracedScene, Error> {
+        let arrays = TracedArrays::new(lights);
+        let side = arrays.info.sky_side;
+        Ok(TracedScene {
+            coordinates: arrays.coordinates,
+            radiance_unit: arrays.radiance_unit,
+            nodes: memory.storage("hierarchy", bytemuck::cast_slice(&arrays.nodes))?,
+            triangles: memory.storage("triangles", bytemuck::cast_slice(&arrays.triangles))?,
+            info: memory.uniform("scene", bytemuck::bytes_of(&arrays.info))?,
+            mask_places: memory.lines("places of masks", &arrays.mask_places)?,
+            masks: memory.words("masks", &arrays.masks)?,
+            lights: memory.storage("lights", bytemuck::cast_slice(&arrays.lights))?,
+            lamps: memory.storage("lamps", bytemuck::cast_slice(&arrays.lamps))?,
+            sky: memory.texels("sky", &arrays.sky, [side.max(1), (2 * side).max(1)])?,
+            _memory: memory,
+        })
+    }
+}
+
+impl TracedArrays {
+    /// The scene of `lights`.
+    pub fn new(lights: &Lights) -> TracedArrays {
+        let scene = lights.scene();
+        let rays = RayScene::of_scene(scene);
+        let panes = Panes::of_scene(scene);
+        let lamps = lights.lights.iter().map(|l| l.exitance.max_element());
+        let sky = scene.sky();
+        let brightest = lamps.chain([PI * sky.brightest()]).fold(0.0, f64::max);
+        let mut arrays = TracedArrays {
+            coordinates: SplitFloat::new(scene),
+            radiance_unit: if brightest > 0.0 { brightest.log2().floor().exp2() } else { 1.0 },
+            nodes: vec![],
+            triangles: Vec::with_capacity(scene.triangles().len()),
+            info: TracedSceneInfo { panes: NOTHING, ..Zeroable::zeroed() },
+            mask_places: vec![[0.0; 4]],
+            masks: vec![0],
+            lights: vec![],
+            lamps: vec![],
+            sky: vec![[0.0; 4]],
+        };
+        let has_holes = arrays.add_masks(scene);
+        let triangle = |t: usize, light: u32| arrays.coordinates.traced(scene, t, light);
+        let with_holes = |mut triangle: TracedTriangle| {
+            if has_holes.get(triangle.index as usize) == Some(&true) {
+                triangle.flags |= HAS_HOLES;
+            }
+            triangle
+        };
+        let mut triangles: Vec<TracedTriangle> =
+            rays.triangles().map(|t| with_holes(triangle(t, lights.of_triangle[t]))).collect();
+        let blocking = triangles.len();
+        if let Some((hierarchy, transmittance)) = panes.hierarchy() {
+            let clear: Vec<usize> =
+                (0..scene.triangles().len()).filter(|&t| scene.is_clear(t)).collect();
+            let first_row = lights.lights.len();
+            triangles.extend(
+                hierarchy.triangles().map(|k| {
+                    with_holes(triangle(clear[k], (first_row + k) as u32))
+                }),
+            );
+            arrays.lights = transmittance.iter().map(pane_row).collect();
+            arrays.add_nodes(&rays, 0);
+            arrays.info.panes = arrays.nodes.len() as u32;
+            arrays.add_nodes(hierarchy, blocking);
+        } else {
+            arrays.add_nodes(&rays, 0);
+        }
+        arrays.triangles = triangles;
+        arrays.add_lights(lights, blocking);
+        arrays.add_light_from_outside(scene);
+        // A buffer has a size, whether anything looks into it or not.
+        let first = |is_empty: bool| if is_empty { 1 } else { 0 };
+        let TracedArrays { triangles, lights, lamps, .. } = &mut arrays;
+        triangles.resize(triangles.len() + first(triangles.is_empty()), Zeroable::zeroed());
+        lights.resize(lights.len() + first(lights.is_empty()), Zeroable::zeroed());
+        lamps.resize(lamps.len() + first(lamps.is_empty()), Zeroable::zeroed());
+        arrays
+    }
+
+    /// The nodes of a hierarchy whose triangles begin at `first_triangle`.
+    fn add_nodes(&mut self, rays: &RayScene, first_triangle: usize) {
+        let tree = rays.tree();
+        // Inner nodes alone have a place of their own: leaves are numbers in their parents.
+        let mut place = vec![u32::MAX; tree.nodes.len()];
+        let mut next = self.nodes.len() as u32;
+        for (k, node) in tree.nodes.iter().enumerate() {
+            if node.children.is_some() {
+                place[k] = next;
+                next += 1;
+            }
+        }
+        let child = |k: usize| {
+            let node = &tree.nodes[k];
+            match node.children {
+                Some(_) => place[k],
+                None => {
+                    let first = (first_triangle + node.items.start) as u32;
+                    LEAF | (node.items.len() as u32 - 1) << 29 | first
+                }
+            }
+        };
+        let bounds = |k: usize| {
+            let bounds = &tree.nodes[k].bounds;
+            self.coordinates.widened([bounds.low, bounds.high].map(|p| rays.in_scene_unit(p)))
+        };
+        let mut nodes = vec![];
+        for node in &tree.nodes {
+            if let Some(first) = node.children {
+                nodes.push(pair(
+                    (bounds(first), child(first)),
+                    (bounds(first + 1), child(first + 1)),
+                ));
+            }
+        }
+        if nodes.is_empty() {
+            // The root is a leaf, or nothing is there.
+            let root = match tree.order.is_empty() {
+                true => (NOWHERE, LEAF),
+                false => (bounds(0), child(0)),
+            };
+            nodes.push(pair(root, (NOWHERE, LEAF)));
+        }
+        self.nodes.extend(nodes);
+    }
+
+    fn add_lights(&mut self, lights: &Lights, blocking: usize) {
+        let scene = lights.scene();
+        let mut slot = vec![u32::MAX; scene.triangles().len()];
+        for (k, triangle) in self.triangles[..blocking].iter().enumerate() {
+            slot[triangle.index as usize] = k as u32;
+        }
+        let mut rows = vec![];
+        for (number, light) in (0..).zip(&lights.lights) {
+            let first = self.lamps.len() as u32;
+            let area = light.surface.total_area();
+            let mut end = 0.0;
+            for &t in &light.triangles {
+                let t = t as usize;
+                if slot[t] == u32::MAX {
+                    slot[t] = self.triangles.len() as u32;
+                    self.triangles.push(self.coordinates.traced(scene, t, number));
+                }
+                end += scene.area(t) / area;
+                self.lamps.push(Lamp { triangle: slot[t], end: end as f32 });
+            }
+            rows.push(TracedLight {
+                exitance: (light.exitance / self.radiance_unit).as_vec3().to_array(),
+                is_convex: light.convex.into(),
+                first,
+                count: light.triangles.len() as u32,
+                area: self.coordinates.area(area),
+                padding: 0,
+            });
+        }
+        self.info.lights = rows.len() as u32;
+        rows.append(&mut self.lights);
+        self.lights = rows;
+    }
+
+    fn add_light_from_outside(&mut self, scene: &Scene) {
+        let (sky, unit) = (scene.sky(), self.radiance_unit);
+        let vector = |v: DVec3| v.as_vec3().to_array();
+        if let Some(uniform) = sky.uniform_radiance() {
+            self.info.sky = vector(PI * uniform / unit);
+        }
+        if let Some(map) = sky.map() {
+            let back = map.turn().inverse();
+            let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| vector(back * axis));
+            self.info.sky_side = map.side() as u32;
+            (self.info.sky_x, self.info.sky_y, self.info.sky_z) = (x, y, z);
+            self.sky = sky_texels(map, unit);
+        }
+        if let Some(sun) = sky.sun() {
+            let (right, up) = sun.direction.any_orthonormal_pair();
+            self.info.has_sun = 1;
+            self.info.sun = vector(sun.irradiance / unit);
+            self.info.sun_middle = vector(sun.direction);
+            self.info.sun_right = vector(right * Sun::tangent());
+            self.info.sun_up = vector(up * Sun::tangent());
+        }
+    }
+
+    /// Adds the masks of cut-outs; says of each triangle whether it has one.
+    fn add_masks(&mut self, scene: &Scene) -> Vec<bool> {
+        if !scene.has_cut_outs() {
+            return vec![];
+        }
+        let mut first_word = rustc_hash::FxHashMap::default();
+        for (material, mask) in scene.masks() {
+            first_word.insert(material, self.masks.len() as u32);
+            let solid: Vec<bool> = mask.solid_texels().collect();
+            let word = |bits: &[bool]| {
+                bits.iter().rev().fold(0, |word, &bit| word << 1 | u32::from(bit))
+            };
+            self.masks.extend(solid.chunks(32).map(word));
+        }
+        let count = scene.triangles().len();
+        self.mask_places = vec![[0.0; 4]; 3 * count];
+        let mut has_holes = vec![false; count];
+        for t in 0..count {
+            let Some(mask) = scene.mask(t) else { continue };
+            let corners = Scene::WHOLE.map(|c| mask.in_texels(scene.texture_place(t, c)));
+            if !corners.iter().all(|place| place.is_finite()) {
+                continue;
+            }
+            let size = mask.texture.size();
+            let whole = DVec2::new(size[0].into(), size[1].into());
+            // From the tile of the first corner on, so that few digits are lost far out.
+            let tile = if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
+            let [a, b, c] = corners.map(|place| (place - tile).as_vec2());
+            let word = first_word[&scene.triangles()[t].material] as f32;
+            self.mask_places[3 * t] = [a.x, a.y, b.x, b.y];
+            self.mask_places[3 * t + 1] = [c.x, c.y, word, size[0] as f32];
+            self.mask_places[3 * t + 2] = [size[1] as f32, mask.clamped.into(), 0.0, 0.0];
+            has_holes[t] = true;
+        }
+        has_holes
+    }
+}
+
+/// A box that no ray meets: a point beyond the farthest end.
+const NOWHERE: [[f32; 3]; 2] = [[1e31; 3]; 2];
+
+fn pair((a, child_a): ([[f32; 3]; 2], u32), (b, child_b): ([[f32; 3]; 2], u32)) -> TraceNode {
+    let ([low_a, high_a], [low_b, high_b]) = (a, b);
+    TraceNode { low_a, child_a, high_a, child_b, low_b, padding: 0, high_b, padding_2: 0 }
+}
+
+fn pane_row(transmittance: &Rgb) -> TracedLight {
+    TracedLight { exitance: transmittance.as_vec3().to_array(), ..Zeroable::zeroed() }
+}
+
+/// Radiosity of the pieces of a map in units of `radiance_unit`, line by line.
+fn sky_texels(map: &SkyMap, radiance_unit: f64) -> Vec<[f32; 4]> {
+    let texel = |piece: &[f32; 3]| {
+        let [r, g, b] = piece.map(|l| (f64::from(l) * PI / radiance_unit) as f32);
+        [r, g, b, 0.0]
+    };
+    map.pieces().iter().map(texel).collect()
+}
+
+/// Margin of boxes, in units of the scene's size: four roundings of a coordinate, which is half of
+/// that at most. That of the hierarchy itself is for its own unit.
+const BOX_MARGIN: f32 = 2.4e-7;
+
+impl SplitFloat {
+    /// A box as rays meet it, wider than it is.
+    fn widened(&self, [low, high]: [DVec3; 2]) -> [[f32; 3]; 2] {
+        let [low, high] = [low, high].map(|p| Vec3A::from_array(self.parts(p)[0]));
+        [(low - BOX_MARGIN).to_array(), (high + BOX_MARGIN).to_array()]
+    }
+
+    /// Triangle `t` of `scene`, of this light.
+    fn traced(&self, scene: &Scene, t: usize, light: u32) -> TracedTriangle {
+        let [a, b, c] = scene.corners(t);
+        let [corner, corner_low] = self.parts(a);
+        let edge = |v: DVec3| (v * self.length_unit()).as_vec3().to_array();
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        TracedTriangle {
+            corner,
+            index: t as u32,
+            corner_low,
+            flags: if scene.is_back_covered(t) { BACK_IS_COVERED } else { 0 },
+            edge_u: edge(b - a),
+            light,
+            edge_v: edge(c - a),
+            extent: self.length(longest),
+        }
+    }
+}
+
+const _: () = assert!(NO_LIGHT == u32::MAX && TEXELS_A_LINE.is_power_of_two());

@@ -1,0 +1,132 @@
+//! What casting rays on a device takes, made once for a device: pipelines, and the scene and light
+//! that were used last.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+
+use super::device::Gpu;
+use super::field::{self, FieldBuffers};
+use super::pipeline;
+use super::shaders::{
+    COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, RANK_LIGHTS_WGSL, ROW_RAYS_WGSL,
+    SETTLE_WGSL,
+};
+use super::traced_scene::TracedScene;
+use crate::error::Error;
+use crate::gather::RadiosityField;
+use crate::gather::lights::Lights;
+use crate::scene::Scene;
+
+/// Kept with a device, for all that cast rays on it.
+#[derive(Debug, Default)]
+pub struct Tracing {
+    gather: OnceLock<GatherPipelines>,
+    rows: OnceLock<RowPipelines>,
+    scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
+    light: Mutex<Option<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
+}
+
+/// The passes of a gather.
+#[derive(Debug)]
+pub struct GatherPipelines {
+    pub rank_lights: wgpu::ComputePipeline,
+    pub hemisphere_rays: wgpu::ComputePipeline,
+    pub more_hemisphere_rays: wgpu::ComputePipeline,
+    pub light_rays: wgpu::ComputePipeline,
+    pub more_light_rays: wgpu::ComputePipeline,
+    pub settle: wgpu::ComputePipeline,
+}
+
+impl GatherPipelines {
+    fn new(device: &wgpu::Device) -> GatherPipelines {
+        let module = |label, source| pipeline::shader(device, label, source);
+        let rank = module("rank_lights.wgsl", RANK_LIGHTS_WGSL);
+        let hemisphere = module("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL);
+        let lights = module("light_rays.wgsl", LIGHT_RAYS_WGSL);
+        let settle = module("settle.wgsl", SETTLE_WGSL);
+        let compute = |module, entry_point| pipeline::compute(device, module, entry_point);
+        GatherPipelines {
+            rank_lights: compute(&rank, "rank_lights"),
+            hemisphere_rays: compute(&hemisphere, "hemisphere_rays"),
+            more_hemisphere_rays: compute(&hemisphere, "more_hemisphere_rays"),
+            light_rays: compute(&lights, "light_rays"),
+            more_light_rays: compute(&lights, "more_light_rays"),
+            settle: compute(&settle, "settle"),
+        }
+    }
+}
+
+/// The passes of rows.
+#[derive(Debug)]
+pub struct RowPipelines {
+    pub row_rays: wgpu::ComputePipeline,
+    pub compact_rows: wgpu::ComputePipeline,
+    pub compact_rows_through_panes: wgpu::ComputePipeline,
+}
+
+impl RowPipelines {
+    fn new(device: &wgpu::Device) -> RowPipelines {
+        let rays = pipeline::shader(device, "row_rays.wgsl", ROW_RAYS_WGSL);
+        let compact = pipeline::shader(device, "compact_rows.wgsl", COMPACT_ROWS_WGSL);
+        RowPipelines {
+            row_rays: pipeline::compute(device, &rays, "row_rays"),
+            compact_rows: pipeline::compute(device, &compact, "compact_rows"),
+            compact_rows_through_panes: pipeline::compute(
+                device,
+                &compact,
+                "compact_rows_through_panes",
+            ),
+        }
+    }
+}
+
+impl Gpu {
+    /// The passes of rows: compiled at the first call.
+    pub(super) fn row_pipelines(&self) -> &RowPipelines {
+        self.tracing.rows.get_or_init(|| RowPipelines::new(&self.device))
+    }
+
+    /// The passes of a gather: compiled at the first call.
+    pub(super) fn gather_pipelines(&self) -> &GatherPipelines {
+        self.tracing.gather.get_or_init(|| GatherPipelines::new(&self.device))
+    }
+
+    /// The scene of `lights` on the device: uploaded unless it is the one before.
+    pub(super) fn traced_scene(
+        &self,
+        scene: &Arc<Scene>,
+        lights: &Lights,
+    ) -> Result<Arc<TracedScene>, Error> {
+        let mut kept = self.tracing.scene.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((owner, traced)) = &*kept
+            && owner.upgrade().is_some_and(|owner| Arc::ptr_eq(&owner, scene))
+        {
+            return Ok(traced.clone());
+        }
+        *kept = None;
+        let traced = self.with_error_scopes(|| TracedScene::new(self.memory(), lights))?;
+        let traced = Arc::new(traced);
+        *kept = Some((Arc::downgrade(scene), traced.clone()));
+        Ok(traced)
+    }
+
+    /// `field` on the device: uploaded unless it is the one before.
+    pub(super) fn field_buffers(
+        &self,
+        scene: &Arc<TracedScene>,
+        field: &RadiosityField,
+    ) -> Result<Arc<FieldBuffers>, Error> {
+        let key = field::key(field);
+        let mut kept = self.tracing.light.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((of, owner, buffers)) = &*kept
+            && *of == key
+            && Arc::ptr_eq(owner, scene)
+        {
+            return Ok(buffers.clone());
+        }
+        *kept = None;
+        let buffers = FieldBuffers::new(self.memory(), field, scene.radiance_unit)?;
+        let buffers = Arc::new(buffers);
+        *kept = Some((key, scene.clone(), buffers.clone()));
+        Ok(buffers)
+    }
+}
