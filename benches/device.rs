@@ -187,7 +187,8 @@ fn points(scene: &Scene, count: usize) -> Vec<GatherPoint> {
             let at = (k as f64 + 0.5) / count as f64 * sum;
             let t = cumulative.partition_point(|&end| end < at).min(cumulative.len() - 1);
             let [a, b, c] = scene.corners(t);
-            let [mut u, mut v] = [0.754_877_666, 0.569_840_291].map(|step| (k as f64 * step).fract());
+            let [mut u, mut v] =
+                [0.754_877_666, 0.569_840_291].map(|step| (k as f64 * step).fract());
             if u + v > 1.0 {
                 (u, v) = (1.0 - u, 1.0 - v);
             }
@@ -227,7 +228,8 @@ fn room(triangles: usize) -> Scene {
     add(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.6), true, 0);
     for k in 0..boxes {
         let cell = DVec3::new((k as f64 / side).fract() * side, (k as f64 / side).floor(), 0.0);
-        let random = |n: usize| (k as f64 * [0.754_877_666, 0.569_840_291, 0.324_717_957][n]).fract();
+        let random =
+            |n: usize| (k as f64 * [0.754_877_666, 0.569_840_291, 0.324_717_957][n]).fract();
         let low = (cell + DVec3::new(0.2 * random(0), 0.2 * random(1), 0.0)) / side;
         let size = DVec3::new(0.3 + 0.4 * random(1), 0.3 + 0.4 * random(2), 0.0) / side;
         let top = low + size + DVec3::Z * (0.02 + 0.3 * random(0) * random(2));

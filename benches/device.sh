@@ -22,12 +22,11 @@ bake() {
     for device in "" --cpu; do
         [ "$(left)" -gt 0 ] || return 0
         local stem="$out/${name}_${device:-gpu}"
-        local begin=$(date +%s.%N)
         timeout 40 "$folder/radiosity" bake "$folder/$name.obj" --error "$error" $device \
-            --write ply,report --out "$stem" >"$stem.log" 2>&1
-        local status=$? end=$(date +%s.%N)
-        echo "bake $name $error ${device:-gpu}: status $status, $(echo "$end - $begin" | bc) s in all"
-        grep -E "seconds|error|stage|gathering|shooting|time" "$stem.log" | sed 's/^/    /'
+            --write ply,json --out "$stem" >"$stem.log" 2>&1
+        echo "bake $name $error ${device:-gpu}: status $?"
+        grep -E "^(adapter|mesh|shooting|gathering|error|seconds)|reached|missed" "$stem.log" |
+            sed 's/^/    /'
         if [ -f "$folder/$name.truth.json" ] && [ -f "$stem.ply" ]; then
             python3 "$folder/compare.py" "$stem.ply" "$folder/$name.truth.json" \
                 --floor 0.05 --trim 0.01 | tail -1 | sed 's/^/    /'

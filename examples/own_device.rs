@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = wgpu::RequestAdapterOptions::default();
     let adapter = pollster::block_on(instance.request_adapter(&options))?;
     let descriptor = wgpu::DeviceDescriptor {
-        required_limits: wgpu::Limits::downlevel_defaults(), // enough for small scenes
+        required_limits: wgpu::Limits::default(), // enough for small scenes
         ..Default::default()
     };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;

@@ -34,7 +34,7 @@ fn main() -> Result<(), Error> {
     // The corners of coarse elements gather that light; elements are split where it is not linear.
     let light = GatheredMesh::from_elements(&mesh, &solution.radiosity)?;
     let coarse = Mesh::new(load_obj(path)?, 150.0)?.split_at_contacts(2);
-    let mut gather = RayGather::new(&coarse, 1024)?; // or HemicubeGather, or your own `Gather`
+    let mut gather = RayGather::new(&coarse, 1024)?; // or TracedGather, or your own `Gather`
     let refinement = RefinementSettings::new(5.0); // no element below 5 mm is split
     let go = |_: &_| ControlFlow::Continue(());
     let fine = gather_at_vertices(&light, &coarse, &refinement, &mut gather, go)?;

@@ -144,17 +144,22 @@ impl Backend {
     /// `resolution` alone, so that every run chooses alike.
     pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
         let (makers, count) = (self.row_makers(scene), scene.triangles().len());
-        let cost = RowCost::of(self.adapter().kind);
+        let cost = RowCost::of(self.assumed_kind());
         cost.cheapest(makers.iter().copied(), count, resolution).unwrap_or(RowMaker::Rays)
     }
 
     /// Whether light is gathered on the device: on graphics hardware. A software device casts rays
     /// more slowly than the CPU does without it.
     pub(crate) fn gathers_on_device(&self) -> bool {
+        self.assumed_kind() != AdapterKind::Cpu
+    }
+
+    /// The kind of adapter that choices are made for.
+    fn assumed_kind(&self) -> AdapterKind {
         match self {
             #[cfg(feature = "gpu")]
-            Backend::Gpu(gpu) => gpu.adapter().kind != AdapterKind::Cpu,
-            Backend::Cpu => false,
+            Backend::Gpu(gpu) => gpu.assumed_kind(),
+            Backend::Cpu => AdapterKind::Cpu,
         }
     }
 

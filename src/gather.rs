@@ -6,7 +6,7 @@
 //!   GatherPoints ────┘
 //! ```
 //!
-//! The contract is [`Gather`]; hemicubes on a GPU and rays on the CPU implement it, and callers
+//! The contract is [`Gather`]; rays on a device and rays on the CPU implement it, and callers
 //! differ only in their list of points: vertices, pixels of an image, or places at which the error
 //! of a result is estimated. [`gather_at_vertices`] is the first of these, with refinement;
 //! [`irradiance_at`] takes points anywhere, and gives each a standard error.
@@ -19,7 +19,6 @@ mod further_bounces;
 pub(crate) mod gather_points;
 mod gathered_mesh;
 mod interpolated_refinement;
-pub(crate) mod light_projection;
 pub(crate) mod lights;
 pub(crate) mod luminaire_light;
 pub(crate) mod point_irradiance;
@@ -69,11 +68,10 @@ pub struct IrradianceSample {
     /// reflected, and the sky where there is no surface.
     pub irradiance: Rgb,
     /// The part of `irradiance` that lights, luminaires and the sun send straight to the point, per
-    /// channel, W/m². By hemicubes, what small lights emit is not in it: they are seen like any
-    /// other surface.
+    /// channel, W/m².
     pub direct: Rgb,
     /// Standard error of `irradiance` as far as its rays tell, W/m²: a length over the channels;
-    /// where they see two fields, that of the first. 0 by hemicubes.
+    /// where they see two fields, that of the first.
     pub noise: f64,
     /// Share of the hemisphere in which nothing is seen, in [0, 1].
     pub escaped: f64,
@@ -96,7 +94,7 @@ pub struct RadiosityField<'a> {
     pub reflected: &'a [Rgb],
 }
 
-/// A source of irradiance samples: hemicubes on a GPU, rays on the CPU, or a caller's own.
+/// A source of irradiance samples: rays on a device, rays on the CPU, or a caller's own.
 ///
 /// A gatherer is made for one scene and owns what that takes (a ray hierarchy, buffers on a
 /// device); the caller owns points and field, which may change from call to call. The field's mesh

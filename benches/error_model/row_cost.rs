@@ -195,6 +195,7 @@ fn square(mesh: &Mesh, row: &Row, truth: &Row) -> f64 {
 /// The triangles from which on a row of `resolution` is left to rays, within 2 %.
 fn crossing(cost: &RowCost, resolution: u32) -> usize {
     let mut counts = (0..1000).map(|k| 1.02f64.powi(k) as usize);
-    let is_drawn = |&t: &usize| cost.cheaper(t, resolution) == RowMaker::Hemicubes;
+    let makers = [RowMaker::Hemicubes, RowMaker::Rays];
+    let is_drawn = |&t: &usize| cost.cheapest(makers, t, resolution) == Some(RowMaker::Hemicubes);
     counts.rfind(is_drawn).map_or(0, |last| last + 1)
 }

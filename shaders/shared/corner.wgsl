@@ -1,4 +1,4 @@
-// A corner of a triangle, and where a view has it. Put before the draw shaders.
+// A corner of a triangle, and where a view has it. Put before the draw shader.
 
 // A corner in two parts that add up to it.
 struct Corner {

@@ -35,37 +35,31 @@ pub struct RowCost {
 
 /// Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle cut into
 /// 1 to 4096, at 16 to 256 pixels. Hemicubes are off by up to half of that, rays by up to a factor
-/// of two.
+/// of two. Rays on it: `docs/data/device.tsv`.
 const SOFTWARE: RowCost = RowCost {
     hemicube: 1.8e-4,
     triangle: 1.3e-7,
     pixel: 5.8e-9,
     device_row: 1e-3,
-    device_ray_level: 1e-7,
+    device_ray_level: 3.5e-7,
     ray_level: 8.5e-9,
 };
 
-/// Not measured: as fast as such devices can be, a triangle a clock and nothing for the rest of a
-/// hemicube but its pixels, against rays on two cores. So rays take their place only where they
-/// are faster for certain.
-const INTEGRATED: RowCost = RowCost {
-    hemicube: 1e-5,
-    triangle: 1e-8,
-    pixel: 1e-10,
-    device_row: 1e-5,
-    device_ray_level: 2e-10,
+/// NVIDIA H200 (Vulkan, driver 580): hemicubes in batches of 16 that are read one after the other;
+/// rays by the fit of a compute shader of the same kind apart from this crate, and a wait of 1 ms
+/// for a batch of 256. `docs/data/device.tsv` has both.
+const DISCRETE: RowCost = RowCost {
+    hemicube: 3.6e-5,
+    triangle: 1.3e-8,
+    pixel: 4.4e-10,
+    device_row: 6e-6,
+    device_ray_level: 2.5e-11,
     ..SOFTWARE
 };
 
-/// Not measured: the same of larger devices.
-const DISCRETE: RowCost = RowCost {
-    hemicube: 6e-6,
-    triangle: 1.3e-8,
-    pixel: 2e-10,
-    device_row: 1.5e-6,
-    device_ray_level: 3e-11,
-    ..SOFTWARE
-};
+/// Not measured: a twentieth of the other's rays and a tenth of its pixels.
+const INTEGRATED: RowCost =
+    RowCost { pixel: 4.4e-9, device_row: 1e-5, device_ray_level: 5e-10, ..DISCRETE };
 
 /// Rays that a row takes for the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
 /// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
@@ -141,33 +135,44 @@ mod tests {
         AdapterKind::Cpu,
     ];
 
-    #[test]
-    fn software_draws_few_triangles_at_many_pixels_and_casts_otherwise() {
-        let software = RowCost::of(AdapterKind::Cpu);
-        for resolution in [64, 128, 256] {
-            assert_eq!(software.cheaper(32, resolution), RowMaker::Hemicubes, "{resolution}");
-        }
-        for resolution in [16, 32, 64] {
-            assert_eq!(software.cheaper(128_000, resolution), RowMaker::Rays, "{resolution}");
-        }
-        assert_eq!(software.cheaper(4000, 32), RowMaker::Rays);
-        assert_eq!(software.cheaper(4000, 256), RowMaker::Hemicubes);
+    const MAKERS: [RowMaker; 3] = [RowMaker::Hemicubes, RowMaker::DeviceRays, RowMaker::Rays];
+
+    fn cheapest(kind: AdapterKind, triangles: usize, resolution: u32) -> RowMaker {
+        RowCost::of(kind).cheapest(MAKERS, triangles, resolution).unwrap()
     }
 
     #[test]
-    fn hardware_draws_all_but_huge_scenes() {
+    fn software_draws_few_triangles_at_many_pixels_and_casts_otherwise() {
+        let cheapest = |triangles, resolution| cheapest(AdapterKind::Cpu, triangles, resolution);
+        for resolution in [64, 128, 256] {
+            assert_eq!(cheapest(32, resolution), RowMaker::Hemicubes, "{resolution}");
+        }
+        for resolution in [16, 32, 64] {
+            assert_eq!(cheapest(128_000, resolution), RowMaker::Rays, "{resolution}");
+        }
+        assert_eq!(cheapest(4000, 32), RowMaker::Rays);
+        assert_eq!(cheapest(4000, 256), RowMaker::Hemicubes);
+    }
+
+    #[test]
+    fn hardware_casts_rays_where_there_are_many_triangles() {
         for kind in KINDS.into_iter().filter(|&kind| kind != AdapterKind::Cpu) {
             for resolution in [32, 64, 128, 256] {
-                assert_eq!(RowCost::of(kind).cheaper(128_000, resolution), RowMaker::Hemicubes);
+                assert_eq!(cheapest(kind, 128_000, resolution), RowMaker::DeviceRays, "{kind}");
             }
-            assert_eq!(RowCost::of(kind).cheaper(100_000_000, 32), RowMaker::Rays, "{kind}");
         }
+        // Where a device has none, hemicubes are drawn as long as triangles are few.
+        let discrete = RowCost::of(AdapterKind::DiscreteGpu);
+        let others = [RowMaker::Hemicubes, RowMaker::Rays];
+        assert_eq!(discrete.cheapest(others, 4000, 64), Some(RowMaker::Hemicubes));
+        assert_eq!(discrete.cheapest(others, 100_000_000, 32), Some(RowMaker::Rays));
+        assert_eq!(discrete.cheapest([], 4000, 64), None);
     }
 
     #[test]
     fn more_triangles_never_bring_hemicubes_back_nor_more_pixels_rays() {
         let casts = |kind, triangles, resolution| {
-            RowCost::of(kind).cheaper(triangles, resolution) == RowMaker::Rays
+            cheapest(kind, triangles, resolution) != RowMaker::Hemicubes
         };
         let counts = |k: u32| (1.15f64.powi(k as i32)) as usize;
         for kind in KINDS {

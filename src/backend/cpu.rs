@@ -8,18 +8,11 @@
 //! |---|---|---|
 //! | `item_buffer.wgsl` | `item_buffer` | `gpu/rows/twin_tests.rs`: items equal |
 //! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
-//! | `radiance.wgsl` | `radiance` | `gpu/gather/twin_tests.rs`: within rounding |
-//! | `sky.wgsl` | `sky` | the same |
-//! | `hemisphere_sum.wgsl` | `hemisphere_sum` | the same; `add_up` bit for bit |
 //! | `shared/*.wgsl` | `shared` | with the draw shaders |
 
 mod gather;
 #[cfg(all(test, feature = "gpu"))]
-pub(super) mod hemisphere_sum;
-#[cfg(all(test, feature = "gpu"))]
 pub(super) mod item_buffer;
-#[cfg(all(test, feature = "gpu"))]
-pub(super) mod radiance;
 #[cfg(all(test, feature = "gpu"))]
 pub(super) mod rasterizer;
 #[cfg(all(test, feature = "gpu"))]
@@ -27,8 +20,6 @@ pub(super) mod reduce;
 pub(crate) mod rows;
 #[cfg(all(test, feature = "gpu"))]
 mod shared;
-#[cfg(all(test, feature = "gpu"))]
-pub(super) mod sky;
 
 pub use gather::RayGather;
 pub use rows::RayRows;

@@ -1,8 +1,8 @@
 //! Lights: connected emitters, which gatherers sample explicitly.
 //!
 //! Emitting triangles of one material and exitance that share corners are one light. From a gather
-//! point, the few lights that could contribute most are sampled one by one (rays to points on them,
-//! or a view that they fill), each scaled by its closed-form unoccluded form factor:
+//! point, the few lights that could contribute most are sampled one by one (rays to points on
+//! them), each scaled by its closed-form unoccluded form factor:
 //!
 //! ```text
 //!   direct irradiance = Σ_lights E · F(point → light) · visible share

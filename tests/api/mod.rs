@@ -2,7 +2,7 @@
 
 use radiosity::backend::cost::RowCost;
 use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::{GpuLimits, HemicubeGather};
+use radiosity::backend::gpu::{GpuLimits, TracedGather, TracedRows};
 use radiosity::backend::{AdapterInfo, BackendRows, RowMaker};
 use radiosity::bake::{GatherSettings, SolveSettings};
 use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
@@ -53,7 +53,6 @@ fn public_types_are_send_and_sync() {
         GatheredMesh,
         Gpu,
         GpuLimits,
-        HemicubeGather,
         HemicubeRows,
         IrradianceSample,
         Ledger,
@@ -83,6 +82,8 @@ fn public_types_are_send_and_sync() {
         Timings,
         ToneCurve,
         Triangle,
+        TracedGather,
+        TracedRows,
         VertexMesh,
         ViewFactors,
     ];

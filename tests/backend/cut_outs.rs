@@ -4,18 +4,20 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::TracedRows;
 use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::verify::PathTracer;
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, FormFactors, Gather, HemicubeRows, Mesh, ObjSettings, Rgb,
-    Scene, Sides, Sky, Sun,
+    Backend, BakeTarget, ErrorKind, FormFactors, Gather, HemicubeRows, Mesh, ObjSettings, RayRows,
+    Rgb, Scene, Sides, Sky, Sun,
 };
 
 use crate::common::changes::same_rays;
 use crate::common::cut_outs::{Lattice, Part, board, read};
+use crate::common::device_rays::{ODD_RAYS, Rays, rays_apart, same_as_on_the_cpu};
+use crate::common::fakes::GivenRadiosity;
 use crate::common::scenes::{Quad, facing_down, facing_up, walls};
 use crate::common::{gpu, keep_counting, keep_going};
 
@@ -244,12 +246,30 @@ fn a_lamp_with_holes_shines_with_what_is_left() {
 }
 
 #[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn rays_on_devices_go_through_cut_outs() {
+    let mesh =
+        Mesh::new(scene(&room_with_a_sheet(), &Lattice { side: 6, is_solid: board }, SKY), 0.5);
+    let light = GivenRadiosity::new(mesh.unwrap(), |e, _| Rgb::splat(0.5 + 0.1 * (e % 5) as f64));
+    let (gpu, mesh) = (gpu(), &light.mesh);
+    let rays = Rays { count: 256, noise: f64::INFINITY };
+    let peak = 1.0 + PI * SKY.max_element();
+    same_as_on_the_cpu(&gpu, &light.sources(), &light.places(60, 1e-4), rays, peak);
+    let patches = [mesh.root(0), mesh.root(12), mesh.element(5)];
+    let on_device = TracedRows::new(&gpu, mesh, 4096).unwrap().rows(mesh, &patches, 1.0).unwrap();
+    let on_the_cpu = RayRows::new(mesh, 4096).unwrap().rows(mesh, &patches, 1.0).unwrap();
+    for ((device, cpu), &patch) in on_device.iter().zip(&on_the_cpu).zip(&patches) {
+        device.check(mesh, patch).unwrap();
+        assert!(rays_apart(device, cpu, 4096) <= ODD_RAYS, "{device:?} {cpu:?}");
+    }
+}
+
+#[test]
 fn devices_leave_scenes_with_cut_outs_to_rays() {
     let mesh =
         Mesh::new(scene(&room_with_a_sheet(), &Lattice { side: 6, is_solid: board }, SKY), 0.5);
     let (mesh, gpu) = (mesh.unwrap(), gpu());
     assert_eq!(HemicubeRows::new(&gpu, &mesh, 16).unwrap_err().kind(), ErrorKind::Device);
-    assert_eq!(HemicubeGather::new(&gpu, &mesh, 16).unwrap_err().kind(), ErrorKind::Device);
     let backend = Backend::Gpu(gpu);
     let patches = [mesh.root(12)];
     let once = std::num::NonZeroU32::MIN;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::{TracedGather, TracedRows};
 use radiosity::mesh::NodeId;
 use radiosity::{
     Backend, BakeTarget, Camera, FormFactors, Gather, GatheredMesh, HemicubeRows, Material, Mesh,
@@ -55,10 +55,11 @@ fn rays_meet_fronts() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn hemicubes_draw_fronts() {
+fn devices_meet_fronts() {
     let (light, gpu) = (even_light(), gpu());
     check_rows(HemicubeRows::new(&gpu, &light.mesh, 64).unwrap(), &light.mesh);
-    check_gather(HemicubeGather::new(&gpu, &light.mesh, 64).unwrap(), &light);
+    check_rows(TracedRows::new(&gpu, &light.mesh, 4096).unwrap(), &light.mesh);
+    check_gather(TracedGather::new(&gpu, &light.mesh, 4096).unwrap(), &light);
 }
 
 #[test]

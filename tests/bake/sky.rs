@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::TracedGather;
 use radiosity::bake::Outcome;
 use radiosity::gather::{Gather, GatherPoint, GatheredMesh};
 use radiosity::verify::{Settings, verify};
@@ -60,10 +60,10 @@ fn open_ground_receives_pi_times_the_radiance() {
     let field =
         radiosity::gather::RadiosityField { mesh: &mesh, corners: &corners, reflected: &dark };
     let mut rays = Backend::Cpu.gather(&mesh, 64).unwrap();
-    let mut hemicubes = HemicubeGather::new(&gpu(), &mesh, 32).unwrap();
-    for gatherer in [&mut *rays as &mut dyn Gather, &mut hemicubes] {
+    let mut on_device = TracedGather::new(&gpu(), &mesh, 64).unwrap();
+    for gatherer in [&mut *rays as &mut dyn Gather, &mut on_device] {
         let sample = gatherer.gather(&field, &[point]).unwrap()[0];
-        // Weights of a hemicube add up to 1 in 32-bit floats.
+        // The device adds up in 32 bits.
         assert!((sample.irradiance / (PI * SKY) - 1.0).abs().max_element() < 1e-6, "{sample:?}");
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::TracedGather;
 use radiosity::bake::Outcome;
 use radiosity::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::verify::{PathTracer, Settings, verify};
@@ -41,15 +41,16 @@ fn open(sky: Sky, others: &[Quad]) -> Scene {
     under(sky, &[below].into_iter().chain(others).collect::<Vec<_>>())
 }
 
-/// What reaches `position` on a surface that looks along `normal`, by rays and by hemicubes.
+/// What reaches `position` on a surface that looks along `normal`, by rays on the CPU and on the
+/// device.
 fn gathered(scene: &Scene, position: DVec3, normal: DVec3) -> [IrradianceSample; 2] {
     let mesh = Mesh::new(scene.clone(), f64::INFINITY).unwrap();
     let point = GatherPoint { position, normal: normal.normalize(), near: 1e-7 };
     let corners = vec![[0; 3]; mesh.element_count()];
     let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &[Rgb::ZERO] };
     let mut rays = Backend::Cpu.gather(&mesh, 1 << 14).unwrap();
-    let mut hemicubes = HemicubeGather::new(&gpu(), &mesh, 128).unwrap();
-    [&mut *rays as &mut dyn Gather, &mut hemicubes]
+    let mut on_device = TracedGather::new(&gpu(), &mesh, 1 << 14).unwrap();
+    [&mut *rays as &mut dyn Gather, &mut on_device]
         .map(|gatherer| gatherer.gather(&field, &[point]).unwrap()[0])
 }
 

@@ -4,6 +4,7 @@
 pub mod changes;
 pub mod closed_forms;
 pub mod cut_outs;
+pub mod device_rays;
 pub mod fakes;
 pub mod files;
 pub mod framed;

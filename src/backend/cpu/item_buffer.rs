@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::rasterizer::{DepthTest, Image, Viewport};
+use super::rasterizer::{Image, Viewport};
 use super::shared::{
     NOWHERE, cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
     shows_covered_back,
@@ -36,8 +36,7 @@ impl ItemBuffer<'_> {
             for (t, grid) in (0..).zip(self.triangles) {
                 let v = [0, 1, 2].map(|k| self.vertex(3 * t + k, view));
                 let corners = v.map(|v| v.position.to_array());
-                let nearest = DepthTest::Nearest;
-                image.draw(corners, viewport, offset, nearest, |fragment, pixel| {
+                image.draw(corners, viewport, offset, |fragment, pixel| {
                     let weighted = (0..3).map(|k| v[k].lattice * fragment.weights[k]);
                     *pixel = self.fragment(weighted.sum(), grid, fragment.front);
                 });

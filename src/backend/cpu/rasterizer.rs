@@ -20,24 +20,11 @@ pub struct Viewport {
     pub height: u32,
 }
 
-/// What of the triangles ends up in a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthTest {
-    /// The nearest, front or back; depth is reversed, its clear value 0.
-    Nearest,
-    /// Any front.
-    AnyFront,
-    /// What is at the far end, where nothing was drawn.
-    Behind,
-}
-
 /// One triangle at one pixel centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Fragment {
     /// Perspective-correct weights of the three corners.
     pub weights: [f32; 3],
-    /// One over the distance along the view's axis.
-    pub inverse_w: f32,
     pub front: bool,
 }
 
@@ -62,14 +49,13 @@ impl<T: Copy> Image<T> {
         corners: [[f32; 4]; 3],
         viewport: Viewport,
         offset: [f64; 2],
-        test: DepthTest,
         shade: impl Fn(&Fragment, &mut T),
     ) {
         let v = corners.map(|[x, y, _, w]| DVec3::new(x.into(), y.into(), w.into()));
         let z = DVec3::from_array(corners.map(|[_, _, z, _]| f64::from(z)));
         let volume = v[0].dot(v[1].cross(v[2]));
         let front = volume > 0.0;
-        if volume == 0.0 || (test == DepthTest::AnyFront && !front) {
+        if volume == 0.0 {
             return;
         }
         let edges = [v[1].cross(v[2]), v[2].cross(v[0]), v[0].cross(v[1])].map(|e| e / volume);
@@ -86,17 +72,13 @@ impl<T: Copy> Image<T> {
                     continue;
                 }
                 let pixel = ((top + y) * self.width + left + x) as usize;
-                if test == DepthTest::Nearest {
-                    if depth <= self.depth[pixel] {
-                        continue;
-                    }
-                    self.depth[pixel] = depth;
-                }
-                if test == DepthTest::Behind && depth < self.depth[pixel] {
+                // The nearest, front or back; depth is reversed, its clear value 0.
+                if depth <= self.depth[pixel] {
                     continue;
                 }
+                self.depth[pixel] = depth;
                 let weights = (b / inverse_w).as_vec3().to_array();
-                let fragment = Fragment { weights, inverse_w: inverse_w as f32, front };
+                let fragment = Fragment { weights, front };
                 shade(&fragment, &mut self.pixels[pixel]);
             }
         }

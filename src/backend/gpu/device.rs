@@ -26,6 +26,7 @@ pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     adapter: AdapterInfo,
+    assumed: AdapterKind,
     limits: GpuLimits,
     /// Why the device is lost, or what went wrong outside of any error scope.
     lost: Arc<Mutex<Option<String>>>,
@@ -76,7 +77,7 @@ impl Gpu {
     /// Uses a device and queue of the caller's, and no more than `limits` of it.
     ///
     /// No feature is required; with [`wgpu::Features::TIMESTAMP_QUERY`] the passes are timed one by
-    /// one ([`crate::Timings`]). The limits of [`wgpu::Limits::downlevel_defaults`] are enough;
+    /// one ([`crate::Timings`]). The limits of [`wgpu::Limits::default`], WebGPU's, are enough;
     /// larger buffers and textures allow larger scenes and resolutions.
     ///
     /// The caller's callbacks for uncaptured errors and for a lost device stay as they are. Errors
@@ -103,6 +104,7 @@ impl Gpu {
         Gpu {
             device,
             queue,
+            assumed: adapter.kind,
             adapter,
             limits,
             lost: Arc::default(),
@@ -118,9 +120,13 @@ impl Gpu {
 
     /// The same, with what makes rows and gathers light chosen as on an adapter of this `kind`: to
     /// have a software device do what hardware does, which takes longer.
-    pub fn assuming(mut self, kind: AdapterKind) -> Gpu {
-        self.adapter.kind = kind;
-        self
+    pub fn assuming(self, kind: AdapterKind) -> Gpu {
+        Gpu { assumed: kind, ..self }
+    }
+
+    /// The kind of adapter that choices are made for: its own, unless another is assumed.
+    pub(crate) fn assumed_kind(&self) -> AdapterKind {
+        self.assumed
     }
 
     /// Gives the device back. All clones, and all that uses it, get [`ErrorKind::Device`] from now
@@ -359,7 +365,7 @@ mod tests {
     fn from_wgpu_makes_the_same_rows() {
         let own = gpu();
         let mesh = scene();
-        let (device, queue) = callers_device(wgpu::Limits::downlevel_defaults());
+        let (device, queue) = callers_device(wgpu::Limits::default());
         let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::MOST).unwrap();
         assert_eq!(gpu.adapter(), own.adapter());
         assert_eq!(rows(&gpu, &mesh).unwrap(), rows(&own, &mesh).unwrap());
@@ -378,6 +384,6 @@ mod tests {
         assert_eq!(e.kind(), ErrorKind::Setting);
         let text = e.to_string();
         assert!(text.contains("max_storage_buffers_per_shader_stage = 0"), "{text}");
-        assert!(text.contains("at least 4"), "{text}");
+        assert!(text.contains("at least 8"), "{text}");
     }
 }

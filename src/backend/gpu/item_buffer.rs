@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use super::layout::{Corner, FaceView, TriangleCells};
 use super::memory::Memory;
-use super::pipeline::{self, DepthMode};
+use super::pipeline;
 use super::render_targets::RenderTargets;
 use super::shaders::ITEM_BUFFER_WGSL;
 use crate::error::Error;
@@ -53,17 +53,11 @@ impl ItemBuffer {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let views = memory.buffer("views", bytes, usage)?;
         let module = pipeline::shader(device, "item_buffer.wgsl", ITEM_BUFFER_WGSL);
-        let draw = pipeline::Draw {
-            module: &module,
-            layout: None,
-            fragment: "fragment",
-            target: ItemBuffer::FORMAT.into(),
-            depth_mode: DepthMode::Nearest,
-        };
-        let pipeline = draw.create(device);
-        let resources = [&corners, &triangles, &views].map(|b| b.as_entire_binding());
+        let pipeline = pipeline::draw(device, &module, ItemBuffer::FORMAT.into());
+        let resources = [(0, &corners), (1, &triangles), (2, &views)]
+            .map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
         let layout = pipeline.get_bind_group_layout(0);
-        let bindings = pipeline::bind_group(device, "item buffer", &layout, 0, &resources);
+        let bindings = pipeline::bind_group(device, "item buffer", &layout, &resources);
         Ok(ItemBuffer { pipeline, bindings, views })
     }
 

@@ -5,15 +5,16 @@
 //! |---|---|---|
 //! | `item_buffer.wgsl` | [`Corner`] ×3, [`TriangleCells`], [`FaceView`] | u32 a pixel |
 //! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
-//! | `radiance.wgsl` | [`Corner`], [`RadianceTriangle`], [`RadianceView`], [`Lattice`] | f32 ×4 |
-//! | `sky.wgsl` | [`RadianceView`], [`SkyAxes`] | f32 ×4 |
-//! | `hemisphere_sum.wgsl` | those, 2 × f32 a weight, [`Tile`], [`Summation`] | [`Sums`] a point |
+//! | `rank_lights.wgsl` | [`TracedTriangle`], [`TracedLight`], [`Lamp`], [`TracedPoint`] | states |
+//! | `hemisphere_rays.wgsl` | those, [`TraceNode`], [`TracedSceneInfo`], quadtrees | states |
+//! | `light_rays.wgsl` | those but for quadtrees | states |
+//! | `settle.wgsl` | states, [`GatherSettings`] | [`Sample`] a point, lists of points |
+//! | `row_rays.wgsl` | [`TraceNode`], [`TracedTriangle`], quadtrees, [`TracedPatch`] | u32 a slot |
+//! | `compact_rows.wgsl` | u32 a slot, [`RowSettings`] | [`RowEntry`] a slot that is not 0 |
 //!
 //! Members that a shader does not read pad the struct to WGSL's alignment.
 
 use bytemuck::{Pod, Zeroable};
-
-use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 
 /// A corner of a triangle, in two parts: see [`super::split_float`].
 #[repr(C)]
@@ -56,86 +57,6 @@ pub struct Reduction {
     pub resolution: u32,
     pub slots: u32,
     pub stride: u32,
-}
-
-/// One face of one hemicube, or the tile of a light, as `radiance.wgsl` draws it.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct RadianceView {
-    pub eye: [f32; 3],
-    pub near: f32,
-    pub right: [f32; 3],
-    pub bottom: f32,
-    pub up: [f32; 3],
-    pub light: u32,
-    pub forward: [f32; 3],
-    pub light_count: u32,
-    pub eye_low: [f32; 3],
-    pub padding: u32,
-    pub lights: [u32; MAX_EXPLICIT_LIGHTS],
-}
-
-/// What a triangle emits, and which of the scene's it is.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct RadianceTriangle {
-    pub exitance: [f32; 3],
-    pub light: u32,
-    pub index: u32,
-    pub padding: [u32; 3],
-}
-
-/// A triangle's nodes at the deepest level that its quadtree is complete to.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Lattice {
-    pub first: u32,
-    pub side: u32,
-}
-
-/// What `hemisphere_sum.wgsl` needs to know of a batch.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Summation {
-    pub resolution: u32,
-    pub tiles: u32,
-}
-
-/// Where the pixels of a light's or of the sun's tile look.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Tile {
-    pub middle: [f32; 3],
-    pub scale: f32,
-    pub right: [f32; 3],
-    pub disc: f32,
-    pub up: [f32; 3],
-    pub padding: u32,
-}
-
-/// The axes of a sky's pieces, and how many of these lie along the edge of a square.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct SkyAxes {
-    pub x: [f32; 3],
-    pub side: u32,
-    pub y: [f32; 3],
-    pub padding: u32,
-    pub z: [f32; 3],
-    pub padding_2: u32,
-}
-
-/// What a point receives, but for the exitance of the lights with tiles: of each the form factor of
-/// what is seen of it, and of all of it as if nothing were in between.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Sums {
-    pub radiosity: [f32; 3],
-    pub open: f32,
-    pub back: f32,
-    pub nearness: f32,
-    pub padding: [f32; 2],
-    pub lights: [[f32; 2]; MAX_EXPLICIT_LIGHTS],
 }
 
 /// Two boxes of the hierarchy that rays descend, and what is in them.
@@ -310,14 +231,8 @@ pub const HAS_HOLES: u32 = 2;
 /// Texels side by side in textures that are read as arrays.
 pub const TEXELS_A_LINE: u32 = 2048;
 
-/// Pixels along an edge of a light's tile.
-pub const TILE: u32 = 32;
-
 /// Elements side by side in the texture of their corners' radiosity.
 pub const ELEMENTS_A_LINE: u32 = 2048;
-
-/// Threads of `hemisphere_sum.wgsl` that add up a point's pixels.
-pub const LANES: u32 = 64;
 
 /// A node with children: this plus the first of the four. A leaf holds its element.
 pub const INNER: u32 = 1 << 31;
@@ -337,9 +252,7 @@ pub const WORKGROUP: u32 = 64;
 mod tests {
     use std::mem::offset_of;
 
-    use super::super::shaders::{
-        HEMISPHERE_SUM_WGSL, ITEM_BUFFER_WGSL, RADIANCE_WGSL, REDUCE_WGSL, SKY_WGSL,
-    };
+    use super::super::shaders::{ITEM_BUFFER_WGSL, REDUCE_WGSL};
     use super::*;
 
     fn parsed(source: &str) -> naga::Module {
@@ -410,47 +323,9 @@ mod tests {
             wgsl_layout(&reduce, "Reduction"),
             rust_layout!(Reduction { resolution, slots, stride })
         );
-        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
-        let sky = parsed(SKY_WGSL);
         assert_eq!(
-            wgsl_layout(&sky, "SkyAxes"),
-            rust_layout!(SkyAxes { x, side, y, padding, z, padding_2 })
-        );
-        assert_eq!(wgsl_layout(&sky, "RadianceView"), wgsl_layout(&radiance, "RadianceView"));
-        assert_eq!(
-            wgsl_layout(&radiance, "RadianceView"),
-            rust_layout!(RadianceView {
-                eye,
-                near,
-                right,
-                bottom,
-                up,
-                light,
-                forward,
-                light_count,
-                eye_low,
-                padding,
-                lights
-            })
-        );
-        assert_eq!(
-            wgsl_layout(&radiance, "RadianceTriangle"),
-            rust_layout!(RadianceTriangle { exitance, light, index, padding })
-        );
-        for module in [&item, &radiance] {
-            assert_eq!(
-                wgsl_layout(module, "Corner"),
-                rust_layout!(Corner { high, back_is_covered, low, padding })
-            );
-        }
-        assert_eq!(wgsl_layout(&radiance, "Lattice"), rust_layout!(Lattice { first, side }));
-        assert_eq!(
-            wgsl_layout(&gather, "Summation"),
-            rust_layout!(Summation { resolution, tiles })
-        );
-        assert_eq!(
-            wgsl_layout(&gather, "Tile"),
-            rust_layout!(Tile { middle, scale, right, disc, up, padding })
+            wgsl_layout(&item, "Corner"),
+            rust_layout!(Corner { high, back_is_covered, low, padding })
         );
     }
 
@@ -468,16 +343,6 @@ mod tests {
         assert_eq!(constant(&item, "BACK"), BACK);
         assert_eq!(constant(&reduce, "STRIP"), STRIP);
         assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
-        let (radiance, gather) = (parsed(RADIANCE_WGSL), parsed(HEMISPHERE_SUM_WGSL));
-        assert_eq!(constant(&radiance, "INNER"), INNER);
-        assert_eq!(constant(&radiance, "ELEMENTS_A_LINE"), ELEMENTS_A_LINE);
-        assert_eq!(constant(&radiance, "MAX_EXPLICIT_LIGHTS"), MAX_EXPLICIT_LIGHTS as u32);
-        assert_eq!(constant(&gather, "TILE"), TILE);
-        assert_eq!(constant(&gather, "LANES"), LANES);
-        // The shader writes a point's numbers one after the other.
-        assert_eq!(constant(&gather, "WORDS") as usize * 4, size_of::<Sums>());
-        let (nearness, lights) = (offset_of!(Sums, nearness), offset_of!(Sums, lights));
-        assert_eq!((nearness, lights), (5 * 4, 8 * 4));
         // OPEN is the clear value of the item buffer: wgpu clears to zero.
         assert_eq!(OPEN, 0);
     }

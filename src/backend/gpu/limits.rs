@@ -1,6 +1,7 @@
 //! How much of a device may be used, and how much of it the passes need.
 
 use super::error::place;
+use super::traced_gather::MAX_POINTS;
 use crate::error::{Error, ErrorKind};
 
 /// The most that is asked of a device; what it cannot do anyway is not asked either.
@@ -58,22 +59,23 @@ impl GpuLimits {
 /// [`ErrorKind::Setting`] with the first limit that is too low.
 pub fn check_device(adapter: &str, device: &wgpu::Limits) -> Result<(), Error> {
     let needs = [
-        // `reduce.wgsl` and the vertex stage of `radiance.wgsl`.
-        ("max_storage_buffers_per_shader_stage", device.max_storage_buffers_per_shader_stage, 4),
-        // Vertex and fragment stage of `radiance.wgsl` share a bind group.
-        ("max_bindings_per_bind_group", device.max_bindings_per_bind_group, 6),
-        ("max_inter_stage_shader_variables", device.max_inter_stage_shader_variables, 5),
-        // `reduce.wgsl` and `hemisphere_sum.wgsl`.
+        // `hemisphere_rays.wgsl`.
+        ("max_storage_buffers_per_shader_stage", device.max_storage_buffers_per_shader_stage, 8),
+        ("max_bindings_per_bind_group", device.max_bindings_per_bind_group, 8),
+        ("max_bind_groups", device.max_bind_groups, 3),
         ("max_compute_workgroup_size_x", device.max_compute_workgroup_size_x, 64),
         ("max_compute_invocations_per_workgroup", device.max_compute_invocations_per_workgroup, 64),
-        ("max_compute_workgroups_per_dimension", device.max_compute_workgroups_per_dimension, 768),
+        // Points of a batch.
+        (
+            "max_compute_workgroups_per_dimension",
+            device.max_compute_workgroups_per_dimension,
+            MAX_POINTS,
+        ),
     ];
     for (limit, found, needed) in needs {
         if found < needed {
             let found = format!("a device opened with {limit} = {found}");
-            let remedy = format!(
-                "open it with at least {needed}, as wgpu::Limits::downlevel_defaults() does"
-            );
+            let remedy = format!("open it with at least {needed}, as wgpu::Limits::default() does");
             return Err(Error::new(ErrorKind::Setting, place(adapter), found, remedy));
         }
     }

@@ -70,10 +70,11 @@ impl Reduce {
         let weights = memory.storage("weights", bytemuck::cast_slice(&weights))?;
         let reduction = Reduction { resolution, slots: self.slots, stride: stride(resolution) };
         let reduction = memory.uniform("reduction", bytemuck::bytes_of(&reduction))?;
-        let resources = [&self.items, &weights, &self.rows, &reduction, &self.slot_of_item]
-            .map(|buffer| buffer.as_entire_binding());
+        let buffers = [&self.items, &weights, &self.rows, &reduction, &self.slot_of_item];
+        let resources: Vec<_> =
+            (0..).zip(buffers).map(|(k, buffer)| (k, buffer.as_entire_binding())).collect();
         let layout = self.pipeline.get_bind_group_layout(0);
-        Ok(pipeline::bind_group(&memory.device, "reduce", &layout, 0, &resources))
+        Ok(pipeline::bind_group(&memory.device, "reduce", &layout, &resources))
     }
 
     /// Records the reduction of the first `count` hemicubes on `targets`, with the bindings for

@@ -12,10 +12,6 @@ macro_rules! draw_shader {
 
 pub const ITEM_BUFFER_WGSL: &str = draw_shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
 pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
-pub const RADIANCE_WGSL: &str =
-    draw_shader!("radiance.wgsl", "corner.wgsl", "lattice.wgsl", "view.wgsl");
-pub const SKY_WGSL: &str = draw_shader!("sky.wgsl", "view.wgsl");
-pub const HEMISPHERE_SUM_WGSL: &str = include_str!("../../../shaders/hemisphere_sum.wgsl");
 
 /// Shaders that cast rays begin with how these meet the scene.
 macro_rules! ray_shader {

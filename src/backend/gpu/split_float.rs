@@ -34,8 +34,8 @@ impl SplitFloat {
         [high.to_array(), (p - high.as_dvec3()).as_vec3().to_array()]
     }
 
-    /// Corners of `triangles` of `scene` one after the other, as `item_buffer.wgsl` and
-    /// `radiance.wgsl` read them.
+    /// Corners of `triangles` of `scene` one after the other, as `item_buffer.wgsl` reads
+    /// them.
     pub fn corners(&self, scene: &Scene, triangles: &[u32]) -> Vec<Corner> {
         let corners = |&t: &u32| {
             let back_is_covered = scene.is_back_covered(t as usize).into();

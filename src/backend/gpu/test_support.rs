@@ -170,14 +170,3 @@ pub fn symbol(item: u32) -> char {
         cell => CELLS[(cell - super::layout::FIRST_CELL) as usize % 62].into(),
     }
 }
-
-/// A symbol for a value: `-` below 0, `.` for 0, then 0 to 9 up to `most`.
-pub fn shade(value: f32, most: f32) -> char {
-    if value < 0.0 {
-        '-'
-    } else if value == 0.0 {
-        '.'
-    } else {
-        char::from(b'0' + (9.99 * (value / most).min(1.0)) as u8)
-    }
-}

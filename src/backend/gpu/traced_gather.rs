@@ -11,7 +11,7 @@
 //! Luminaires are looked for by rays on the CPU.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use super::device::Gpu;
 use super::field::{self, FieldBuffers};
 use super::layout::{
-    GatherSettings, POINT_STATE_BYTES, Sample, TracedPoint, WORK_HEADER_BYTES,
+    GatherSettings, POINT_STATE_BYTES, Sample, TEXELS_A_LINE, TracedPoint, WORK_HEADER_BYTES,
 };
 use super::memory::Memory;
-use super::pipeline::bind_group_of;
+use super::pipeline::bind_group;
 use super::traced_scene::TracedScene;
 use crate::backend::adapter::AdapterKind;
 use crate::error::{Error, ErrorKind};
@@ -54,21 +54,23 @@ pub struct TracedGather {
     max_rays: u32,
     noise: f64,
     dim: f64,
-    batches: Batches,
+    directions: wgpu::TextureView,
+    _memory: Memory,
     rays: u64,
     seconds: f64,
 }
 
-/// What is made anew where the number of rays changes.
+/// Buffers of the batches under way: kept with the device, for all gatherers one after the other.
 #[derive(Debug)]
-struct Batches {
-    directions: wgpu::TextureView,
+pub struct Slots {
     /// The first half of `Work` with no points in its lists.
     no_work: wgpu::Buffer,
     slots: Vec<Slot>,
-    /// Points at once, at most.
-    max_points: u32,
-    memory: Memory,
+    /// Points of a batch, at most.
+    points: u32,
+    /// Passes that cast rays of one half, at most.
+    passes: u32,
+    _memory: Memory,
 }
 
 /// Buffers of a batch, used again once its samples are read.
@@ -102,7 +104,7 @@ const IN_FLIGHT: usize = 3;
 const PASS_RAYS: u32 = 4096;
 
 /// Points of a batch at most: beyond that an H200 gets no faster.
-const MAX_POINTS: u32 = 32_768;
+pub const MAX_POINTS: u32 = 32_768;
 
 /// Seconds that one dispatch may take: drivers end those of seconds, and a desktop stands still
 /// meanwhile.
@@ -143,6 +145,7 @@ impl TracedGather {
             true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
             false => min_rays,
         };
+        check_textures(gpu.limits().texture)?;
         let scene = mesh.scene();
         let lights = Arc::new(Lights::new(mesh.shared_scene()));
         let traced = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
@@ -150,10 +153,9 @@ impl TracedGather {
             Some(_) => HemisphereSamples::progressive(max_rays),
             None => HemisphereSamples::centred(max_rays, min_rays),
         };
+        let memory = gpu.memory();
         let directions = ordered_directions(&samples, min_rays);
-        let batches = gpu.with_error_scopes(|| {
-            Batches::new(gpu.memory(), &directions, [min_rays, max_rays])
-        })?;
+        let directions = gpu.with_error_scopes(|| memory.lines("directions", &directions))?;
         Ok(TracedGather {
             gpu: gpu.clone(),
             lights,
@@ -166,7 +168,8 @@ impl TracedGather {
             max_rays,
             noise,
             dim,
-            batches,
+            directions,
+            _memory: memory,
             rays: 0,
             seconds: 0.0,
         })
@@ -228,46 +231,65 @@ impl TracedGather {
         if is_sound { Ok(sample) } else { Err(format!("{sample:?}")) }
     }
 
-    /// Points of one batch: as many as a dispatch may take time for.
-    fn batch_len(&self) -> u32 {
+    /// Points of one batch: as many as a dispatch may take time for, and no more than `most`.
+    fn batch_len(&self, most: u32) -> u32 {
         let per_ray = match (self.gpu.adapter().kind, self.rays) {
             (AdapterKind::Cpu, 0) => 1e-6,
             (_, 0) => 2e-8,
             (_, rays) => self.seconds / rays as f64,
         };
         let seconds = per_ray * f64::from(self.min_rays.min(PASS_RAYS));
-        ((DISPATCH_SECONDS / seconds) as u32).clamp(64, self.batches.max_points)
+        ((DISPATCH_SECONDS / seconds) as u32).max(64).min(most)
     }
 
+    /// The samples of `points`, in batches of no more than `most`.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,
         points: &[TracedPoint],
+        most: u32,
     ) -> Result<Vec<IrradianceSample>, Error> {
+        let gpu = self.gpu.clone();
+        let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let len = (self.batch_len(most) as usize).min(points.len());
+        // Of all rays of the first pass, or of the last doubling.
+        let passes = self.min_rays.max(self.max_rays / 2).div_ceil(PASS_RAYS);
+        let has_room = |slots: &Slots| slots.points as usize >= len && slots.passes >= passes;
+        // Taken, so that a batch that fails leaves none that is half done.
+        let slots = match kept.take().filter(has_room) {
+            Some(slots) => slots,
+            None => Slots::new(gpu.memory(), (len as u32).next_power_of_two(), passes)?,
+        };
         let mut out = Vec::with_capacity(points.len());
         let mut waiting: VecDeque<InFlight> = VecDeque::new();
-        let bound: Vec<Bound> = (0..IN_FLIGHT).map(|k| self.bind(k, field)).collect();
-        let len = self.batch_len() as usize;
-        for (number, batch) in points.chunks(len).enumerate() {
+        let bound: Vec<Bound> = slots.slots.iter().map(|slot| self.bind(slot, field)).collect();
+        for (number, batch) in points.chunks(len.max(1)).enumerate() {
             if waiting.len() == IN_FLIGHT
                 && let Some(oldest) = waiting.pop_front()
             {
-                self.read(&oldest, &mut out)?;
+                self.read(&slots, &oldest, &mut out)?;
             }
             let slot = number % IN_FLIGHT;
-            let submission = self.submit(slot, &bound[slot], batch);
+            let submission = self.submit(&slots, slot, &bound[slot], batch);
             waiting.push_back(InFlight { slot, points: batch.len(), submission });
         }
         for batch in waiting {
-            self.read(&batch, &mut out)?;
+            self.read(&slots, &batch, &mut out)?;
         }
+        *kept = Some(slots);
         Ok(out)
     }
 
     /// Starts a batch.
-    fn submit(&self, slot: usize, bound: &Bound, points: &[TracedPoint]) -> wgpu::SubmissionIndex {
-        let (gpu, batches) = (&self.gpu, &self.batches);
-        let Slot { points: buffer, samples, work, staging, settings, .. } = &batches.slots[slot];
+    fn submit(
+        &self,
+        slots: &Slots,
+        slot: usize,
+        bound: &Bound,
+        points: &[TracedPoint],
+    ) -> wgpu::SubmissionIndex {
+        let gpu = &self.gpu;
+        let Slot { points: buffer, samples, work, staging, settings, .. } = &slots.slots[slot];
         let count = points.len() as u32;
         gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(points));
         for (pass, buffer) in (0..).zip(settings) {
@@ -302,7 +324,7 @@ impl TracedGather {
             }
         }
         let settle = |encoder: &mut wgpu::CommandEncoder| {
-            encoder.copy_buffer_to_buffer(&batches.no_work, 0, work, 0, WORK_HEADER_BYTES);
+            encoder.copy_buffer_to_buffer(&slots.no_work, 0, work, 0, WORK_HEADER_BYTES);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             bound.settle.set(&mut pass, &pipelines.settle, 0);
             pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
@@ -334,8 +356,13 @@ impl TracedGather {
     }
 
     /// Waits for a batch and reads its samples.
-    fn read(&mut self, batch: &InFlight, out: &mut Vec<IrradianceSample>) -> Result<(), Error> {
-        let staging = &self.batches.slots[batch.slot].staging;
+    fn read(
+        &mut self,
+        slots: &Slots,
+        batch: &InFlight,
+        out: &mut Vec<IrradianceSample>,
+    ) -> Result<(), Error> {
+        let staging = &slots.slots[batch.slot].staging;
         let slice = staging.slice(..(size_of::<Sample>() * batch.points) as u64);
         let mut rays = 0;
         let samples = self.gpu.read_mapped(slice, batch.submission.clone(), |bytes| {
@@ -350,10 +377,10 @@ impl TracedGather {
     }
 
     /// Buffers of a slot as the passes bind them.
-    fn bind(&self, slot: usize, field: &FieldBuffers) -> Bound {
+    fn bind(&self, slot: &Slot, field: &FieldBuffers) -> Bound {
         let (device, scene) = (&self.gpu.device, &*self.scene);
         let pipelines = self.gpu.gather_pipelines();
-        let Slot { points, states, samples, work, settings, .. } = &self.batches.slots[slot];
+        let Slot { points, states, samples, work, settings, .. } = slot;
         let view = wgpu::BindingResource::TextureView;
         let geometry = [
             (0, scene.nodes.as_entire_binding()),
@@ -363,28 +390,25 @@ impl TracedGather {
             (4, view(&scene.masks)),
         ];
         let without_nodes = geometry[1..].to_vec();
-        let lights = [
-            (5, scene.lights.as_entire_binding()),
-            (6, scene.lamps.as_entire_binding()),
-        ];
+        let lights = [(5, scene.lights.as_entire_binding()), (6, scene.lamps.as_entire_binding())];
         let sky = [(7, view(&scene.sky))];
         let light_field =
             vec![(0, field.quadtrees.as_entire_binding()), (1, view(&field.elements))];
         let point = [(0, points.as_entire_binding()), (1, states.as_entire_binding())];
-        let directions = [(2, view(&self.batches.directions))];
+        let directions = [(2, view(&self.directions))];
         let work_list = [(4, work.as_entire_binding())];
         let bind = |pipeline: &wgpu::ComputePipeline,
                     fixed: Vec<(u32, Vec<(u32, wgpu::BindingResource)>)>,
                     batch: Vec<(u32, wgpu::BindingResource)>| {
             let groups = fixed.into_iter().map(|(group, entries)| {
                 let layout = pipeline.get_bind_group_layout(group);
-                (group, bind_group_of(device, "scene", &layout, &entries))
+                (group, bind_group(device, "scene", &layout, &entries))
             });
             let layout = pipeline.get_bind_group_layout(1);
             let batches = settings.iter().map(|settings| {
                 let mut entries = batch.clone();
                 entries.push((3, settings.as_entire_binding()));
-                bind_group_of(device, "batch", &layout, &entries)
+                bind_group(device, "batch", &layout, &entries)
             });
             BoundPass { groups: groups.collect(), batches: batches.collect() }
         };
@@ -448,37 +472,33 @@ impl BoundPass {
     }
 }
 
-impl Batches {
-    fn new(
-        memory: Memory,
-        directions: &[[f32; 4]],
-        [min_rays, max_rays]: [u32; 2],
-    ) -> Result<Batches, Error> {
+impl Slots {
+    fn new(memory: Memory, points: u32, passes: u32) -> Result<Slots, Error> {
         use wgpu::BufferUsages as Usage;
-        // Of all rays of the first pass, or of the last doubling.
-        let passes = min_rays.max(max_rays / 2).div_ceil(PASS_RAYS).max(1);
         let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
-        let no_work = memory.buffer("no work", WORK_HEADER_BYTES, Usage::COPY_SRC | Usage::COPY_DST)?;
+        let no_work =
+            memory.buffer("no work", WORK_HEADER_BYTES, Usage::COPY_SRC | Usage::COPY_DST)?;
         memory.queue.write_buffer(&no_work, 0, bytemuck::cast_slice(&header));
-        let points = u64::from(MAX_POINTS);
+        let room = u64::from(points);
         let storage = Usage::STORAGE | Usage::COPY_DST;
+        let sample_bytes = room * size_of::<Sample>() as u64;
         let slot = |_| {
             Ok(Slot {
-                points: memory.buffer("points", points * size_of::<TracedPoint>() as u64, storage)?,
-                states: memory.buffer("states", points * POINT_STATE_BYTES, Usage::STORAGE)?,
+                points: memory.buffer("points", room * size_of::<TracedPoint>() as u64, storage)?,
+                states: memory.buffer("states", room * POINT_STATE_BYTES, Usage::STORAGE)?,
                 samples: memory.buffer(
                     "samples",
-                    points * size_of::<Sample>() as u64,
+                    sample_bytes,
                     Usage::STORAGE | Usage::COPY_SRC,
                 )?,
                 work: memory.buffer(
                     "work",
-                    WORK_HEADER_BYTES + 2 * points * 4,
+                    WORK_HEADER_BYTES + 2 * room * 4,
                     storage | Usage::INDIRECT,
                 )?,
                 staging: memory.buffer(
                     "staging",
-                    points * size_of::<Sample>() as u64,
+                    sample_bytes,
                     Usage::MAP_READ | Usage::COPY_DST,
                 )?,
                 settings: (0..passes)
@@ -487,9 +507,18 @@ impl Batches {
             })
         };
         let slots = (0..IN_FLIGHT).map(slot).collect::<Result<_, Error>>()?;
-        let directions = memory.lines("directions", directions)?;
-        Ok(Batches { directions, no_work, slots, max_points: MAX_POINTS, memory })
+        Ok(Slots { no_work, slots, points, passes, _memory: memory })
     }
+}
+
+/// Checks that textures of a device may be as wide as those that are read as arrays.
+pub fn check_textures(texture: u32) -> Result<(), Error> {
+    if texture >= TEXELS_A_LINE {
+        return Ok(());
+    }
+    let found = format!("textures of {texture} pixels along an edge");
+    let remedy = format!("rays on the device take {TEXELS_A_LINE}");
+    Err(Error::new(ErrorKind::Setting, "graphics device", found, remedy))
 }
 
 /// The directions of `samples`, ray by ray. Those that are cast together, the first half of
@@ -530,12 +559,22 @@ impl Gather for TracedGather {
         field::check(self.gpu.limits(), field, self.triangles)?;
         let traced: Vec<TracedPoint> = points.par_iter().map(|p| self.traced_point(p)).collect();
         let gpu = self.gpu.clone();
-        let samples = gpu.with_error_scopes(|| {
-            let field = gpu.field_buffers(&self.scene, field)?;
-            self.gather_all(&field, &traced)
-        });
+        let mut most = MAX_POINTS.min((points.len() as u32).next_power_of_two());
+        let samples = loop {
+            let samples = gpu.with_error_scopes(|| {
+                let field = gpu.field_buffers(&self.scene, field)?;
+                self.gather_all(&field, &traced, most)
+            });
+            match samples {
+                // Smaller batches make room for the light.
+                Err(e) if e.kind() == ErrorKind::Memory && most > 1 => {
+                    most /= 2;
+                    gpu.forget_slots()?;
+                }
+                samples => break samples,
+            }
+        };
         self.seconds += start.elapsed().as_secs_f64();
         samples
     }
 }
-

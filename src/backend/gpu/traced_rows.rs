@@ -17,7 +17,8 @@ use super::layout::{
     BACK, FIRST_ELEMENT, OPEN, ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings, TracedPatch,
 };
 use super::memory::Memory;
-use super::pipeline::bind_group_of;
+use super::pipeline::bind_group;
+use super::traced_gather::check_textures;
 use super::traced_scene::TracedScene;
 use crate::backend::cpu::rows::{self as cpu, rays_for_importance, rotation, row_of_counts};
 use crate::error::{Error, ErrorKind};
@@ -79,6 +80,7 @@ impl TracedRows {
     /// not fit the device or there is no memory, [`ErrorKind::Device`] when the device fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, count: u32) -> Result<TracedRows, Error> {
         let samples = HemisphereSamples::new(count)?;
+        check_textures(gpu.limits().texture)?;
         let lights = Lights::new(mesh.shared_scene());
         let scene = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
         let has_panes = mesh.scene().clear_panes().is_some();
@@ -163,10 +165,10 @@ impl TracedRows {
             return Ok(rows);
         };
         entries.par_sort_unstable_by_key(|e| (e.patch_, item(e.slot)));
-        let of_patches: Vec<&[RowEntry]> =
-            entries.chunk_by(|a, b| a.patch_ == b.patch_).collect();
-        let counted =
-            |row: &&[RowEntry]| row.iter().map(|e| u64::from(e.count)).sum::<u64>() == u64::from(rays);
+        let of_patches: Vec<&[RowEntry]> = entries.chunk_by(|a, b| a.patch_ == b.patch_).collect();
+        let counted = |row: &&[RowEntry]| {
+            row.iter().map(|e| u64::from(e.count)).sum::<u64>() == u64::from(rays)
+        };
         if of_patches.len() != patches.len() || !of_patches.iter().all(counted) {
             return Err(gpu.invalid_result("rows of another number of rays".into()));
         }
@@ -197,7 +199,7 @@ impl TracedRows {
                      group: u32,
                      entries: &[(u32, wgpu::BindingResource)]| {
             let layout = pipeline.get_bind_group_layout(group);
-            bind_group_of(device, "rows", &layout, entries)
+            bind_group(device, "rows", &layout, entries)
         };
         let scene = &*self.scene;
         let geometry = [
@@ -232,7 +234,8 @@ impl TracedRows {
         }
         // As many as there may be, if that is little; else how many there are is asked first.
         let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
-        let bytes = |entries: u64| ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
+        let bytes =
+            |entries: u64| ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
         let guess = most.min(u64::from(settings.entries)).min(FIRST_ENTRIES);
         encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
         let submission = gpu.queue.submit([encoder.finish()]);
@@ -313,7 +316,11 @@ impl Buffers {
         let storage = Usage::STORAGE | Usage::COPY_DST;
         Ok(Buffers {
             quadtrees: memory.storage("quadtrees", bytemuck::cast_slice(&quadtrees(mesh)))?,
-            patches: memory.buffer("patches", patches * size_of::<TracedPatch>() as u64, storage)?,
+            patches: memory.buffer(
+                "patches",
+                patches * size_of::<TracedPatch>() as u64,
+                storage,
+            )?,
             // Zero at first, and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
             settings: memory.uniform("settings", &[0; size_of::<RowSettings>()])?,

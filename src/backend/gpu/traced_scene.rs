@@ -114,9 +114,9 @@ impl TracedArrays {
                 (0..scene.triangles().len()).filter(|&t| scene.is_clear(t)).collect();
             let first_row = lights.lights.len();
             triangles.extend(
-                hierarchy.triangles().map(|k| {
-                    with_holes(triangle(clear[k], (first_row + k) as u32))
-                }),
+                hierarchy
+                    .triangles()
+                    .map(|k| with_holes(triangle(clear[k], (first_row + k) as u32))),
             );
             arrays.lights = transmittance.iter().map(pane_row).collect();
             arrays.add_nodes(&rays, 0);
@@ -249,9 +249,8 @@ impl TracedArrays {
         for (material, mask) in scene.masks() {
             first_word.insert(material, self.masks.len() as u32);
             let solid: Vec<bool> = mask.solid_texels().collect();
-            let word = |bits: &[bool]| {
-                bits.iter().rev().fold(0, |word, &bit| word << 1 | u32::from(bit))
-            };
+            let word =
+                |bits: &[bool]| bits.iter().rev().fold(0, |word, &bit| word << 1 | u32::from(bit));
             self.masks.extend(solid.chunks(32).map(word));
         }
         let count = scene.triangles().len();
@@ -266,7 +265,8 @@ impl TracedArrays {
             let size = mask.texture.size();
             let whole = DVec2::new(size[0].into(), size[1].into());
             // From the tile of the first corner on, so that few digits are lost far out.
-            let tile = if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
+            let tile =
+                if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
             let [a, b, c] = corners.map(|place| (place - tile).as_vec2());
             let word = first_word[&scene.triangles()[t].material] as f32;
             self.mask_places[3 * t] = [a.x, a.y, b.x, b.y];

@@ -10,6 +10,7 @@ use super::shaders::{
     COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, RANK_LIGHTS_WGSL, ROW_RAYS_WGSL,
     SETTLE_WGSL,
 };
+use super::traced_gather::Slots;
 use super::traced_scene::TracedScene;
 use crate::error::Error;
 use crate::gather::RadiosityField;
@@ -23,6 +24,7 @@ pub struct Tracing {
     rows: OnceLock<RowPipelines>,
     scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
     light: Mutex<Option<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
+    pub slots: Mutex<Option<Slots>>,
 }
 
 /// The passes of a gather.
@@ -80,6 +82,16 @@ impl RowPipelines {
 }
 
 impl Gpu {
+    /// Gives the memory of batches back to the device.
+    pub(super) fn forget_slots(&self) -> Result<(), Error> {
+        *self.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        // It is free once writes to it have gone through.
+        self.with_error_scopes(|| {
+            self.queue.submit([]);
+            self.wait()
+        })
+    }
+
     /// The passes of rows: compiled at the first call.
     pub(super) fn row_pipelines(&self) -> &RowPipelines {
         self.tracing.rows.get_or_init(|| RowPipelines::new(&self.device))

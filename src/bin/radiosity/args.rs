@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use lexopt::prelude::*;
+use radiosity::backend::AdapterKind;
 use radiosity::{Backend, Error, ErrorKind, Rgb};
 
 use crate::interrupt;
@@ -211,6 +212,17 @@ impl Device {
             }),
             Device::Cpu => Ok(Backend::Cpu),
         }
+    }
+}
+
+/// The value of `--adapter-kind`.
+pub fn adapter_kind(parser: &mut lexopt::Parser) -> Result<AdapterKind, Stop> {
+    let text = parser.value()?.string()?;
+    match &*text {
+        "discrete" => Ok(AdapterKind::DiscreteGpu),
+        "integrated" => Ok(AdapterKind::IntegratedGpu),
+        "software" => Ok(AdapterKind::Cpu),
+        _ => Err(wrong_value("adapter-kind", &text, "discrete, integrated or software")),
     }
 }
 

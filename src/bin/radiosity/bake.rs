@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 
 use files::Files;
 use lexopt::prelude::*;
+use radiosity::backend::AdapterKind;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, Solver};
 use settings::{Adjustment, Setting};
 
-use crate::args::{self, Device, Stop};
+use crate::args::{self, Device, Stop, adapter_kind};
 use crate::report::Report;
 use crate::scene_options::SceneOptions;
 use crate::{interrupt, progress};
@@ -23,6 +24,7 @@ usage: radiosity bake SCENE.obj [--out STEM] [--error X | --error-each X] [--tim
             [--gather none|needed|all] [settings] [--camera ex,ey,ez,tx,ty,tz,vfov_deg]
             [--exposure X] [--image W,H] [--pixel-gather] [--write FORMATS]
             [--elements] [--bands FILE.json] [--adapter NAME | --cpu]
+            [--adapter-kind KIND]
 
 Writes STEM.ply (radiosity at vertices, and how far it may be off), STEM.glb (the same for viewers
 of glTF), STEM.json (a report) and a picture, STEM.exr (linear radiance) and STEM.png. STEM is the
@@ -114,9 +116,11 @@ Files and devices:
   --pixel-gather    every pixel of the picture gathers the settled light for itself
   --elements        write STEM.elements.ply too: each element with its own value, not smoothed
   --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
-  --cpu             rays on the CPU instead of hemicubes, K N squared a row that much
-                    light goes along; done unasked where rays are the faster: on software
-                    adapters, for many triangles at few pixels
+  --adapter-kind KIND  choose between hemicubes, rays on the device and rays on the CPU as on a
+                    discrete, an integrated or a software adapter [what the driver says]
+  --cpu             rays on the CPU alone, K N squared a row that much light goes along; done
+                    unasked where they are the fastest: on software adapters, for gathers and for
+                    many triangles at few pixels
 
 Ctrl-C or SIGTERM stops the bake, and what there is is written; again, it ends at once.";
 
@@ -150,6 +154,8 @@ pub struct Bake {
     bands: Option<PathBuf>,
     files: Files,
     device: Device,
+    /// What is chosen as on an adapter of this kind; as on its own, with none.
+    kind: Option<AdapterKind>,
 }
 
 /// How far to go.
@@ -194,6 +200,7 @@ impl Bake {
             bands: None,
             files: Files::new(),
             device: Device::Gpu(None),
+            kind: None,
         };
         while let Some(arg) = parser.next()? {
             match arg {
@@ -213,6 +220,7 @@ impl Bake {
                 }
                 Long("bands") => bake.bands = Some(parser.value()?.into()),
                 Long("adapter") => bake.device = Device::named(parser)?,
+                Long("adapter-kind") => bake.kind = Some(adapter_kind(parser)?),
                 Long("cpu") => bake.device = Device::Cpu,
                 Long(name) => {
                     let name = name.to_string();
@@ -294,6 +302,10 @@ impl Bake {
         let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
         let device = progress::of_stage("opening the device", || self.device.open())?;
+        let device = match (device, self.kind) {
+            (Backend::Gpu(gpu), Some(kind)) => Backend::Gpu(gpu.assuming(kind)),
+            (device, _) => device,
+        };
         let open = opening.elapsed().as_secs_f64();
         let unshot_goal = Cell::new(Solver::default().unshot);
         interrupt::catch();

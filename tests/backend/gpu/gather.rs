@@ -1,25 +1,27 @@
-//! Gathering with hemicubes: against closed forms, against rays, and against itself.
+//! Gathering with rays on the device: against closed forms, against rays on the CPU, and against
+//! itself.
 
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::TracedGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
-use radiosity::{ErrorKind, Gather, Gpu, Material, Mesh, Rgb, Scene, Triangle};
+use radiosity::{
+    ErrorKind, Gather, Gpu, Material, Mesh, Rgb, Scene, Sky, SkyDistribution, Sun, Triangle,
+};
 
+use crate::common::device_rays::{ROUNDING, Rays, same_as_on_the_cpu};
 use crate::common::fakes::GivenRadiosity;
-use crate::common::hemicubes::outline_bound;
-use crate::common::scenes::{Quad, facing_down, grey, lamp};
+use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp};
 use crate::common::{cornell_box, cube, gpu, quads};
 
-/// What `places` see of `light` in hemicubes of resolution `n`.
+/// What `places` see of `light` by `n` rays.
 fn gather_all(
     light: &GivenRadiosity,
     gpu: &Gpu,
     n: u32,
     places: &[GatherPoint],
 ) -> Vec<IrradianceSample> {
-    let mut gather = HemicubeGather::new(gpu, &light.mesh, n).unwrap();
+    let mut gather = TracedGather::new(gpu, &light.mesh, n).unwrap();
 
     gather.gather(&light.sources(), places).unwrap()
 }
@@ -43,38 +45,74 @@ fn factor(place: &GatherPoint, corners: &[[f64; 3]]) -> f64 {
     point_to_polygon(place.position, place.normal, &corners)
 }
 
-#[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn hemicubes_agree_with_rays() {
-    let gpu = gpu();
-    // Unequal depths: every third element split, and every fifth of what comes of it. Values jump
-    // from element to element, so that a wrong one is seen.
+/// The Cornell box in elements of unequal depths: every third is split, and every fifth of what
+/// comes of it. Values jump from element to element, so that a wrong one is seen.
+fn uneven_box() -> GivenRadiosity {
     let mesh = cornell_box(60.0);
     let third: Vec<usize> = (0..mesh.element_count()).step_by(3).collect();
     let mesh = mesh.split(&third).unwrap();
     let fifth: Vec<usize> = (0..mesh.element_count()).step_by(5).collect();
-    let light = GivenRadiosity::new(mesh.split(&fifth).unwrap(), |e, p| {
+    GivenRadiosity::new(mesh.split(&fifth).unwrap(), |e, p| {
         Rgb::new(1.0 + p.x / 600.0, 1.0 + p.y / 600.0, 1.0 + (e % 7) as f64 / 7.0)
-    });
-    let places = light.places(64, 0.01);
-    let got = gather_all(&light, &gpu, 128, &places);
-    let mut rays = RayGather::new(&light.mesh, 1 << 15).unwrap();
-    let want = rays.gather(&light.sources(), &places).unwrap();
-    for ((place, got), want) in places.iter().zip(&got).zip(&want) {
-        let indirect = |g: &IrradianceSample| g.irradiance - g.direct;
-        // Values scatter by 0.3 or less about their mean, so 2¹⁵ rays err by 1.7e-3. At most half
-        // of the 49152 pixels, 2e-5 of weight each, lie across a border and err by up to the jump
-        // there, 0.6 on the whole, evenly: √(25000/12) · 2e-5 · 0.6 = 6e-4. Six of both together.
-        let error = (indirect(got) - indirect(want)).abs().max_element();
-        assert!(error < 6.0 * 1.8e-3, "{place:?}: {error}");
-        // Hit or miss of outlines, 3 half faces long or 300 pixels: 6 · √(300/12) · 3e-5 = 9e-4; a
-        // fifth of 2¹⁵ rays might hit either way: 6 · √(0.2 · 0.8 / 2¹⁵) = 1.3e-2 for each bare
-        // share, a tenth of it as the rays are stratified.
-        let error = (got.direct - want.direct).abs().max_element();
-        assert!(error <= 0.01 * want.irradiance.max_element(), "{place:?}: {error}");
-        assert!((got.escaped - want.escaped).abs() < 2e-3, "{place:?}");
-        assert!((got.backface - want.backface).abs() < 2e-3, "{place:?}");
-        assert!((got.inverse_distance / want.inverse_distance - 1.0).abs() < 5e-3, "{place:?}");
+    })
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn device_gathers_as_the_cpu_does() {
+    let (gpu, light) = (gpu(), uneven_box());
+    let lamp = light.mesh.scene().materials().iter().map(|m| m.exitance.max_element());
+    let peak = 3.0 + lamp.fold(0.0, f64::max);
+    let points = light.places(200, 0.01);
+    for (count, noise) in [(2, f64::INFINITY), (64, f64::INFINITY), (64, 0.02), (8192, 0.02)] {
+        let points = if count > 64 { &points[..20] } else { &points };
+        same_as_on_the_cpu(&gpu, &light.sources(), points, Rays { count, noise }, peak);
+    }
+}
+
+/// Skies and suns, wide lights, many lights, small ones and those of many triangles: as on the CPU.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn device_gathers_all_kinds_of_light() {
+    let gpu = gpu();
+    let clear = SkyDistribution::cie(12).unwrap();
+    let (up, towards_sun) = (DVec3::Z, DVec3::new(0.3, 0.2, 0.9));
+    let sun = Sun { direction: towards_sun, irradiance: Rgb::new(3.0, 2.0, 1.0) };
+    let sky = Sky::new(clear, Rgb::new(0.5, 0.7, 1.0), up, towards_sun).unwrap();
+    let sky = sky.with_sun(sun).unwrap();
+    let floor = facing_up([-2.0, 2.0], [-2.0, 2.0], 0.0);
+    let table = [facing_up([0.2, 0.9], [0.1, 0.8], 0.5), facing_down([0.2, 0.9], [0.1, 0.8], 0.5)];
+    let ceiling = facing_down([-2.0, 2.0], [-2.0, 2.0], 2.0);
+    let furniture: Vec<(Quad, Material)> =
+        [floor, table[0], table[1]].map(|quad| (quad, grey())).into();
+    let lamps = |count: i32, size: f64| {
+        let at = move |k: i32| [f64::from(k % 5) * 0.7 - 1.5, f64::from(k / 5) * 0.8 - 1.4];
+        (0..count)
+            .map(at)
+            .map(move |[x, y]| (facing_down([x, x + size], [y, y + size], 1.9), lamp(LAMP)))
+    };
+    let scenes = [
+        ("a clear sky with a sun", quads(&furniture).with_sky(sky).unwrap()),
+        ("a uniform sky", quads(&furniture).with_sky(Rgb::new(1.0, 0.5, 0.2)).unwrap()),
+        ("a ceiling that shines", quads(&[&furniture[..], &[(ceiling, lamp(LAMP))]].concat())),
+        (
+            "twenty lights",
+            quads(&furniture.iter().cloned().chain(lamps(20, 0.3)).collect::<Vec<_>>()),
+        ),
+        (
+            "a tiny light",
+            quads(&furniture.iter().cloned().chain(lamps(1, 1e-3)).collect::<Vec<_>>()),
+        ),
+    ];
+    for (name, scene) in scenes {
+        println!("{name}");
+        let mesh = Mesh::new(scene, 0.5).unwrap();
+        let light =
+            GivenRadiosity::new(mesh, |e, p| Rgb::splat(0.2 + 0.1 * (e % 3) as f64) + p.x.abs());
+        let points = light.places(100, 1e-4);
+        for (count, noise) in [(256, f64::INFINITY), (64, 0.01)] {
+            same_as_on_the_cpu(&gpu, &light.sources(), &points, Rays { count, noise }, 8.0);
+        }
     }
 }
 
@@ -92,7 +130,7 @@ fn furnace_irradiance_is_even() {
     let cube = Scene::new(cube.positions().to_vec(), triangles, groups, vec![material]).unwrap();
     let light = GivenRadiosity::new(Mesh::new(cube, 0.2).unwrap(), |_, _| Rgb::ONE);
     for g in gather_all(&light, &gpu, 64, &light.places(50, 1e-4)) {
-        assert!((g.irradiance - 2.0).abs().max_element() < 2e-5, "{g:?}");
+        assert!((g.irradiance - 2.0).abs().max_element() < ROUNDING, "{g:?}");
         assert_eq!((g.escaped, g.backface), (0.0, 0.0));
     }
 }
@@ -119,16 +157,17 @@ fn direct_light_is_the_closed_form() {
     ];
     for (place, got) in places.iter().zip(gather_all(&light, &gpu, 64, &places)) {
         let factors = [&overhead, &wall].map(|q| factor(place, q));
-        // What could give less than 1e-3 of it all is left to the hemicube.
+        // What could give less than 1e-3 of it all is left to the rays over the hemisphere.
         let least = 1e-3 * factors.iter().sum::<f64>();
         let want = lamp(LAMP).exitance * factors.iter().filter(|&&f| f > least).sum::<f64>();
-        // Every pixel that would show the light does: the closed form as it is.
-        let error = (got.direct - want).abs().max_element();
-        assert!(error < 1e-6, "{place:?}: {got:?} {want}");
+        // Every ray to the light arrives: the closed form as it is, and rays that meet what is left.
         let left = lamp(LAMP).exitance * factors.iter().filter(|&&f| f <= least).sum::<f64>();
-        let error = (got.irradiance - got.direct - left).abs().max_element();
-        assert!(error < 3.0 * outline_bound(64, 0.1, 4.0), "{place:?}: {got:?} {left}");
-        assert!(left != Rgb::ZERO || got.direct == got.irradiance);
+        let off = (got.direct - want).max_element();
+        let a_ray = 3.0 * LAMP[2] / 64.0;
+        let most = if left == Rgb::ZERO { 0.0 } else { left.max_element() + a_ray };
+        let within = ROUNDING * want.max_element();
+        assert!(off > -within && off < within + most, "{place:?}: {got:?} {want}");
+        assert_eq!(got.direct, got.irradiance);
     }
 }
 
@@ -154,7 +193,7 @@ fn half_hidden_light_matches_clipped_polygon() {
         ];
         let light = dark(&[(square, lamp(LAMP)), (blocker.map(|p| p.to_array()), grey())]);
         let place = place([0.0; 3], [0.1, 0.2, 1.0]);
-        let got = gather_all(&light, &gpu, 64, &[place])[0];
+        let got = gather_all(&light, &gpu, 4096, &[place])[0];
         // The part of the square on the light side of the line at `at` across.
         let mut left = vec![];
         for k in 0..4 {
@@ -166,13 +205,10 @@ fn half_hidden_light_matches_clipped_polygon() {
         let (want, whole) = (factor(&place, &left), factor(&place, &square));
         let error = (got.direct.x - want) / whole;
         worst[k / 20] = error.abs().max(worst[k / 20]);
-        // The shadow's edge crosses some 28 of the tile's columns, the light covers some 700 of its
-        // pixels. A column is off by half a pixel at most. Parallel to the light's edge, the
-        // shadow's climbs a line in four or five columns that even out but for one: 7 halves. At
-        // the other angles its slopes are near 3/4 and 3/5, and the midpoints of as many columns
-        // miss by an eighth of a pixel each and one by a half where the pattern shifts: 28/8 + 7/2.
-        let pixels = if angle == 0.0 { 3.5 } else { 7.0 };
-        assert!(error.abs() < pixels / 700.0, "{k}: {error}");
+        // Of 1024 points on the light, a (0,2)-net turned along both axes, an edge has wrong no more
+        // than those in the cells of 1/32 that it crosses, two times 32 at most, evenly to either
+        // side: 6 √(64/12) = 14 of them.
+        assert!(error.abs() < 14.0 / 1024.0, "{k}: {error}");
     }
     println!("worst errors {worst:.4?} of the light, by angle");
 }
@@ -219,14 +255,13 @@ fn light_of_many_triangles_matches_closed_form() {
         for place in
             [place([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]), place([0.3, 0.0, 0.3], [-0.5, 0.2, 1.0])]
         {
-            let got = gather_all(&light, &gpu, 64, &[place])[0];
+            let got = gather_all(&light, &gpu, 4096, &[place])[0];
             let want: f64 =
                 corners.iter().map(|t| point_to_polygon(place.position, place.normal, t)).sum();
             let error = got.direct.x / want - 1.0;
-            // Not convex: pixels' own form factors. Some 700 show it, four sides of some 30 pixels
-            // are crossed, each wrong by half a pixel and as often too little as too much: 6 σ are
-            // 6·√(120/12) = 19 pixels, and midpoints are off by (2/32)²/24·8 = 1.3e-3.
-            let bound = if convex { 1e-6 } else { 19.0 / 700.0 + 1.3e-3 };
+            // Not convex: the mean over 1024 points of form factors that vary by as much as they
+            // are, in a (0,2)-net with four borders between triangles: 4/32.
+            let bound = if convex { ROUNDING } else { 4.0 / 32.0 };
             println!("convex {convex}: {error:.1e}");
             assert!(error.abs() < bound, "convex {convex}: {error}");
         }
@@ -235,40 +270,17 @@ fn light_of_many_triangles_matches_closed_form() {
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn lights_beyond_eight_are_left_to_pixels() {
-    let gpu = gpu();
-    let lamps: Vec<Quad> = (0..12)
-        .map(|k| (f64::from(k % 4) - 1.6, f64::from(k / 4) - 1.2))
-        .map(|(x, y)| facing_down([x, x + 0.3], [y, y + 0.3], 1.5))
-        .collect();
-    let light = dark(&lamps.iter().map(|&q| (q, lamp(LAMP))).collect::<Vec<_>>());
-    let place = place([0.0; 3], [0.0, 0.0, 1.0]);
-    let got = gather_all(&light, &gpu, 256, &[place])[0];
-    let mut factors: Vec<f64> = lamps.iter().map(|q| factor(&place, q)).collect();
-    factors.sort_by(|a, b| b.total_cmp(a));
-    let apart: f64 = factors[..8].iter().sum();
-    assert!((got.direct.x - apart).abs() < 1e-6, "{got:?} {apart}");
-    // Four squares of sides 0.3/1.5 half faces are left to the pixels.
-    let bound = outline_bound(256, 4.0 * 4.0 * 0.2, 16.0);
-    let all: f64 = factors.iter().sum();
-    assert!((got.irradiance.x - all).abs() < bound, "{got:?} {all} {bound}");
-    assert!(got.irradiance.x > got.direct.x);
-}
-
-#[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn large_light_nearby_is_left_to_pixels() {
+fn large_light_nearby_is_its_closed_form() {
     let gpu = gpu();
     let sheet = facing_down([-1.0, 1.0], [-1.0, 1.0], 1.0);
     let light = dark(&[(sheet, lamp(LAMP))]);
     let places =
         [place([0.1, 0.2, 0.999], [0.0, 0.0, 1.0]), place([0.99, 0.2, 0.999], [0.4, 0.0, 1.0])];
-    for (place, got) in places.iter().zip(gather_all(&light, &gpu, 128, &places)) {
-        assert_eq!(got.direct, Rgb::ZERO);
-        // The outline runs along the horizon's 8 half faces, or straight across the hemicube.
-        let (want, bound) = (factor(place, &sheet), outline_bound(128, 8.0, 8.0));
-        assert!((got.irradiance.x - want).abs() < bound, "{got:?} {want}");
-        assert!(((1.0 - got.escaped) - want).abs() < bound);
+    for (place, got) in places.iter().zip(gather_all(&light, &gpu, 4096, &places)) {
+        let want = factor(place, &sheet);
+        assert!((got.direct.x / want - 1.0).abs() < ROUNDING, "{got:?} {want}");
+        // Stratified rays: those whose cells of 1/64 the outline crosses, at most two times 64.
+        assert!(((1.0 - got.escaped) - want).abs() < 6.0 * (128f64 / 12.0).sqrt() / 4096.0);
     }
 }
 
@@ -291,10 +303,11 @@ fn linear_radiosity_is_interpolated() {
         let mesh = Mesh::new(quads(&[(floor, grey())]), size).unwrap();
         let uneven: Vec<usize> = (0..mesh.element_count()).step_by(3).collect();
         let light = GivenRadiosity::new(mesh.split(&uneven).unwrap(), |_, p| value(p));
-        let got = gather_all(&light, &gpu, 256, &[place])[0];
-        // Pixels on the outline (8 half faces on the top face or lower) are wrong by half the
-        // radiosity of up to 5; cells and pixels are taken at their middles: 0.04² of 4/24 each.
-        let bound = 5.0 * outline_bound(256, 8.0, 8.0) / 10.0 + 3e-4;
+        let got = gather_all(&light, &gpu, 1 << 14, &[place])[0];
+        // Stratified rays in cells of 1/128: those that the outline crosses, up to two times 128,
+        // are wrong by up to the radiosity of 5, and evenly; cells are taken at their middles:
+        // 0.04² of 4/24.
+        let bound = 5.0 * 6.0 * (256f64 / 12.0).sqrt() / 16384.0 + 3e-4;
         let error = (got.irradiance - want).abs().max_element();
         println!("size {size}: {error:.1e}, bound {bound:.1e}");
         assert!(error < bound, "{got:?} {want}");
@@ -308,13 +321,13 @@ fn gather_is_independent_of_batching() {
     let gpu = gpu();
     let light = GivenRadiosity::new(cornell_box(100.0), |t, p| p / 600.0 + 0.1 * (t % 3) as f64);
     let places = light.places(70, 0.01);
-    let mut gather = HemicubeGather::new(&gpu, &light.mesh, 64).unwrap();
+    let mut gather = TracedGather::new(&gpu, &light.mesh, 64).unwrap();
     let together = gather.gather(&light.sources(), &places).unwrap();
     for (place, want) in places.iter().zip(&together) {
         assert_eq!(&gather.gather(&light.sources(), &[*place]).unwrap()[0], want);
     }
-    // One for each point, twice.
-    assert_eq!(gather.drawn(), 2 * places.len() as u64);
+    // Those over the hemisphere and a quarter as many to each light, of each point, twice.
+    assert_eq!(gather.rays(), 2 * (64 + 16) * places.len() as u64);
     assert!(gather_all(&light, &gpu, 64, &places) == together);
     assert_eq!(gather.gather(&light.sources(), &[]).unwrap(), []);
 }
@@ -330,34 +343,34 @@ fn sky_backs_and_distance_match_closed_forms() {
         if back {
             plane.reverse();
         }
-        let got = gather_all(&dark(&[(plane, grey())]), &gpu, 64, &[place])[0];
-        // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Pixels on the
-        // lowest lines of 64 look out at 1/64, above the plane's end at 1e-3. Midpoints of pixels:
-        // relative (2/64)²/24 · 12 = 5e-4.
+        let got = gather_all(&dark(&[(plane, grey())]), &gpu, 4096, &[place])[0];
+        // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Rays start at the
+        // inner rims of their rings: the mean cosine is 1/(2 n) too much (`sampling::hemisphere`),
+        // 3/(4 n) of itself. The plane ends at 1e-3 above the horizon: one ray in 10⁶.
         assert_eq!(got.escaped, 0.0);
         assert!((got.backface - f64::from(u8::from(back))).abs() < 1e-5, "{got:?}");
-        assert!((got.inverse_distance * 1.5 * z - 1.0).abs() < 5e-4, "{got:?}");
+        assert!((got.inverse_distance * 1.5 * z - 1.0).abs() < 1.0 / 4096.0, "{got:?}");
     }
     // Half the sky: what is not on one side of a wall.
     let wall = [[0.0, -1e3, -1e3], [0.0, 1e3, -1e3], [0.0, 1e3, 1e3], [0.0, -1e3, 1e3]];
     let shifted = GatherPoint { position: DVec3::new(0.01, 0.0, 0.0), ..place };
-    let got = gather_all(&dark(&[(wall, grey())]), &gpu, 64, &[shifted])[0];
-    // The top of the wall is 1e-5 off the zenith; 4 half faces of outline.
-    assert!((got.escaped - 0.5).abs() < outline_bound(64, 4.0, 2.0), "{got:?}");
+    let got = gather_all(&dark(&[(wall, grey())]), &gpu, 4096, &[shifted])[0];
+    // The top of the wall is 1e-5 off the zenith; of two times 64 cells half is wrong at most.
+    assert!((got.escaped - 0.5).abs() < 6.0 * (128f64 / 12.0).sqrt() / 4096.0, "{got:?}");
     assert!((got.escaped + got.backface - 1.0).abs() < 1e-5 || got.backface == 0.0);
 }
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn rejects_bad_resolutions_and_fields() {
+fn rejects_bad_numbers_of_rays_and_fields() {
     let gpu = gpu();
     let light = GivenRadiosity::new(cornell_box(200.0), |_, _| Rgb::ONE);
-    for n in [0, 7, 100_000] {
-        let e = HemicubeGather::new(&gpu, &light.mesh, n).unwrap_err();
+    for n in [0, (1 << 20) + 1] {
+        let e = TracedGather::new(&gpu, &light.mesh, n).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         assert!(e.to_string().contains(&n.to_string()), "{e}");
     }
-    let mut gather = HemicubeGather::new(&gpu, &light.mesh, 64).unwrap();
+    let mut gather = TracedGather::new(&gpu, &light.mesh, 64).unwrap();
     let other = dark(&[(facing_down([0.0, 1.0], [0.0, 1.0], 1.0), lamp(LAMP))]);
     let good = light.sources();
     let short = RadiosityField { corners: &light.corners[1..], ..good };

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::HemicubeGather;
+use radiosity::backend::gpu::TracedGather;
 use radiosity::form_factor::{AdaptiveViewpoints, ProximityCorrection};
 use radiosity::gather::{GatherPoint, RefinementSettings, gather_at_vertices};
 use radiosity::solver::Method;
@@ -109,7 +109,7 @@ impl Ask<'_> {
 
     fn gatherer(&self, mesh: &Mesh) -> Result<Box<dyn Gather>, Error> {
         Ok(match self.device {
-            Backend::Gpu(gpu) => Box::new(HemicubeGather::new(gpu, mesh, PIXELS)?),
+            Backend::Gpu(gpu) => Box::new(TracedGather::new(gpu, mesh, PIXELS * PIXELS)?),
             Backend::Cpu => Box::new(RayGather::new(mesh, PIXELS * PIXELS)?),
         })
     }

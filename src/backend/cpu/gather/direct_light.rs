@@ -12,7 +12,7 @@ use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
 use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
-use crate::gather::light_projection::LightProjection;
+use crate::geometry::polygon::clip;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::second_rotation;
 use crate::scene::{Rgb, Sun};
@@ -29,6 +29,26 @@ pub(super) struct DirectLight<'a> {
     wide: Vec<WideLight>,
     sun: Option<&'a Sun>,
     rotation: f64,
+}
+
+/// Cosine of the largest angle between the mean direction to a light and any direction to it, for
+/// points on it to sample it well: 60°. Chosen by hand.
+const MIN_AXIS_COSINE: f64 = 0.5;
+
+/// Whether what of a light is above the horizon of `point` lies within a cone around the mean
+/// direction there; false where nothing is.
+fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
+    let mut directions = vec![];
+    for corners in triangles {
+        let [a, b, c] = corners.map(|p| p - point.position);
+        if (b - a).cross(c - a).dot(a) < 0.0 {
+            directions.extend(clip(&[a, b, c], DVec3::ZERO, point.normal));
+        }
+    }
+    let axis = directions.iter().map(|d| d.normalize_or_zero()).sum::<DVec3>().try_normalize();
+    let is_within =
+        |axis: DVec3| directions.iter().all(|d| d.dot(axis) > MIN_AXIS_COSINE * d.length());
+    axis.is_some_and(is_within)
 }
 
 /// What rays of a range found of each light and of the sun.
@@ -49,8 +69,7 @@ impl<'a> DirectLight<'a> {
         lights.retain(|&(light, _)| {
             let light = &gather.lights.lights[light as usize];
             let corner = |&t: &u32| scene.corners(t as usize);
-            light.convex
-                || LightProjection::new(point, light.triangles.iter().map(corner)).is_some()
+            light.convex || is_within_cone(point, light.triangles.iter().map(corner))
         });
         let all = &gather.lights.lights;
         let rays = [gather.min_rays, RAYS_PER_SHADOW_RAY];
