@@ -372,6 +372,26 @@ impl Mesh {
         (first != LEAF).then(|| [0, 1, 2, 3].map(|k| NodeId(first + k)))
     }
 
+    /// The four parts of the node that `node` is a part of, itself among them; none of a root.
+    pub(crate) fn siblings(&self, node: NodeId) -> Option<[NodeId; 4]> {
+        let first = node.0 - self.place_in_parent(node)? as u32;
+        Some([0, 1, 2, 3].map(|k| NodeId(first + k)))
+    }
+
+    /// Which of the four parts of its parent `node` is; none of a root.
+    pub(crate) fn place_in_parent(&self, node: NodeId) -> Option<usize> {
+        node.0.checked_sub(self.depths.len() as u32).map(|k| (k % 4) as usize)
+    }
+
+    /// The element at corner `k` of `node`, which has it for its own corner `k`.
+    pub(crate) fn element_at_corner(&self, node: NodeId, k: usize) -> usize {
+        let mut node = self.node(node);
+        while node.children != LEAF {
+            node = self.node(NodeId(node.children + k as u32));
+        }
+        node.first_element as usize
+    }
+
     /// The scene triangle that `node` lies in.
     pub fn triangle(&self, node: NodeId) -> usize {
         self.node(node).triangle as usize

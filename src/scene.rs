@@ -37,6 +37,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
 pub(crate) use crate::geometry::polygon::longest_edge;
+use crate::geometry::weld::Weld;
 use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
@@ -271,6 +272,19 @@ impl Scene {
         self.triangles[t].corners.map(|k| self.positions[k as usize])
     }
 
+    /// Of all triangles the corners by the numbers of their positions, of which equal ones have
+    /// one; and how many numbers there are.
+    pub(crate) fn welded_corners(&self) -> (Vec<[u32; 3]>, usize) {
+        let mut weld = Weld::default();
+        let mut numbers = vec![None; self.positions.len()];
+        let mut number = |corner: u32| {
+            let k = corner as usize;
+            *numbers[k].get_or_insert_with(|| weld.number(self.positions[k]))
+        };
+        let corners = self.triangles.iter().map(|t| t.corners.map(&mut number)).collect();
+        (corners, weld.positions.len())
+    }
+
     /// Unit normal of triangle `t`, on its front.
     pub fn normal(&self, t: usize) -> DVec3 {
         let [a, b, c] = self.corners(t);
@@ -423,9 +437,9 @@ impl Scene {
         Scene { crease_degrees: Some(degrees), ..self.clone() }
     }
 
-    /// What `make` makes of the scene, once: the hierarchy that rays are cast at, of which the
-    /// scene knows nothing.
-    pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl Fn(&Scene) -> T) -> Arc<T> {
+    /// What `make` makes of the scene, once for each type: the hierarchy that rays are cast at, and
+    /// its smooth surfaces, of which the scene knows nothing.
+    pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
         self.derived.get(|| make(self))
     }
 

@@ -20,7 +20,9 @@ pub(crate) mod keys;
 mod textured;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use crate::geometry::incidence::Incidence;
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::{Rgb, Sky};
 pub(crate) use face_at::FacePlace;
@@ -89,15 +91,12 @@ impl VertexMesh {
         let untextured = irradiance::untextured(mesh, element_radiosity);
         let with_textures = element_radiosity;
         let element_radiosity = untextured.as_deref().unwrap_or(element_radiosity);
-        let topology = SurfaceTopology::new(mesh.scene());
+        let topology = SurfaceTopology::of_scene(mesh.scene());
         let vertices = Vertices::new(mesh, &topology);
         let outlines = &vertices.outlines;
         let average = VertexAverage::new(mesh, &vertices);
-        let normals: Vec<DVec3> = average
-            .mean(|e, _| mesh.normal(mesh.element(e)))
-            .into_iter()
-            .map(DVec3::normalize_or_zero)
-            .collect();
+        let normals = average.mean(|e, _| mesh.normal(mesh.element(e)));
+        let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
         let mut smoothed = average.mean(|e, _| element_radiosity[e]);
         let positions = &vertices.positions;
         for (v, value) in
@@ -209,35 +208,30 @@ impl VertexMesh {
 /// Means over the elements around each vertex, weighted by area.
 struct VertexAverage<'a> {
     outlines: &'a ElementLoops,
-    /// Area of each element, and of all elements around each vertex, scene unit squared.
-    element_areas: Vec<f64>,
-    vertex_areas: Vec<f64>,
+    /// The elements with each vertex on their outlines.
+    around: Incidence,
+    /// Area of each element, scene unit squared.
+    areas: Vec<f64>,
 }
 
 impl VertexAverage<'_> {
     fn new<'a>(mesh: &Mesh, vertices: &'a Vertices) -> VertexAverage<'a> {
         let outlines = &vertices.outlines;
-        let element_areas: Vec<f64> =
-            outlines.iter().map(|(e, _)| mesh.weight(mesh.element(e))).collect();
-        let mut vertex_areas = vec![0.0; vertices.positions.len()];
-        for (e, outline) in outlines.iter() {
-            for &v in outline {
-                vertex_areas[v as usize] += element_areas[e];
-            }
-        }
-        VertexAverage { outlines, element_areas, vertex_areas }
+        let around = Incidence::new(vertices.positions.len(), || outlines.iter());
+        let areas = outlines.iter().map(|(e, _)| mesh.weight(mesh.element(e))).collect();
+        VertexAverage { outlines, around, areas }
     }
 
     /// The mean at each vertex of what `value` has for an element and its outline.
-    fn mean(&self, value: impl Fn(usize, &[u32]) -> DVec3) -> Vec<DVec3> {
-        let mut sums = vec![DVec3::ZERO; self.vertex_areas.len()];
-        for (e, outline) in self.outlines.iter() {
-            let weighted = value(e, outline) * self.element_areas[e];
-            for &v in outline {
-                sums[v as usize] += weighted;
-            }
-        }
-        sums.into_iter().zip(&self.vertex_areas).map(|(sum, area)| sum / area).collect()
+    fn mean(&self, value: impl Fn(usize, &[u32]) -> DVec3 + Sync) -> Vec<DVec3> {
+        let weighted = |e: usize| value(e, self.outlines.of(e)) * self.areas[e];
+        let weighted: Vec<DVec3> = (0..self.areas.len()).into_par_iter().map(weighted).collect();
+        let mean = |v: u32| {
+            let around = || self.around.at(v).iter().map(|&e| e as usize);
+            let sum = around().map(|e| weighted[e]).sum::<DVec3>();
+            sum / around().map(|e| self.areas[e]).sum::<f64>()
+        };
+        (0..self.around.vertex_count() as u32).into_par_iter().map(mean).collect()
     }
 }
 

@@ -332,12 +332,12 @@ impl ErrorEstimator<'_> {
                 rotation: rotations.at(point.position, point.near),
             })
         };
-        let mut parts = Vec::with_capacity(surface.faces.len());
-        for (face, vertices) in surface.faces.iter().enumerate() {
+        let with_parts_of = |mut parts: Vec<SampledPart>, face: usize| {
+            let vertices = &surface.faces[face];
             let element = surface.elements[face] as usize;
             let node = mesh.element(element);
             if !mesh.scatters(node) {
-                continue;
+                return parts;
             }
             let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
             let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
@@ -354,7 +354,11 @@ impl ErrorEstimator<'_> {
             };
             let area = (solid * area(vertices), solid < 1.0);
             self.octaves.for_each_part(corners(vertices), area, &mut take);
-        }
+            parts
+        };
+        let faces = (0..surface.faces.len()).into_par_iter();
+        let mut parts: Vec<SampledPart> =
+            faces.fold(Vec::new, with_parts_of).flatten_iter().collect();
         let mut samples = vec![];
         let mut strata = vec![];
         for (k, stratum) in strata_of(&mut parts, counts).into_iter().enumerate() {

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::bake::model;
@@ -64,7 +65,7 @@ pub(super) fn strata_of(parts: &mut [SampledPart], counts: SampleCounts) -> Vec<
     by_group.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.group.cmp(&b.group)));
     let rank_of = |(rank, stratum): (usize, &StratumParts)| Some((stratum.group?, rank));
     let rank: FxHashMap<u32, usize> = by_group.iter().enumerate().filter_map(rank_of).collect();
-    parts.sort_by_key(|part| rank[&part.group]);
+    parts.par_sort_by_key(|part| rank[&part.group]);
     let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
     if by_group.len() > single.max(1) {
         let small = by_group.split_off(single);

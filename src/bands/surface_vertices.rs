@@ -14,7 +14,7 @@ pub(super) struct SurfaceVertices {
 
 impl SurfaceVertices {
     pub fn new(mesh: &Mesh) -> SurfaceVertices {
-        let topology = SurfaceTopology::new(mesh.scene());
+        let topology = SurfaceTopology::of_scene(mesh.scene());
         let vertices = Vertices::new(mesh, &topology);
         let hanging = HangingNodes::new(mesh, &topology, &vertices);
         let nodes = hanging.nodes.iter().map(|node| node.between.to_vec());

@@ -162,7 +162,7 @@ impl GatheredView<'_> {
         let scene = lit.light.mesh.scene();
         GatheredView {
             offset: SurfaceOffset::new(scene),
-            surfaces: SurfaceTopology::new(scene).surfaces(),
+            surfaces: SurfaceTopology::of_scene(scene).surfaces(),
             second_pass: SecondPass::new(&lit),
             lit,
         }

@@ -96,7 +96,7 @@ impl SecondPass {
         Some(SecondPass {
             media: glass.around(scene, lit.rays.eye),
             glass,
-            surfaces: SurfaceTopology::new(scene).surfaces(),
+            surfaces: SurfaceTopology::of_scene(scene).surfaces(),
             contact,
         })
     }

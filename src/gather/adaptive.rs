@@ -27,9 +27,9 @@ use super::gathered_mesh::GatheredMesh;
 use super::interpolated_refinement::interpolated_refinement;
 use super::point_row::PointRows;
 use super::progress::Progress;
-use super::refinement_indicator::{ErrorScale, counted_area, squared_error};
+use super::refinement_indicator::{ErrorScale, counted_area, has_buried_node, squared_error};
 use super::refinement_settings::RefinementSettings;
-use super::sampled_mesh::SampledMesh;
+use super::sampled_mesh::{SampledMesh, after_split};
 use super::scouts::{self, Scouts};
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
@@ -296,16 +296,18 @@ impl<'a> AdaptiveGather<'a> {
         mut scout: Option<&mut dyn Gather>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
+        let mut known = vec![None; self.samples.mesh.element_count()];
         loop {
             let element_count = self.samples.mesh.element_count();
-            let mut marked = self.mark(settings);
+            let mut marked = self.mark(settings, &mut known);
             if marked.is_empty() {
                 let Some(scout) = &mut scout else { return Ok(StopReason::Converged) };
                 match self.look(settings, &mut **scout, progress)? {
                     ControlFlow::Break(()) => return Ok(StopReason::Cancelled),
                     ControlFlow::Continue(false) => return Ok(StopReason::Converged),
-                    ControlFlow::Continue(true) => continue,
+                    ControlFlow::Continue(true) => known.fill(None),
                 }
+                continue;
             }
             // Each split adds three elements.
             let room = settings.max_elements.saturating_sub(element_count) / 3;
@@ -316,6 +318,7 @@ impl<'a> AdaptiveGather<'a> {
             marked.sort_unstable();
             let new_vertices = self.samples.split(&marked)?;
             self.scouts.split(&marked);
+            known = after_split(&known, &marked, None);
             self.refinements += 1;
             if self.gather(&new_vertices, gatherer, progress)?.is_break() {
                 return Ok(StopReason::Cancelled);
@@ -366,15 +369,25 @@ impl<'a> AdaptiveGather<'a> {
     /// as many as it takes for the sum to be what `settings` allow, as far as it is known
     /// beforehand. What is far from the light has a sum of its own, as has each group where these
     /// have scales of their own.
-    fn mark(&self, settings: &RefinementSettings) -> Vec<usize> {
+    ///
+    /// What is not `known` yet of an element, its pool and its share, is added; not where a buried
+    /// vertex has a part in it, since its value follows new neighbours.
+    fn mark(
+        &self,
+        settings: &RefinementSettings,
+        known: &mut [Option<(usize, Share)>],
+    ) -> Vec<usize> {
         let mesh = &self.samples.mesh;
-        let all = 0..mesh.element_count();
         if self.refinements < settings.initial_subdivisions {
+            let all = 0..mesh.element_count();
             return all.filter(|&e| self.samples.is_splittable(e)).collect();
         }
         // What it has between vertices, they may have missed.
         let shot = self.source.shot;
-        let judged = |element| {
+        let judged = |(element, known): (usize, &mut Option<(usize, Share)>)| {
+            if let &mut Some((pool, share)) = known {
+                return (pool, Share { element, ..share });
+            }
             let (samples, scale) = (&self.samples, &self.scale);
             let found = self.scouts.error(element);
             let square = squared_error(samples, &shot, scale, settings, (element, found));
@@ -384,9 +397,11 @@ impl<'a> AdaptiveGather<'a> {
                 true => usize::from(scale.is_far(mesh, node)),
                 false => mesh.group(node) as usize,
             };
-            (pool, Share { square, area, element })
+            let judged = (pool, Share { square, area, element });
+            *known = (!has_buried_node(samples, element)).then_some(judged);
+            judged
         };
-        let shares: Vec<(usize, Share)> = all.into_par_iter().map(judged).collect();
+        let shares: Vec<(usize, Share)> = known.par_iter_mut().enumerate().map(judged).collect();
         let pools = shares.iter().map(|&(pool, _)| pool + 1).max().unwrap_or(0);
         let mut by_pool: Vec<Vec<Share>> = vec![vec![]; pools];
         for (pool, share) in shares {
@@ -431,7 +446,7 @@ impl<'a> AdaptiveGather<'a> {
             let mut queue = &pending[..];
             while !queue.is_empty() {
                 let batch = batch_sizer.next(&mut queue, |vertices| {
-                    let places = vertices.iter().map(|&v| points.point(v, attempt)).collect();
+                    let places = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
                     gather_batch(vertices, places, &source, gatherer)
                 })?;
                 let unresolved = batch.unresolved(&points, attempt);
@@ -494,7 +509,7 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64) -> Vec<(f64, usize)> {
     shares.retain(|share| share.square > 0.0);
     let order =
         |a: &Share, b: &Share| b.square.total_cmp(&a.square).then(a.element.cmp(&b.element));
-    shares.sort_unstable_by(order);
+    shares.par_sort_unstable_by(order);
     let (mut excess, mut bulk) = (total - allowed * area, BULK * total);
     let is_marked = move |share: &Share| {
         if share.square.is_finite() {

@@ -1,5 +1,7 @@
 //! A batch of vertices that gather at once, and what follows for their values.
 
+use rayon::prelude::*;
+
 use super::gather_points::VertexGatherPoints;
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
@@ -36,7 +38,7 @@ pub(super) fn gather_batch<'v>(
 impl Batch<'_> {
     /// Vertices whose point of this attempt is buried and that have another one.
     pub fn unresolved(&self, points: &VertexGatherPoints, attempt: usize) -> Vec<u32> {
-        let pairs = self.vertices.iter().zip(&self.samples);
+        let pairs = self.vertices.par_iter().zip(&self.samples);
         pairs
             .filter(|&(&v, sample)| points.is_buried(v, sample) && points.has_more(v, attempt))
             .map(|(&v, _)| v)
@@ -45,16 +47,24 @@ impl Batch<'_> {
 
     /// Writes what was gathered at this `attempt` to the values of the vertices that it resolves.
     pub fn apply(&self, points: &VertexGatherPoints, attempt: usize, values: &mut VertexValues) {
-        for (&v, sample) in self.vertices.iter().zip(&self.samples) {
+        let value = |(&v, sample): (&u32, &IrradianceSample)| {
             let is_buried = points.is_buried(v, sample);
             if is_buried && points.has_more(v, attempt) {
-                continue;
+                return None;
             }
             // (ρ + τ) E, which is darkness at a buried vertex.
-            values.reflected[v as usize] = points.albedo(v) * sample.irradiance;
-            values.noise[v as usize] = reflected_noise(points.albedo(v), sample);
-            values.buried[v as usize] = is_buried;
-            values.inverse_distance[v as usize] = sample.inverse_distance;
+            let albedo = points.albedo(v);
+            let noise = reflected_noise(albedo, sample);
+            Some((v, albedo * sample.irradiance, noise, is_buried, sample.inverse_distance))
+        };
+        let pairs = self.vertices.par_iter().zip(&self.samples);
+        let found: Vec<(u32, Rgb, f64, bool, f64)> = pairs.filter_map(value).collect();
+        for (v, reflected, noise, is_buried, inverse_distance) in found {
+            let v = v as usize;
+            values.reflected[v] = reflected;
+            values.noise[v] = noise;
+            values.buried[v] = is_buried;
+            values.inverse_distance[v] = inverse_distance;
         }
     }
 }

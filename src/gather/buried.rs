@@ -13,6 +13,7 @@
 //! ```
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
@@ -22,51 +23,80 @@ use crate::scene::Rgb;
 const MIN_RATIO: f64 = 0.5;
 const MAX_RATIO: f64 = 2.0;
 
+/// In the place of a vertex's number: it has none.
+const UNNUMBERED: usize = usize::MAX;
+
 /// Gives buried vertices next to others the values that these suggest.
 pub(super) fn extrapolate_into_buried(samples: &mut SampledMesh) {
     if !samples.buried.contains(&true) {
         return;
     }
-    let gradients = vertex_gradients(samples);
-    let positions = &samples.vertices.positions;
-    // For every buried vertex the sum of the values that its neighbours suggest, each over its
-    // distance, and the sum of 1/distance.
-    let mut sums = vec![(Rgb::ZERO, 0.0); samples.buried.len()];
-    for (_, outline) in samples.vertices.outlines.iter() {
-        let outline = || outline.iter().map(|&v| v as usize);
-        for v in outline().filter(|&v| samples.buried[v]) {
-            for w in outline().filter(|&w| !samples.buried[w]) {
+    let (buried, positions) = (&samples.buried, &samples.vertices.positions);
+    // Elements with a buried vertex on their outline, and one that is not.
+    let outline = |e: usize| samples.vertices.outlines.of(e).iter().map(|&v| v as usize);
+    let is_on_the_way = |&e: &usize| {
+        let mut inside = outline(e).map(|v| buried[v]);
+        inside.next().is_some_and(|first| inside.any(|other| other != first))
+    };
+    let on_the_way: Vec<usize> =
+        (0..samples.corners().len()).into_par_iter().filter(is_on_the_way).collect();
+    // The vertices of these have numbers among themselves.
+    let mut numbers = vec![UNNUMBERED; buried.len()];
+    let mut vertices = vec![];
+    for v in on_the_way.iter().flat_map(|&e| outline(e)) {
+        if numbers[v] == UNNUMBERED {
+            numbers[v] = vertices.len();
+            vertices.push(v);
+        }
+    }
+    let gradients = vertex_gradients(samples, &numbers, vertices.len());
+    // For each of them that is buried the sum of the values that its neighbours suggest, each over
+    // its distance, and the sum of 1/distance.
+    let mut sums = vec![(Rgb::ZERO, 0.0); vertices.len()];
+    for e in on_the_way {
+        for v in outline(e).filter(|&v| buried[v]) {
+            for w in outline(e).filter(|&w| !buried[w]) {
                 let step = positions[v] - positions[w];
                 let value = samples.reflected[w];
-                let extrapolated = value + gradients[w] * step;
+                let extrapolated = value + gradients[numbers[w]] * step;
                 let value = extrapolated.clamp(value * MIN_RATIO, value * MAX_RATIO);
-                sums[v].0 += value / step.length();
-                sums[v].1 += 1.0 / step.length();
+                let sum = &mut sums[numbers[v]];
+                sum.0 += value / step.length();
+                sum.1 += 1.0 / step.length();
             }
         }
     }
-    for (v, (sum, weight)) in sums.into_iter().enumerate() {
+    for (v, (sum, weight)) in vertices.into_iter().zip(sums) {
         if weight > 0.0 {
             samples.reflected[v] = sum / weight;
         }
     }
 }
 
-/// Gradient of the reflected radiosity at each vertex, W/m² per scene unit: a matrix that takes a
-/// step to a change. The mean over the elements around it without buried corners, weighted by area.
-fn vertex_gradients(samples: &SampledMesh) -> Vec<DMat3> {
-    let mut sums = vec![(DMat3::ZERO, 0.0); samples.reflected.len()];
-    for (e, corners) in samples.corners().iter().enumerate() {
-        if corners.iter().any(|&v| samples.buried[v as usize]) {
-            continue;
+/// Gradient of the reflected radiosity at the vertices with `numbers` below `count`, W/m² per scene
+/// unit: a matrix that takes a step to a change. The mean over the elements around a vertex without
+/// buried corners, weighted by area.
+fn vertex_gradients(samples: &SampledMesh, numbers: &[usize], count: usize) -> Vec<DMat3> {
+    let weighted = |e: usize| {
+        let corners = samples.corners()[e].map(|v| v as usize);
+        let is_needed = corners.iter().any(|&v| numbers[v] != UNNUMBERED);
+        if !is_needed || corners.iter().any(|&v| samples.buried[v]) {
+            return None;
         }
-        let positions = corners.map(|v| samples.vertices.positions[v as usize]);
-        let values = corners.map(|v| samples.reflected[v as usize]);
-        let gradient = triangle_gradient(positions, values);
+        let positions = corners.map(|v| samples.vertices.positions[v]);
+        let values = corners.map(|v| samples.reflected[v]);
         let area = samples.mesh.area(samples.mesh.element(e));
-        for v in corners.map(|v| v as usize) {
-            sums[v].0 += gradient * area;
-            sums[v].1 += area;
+        Some((corners, triangle_gradient(positions, values) * area, area))
+    };
+    let elements = (0..samples.corners().len()).into_par_iter();
+    let weighted: Vec<([usize; 3], DMat3, f64)> = elements.filter_map(weighted).collect();
+    let mut sums = vec![(DMat3::ZERO, 0.0); count];
+    for (corners, gradient, area) in weighted {
+        for v in corners {
+            if let Some(sum) = sums.get_mut(numbers[v]) {
+                sum.0 += gradient;
+                sum.1 += area;
+            }
         }
     }
     sums.into_iter().map(|(s, area)| if area > 0.0 { s * (1.0 / area) } else { s }).collect()

@@ -26,10 +26,6 @@ pub(super) struct VertexGatherPoints<'a> {
     vertices: &'a Vertices,
     /// Elements with each vertex on their outline.
     around: Incidence,
-    /// Unit normals, weighted by area over the elements around a vertex.
-    normals: Vec<DVec3>,
-    /// Square root of the smallest element's area around each vertex, scene unit.
-    sizes: Vec<f64>,
     offset: SurfaceOffset,
     touching: f64,
 }
@@ -53,25 +49,27 @@ impl<'a> VertexGatherPoints<'a> {
     pub fn new(mesh: &'a Mesh, vertices: &'a Vertices, touching: f64) -> VertexGatherPoints<'a> {
         let count = vertices.positions.len();
         let around = Incidence::new(count, || vertices.outlines.iter());
-        let mut normals = vec![DVec3::ZERO; count];
-        let mut sizes = vec![f64::INFINITY; count];
-        for (e, outline) in vertices.outlines.iter() {
-            let node = mesh.element(e);
-            let area = mesh.area(node);
-            for v in outline.iter().map(|&v| v as usize) {
-                normals[v] += mesh.normal(node) * area;
-                sizes[v] = sizes[v].min(area.sqrt());
-            }
-        }
-        for normal in &mut normals {
-            *normal = normal.normalize_or(DVec3::Z);
-        }
         let offset = SurfaceOffset::new(mesh.scene());
-        VertexGatherPoints { mesh, vertices, around, normals, sizes, offset, touching }
+        VertexGatherPoints { mesh, vertices, around, offset, touching }
     }
 
     fn around(&self, v: u32) -> &[u32] {
         self.around.at(v)
+    }
+
+    fn nodes_around(&self, v: u32) -> impl Iterator<Item = NodeId> + '_ {
+        self.around(v).iter().map(|&e| self.mesh.element(e as usize))
+    }
+
+    /// Unit normal at vertex `v`, weighted by area over the elements around it.
+    fn normal(&self, v: u32) -> DVec3 {
+        let weighted = |node| self.mesh.normal(node) * self.mesh.area(node);
+        self.nodes_around(v).map(weighted).sum::<DVec3>().normalize_or(DVec3::Z)
+    }
+
+    /// Square root of the smallest element's area around vertex `v`, scene unit.
+    fn size(&self, v: u32) -> f64 {
+        self.nodes_around(v).map(|node| self.mesh.area(node).sqrt()).fold(f64::INFINITY, f64::min)
     }
 
     /// Albedo of the surface that vertex `v` is on; 0 where holes are all around it.
@@ -92,8 +90,7 @@ impl<'a> VertexGatherPoints<'a> {
     }
 
     fn is_solid(&self, v: u32) -> bool {
-        let is_solid = |&e: &u32| self.mesh.solid_share(self.mesh.element(e as usize)) > 0.0;
-        self.around(v).iter().any(is_solid)
+        self.nodes_around(v).any(|node| self.mesh.solid_share(node) > 0.0)
     }
 
     fn material(&self, v: u32) -> &Material {
@@ -107,8 +104,8 @@ impl<'a> VertexGatherPoints<'a> {
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
         let position = self.vertices.positions[v as usize];
         let inset = (self.mesh.centroid(element) - position) * CORNER_INSET;
-        let size = self.sizes[v as usize];
-        let point = self.offset.gather_point(position + inset, self.normals[v as usize], size);
+        let (normal, size) = (self.normal(v), self.size(v));
+        let point = self.offset.gather_point(position + inset, normal, size);
         TwoSidedPoint::new(point, self.material(v))
     }
 
@@ -126,7 +123,7 @@ impl<'a> VertexGatherPoints<'a> {
     /// The same by the form factor of the backs that were seen, and the mean of 1/distance.
     pub fn sees_inside(&self, v: u32, backface: f64, inverse_distance: f64) -> bool {
         let sample = IrradianceSample { backface, inverse_distance, ..Default::default() };
-        is_buried(&sample, self.sizes[v as usize].min(self.touching))
+        is_buried(&sample, self.size(v).min(self.touching))
     }
 }
 

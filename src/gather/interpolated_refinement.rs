@@ -16,7 +16,7 @@
 //! | in a gap, or at its mouth | a quarter of its radiosity, at least |
 
 use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 
 use super::RadiosityField;
 use super::refinement_indicator::{ErrorScale, counted_area, source_nonlinearity};
@@ -25,7 +25,7 @@ use super::sampled_mesh::SampledMesh;
 use super::surplus::HierarchicalSurplus;
 use crate::error::Error;
 use crate::scene::Rgb;
-use crate::vertex::keys::{VertexKey, midside_keys};
+use crate::vertex::keys::VertexKey;
 
 /// Errors of elements at a boundary of their surface, over what the surplus says: next to a wall
 /// light goes as d ln d with the distance d, for which halving h does not quarter the surplus, and
@@ -57,14 +57,8 @@ pub(super) fn interpolated_refinement(
     settings: &RefinementSettings,
 ) -> Result<InterpolatedRefinement, Error> {
     let split = to_be_split(samples, scale, settings);
-    let midsides = midside_values(samples, &split);
     let (mut refined, new) = samples.with_split(&split)?;
-    for v in new {
-        let v = v as usize;
-        if let Some((sum, count)) = midsides.get(&refined.vertices.keys[v]) {
-            refined.reflected[v] = *sum / *count;
-        }
-    }
+    put_on_interpolants(&mut refined, &new, samples, &split);
     let residual_error = residual_errors(samples, source, scale, &split);
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }
@@ -107,26 +101,35 @@ fn to_be_split(
     elements
 }
 
-/// Sums and numbers of the values that the interpolants of the elements to be `split` have at their
-/// midsides.
-fn midside_values(samples: &SampledMesh, split: &[usize]) -> FxHashMap<VertexKey, (Rgb, f64)> {
-    let mut sums: FxHashMap<VertexKey, (Rgb, f64)> = FxHashMap::default();
-    for &e in split {
-        let node = samples.mesh.element(e);
-        let (t, cell) = (samples.mesh.triangle(node), samples.mesh.cell(node));
-        let siblings = cell.ancestor(cell.level - 1).children();
-        let child = siblings.iter().position(|c| *c == cell).expect("a child of its parent");
-        let keys = midside_keys(&samples.topology, t, cell).expect("an element that can be split");
-        let values = interpolant(samples, e)
-            .expect("all that are to be split have one")
-            .child_midsides(child);
-        for (key, value) in keys.into_iter().zip(values) {
-            let (sum, count) = sums.entry(key).or_default();
+/// Gives the `new` vertices of `refined`, which is `samples` with the elements `split`, the mean of
+/// what the interpolants of these elements have at their midsides.
+fn put_on_interpolants(
+    refined: &mut SampledMesh,
+    new: &[u32],
+    samples: &SampledMesh,
+    split: &[usize],
+) {
+    let mesh = &samples.mesh;
+    let values = |&e: &usize| {
+        let place = mesh.place_in_parent(mesh.element(e)).expect("a child of its parent");
+        interpolant(samples, e).expect("all that are to be split have one").child_midsides(place)
+    };
+    let values: Vec<[Rgb; 3]> = split.par_iter().map(values).collect();
+    let mut sums = vec![(Rgb::ZERO, 0.0); refined.reflected.len()];
+    for (k, (&e, values)) in split.iter().zip(values).enumerate() {
+        // Each split before this one has put four elements in the place of one. The corners of the
+        // last part are the middles of the sides opposite.
+        let middle = refined.corners()[e + 3 * k + 3];
+        for (value, corner) in values.into_iter().zip([2, 0, 1]) {
+            let (sum, count) = &mut sums[middle[corner] as usize];
             *sum += value.max(Rgb::ZERO);
             *count += 1.0;
         }
     }
-    sums
+    for v in new.iter().map(|&v| v as usize) {
+        let (sum, count) = sums[v];
+        refined.reflected[v] = sum / count;
+    }
 }
 
 /// Error that remains in each element after `split` (ascending) were split, W/m².

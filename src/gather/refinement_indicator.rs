@@ -17,6 +17,7 @@
 //! there. Nothing is known of the middle of an element whose corners are all buried, under houses
 //! that stand on a ground, say: if there was light before, it is split.
 
+use arrayvec::ArrayVec;
 use glam::DVec2;
 
 use super::refinement_settings::RefinementSettings;
@@ -31,6 +32,9 @@ use crate::visibility::buried;
 /// Steps along an element's side of the lattice at which the source light is compared with its
 /// linear interpolant. Chosen by hand; no measurement kept.
 const SOURCE_SAMPLES: u32 = 4;
+
+/// Places of that lattice.
+const LATTICE_PLACES: usize = ((SOURCE_SAMPLES + 1) * (SOURCE_SAMPLES + 2) / 2) as usize;
 
 /// Root mean square of a quadratic's distance from its linear interpolant over the largest surplus
 /// of its midsides. For 4 λ_i λ_j alone it is 0.42 (one curved side), for two equal surpluses 0.71.
@@ -148,7 +152,7 @@ pub(super) fn squared_error(
     let emitted = samples.mesh.material(node).exitance;
     let factor = if in_gap { gap_factor } else { group_factor };
     let weight = counted_area(samples, scale, settings, e) / (factor * factor);
-    let open = samples.vertices.corners[e].into_iter().map(|v| v as usize);
+    let open = samples.corners()[e].into_iter().map(|v| v as usize);
     let darkest = open
         .filter(|&v| !samples.buried[v])
         .map(|v| (samples.reflected[v] + emitted).length())
@@ -160,7 +164,7 @@ pub(super) fn squared_error(
         let difference = beyond_noise((value - other).length(), noise);
         if radiosity > 0.0 { difference / radiosity } else { 0.0 }
     };
-    let corners = samples.vertices.corners[e].map(|v| NodeValue::of(samples, v));
+    let corners = samples.corners()[e].map(|v| NodeValue::of(samples, v));
     let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
     let largest_difference = |sides: &mut dyn Iterator<Item = [NodeValue; 2]>| {
         let either = |[a, b]: [NodeValue; 2]| {
@@ -211,10 +215,19 @@ pub(super) fn squared_error(
     weight * rms.max(found).powi(2)
 }
 
+/// Whether any of the values that the error of element `e` is predicted by is that of a buried
+/// vertex.
+pub(super) fn has_buried_node(samples: &SampledMesh, e: usize) -> bool {
+    let parent = HierarchicalSurplus::of_parent(samples, e);
+    samples.corners()[e].iter().any(|&v| samples.buried[v as usize])
+        || parent.is_some_and(|parent| !parent.is_sampled())
+}
+
 /// How far `source` is from linear over element `e` of `mesh`: root mean square over a lattice,
 /// W/m², a length over the channels.
 pub(super) fn source_nonlinearity(mesh: &Mesh, source: &RadiosityField, e: usize) -> f64 {
-    let values: Vec<([f64; 3], Rgb)> = source_lattice(mesh, source, e).collect();
+    let values: ArrayVec<([f64; 3], Rgb), LATTICE_PLACES> =
+        source_lattice(mesh, source, e).collect();
     let end = |k: usize| values.iter().find(|(at, _)| at[k] == 1.0).map_or(Rgb::ZERO, |(_, b)| *b);
     let ends = [0, 1, 2].map(end);
     let square = |([u, v, w], value): &([f64; 3], Rgb)| {

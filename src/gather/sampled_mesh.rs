@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::RadiosityField;
 use crate::error::Error;
@@ -40,10 +41,11 @@ const MIN_NARROWNESS: f64 = 4.0;
 impl SampledMesh {
     /// `mesh` with the values that `field`, of the same scene, has at its vertices.
     pub fn new(mesh: Mesh, field: &RadiosityField) -> SampledMesh {
-        let topology = Arc::new(SurfaceTopology::new(mesh.scene()));
+        let topology = SurfaceTopology::of_scene(mesh.scene());
         let vertices = Vertices::new(&mesh, &topology);
-        let value = |(t, [u, v]): (usize, [f64; 2])| field.untextured_at(t, u, v);
-        let reflected: Vec<Rgb> = vertices.barycentric().map(value).collect();
+        let places: Vec<(usize, [f64; 2])> = vertices.barycentric().collect();
+        let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
+        let reflected: Vec<Rgb> = places.par_iter().map(value).collect();
         let noise = vec![0.0; reflected.len()];
         let buried = vec![false; reflected.len()];
         let inverse_distance = vec![0.0; reflected.len()];
@@ -94,25 +96,9 @@ impl SampledMesh {
 
     /// The same as a mesh of its own.
     pub fn with_split(&self, elements: &[usize]) -> Result<(SampledMesh, Vec<u32>), Error> {
-        let finer = self.mesh.split(elements)?;
-        let vertices = Vertices::new(&finer, &self.topology);
-        let count = vertices.positions.len();
-        let mut reflected = vec![Rgb::ZERO; count];
-        let mut noise = vec![0.0; count];
-        let mut buried = vec![false; count];
-        let mut inverse_distance = vec![0.0; count];
-        let mut is_new = vec![false; count];
-        for (v, key) in vertices.keys.iter().enumerate() {
-            match self.vertices.index_of(key) {
-                Some(old) => {
-                    reflected[v] = self.reflected[old as usize];
-                    noise[v] = self.noise[old as usize];
-                    buried[v] = self.buried[old as usize];
-                    inverse_distance[v] = self.inverse_distance[old as usize];
-                }
-                None => is_new[v] = true,
-            }
-        }
+        let mesh = self.mesh.split(elements)?;
+        let (vertices, old_numbers) = self.vertices.split(&mesh, &self.topology, elements);
+        let mut reflected = kept(&self.reflected, &old_numbers);
         for (k, &e) in elements.iter().enumerate() {
             // Each split before this one has put four elements in the place of one.
             let first_child = e + 3 * k;
@@ -120,16 +106,22 @@ impl SampledMesh {
             // The corners of the fourth child are the middles of the sides opposite a, b and c.
             let midsides = vertices.corners[first_child + 3].map(|v| v as usize);
             for (m, sum_of_ends) in midsides.into_iter().zip([b + c, c + a, a + b]) {
-                if is_new[m] {
+                if old_numbers[m].is_none() {
                     reflected[m] = sum_of_ends / 2.0;
                 }
             }
         }
-        let new = (0..count as u32).filter(|&v| is_new[v as usize]).collect();
-        let topology = self.topology.clone();
-        let mesh = finer;
-        let split =
-            SampledMesh { mesh, topology, vertices, reflected, noise, buried, inverse_distance };
+        let is_new = |v: &u32| old_numbers[*v as usize].is_none();
+        let new = (0..old_numbers.len() as u32).filter(is_new).collect();
+        let split = SampledMesh {
+            mesh,
+            topology: self.topology.clone(),
+            vertices,
+            reflected,
+            noise: kept(&self.noise, &old_numbers),
+            buried: kept(&self.buried, &old_numbers),
+            inverse_distance: kept(&self.inverse_distance, &old_numbers),
+        };
         Ok((split, new))
     }
 
@@ -178,4 +170,23 @@ impl SampledMesh {
         });
         out
     }
+}
+
+/// One value an element when each of `split` (ascending) has become four, for which it is `new`.
+pub(super) fn after_split<T: Copy>(values: &[T], split: &[usize], new: T) -> Vec<T> {
+    let mut after = Vec::with_capacity(values.len() + 3 * split.len());
+    let mut split = split.iter().peekable();
+    for (e, &value) in values.iter().enumerate() {
+        match split.next_if_eq(&&e) {
+            Some(_) => after.extend([new; 4]),
+            None => after.push(value),
+        }
+    }
+    after
+}
+
+/// Of `values` of vertices those by their old numbers; zero or false of new vertices.
+fn kept<T: Copy + Default + Send + Sync>(values: &[T], old_numbers: &[Option<u32>]) -> Vec<T> {
+    let value = |old: &Option<u32>| old.map_or(T::default(), |v| values[v as usize]);
+    old_numbers.par_iter().map(value).collect()
 }

@@ -5,7 +5,7 @@
 //! from what the corners interpolate to count with that error, and are split where it pays.
 
 use super::gather_points::{SurfaceOffset, is_buried};
-use super::sampled_mesh::SampledMesh;
+use super::sampled_mesh::{SampledMesh, after_split};
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, RadiosityField};
 use crate::error::Error;
@@ -55,15 +55,7 @@ impl Scouts {
 
     /// Takes over that four elements are in the place of each of `split` (ascending).
     pub fn split(&mut self, split: &[usize]) {
-        let mut split = split.iter().peekable();
-        let mut errors = Vec::with_capacity(self.errors.len() + 3 * split.len());
-        for (e, &error) in self.errors.iter().enumerate() {
-            match split.next_if_eq(&&e) {
-                Some(_) => errors.extend([f32::NAN; 4]),
-                None => errors.push(error),
-            }
-        }
-        self.errors = errors;
+        self.errors = after_split(&self.errors, split, f32::NAN);
     }
 
     /// Looks at `elements`, the light of `source` by the rays of `gatherer`. Errors are relative to

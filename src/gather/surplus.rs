@@ -26,7 +26,6 @@ use rayon::prelude::*;
 
 use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
-use crate::vertex::keys::{VertexKey, corner_keys, midside_keys};
 
 /// Surplus of a child's side over that of the parent's side it is parallel to, for quadratic light.
 pub(super) const CHILD_SURPLUS: f64 = 0.25;
@@ -81,17 +80,19 @@ pub(super) struct HierarchicalSurplus {
 }
 
 impl HierarchicalSurplus {
-    /// The six nodes of the parent of element `e`; `None` for an element without a parent, or where
-    /// a side of the parent has no vertex in its middle.
+    /// The six nodes of the parent of element `e`; `None` for an element without a parent.
     pub fn of_parent(samples: &SampledMesh, e: usize) -> Option<HierarchicalSurplus> {
-        let node = samples.mesh.element(e);
-        let (t, cell) = (samples.mesh.triangle(node), samples.mesh.cell(node));
-        let parent = cell.ancestor(cell.level.checked_sub(1)?);
-        let node_value =
-            |key: &VertexKey| Some(NodeValue::of(samples, samples.vertices.index_of(key)?));
-        let [a, b, c] = corner_keys(&samples.topology, t, parent).each_ref().map(node_value);
-        let [d, e, f] = midside_keys(&samples.topology, t, parent)?.each_ref().map(node_value);
-        Some(HierarchicalSurplus { corners: [a?, b?, c?], midsides: [d?, e?, f?] })
+        let mesh = &samples.mesh;
+        let parts = mesh.siblings(mesh.element(e))?;
+        let node_value = |part: usize, corner: usize| {
+            let element = mesh.element_at_corner(parts[part], corner);
+            NodeValue::of(samples, samples.corners()[element][corner])
+        };
+        Some(HierarchicalSurplus {
+            corners: [0, 1, 2].map(|k| node_value(k, k)),
+            // Corners of the middle part are the middles of the sides opposite.
+            midsides: [2, 0, 1].map(|corner| node_value(3, corner)),
+        })
     }
 
     /// Surplus of each midside, W/m² per channel.
@@ -117,13 +118,17 @@ impl HierarchicalSurplus {
         found.into_iter().zip(&self.midsides).filter(|(_, m)| !m.buried).map(|(found, _)| found)
     }
 
+    /// Whether all six nodes are samples of the light.
+    pub fn is_sampled(&self) -> bool {
+        self.corners.iter().chain(&self.midsides).all(|node| !node.buried)
+    }
+
     /// Whether the quadratic interpolant describes the light: all six nodes are samples of it, and
     /// none is at a jump.
     pub fn is_smooth(&self) -> bool {
         let surplus = self.midside_surplus().iter().sum::<Rgb>();
         let midsides = self.midsides.iter().map(|m| m.value).sum::<Rgb>();
-        self.corners.iter().chain(&self.midsides).all(|node| !node.buried)
-            && surplus.length() < MAX_SMOOTH_SURPLUS * midsides.length()
+        self.is_sampled() && surplus.length() < MAX_SMOOTH_SURPLUS * midsides.length()
     }
 
     /// Whether it may jump next to its darkest node, or to `floor` (W/m²) where this is more.

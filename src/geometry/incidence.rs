@@ -32,6 +32,11 @@ impl Incidence {
         Incidence { first, faces: at_vertices }
     }
 
+    /// How many vertices there are.
+    pub fn vertex_count(&self) -> usize {
+        self.first.len() - 1
+    }
+
     /// The faces at vertex `v`.
     pub fn at(&self, v: u32) -> &[u32] {
         let v = v as usize;

@@ -121,7 +121,7 @@ impl Atlas {
     /// Unit normals at the corners of each triangle: of the smooth surface that it is a part of,
     /// the mean around a corner, weighted by area.
     pub(crate) fn corner_normals(&self) -> Vec<[DVec3; 3]> {
-        let (scene, topology) = (&self.scene, SurfaceTopology::new(&self.scene));
+        let (scene, topology) = (&self.scene, SurfaceTopology::of_scene(&self.scene));
         let mut sums = vec![DVec3::ZERO; 3 * topology.corners.len()];
         for (t, corners) in topology.corners.iter().enumerate() {
             corners.iter().for_each(|&k| sums[k as usize] += scene.normal(t) * scene.area(t));

@@ -58,7 +58,7 @@ pub(super) fn weld(atlas: &Atlas, irradiance: &mut [Rgb]) {
 
 /// Points along all cuts, half a texel or less apart.
 fn seam_points(atlas: &Atlas) -> Vec<SeamPoint> {
-    let topology = SurfaceTopology::new(atlas.scene());
+    let topology = SurfaceTopology::of_scene(atlas.scene());
     let has_place = |t: usize| {
         let [a, b, c] = atlas.corners(t);
         (b - a).perp_dot(c - a).abs() > ROUNDING * ROUNDING

@@ -81,7 +81,7 @@ pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Er
 /// The smooth surfaces of `scene`, in units of its longest side from its centre, so that 32 bits
 /// are enough for coordinates of any size.
 fn surfaces(scene: &Scene) -> Vec<Surface> {
-    let (bounds, topology) = (scene.bounds(), SurfaceTopology::new(scene));
+    let (bounds, topology) = (scene.bounds(), SurfaceTopology::of_scene(scene));
     let (centre, unit) = (bounds.centre(), bounds.longest_side());
     let mut surfaces: BTreeMap<u32, (Surface, FxHashMap<u32, u32>)> = BTreeMap::new();
     for (t, surface) in topology.surfaces().into_iter().enumerate() {

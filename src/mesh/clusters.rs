@@ -18,8 +18,10 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
+use std::iter::Peekable;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::SurfaceTopology;
 use crate::geometry::rounding::tie_stable_key;
@@ -57,43 +59,33 @@ struct Cluster {
 
 impl Clusters {
     /// The clusters of `scene`, in time that is linear in its triangles but for the sorting.
+    ///
+    /// All that may merge is of one smooth surface. So each is merged by itself, many at once, and
+    /// then the cheapest of what is next on each gets the next number, as if all were one.
     pub fn new(scene: &Scene) -> Clusters {
         let count = scene.triangles().len();
+        let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
+        let (beside, surface_of) = (neighbours(&topology), topology.surfaces());
         let mut clusters: Vec<Cluster> = (0..count).map(|t| Cluster::of(scene, t)).collect();
+        let mut order: Vec<u32> = (0..count as u32).collect();
+        order.sort_by_key(|&t| surface_of[t as usize]);
+        let on_one = |&a: &u32, &b: &u32| surface_of[a as usize] == surface_of[b as usize];
+        let merged = |triangles: &[u32]| MergedSurface::new(&clusters, triangles, &beside);
+        let mut surfaces: Vec<MergedSurface> = order.par_chunk_by(on_one).map(merged).collect();
         let mut parts: Vec<[u32; 2]> = vec![];
-        let mut beside = neighbours(scene);
-        // Clusters that are not yet part of another.
-        let mut active = vec![true; count];
-        let mut queue = BinaryHeap::new();
-        for (a, others) in (0u32..).zip(&beside) {
-            for &b in others.range(a + 1..) {
-                queue.extend(candidate(&clusters, a, b));
-            }
+        let mut is_root = vec![true; count];
+        let mut queue: BinaryHeap<_> =
+            (0..).zip(&mut surfaces).filter_map(|(k, surface)| surface.next(k)).collect();
+        while let Some(Reverse((_, pair, k))) = queue.pop() {
+            let surface: &mut MergedSurface = &mut surfaces[k];
+            surface.numbers.push(clusters.len() as u32);
+            clusters.extend(surface.merges.next().map(|merge| merge.cluster));
+            queue.extend(surface.next(k));
+            pair.iter().for_each(|&part| is_root[part as usize] = false);
+            is_root.push(true);
+            parts.push(pair);
         }
-        while let Some(Reverse((_, a, b))) = queue.pop() {
-            if !(active[a as usize] && active[b as usize]) {
-                continue;
-            }
-            let merged = clusters.len() as u32;
-            clusters.push(clusters[a as usize].merged(&clusters[b as usize]));
-            parts.push([a, b]);
-            active.push(true);
-            let mut others = BTreeSet::new();
-            for part in [a, b] {
-                active[part as usize] = false;
-                others.append(&mut beside[part as usize]);
-            }
-            others.retain(|&o| o != a && o != b);
-            for &o in &others {
-                let neighbours = &mut beside[o as usize];
-                neighbours.remove(&a);
-                neighbours.remove(&b);
-                neighbours.insert(merged);
-                queue.extend(candidate(&clusters, o, merged));
-            }
-            beside.push(others);
-        }
-        let roots = (0..clusters.len() as u32).filter(|&c| active[c as usize]).collect();
+        let roots = (0..clusters.len() as u32).filter(|&c| is_root[c as usize]).collect();
         Clusters { clusters, parts, roots }
     }
 
@@ -134,6 +126,73 @@ impl Clusters {
         }
         triangles.sort_unstable();
         triangles
+    }
+}
+
+/// Two clusters become one.
+struct Merge {
+    /// What it costs, see [`candidate`].
+    key: u64,
+    /// Both, as the surface numbers them: its triangles first, and then what merged.
+    parts: [u32; 2],
+    cluster: Cluster,
+}
+
+/// A smooth surface, all that may merge on which has merged.
+struct MergedSurface {
+    /// The clusters that it has yet, by their numbers in the scene.
+    numbers: Vec<u32>,
+    /// How it gets the others.
+    merges: Peekable<std::vec::IntoIter<Merge>>,
+}
+
+impl MergedSurface {
+    /// That of these `triangles`, ascending, of all in `clusters`; what is `beside` each.
+    fn new(clusters: &[Cluster], triangles: &[u32], beside: &[BTreeSet<u32>]) -> MergedSurface {
+        let local = |t: &u32| triangles.partition_point(|other| other < t) as u32;
+        let mut clusters: Vec<Cluster> = triangles.iter().map(|&t| clusters[t as usize]).collect();
+        let mut beside: Vec<BTreeSet<u32>> =
+            triangles.iter().map(|&t| beside[t as usize].iter().map(local).collect()).collect();
+        let mut merges = vec![];
+        // Clusters that are not yet part of another.
+        let mut active = vec![true; triangles.len()];
+        let mut queue = BinaryHeap::new();
+        for (a, others) in (0u32..).zip(&beside) {
+            for &b in others.range(a + 1..) {
+                queue.extend(candidate(&clusters, a, b));
+            }
+        }
+        while let Some(Reverse((key, a, b))) = queue.pop() {
+            if !(active[a as usize] && active[b as usize]) {
+                continue;
+            }
+            let merged = clusters.len() as u32;
+            let cluster = clusters[a as usize].merged(&clusters[b as usize]);
+            merges.push(Merge { key, parts: [a, b], cluster });
+            clusters.push(cluster);
+            active.push(true);
+            let mut others = BTreeSet::new();
+            for part in [a, b] {
+                active[part as usize] = false;
+                others.append(&mut beside[part as usize]);
+            }
+            others.retain(|&o| o != a && o != b);
+            for &o in &others {
+                let neighbours = &mut beside[o as usize];
+                neighbours.remove(&a);
+                neighbours.remove(&b);
+                neighbours.insert(merged);
+                queue.extend(candidate(&clusters, o, merged));
+            }
+            beside.push(others);
+        }
+        MergedSurface { numbers: triangles.to_vec(), merges: merges.into_iter().peekable() }
+    }
+
+    /// What is next on this surface, the `k`th: its cost, and the numbers of its parts.
+    fn next(&mut self, k: usize) -> Option<Reverse<(u64, [u32; 2], usize)>> {
+        let Merge { key, parts, .. } = self.merges.peek()?;
+        Some(Reverse((*key, parts.map(|part| self.numbers[part as usize]), k)))
     }
 }
 
@@ -184,8 +243,7 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
 }
 
 /// For each triangle its neighbours across sides that are no crease.
-fn neighbours(scene: &Scene) -> Vec<BTreeSet<u32>> {
-    let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
+fn neighbours(topology: &SurfaceTopology) -> Vec<BTreeSet<u32>> {
     let mut beside = vec![BTreeSet::new(); topology.sides.len()];
     for [(s, _), (t, _)] in topology.shared_edges() {
         beside[s].insert(t as u32);
@@ -309,7 +367,8 @@ mod tests {
                 }
             }
             // Merging goes on until no two neighbours may merge any more.
-            for (a, others) in neighbours(scene).iter().enumerate() {
+            let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
+            for (a, others) in neighbours(&topology).iter().enumerate() {
                 for &b in others {
                     let [a, b] = [root_of[a], root_of[b as usize]];
                     assert!(a == b || candidate(&clusters.clusters, a, b).is_none(), "{a} {b}");

@@ -54,7 +54,7 @@ const MAX_SEGMENTS: usize = 1 << 17;
 /// `scene` with its reflecting triangles cut where others touch them, for elements with edges down
 /// to `finest` (scene unit); as it is where none are.
 pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
-    let topology = SurfaceTopology::new(scene);
+    let topology = SurfaceTopology::of_scene(scene);
     let mut cuts = find_cuts(scene, &topology, finest);
     let segments: usize = cuts.iter().map(|cuts| cuts.segments.len()).sum();
     if segments == 0 || segments > MAX_SEGMENTS {

@@ -66,7 +66,7 @@ impl Mesh {
             .map(|t| Aabb::from_points(self.scene.corners(t)).expanded(tolerances[t]))
             .collect();
         let nearby = overlapping_pairs(&boxes, |t| self.scene.area(t));
-        let outer_edges = outer_edges(self.scene(), &SurfaceTopology::new(self.scene()));
+        let outer_edges = outer_edges(self.scene(), &SurfaceTopology::of_scene(self.scene()));
         let separated_in = |t: usize| {
             let plane = TrianglePlane::new(self.scene(), t, tolerances[t]);
             let mut segments = vec![];

@@ -118,7 +118,7 @@ impl Part {
 
 impl Bisection {
     fn new(scene: &Scene) -> Bisection {
-        let topology = SurfaceTopology::new(scene);
+        let topology = SurfaceTopology::of_scene(scene);
         let whole = |(triangle, &ids): (usize, &[u32; 3])| {
             let Piece { corners, weights, .. } = Piece::whole(scene.corners(triangle));
             Part { triangle, ids, corners, weights }

@@ -48,19 +48,6 @@ impl Cell {
         }
     }
 
-    /// The cell of `level` (not deeper than this one) that contains this one.
-    pub fn ancestor(self, level: u32) -> Cell {
-        let mut cell = self;
-        while cell.level > level {
-            // A step back from either child orientation: the middle child is turned over.
-            let (i, j) = (cell.i / 2, cell.j / 2);
-            let odd = cell.i % 2 + cell.j % 2;
-            let flipped = if cell.flipped { odd > 0 } else { odd == 2 };
-            cell = Cell { level: cell.level - 1, i, j, flipped };
-        }
-        cell
-    }
-
     /// Calls `f` with every cell of `level` (not above this one) that lies in this one.
     pub fn for_each_descendant(self, level: u32, f: &mut impl FnMut(Cell)) {
         match self.level == level {
@@ -113,11 +100,18 @@ mod tests {
     fn children_tile_their_parent_and_keep_its_winding() {
         for l in 0..5 {
             for parent in level(l) {
-                for child in parent.children() {
+                let children = parent.children();
+                for child in children {
                     // Lattice coordinates are exact: four equal parts, wound like the root.
                     assert_eq!(signed_area(child) * 4.0, signed_area(parent));
                     assert!(signed_area(child) > 0.0);
-                    assert_eq!(child.ancestor(l), parent);
+                }
+                let corners = parent.corners();
+                for k in 0..3 {
+                    let [a, b] = [1, 2].map(|step| corners[(k + step) % 3]);
+                    let opposite = [0, 1].map(|axis| (a[axis] + b[axis]) / 2.0);
+                    assert_eq!(children[k].corners()[k], corners[k]);
+                    assert_eq!(children[3].corners()[k], opposite);
                 }
             }
         }

@@ -29,11 +29,11 @@
 //! so that one position has a vertex for each smooth surface that meets there.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use rayon::prelude::*;
 
 use crate::geometry::union_find::UnionFind;
-use crate::geometry::weld::Weld;
 use crate::mesh::Mesh;
 use crate::scene::{Scene, Triangle};
 
@@ -67,6 +67,11 @@ const SAME_ANGLE: f64 = 1e-4;
 type TriangleSide = (usize, usize);
 
 impl SurfaceTopology {
+    /// Those of [`SurfaceTopology::new`], made once for a scene.
+    pub fn of_scene(scene: &Scene) -> Arc<SurfaceTopology> {
+        scene.derived(SurfaceTopology::new)
+    }
+
     /// Surfaces that continue by the scene's smoothing groups and by angles: up to
     /// [`Mesh::CREASE_DEGREES`] within one smoothing group, up to [`Scene::crease_degrees`] where
     /// none is known, else up to [`Mesh::COPLANAR_DEGREES`].
@@ -87,45 +92,56 @@ impl SurfaceTopology {
     /// most `crease_angle` of both, degrees.
     fn with_crease_angle(
         scene: &Scene,
-        crease_angle: impl Fn(&Triangle, &Triangle) -> f64,
+        crease_angle: impl Fn(&Triangle, &Triangle) -> f64 + Sync,
     ) -> SurfaceTopology {
         let count = scene.triangles().len();
-        let ends = side_ends(scene);
-        let mut by_ends: FxHashMap<(u32, u32), Vec<TriangleSide>> = FxHashMap::default();
-        for (t, sides) in ends.iter().enumerate() {
-            for (k, &(a, b)) in sides.iter().enumerate() {
-                by_ends.entry((a.min(b), a.max(b))).or_default().push((t, k));
-            }
-        }
+        let ends: Vec<[[u32; 2]; 3]> =
+            scene.welded_corners().0.iter().map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
         let mut sides: Vec<[Side; 3]> = (0..count)
             .map(|t| {
                 [0, 1, 2].map(|k| {
-                    let (a, b) = ends[t][k];
+                    let [a, b] = ends[t][k];
                     Side { id: (3 * t + k) as u32, reversed: a > b }
                 })
             })
             .collect();
-        let mut corners = UnionFind::new(3 * count);
+        // Sides between the same two positions come together, in the order of the triangles.
+        let ends = |&(t, k): &TriangleSide| {
+            let [a, b] = ends[t][k];
+            [a.min(b), a.max(b)]
+        };
+        let all = (0..count).flat_map(|t| [(t, 0), (t, 1), (t, 2)]);
+        let mut by_ends: Vec<([u32; 2], TriangleSide)> = all.map(|s| (ends(&s), s)).collect();
+        by_ends.par_sort_unstable();
+        let by_ends: Vec<TriangleSide> = by_ends.into_iter().map(|(_, side)| side).collect();
         let mut edges = vec![[0; 3]; count];
-        // No two of these have a side in common, so that their order does not matter.
-        for sharing in by_ends.values() {
-            // In the order of the triangles: the first is the lowest.
+        for sharing in by_ends.chunk_by(|side, next| ends(side) == ends(next)) {
             let edge = (3 * sharing[0].0 + sharing[0].1) as u32;
             for &(t, k) in sharing {
                 edges[t][k] = edge;
             }
-            for [(t, k), (s, l)] in facing_pairs(scene, &sides, sharing) {
+        }
+        let continued = |sharing: &[TriangleSide]| {
+            let mut pairs = facing_pairs(scene, &sides, sharing);
+            pairs.retain(|&[(t, k), (s, l)]| {
                 let is_cut = scene.is_cut(t, k) || scene.is_cut(s, l);
-                if is_cut || !continues(scene, t, s, &crease_angle) {
-                    continue;
-                }
-                let id = sides[t][k].id.min(sides[s][l].id);
-                sides[t][k].id = id;
-                sides[s][l].id = id;
-                // Opposite windings: where one side starts, the other ends.
-                corners.join(3 * t + k, 3 * s + (l + 1) % 3);
-                corners.join(3 * t + (k + 1) % 3, 3 * s + l);
-            }
+                !is_cut && continues(scene, t, s, &crease_angle)
+            });
+            pairs
+        };
+        let pairs: Vec<[TriangleSide; 2]> = by_ends
+            .par_chunk_by(|side, next| ends(side) == ends(next))
+            .flat_map_iter(continued)
+            .collect();
+        let mut corners = UnionFind::new(3 * count);
+        // No two of these have a side in common.
+        for [(t, k), (s, l)] in pairs {
+            let id = sides[t][k].id.min(sides[s][l].id);
+            sides[t][k].id = id;
+            sides[s][l].id = id;
+            // Opposite windings: where one side starts, the other ends.
+            corners.join(3 * t + k, 3 * s + (l + 1) % 3);
+            corners.join(3 * t + (k + 1) % 3, 3 * s + l);
         }
         let corners =
             (0..count).map(|t| [0, 1, 2].map(|k| corners.find(3 * t + k) as u32)).collect();
@@ -151,16 +167,6 @@ impl SurfaceTopology {
         }
         (0..self.sides.len()).map(|t| surfaces.find(t) as u32).collect()
     }
-}
-
-/// Per triangle and side, the welded positions that it runs from and to.
-fn side_ends(scene: &Scene) -> Vec<[(u32, u32); 3]> {
-    let mut weld = Weld::default();
-    let ends = |t: usize| {
-        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
-        [(a, b), (b, c), (c, a)]
-    };
-    (0..scene.triangles().len()).map(ends).collect()
 }
 
 /// Of triangles with sides between the same two positions, those whose fronts look into one wedge

@@ -18,7 +18,6 @@ use super::covers::Covers;
 use super::{Scene, longest_edge};
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
-use crate::geometry::weld::Weld;
 
 /// Fronts lie in the same place as a triangle up to this distance, in units of the longer of their
 /// longest edges: well above what a file's six digits leave of a flat polygon.
@@ -35,12 +34,9 @@ const MAX_TRIANGLES: usize = 256;
 /// Which backs of `scene` are covered.
 pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let count = scene.triangles().len();
-    let mut weld = Weld::default();
-    let corners: Vec<[u32; 3]> =
-        (0..count).map(|t| scene.corners(t).map(|p| weld.number(p))).collect();
-    let meeting = Incidence::new(weld.positions.len(), || {
-        corners.iter().map(<[u32; 3]>::as_slice).enumerate()
-    });
+    let (corners, positions) = scene.welded_corners();
+    let meeting =
+        Incidence::new(positions, || corners.iter().map(<[u32; 3]>::as_slice).enumerate());
     let surfaces = Surfaces { scene, corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
         (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();

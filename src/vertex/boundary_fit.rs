@@ -15,9 +15,9 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use super::keys::ElementLoops;
+use crate::geometry::incidence::Incidence;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
@@ -68,9 +68,9 @@ pub(super) fn boundary_vertices(
     positions: &[DVec3],
     normals: &[DVec3],
 ) -> Vec<BoundaryVertex> {
-    let around = outlines.elements_around(positions.len());
+    let around = Incidence::new(positions.len(), || outlines.iter());
     let boundary_vertex = |vertex: usize| {
-        let near = ring(outlines, &around, &around[vertex]);
+        let near = ring(outlines, &around, around.at(vertex as u32));
         let neighbourhood = ring(outlines, &around, &near);
         let position = positions[vertex];
         let fit = linear_fit(mesh, near, position, normals[vertex]);
@@ -108,9 +108,9 @@ fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -
 
 /// The elements that share a vertex with one of `elements`, those included, ascending; see
 /// [`MAX_VALENCE`].
-fn ring(outlines: &ElementLoops, around: &[Vec<u32>], elements: &[u32]) -> Vec<u32> {
+fn ring(outlines: &ElementLoops, around: &Incidence, elements: &[u32]) -> Vec<u32> {
     let vertices = elements.iter().flat_map(|&e| outlines.of(e as usize));
-    let neighbours = vertices.map(|&v| &around[v as usize]).filter(|n| n.len() < MAX_VALENCE);
+    let neighbours = vertices.map(|&v| around.at(v)).filter(|n| n.len() < MAX_VALENCE);
     let mut ring: Vec<u32> = neighbours.flatten().chain(elements).copied().collect();
     ring.sort_unstable();
     ring.dedup();
@@ -119,16 +119,14 @@ fn ring(outlines: &ElementLoops, around: &[Vec<u32>], elements: &[u32]) -> Vec<u
 
 /// Vertices on a side that only one element has, ascending.
 fn vertices_on_boundary(outlines: &ElementLoops) -> Vec<usize> {
-    let mut occurrences: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    let mut sides: Vec<[u32; 2]> = vec![];
     for (_, outline) in outlines.iter() {
-        for (k, &a) in outline.iter().enumerate() {
-            let b = outline[(k + 1) % outline.len()];
-            *occurrences.entry((a.min(b), a.max(b))).or_default() += 1;
-        }
+        let next = outline.iter().cycle().skip(1);
+        sides.extend(outline.iter().zip(next).map(|(&a, &b)| [a.min(b), a.max(b)]));
     }
-    let single = occurrences.into_iter().filter(|&(_, count)| count == 1);
-    let mut vertices: Vec<usize> =
-        single.flat_map(|((a, b), _)| [a as usize, b as usize]).collect();
+    sides.par_sort_unstable();
+    let single = sides.chunk_by(|side, next| side == next).filter(|alike| alike.len() == 1);
+    let mut vertices: Vec<usize> = single.flat_map(|side| side[0].map(|v| v as usize)).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices

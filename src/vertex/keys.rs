@@ -101,17 +101,6 @@ impl ElementLoops {
     pub fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
         (0..self.ends.len()).map(|e| (e, self.of(e)))
     }
-
-    /// The elements around each of `vertices` vertices, ascending.
-    pub fn elements_around(&self, vertices: usize) -> Vec<Vec<u32>> {
-        let mut around = vec![vec![]; vertices];
-        for (e, outline) in self.iter() {
-            for &v in outline {
-                around[v as usize].push(e as u32);
-            }
-        }
-        around
-    }
 }
 
 /// A place where an element's outline could have a vertex, but the mesh has none.
@@ -123,30 +112,107 @@ pub(crate) struct MissingVertex<'a> {
     pub between: [u32; 2],
 }
 
+/// In the place of a vertex's number: it has none yet.
+const UNNUMBERED: u32 = u32::MAX;
+
 impl Vertices {
     /// The vertices of `mesh`, whose scene has the smooth surfaces `topology`.
     pub fn new(mesh: &Mesh, topology: &SurfaceTopology) -> Vertices {
         let mut vertices = Vertices::default();
         vertices.corners.reserve_exact(mesh.element_count());
+        vertices.index = HashTable::with_capacity(mesh.element_count());
         for e in 0..mesh.element_count() {
-            vertices.add_corners(mesh, topology, e);
+            let node = mesh.element(e);
+            let t = mesh.triangle(node);
+            let corners = lattice_corners(mesh.cell(node));
+            let corners = corners.map(|point| vertices.number(mesh, topology, (t, point)));
+            vertices.corners.push(corners);
         }
         vertices.keys.shrink_to_fit();
         vertices.positions.shrink_to_fit();
         vertices.places.shrink_to_fit();
-        let loops = by_task(mesh.element_count(), |elements| {
-            let mut loops = ElementLoops::default();
-            for e in elements {
-                loops.push(|outline| {
-                    vertices.add_outline(mesh, topology, e, outline, &mut |_| None);
-                });
-            }
-            loops
+        vertices.outlines = outlines_of(mesh, |e, outline| {
+            vertices.add_outline(mesh, topology, e, outline, &mut |_| None);
         });
-        for loops in loops {
-            vertices.outlines.append(&loops);
-        }
         vertices
+    }
+
+    /// The vertices of `finer`, the mesh of these with each of `elements` (ascending) split into
+    /// four: the same as by [`Vertices::new`], in the same order. And of each its number among
+    /// these, none of a new one.
+    pub fn split(
+        &self,
+        finer: &Mesh,
+        topology: &SurfaceTopology,
+        elements: &[usize],
+    ) -> (Vertices, Vec<Option<u32>>) {
+        // Of each element of `finer` the one that it was; none of a part of one that was split.
+        let mut old_elements = Vec::with_capacity(finer.element_count());
+        // Between two vertices of which one is at no split element there is no new one.
+        let mut is_at_split = vec![false; self.keys.len()];
+        let mut elements = elements.iter().peekable();
+        for (e, corners) in self.corners.iter().enumerate() {
+            if elements.next_if_eq(&&e).is_some() {
+                old_elements.extend([None; 4]);
+                corners.iter().for_each(|&v| is_at_split[v as usize] = true);
+            } else {
+                old_elements.push(Some(e));
+            }
+        }
+        let places_of = |f: usize| {
+            let node = finer.element(f);
+            let t = finer.triangle(node);
+            lattice_corners(finer.cell(node)).map(|point| (t, point))
+        };
+        let old_corners = |(f, old): (usize, &Option<usize>)| match old {
+            Some(e) => self.corners[*e].map(Some),
+            None => places_of(f).map(|(t, point)| self.index_of(&vertex_key(topology, t, point))),
+        };
+        let old_corners: Vec<[Option<u32>; 3]> =
+            old_elements.par_iter().enumerate().map(old_corners).collect();
+        // New vertices alone are in its index at first.
+        let mut split = Vertices::default();
+        split.corners.reserve_exact(finer.element_count());
+        let mut numbers = vec![UNNUMBERED; self.keys.len()];
+        for (f, old_corners) in old_corners.into_iter().enumerate() {
+            let places = places_of(f);
+            let corners = [0, 1, 2].map(|k| {
+                let (t, point) = places[k];
+                let Some(old) = old_corners[k] else {
+                    return split.number(finer, topology, places[k]);
+                };
+                let number = &mut numbers[old as usize];
+                if *number == UNNUMBERED {
+                    // Its first element may be in another triangle than before.
+                    let old = old as usize;
+                    let position = match self.places[old] == (t as u32, point) {
+                        true => self.positions[old],
+                        false => lattice_position(finer.scene(), topology, t, point),
+                    };
+                    *number = split.push(self.keys[old], position, places[k]);
+                }
+                *number
+            });
+            split.corners.push(corners);
+        }
+        let mut old_numbers = vec![None; split.keys.len()];
+        for (old, &number) in (0..).zip(&numbers) {
+            old_numbers[number as usize] = Some(old);
+        }
+        let new_index = std::mem::replace(&mut split.index, self.index.clone());
+        split.index.iter_mut().for_each(|v| *v = numbers[*v as usize]);
+        new_index.iter().for_each(|&v| split.add_to_index(v));
+        split.outlines = outlines_of(finer, |f, outline| {
+            let old_outline = old_elements[f].map(|e| self.outlines.of(e)).filter(|old| {
+                let is_at_split = |k: usize| is_at_split[old[k % old.len()] as usize];
+                !(0..old.len()).any(|k| is_at_split(k) && is_at_split(k + 1))
+            });
+            match old_outline {
+                Some(old) => outline.extend(old.iter().map(|&v| numbers[v as usize])),
+                None => split.add_outline(finer, topology, f, outline, &mut |_| None),
+            }
+        });
+        (split, old_numbers)
     }
 
     /// The index of the vertex with this key.
@@ -160,21 +226,33 @@ impl Vertices {
         self.places.iter().map(|&(t, point)| (t as usize, point.map(side_fraction)))
     }
 
-    fn add_corners(&mut self, mesh: &Mesh, topology: &SurfaceTopology, e: usize) {
-        let node = mesh.element(e);
-        let t = mesh.triangle(node);
-        let corners = lattice_corners(mesh.cell(node)).map(|point| {
-            let key = vertex_key(topology, t, point);
-            self.index_of(&key).unwrap_or_else(|| {
-                let v = self.keys.len() as u32;
-                self.keys.push(key);
-                self.positions.push(lattice_position(mesh.scene(), topology, t, point));
-                self.places.push((t as u32, point));
-                self.index.insert_unique(hash(&key), v, |&v| hash(&self.keys[v as usize]));
-                v
-            })
-        });
-        self.corners.push(corners);
+    /// The number of the vertex at a place, a triangle and a point of its lattice: of a new one if
+    /// there is none.
+    fn number(
+        &mut self,
+        mesh: &Mesh,
+        topology: &SurfaceTopology,
+        (t, point): (usize, [u32; 2]),
+    ) -> u32 {
+        let key = vertex_key(topology, t, point);
+        self.index_of(&key).unwrap_or_else(|| {
+            let position = lattice_position(mesh.scene(), topology, t, point);
+            let v = self.push(key, position, (t, point));
+            self.add_to_index(v);
+            v
+        })
+    }
+
+    fn push(&mut self, key: VertexKey, position: DVec3, (t, point): (usize, [u32; 2])) -> u32 {
+        self.keys.push(key);
+        self.positions.push(position);
+        self.places.push((t as u32, point));
+        self.keys.len() as u32 - 1
+    }
+
+    fn add_to_index(&mut self, v: u32) {
+        let hash_of = |v: &u32| hash(&self.keys[*v as usize]);
+        self.index.insert_unique(hash_of(&v), v, hash_of);
     }
 
     /// Adds the vertices around element `e` to `outline`: its corners, and those between them,
@@ -214,6 +292,18 @@ impl Vertices {
     }
 }
 
+/// The outlines of the elements of `mesh`, each appended by `add`.
+fn outlines_of(mesh: &Mesh, add: impl Fn(usize, &mut Vec<u32>) + Sync) -> ElementLoops {
+    let of_tasks = by_task(mesh.element_count(), |elements| {
+        let mut loops = ElementLoops::default();
+        elements.for_each(|e| loops.push(|outline| add(e, outline)));
+        loops
+    });
+    let mut all = ElementLoops::default();
+    of_tasks.iter().for_each(|loops| all.append(loops));
+    all
+}
+
 /// What `work` makes of ranges of `elements` elements, in their order.
 pub(super) fn by_task<T: Send>(elements: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let tasks = (0..elements.div_ceil(ELEMENTS_A_TASK)).into_par_iter();
@@ -223,23 +313,6 @@ pub(super) fn by_task<T: Send>(elements: usize, work: impl Fn(Range<usize>) -> T
 
 fn hash(key: &VertexKey) -> u64 {
     FxBuildHasher.hash_one(key)
-}
-
-/// The keys of the corners of a cell of triangle `t`.
-pub(crate) fn corner_keys(topology: &SurfaceTopology, t: usize, cell: Cell) -> [VertexKey; 3] {
-    lattice_corners(cell).map(|point| vertex_key(topology, t, point))
-}
-
-/// The keys of the vertices that splitting a cell of triangle `t` makes: in the middle of the side
-/// from its first to its second corner, and so on. None at the finest level.
-pub(crate) fn midside_keys(
-    topology: &SurfaceTopology,
-    t: usize,
-    cell: Cell,
-) -> Option<[VertexKey; 3]> {
-    let [a, b, c] = lattice_corners(cell);
-    let key = |p, q| Some(vertex_key(topology, t, lattice_midpoint(p, q)?));
-    Some([key(a, b)?, key(b, c)?, key(c, a)?])
 }
 
 /// The lattice point half-way between two; none between neighbours.
@@ -299,5 +372,44 @@ fn vertex_key(topology: &SurfaceTopology, triangle: usize, [i, j]: [u32; 2]) -> 
         (i, j) if i + j == LATTICE_STEPS => on_side(1, j),
         (0, j) => on_side(2, LATTICE_STEPS - j),
         (i, j) => VertexKey::Inside { triangle: triangle as u32, i, j },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Triangle};
+
+    #[test]
+    fn vertices_of_a_split_mesh_are_those_found_anew() {
+        // Two walls and a floor of one smooth surface each, of unequal elements.
+        let at = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+        let quads = [[0, 1, 3, 2], [0, 4, 5, 1], [0, 2, 6, 4]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        let scene = Scene::new(
+            (0..8).map(at).collect(),
+            triangles.map(|corners| Triangle { corners, ..Default::default() }).collect(),
+            vec!["walls".into()],
+            vec![Material::grey("grey", 0.5)],
+        );
+        let mut mesh = Mesh::new(scene.unwrap(), 0.8).unwrap();
+        let topology = SurfaceTopology::new(mesh.scene());
+        let mut vertices = Vertices::new(&mesh, &topology);
+        for round in 0..5 {
+            let is_split = |&e: &usize| (e * 7 + round) % 5 < 2;
+            let elements: Vec<usize> = (0..mesh.element_count()).filter(is_split).collect();
+            let finer = mesh.split(&elements).unwrap();
+            let (split, old_numbers) = vertices.split(&finer, &topology, &elements);
+            let anew = Vertices::new(&finer, &topology);
+            assert_eq!(split.keys, anew.keys);
+            assert_eq!((&split.positions, &split.places), (&anew.positions, &anew.places));
+            assert_eq!(split.corners, anew.corners);
+            assert!(split.outlines.iter().eq(anew.outlines.iter()));
+            assert!(split.outlines.iter().any(|(_, outline)| outline.len() > 3));
+            for (v, (key, old)) in (0..).zip(split.keys.iter().zip(old_numbers)) {
+                assert_eq!((split.index_of(key), old), (Some(v), vertices.index_of(key)));
+            }
+            (mesh, vertices) = (finer, split);
+        }
     }
 }

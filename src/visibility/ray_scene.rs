@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
 
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
@@ -62,7 +63,7 @@ impl RayScene {
         let tree = SahTree::new(&boxes);
         let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.place(corner)));
         let plane = |&k: &u32| TrianglePlane::new(met[k as usize], corners(k));
-        let triangles = tree.order.iter().map(plane).collect();
+        let triangles = tree.order.par_iter().map(plane).collect();
         RayScene { bvh, tree, triangles, unit, cut_outs: None }
     }
 

@@ -27,6 +27,9 @@ const STEP_COST: f32 = 2.0;
 /// Bins along an axis, between which a split may lie. Chosen by hand; no measurement was kept.
 const SAH_BINS: usize = 32;
 
+/// Boxes that one thread parts at a time. Chosen by hand: results do not depend on it.
+const BOXES_A_TASK: usize = 4096;
+
 /// An axis-aligned box in 32 bits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Aabb32 {
@@ -81,26 +84,46 @@ impl SahTree {
     /// all boxes are the same, or lie one in the other.
     pub fn new(boxes: &[Aabb32]) -> SahTree {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        let mut nodes = vec![SahNode::over(boxes, &order, 0..boxes.len())];
-        let mut open = vec![(0, MAX_LEVELS)];
-        while let Some((node, levels)) = open.pop() {
-            let SahNode { bounds, items, .. } = nodes[node].clone();
-            if items.len() < 2 {
-                continue;
-            }
-            let (half, cost) = split(boxes, &mut order[items.clone()], levels - 1);
-            let saved = items.len() as f32 * bounds.half_area() - cost;
-            if items.len() <= MAX_LEAF_SIZE && saved <= STEP_COST * bounds.half_area() {
-                continue;
-            }
-            let (first, middle) = (nodes.len(), items.start + half);
-            nodes[node].children = Some(first);
-            nodes.push(SahNode::over(boxes, &order, items.start..middle));
-            nodes.push(SahNode::over(boxes, &order, middle..items.end));
-            open.extend([(first, levels - 1), (first + 1, levels - 1)]);
-        }
+        let nodes = nodes_over(boxes, &mut order, MAX_LEVELS);
         SahTree { order, nodes }
     }
+}
+
+/// The nodes over boxes in this `order`, which is changed; the root has `levels` below it at most.
+fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32) -> Vec<SahNode> {
+    let mut nodes = vec![SahNode::over(boxes, order, 0..order.len())];
+    if order.len() > BOXES_A_TASK {
+        let (half, _) = split(boxes, order, levels - 1);
+        let (first, second) = order.split_at_mut(half);
+        let below = |part| nodes_over(boxes, part, levels - 1);
+        let (mut first, mut second) = rayon::join(|| below(first), || below(second));
+        // Both roots side by side, and then what is below each.
+        first.iter_mut().for_each(|node| node.shift(0, 2));
+        second.iter_mut().for_each(|node| node.shift(half, first.len() + 1));
+        nodes[0].children = Some(1);
+        nodes.extend(first.drain(..1).chain(second.drain(..1)));
+        nodes.append(&mut first);
+        nodes.append(&mut second);
+        return nodes;
+    }
+    let mut open = vec![(0, levels)];
+    while let Some((node, levels)) = open.pop() {
+        let SahNode { bounds, items, .. } = nodes[node].clone();
+        if items.len() < 2 {
+            continue;
+        }
+        let (half, cost) = split(boxes, &mut order[items.clone()], levels - 1);
+        let saved = items.len() as f32 * bounds.half_area() - cost;
+        if items.len() <= MAX_LEAF_SIZE && saved <= STEP_COST * bounds.half_area() {
+            continue;
+        }
+        let (first, middle) = (nodes.len(), items.start + half);
+        nodes[node].children = Some(first);
+        nodes.push(SahNode::over(boxes, order, items.start..middle));
+        nodes.push(SahNode::over(boxes, order, middle..items.end));
+        open.extend([(first, levels - 1), (first + 1, levels - 1)]);
+    }
+    nodes
 }
 
 impl SahNode {
@@ -108,6 +131,12 @@ impl SahNode {
         let part = order[items.clone()].iter().map(|&k| &boxes[k as usize]);
         let bounds = part.fold(Aabb32::EMPTY, |all, item| all.union(item));
         SahNode { bounds, items, children: None }
+    }
+
+    /// Puts so many items and nodes before those of its tree.
+    fn shift(&mut self, items: usize, nodes: usize) {
+        self.items = self.items.start + items..self.items.end + items;
+        self.children = self.children.map(|first| first + nodes);
     }
 }
 

@@ -105,7 +105,7 @@ const IMAGE: u32 = 2;
 impl Model<'_> {
     fn new(map: &LightMap, png: Vec<u8>) -> Model<'_> {
         let scene = map.atlas.scene();
-        let (topology, normals) = (SurfaceTopology::new(scene), scene_normals(map));
+        let (topology, normals) = (SurfaceTopology::of_scene(scene), scene_normals(map));
         let origin = origin(scene.bounds());
         let mut primitives: BTreeMap<(u32, u32), Primitive> = BTreeMap::new();
         // Corners of one smooth surface are one vertex where they have the same places.

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use super::sheets::triangles_at_edges;
+use super::sheets::{is_at_one_edge, triangles_at_edges};
 use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::scene::Scene;
@@ -13,10 +13,12 @@ use crate::scene::Scene;
 pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
     let count = scene.triangles().len();
     let (mut surfaces, mut is_open) = (UnionFind::new(count), vec![false; count]);
-    for triangles in triangles_at_edges(scene).values() {
-        match triangles.as_slice() {
-            &[(t, forward), (s, also_forward)] if forward != also_forward => surfaces.join(t, s),
-            others => others.iter().for_each(|&(t, _)| is_open[t] = true),
+    for triangles in triangles_at_edges(scene).chunk_by(is_at_one_edge) {
+        match triangles {
+            &[(_, t, forward), (_, s, also_forward)] if forward != also_forward => {
+                surfaces.join(t, s);
+            }
+            others => others.iter().for_each(|&(_, t, _)| is_open[t] = true),
         }
     }
     let mut of_surfaces: FxHashMap<usize, Surface> = FxHashMap::default();

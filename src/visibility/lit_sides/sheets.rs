@@ -2,10 +2,8 @@
 
 use fastrand::Rng;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use crate::geometry::union_find::UnionFind;
-use crate::geometry::weld::Weld;
 use crate::sampling::hash::split_mix64;
 use crate::scene::Scene;
 
@@ -63,13 +61,15 @@ impl Sheets {
             }
             (side, found)
         };
-        let of_sides: FxHashMap<SideIndex, Found> = sides.par_iter().map(from_side).collect();
-        let mut of_sheets: FxHashMap<SideIndex, Found> = FxHashMap::default();
-        for side in sides {
-            let (sheet, found) = (of_sheets.entry(self.first[*side]).or_default(), of_sides[side]);
+        let found: Vec<(SideIndex, Found)> = sides.par_iter().map(from_side).collect();
+        let mut of_sides = vec![Found::default(); self.first.len()];
+        let mut of_sheets = of_sides.clone();
+        for (side, found) in found {
+            let sheet = &mut of_sheets[self.first[side]];
             sheet.places += found.places;
             sheet.hits += found.hits;
             sheet.sum += found.sum;
+            of_sides[side] = found;
         }
         Answers { sheets: self, of_sides, of_sheets }
     }
@@ -78,20 +78,21 @@ impl Sheets {
 /// What was found from places on sides.
 pub struct Answers<'a> {
     sheets: &'a Sheets,
-    of_sides: FxHashMap<SideIndex, Found>,
+    /// Per side; nothing from those that were not asked.
+    of_sides: Vec<Found>,
     /// By the first side of each.
-    of_sheets: FxHashMap<SideIndex, Found>,
+    of_sheets: Vec<Found>,
 }
 
 impl Answers<'_> {
     /// From a side that was asked.
     pub fn of(&self, side: SideIndex) -> Found {
-        self.of_sides[&side]
+        self.of_sides[side]
     }
 
     /// From those of its sheet that were asked.
     pub fn of_sheet(&self, side: SideIndex) -> Found {
-        self.of_sheets[&self.sheets.first[side]]
+        self.of_sheets[self.sheets.first[side]]
     }
 }
 
@@ -122,8 +123,8 @@ impl Found {
 fn first_sides(scene: &Scene) -> Vec<SideIndex> {
     let count = scene.triangles().len();
     let mut sheets = UnionFind::new(2 * count);
-    for triangles in triangles_at_edges(scene).values() {
-        let &[(t, forward), (s, also_forward)] = triangles.as_slice() else { continue };
+    for triangles in triangles_at_edges(scene).chunk_by(is_at_one_edge) {
+        let &[(_, t, forward), (_, s, also_forward)] = triangles else { continue };
         if scene.triangles()[t].group == scene.triangles()[s].group {
             // Wound alike, one runs forward along what they share, and the other back.
             let across = usize::from(forward == also_forward);
@@ -134,16 +135,21 @@ fn first_sides(scene: &Scene) -> Vec<SideIndex> {
     (0..2 * count).map(|side| sheets.find(side)).collect()
 }
 
-/// The triangles at each edge of `scene`, by the welded positions at its ends, lower first, and
-/// whether each runs along it from the lower to the higher.
-pub fn triangles_at_edges(scene: &Scene) -> FxHashMap<(u32, u32), Vec<(usize, bool)>> {
-    let mut weld = Weld::default();
-    let mut at_edges: FxHashMap<(u32, u32), Vec<(usize, bool)>> = FxHashMap::default();
-    for t in 0..scene.triangles().len() {
-        let [a, b, c] = scene.corners(t).map(|p| weld.number(p));
-        for (a, b) in [(a, b), (b, c), (c, a)] {
-            at_edges.entry((a.min(b), a.max(b))).or_default().push((t, a < b));
-        }
-    }
-    at_edges
+/// A triangle at an edge of its scene: the welded positions at the ends, lower first, the triangle,
+/// and whether it runs along the edge from the lower to the higher.
+pub type TriangleAtEdge = ([u32; 2], usize, bool);
+
+/// All triangles of `scene` at their edges, those at one edge side by side.
+pub fn triangles_at_edges(scene: &Scene) -> Vec<TriangleAtEdge> {
+    let at_edges = |(t, [a, b, c]): (usize, [u32; 3])| {
+        [(a, b), (b, c), (c, a)].map(|(a, b)| ([a.min(b), a.max(b)], t, a < b))
+    };
+    let corners = scene.welded_corners().0;
+    let mut all: Vec<TriangleAtEdge> = corners.into_iter().enumerate().flat_map(at_edges).collect();
+    all.par_sort_unstable();
+    all
+}
+
+pub fn is_at_one_edge(first: &TriangleAtEdge, second: &TriangleAtEdge) -> bool {
+    first.0 == second.0
 }
