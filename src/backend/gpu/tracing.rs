@@ -12,10 +12,14 @@ use super::shaders::{
 };
 use super::traced_gather::Slots;
 use super::traced_scene::TracedScene;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
 use crate::gather::lights::Lights;
 use crate::scene::Scene;
+
+/// Fields that are kept on a device: what vertices gather from, and what they have gathered, which
+/// an estimate of the error compares.
+const FIELDS: usize = 2;
 
 /// Kept with a device, for all that cast rays on it.
 #[derive(Debug, Default)]
@@ -23,7 +27,8 @@ pub struct Tracing {
     gather: OnceLock<GatherPipelines>,
     rows: OnceLock<RowPipelines>,
     scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
-    light: Mutex<Option<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
+    /// By their keys and scenes, the one used last at the end.
+    fields: Mutex<Vec<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
     pub slots: Mutex<Option<Slots>>,
 }
 
@@ -115,30 +120,43 @@ impl Gpu {
             return Ok(traced.clone());
         }
         *kept = None;
+        self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner).clear();
         let traced = self.with_error_scopes(|| TracedScene::new(self.memory(), lights))?;
         let traced = Arc::new(traced);
         *kept = Some((Arc::downgrade(scene), traced.clone()));
         Ok(traced)
     }
 
-    /// `field` on the device: uploaded unless it is the one before.
+    /// `field` on the device: uploaded unless it is one of those before.
     pub(super) fn field_buffers(
         &self,
         scene: &Arc<TracedScene>,
         field: &RadiosityField,
     ) -> Result<Arc<FieldBuffers>, Error> {
         let key = field::key(field);
-        let mut kept = self.tracing.light.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((of, owner, buffers)) = &*kept
-            && *of == key
-            && Arc::ptr_eq(owner, scene)
-        {
-            return Ok(buffers.clone());
-        }
-        *kept = None;
-        let buffers = FieldBuffers::new(self.memory(), field, scene.radiance_unit)?;
-        let buffers = Arc::new(buffers);
-        *kept = Some((key, scene.clone(), buffers.clone()));
+        let mut kept = self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_same = |(of, owner, _): &(u64, Arc<TracedScene>, Arc<FieldBuffers>)| {
+            *of == key && Arc::ptr_eq(owner, scene)
+        };
+        let found = kept.iter().position(is_same).map(|k| kept.remove(k).2);
+        let buffers = match found {
+            Some(buffers) => buffers,
+            None => {
+                if kept.len() >= FIELDS {
+                    kept.remove(0);
+                }
+                let new = || FieldBuffers::new(self.memory(), field, scene.radiance_unit);
+                Arc::new(new().or_else(|e| match e.kind() {
+                    // The others make room.
+                    ErrorKind::Memory if !kept.is_empty() => {
+                        kept.clear();
+                        new()
+                    }
+                    _ => Err(e),
+                })?)
+            }
+        };
+        kept.push((key, scene.clone(), buffers.clone()));
         Ok(buffers)
     }
 }
