@@ -8,7 +8,13 @@
 //! |---|---|---|
 //! | `item_buffer.wgsl` | `item_buffer` | `gpu/rows/twin_tests.rs`: items equal |
 //! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
-//! | `shared/*.wgsl` | `shared` | with the draw shaders |
+//! | `rank_lights.wgsl` | `twins/rank_lights` | `gpu/traced_gather/twin_tests.rs`: within rounding |
+//! | `hemisphere_rays.wgsl` | `twins/hemisphere_rays` | the same, but for rays near an edge |
+//! | `light_rays.wgsl` | `twins/light_rays` | the same |
+//! | `settle.wgsl` | `twins/settle` | the same decisions, samples within rounding |
+//! | `row_rays.wgsl` | `twins/row_rays` | `gpu/traced_rows/twin_tests.rs`: but for rays near an edge |
+//! | `compact_rows.wgsl` | `twins/compact_rows` | the same: entries equal |
+//! | `shared/*.wgsl` | `shared`, `twins` | with the shaders that need them |
 
 mod gather;
 #[cfg(all(test, feature = "gpu"))]
@@ -20,6 +26,8 @@ pub(super) mod reduce;
 pub(crate) mod rows;
 #[cfg(all(test, feature = "gpu"))]
 mod shared;
+#[cfg(all(test, feature = "gpu"))]
+pub(super) mod twins;
 
 pub use gather::RayGather;
 pub use rows::RayRows;

@@ -23,7 +23,7 @@ mod split_float;
 mod test_support;
 mod traced_gather;
 mod traced_rows;
-mod traced_scene;
+pub(super) mod traced_scene;
 mod tracing;
 
 pub use crate::backend::adapter::AdapterInfo;

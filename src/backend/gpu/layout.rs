@@ -252,8 +252,28 @@ pub const WORKGROUP: u32 = 64;
 mod tests {
     use std::mem::offset_of;
 
-    use super::super::shaders::{ITEM_BUFFER_WGSL, REDUCE_WGSL};
+    use super::super::shaders::{
+        COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, ITEM_BUFFER_WGSL, LIGHT_RAYS_WGSL,
+        RANK_LIGHTS_WGSL, REDUCE_WGSL, ROW_RAYS_WGSL, SETTLE_WGSL,
+    };
+    use super::super::traced_gather::RAYS_PER_SHADOW_RAY;
     use super::*;
+    use crate::backend::cpu::twins::gather_state::{
+        LANES, PointState, RankedLight, RaySums, SOURCES, Visible,
+    };
+    use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
+    use crate::scene::Sun;
+    use crate::visibility::sah_tree::MAX_LEVELS;
+
+    /// All that cast rays, and [`COMPACT_ROWS_WGSL`].
+    const RAY_SHADERS: [&str; 6] = [
+        RANK_LIGHTS_WGSL,
+        HEMISPHERE_RAYS_WGSL,
+        LIGHT_RAYS_WGSL,
+        SETTLE_WGSL,
+        ROW_RAYS_WGSL,
+        COMPACT_ROWS_WGSL,
+    ];
 
     fn parsed(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source).expect("WGSL parses");
@@ -266,19 +286,39 @@ mod tests {
     }
 
     /// Name, offset and size of each member, and the size of the whole.
-    fn wgsl_layout(module: &naga::Module, name: &str) -> (Vec<(String, usize, usize)>, usize) {
-        let (_, ty) = module
-            .types
-            .iter()
-            .find(|(_, t)| t.name.as_deref() == Some(name))
-            .unwrap_or_else(|| panic!("no struct {name}"));
+    type Layout = (Vec<(String, usize, usize)>, usize);
+
+    fn wgsl_layout(module: &naga::Module, name: &str) -> Layout {
+        layout_if_there(module, name).unwrap_or_else(|| panic!("no struct {name}"))
+    }
+
+    /// None where the shader does not have it.
+    fn layout_if_there(module: &naga::Module, name: &str) -> Option<Layout> {
+        let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name))?;
         let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };
         let size = |m: &naga::StructMember| module.types[m.ty].inner.size(module.to_ctx());
         let list = members
             .iter()
             .map(|m| (m.name.clone().unwrap(), m.offset as usize, size(m) as usize))
             .collect();
-        (list, *span as usize)
+        Some((list, *span as usize))
+    }
+
+    /// The value of a constant; none where the shader does not have it.
+    fn constant_if_there(module: &naga::Module, name: &str) -> Option<naga::Literal> {
+        let named = |c: &naga::Constant| c.name.as_deref() == Some(name);
+        let (_, constant) = module.constants.iter().find(|(_, c)| named(c))?;
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(value) => Some(value),
+            ref other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    fn constant(module: &naga::Module, name: &str) -> u32 {
+        match constant_if_there(module, name) {
+            Some(naga::Literal::U32(value)) => value,
+            other => panic!("{name}: {other:?}"),
+        }
     }
 
     macro_rules! rust_layout {
@@ -332,18 +372,239 @@ mod tests {
     #[test]
     fn shared_constants_have_one_value() {
         let (item, reduce) = (parsed(ITEM_BUFFER_WGSL), parsed(REDUCE_WGSL));
-        let constant = |module: &naga::Module, name: &str| {
-            let (_, c) =
-                module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name)).unwrap();
-            match module.global_expressions[c.init] {
-                naga::Expression::Literal(naga::Literal::U32(value)) => value,
-                ref other => panic!("{name}: {other:?}"),
-            }
-        };
         assert_eq!(constant(&item, "BACK"), BACK);
         assert_eq!(constant(&reduce, "STRIP"), STRIP);
         assert_eq!(reduce.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
         // OPEN is the clear value of the item buffer: wgpu clears to zero.
         assert_eq!(OPEN, 0);
+    }
+
+    /// A struct that shaders which cast rays share with the host, by its name in WGSL: the same in
+    /// all that have it, and one has.
+    #[test]
+    fn structs_of_ray_shaders_have_one_layout() {
+        let modules = RAY_SHADERS.map(parsed);
+        let shared = [
+            (
+                "Node",
+                rust_layout!(TraceNode {
+                    low_a,
+                    child_a,
+                    high_a,
+                    child_b,
+                    low_b,
+                    padding,
+                    high_b,
+                    padding_2
+                }),
+            ),
+            (
+                "TracedTriangle",
+                rust_layout!(TracedTriangle {
+                    corner,
+                    index,
+                    corner_low,
+                    flags,
+                    edge_u,
+                    light,
+                    edge_v,
+                    extent
+                }),
+            ),
+            (
+                "TracedScene",
+                rust_layout!(TracedSceneInfo {
+                    panes,
+                    lights,
+                    sky_side,
+                    has_sun,
+                    sky,
+                    padding,
+                    sky_x,
+                    padding_2,
+                    sky_y,
+                    padding_3,
+                    sky_z,
+                    padding_4,
+                    sun,
+                    padding_5,
+                    sun_middle,
+                    padding_6,
+                    sun_right,
+                    padding_7,
+                    sun_up,
+                    padding_8
+                }),
+            ),
+            (
+                "TracedLight",
+                rust_layout!(TracedLight { exitance, is_convex, first, count, area, padding }),
+            ),
+            ("Lamp", rust_layout!(Lamp { triangle, end })),
+            (
+                "TracedPoint",
+                rust_layout!(TracedPoint {
+                    position,
+                    near,
+                    position_low,
+                    rotation,
+                    normal,
+                    second_rotation,
+                    luminaires,
+                    padding
+                }),
+            ),
+            (
+                "GatherSettings",
+                rust_layout!(GatherSettings {
+                    min_rays,
+                    max_rays,
+                    noise,
+                    dim,
+                    points,
+                    first,
+                    pass_rays,
+                    padding
+                }),
+            ),
+            (
+                "Sample",
+                rust_layout!(Sample {
+                    irradiance,
+                    noise,
+                    direct,
+                    escaped,
+                    back,
+                    inverse_distance,
+                    rays,
+                    shadow_rays
+                }),
+            ),
+            (
+                "TracedPatch",
+                rust_layout!(TracedPatch {
+                    position,
+                    near,
+                    position_low,
+                    own_triangle,
+                    normal,
+                    rotation
+                }),
+            ),
+            ("RowSettings", rust_layout!(RowSettings { rays, slots, unit, entries })),
+            (
+                "RowEntry",
+                rust_layout!(RowEntry { patch_, slot, count, padding, passed, padding_2 }),
+            ),
+            (
+                "RaySums",
+                rust_layout!(RaySums {
+                    light,
+                    escaped,
+                    lamps,
+                    back,
+                    inverse_distance,
+                    largest,
+                    padding
+                }),
+            ),
+            ("Visible", rust_layout!(Visible { seen, all })),
+            ("RankedLight", rust_layout!(RankedLight { light, factor, is_wide, padding })),
+            (
+                "PointState",
+                rust_layout!(PointState {
+                    rays,
+                    lights,
+                    visible,
+                    light_count,
+                    ray_count,
+                    shadow_count,
+                    pending,
+                    ray_error,
+                    shadow_error,
+                    padding
+                }),
+            ),
+        ];
+        for (name, layout) in shared {
+            let found: Vec<_> = modules.iter().filter_map(|m| layout_if_there(m, name)).collect();
+            assert!(!found.is_empty(), "no shader has {name}");
+            found.iter().for_each(|found| assert_eq!(*found, layout, "{name}"));
+        }
+        assert_eq!(size_of::<PointState>() as u64, POINT_STATE_BYTES);
+        // Lists start where their headers end.
+        let lists = [
+            ("Work", "points", WORK_HEADER_BYTES),
+            ("WorkRead", "points", WORK_HEADER_BYTES),
+            ("RowEntries", "entries", ROW_ENTRIES_HEADER_BYTES),
+        ];
+        for (name, list, bytes) in lists {
+            let found: Vec<_> = modules.iter().filter_map(|m| layout_if_there(m, name)).collect();
+            assert!(!found.is_empty(), "no shader has {name}");
+            for (members, _) in found {
+                let (last, offset, _) = members.last().unwrap();
+                assert_eq!((last.as_str(), *offset as u64), (list, bytes), "{name}");
+            }
+        }
+        // Indirect dispatches read the second count from byte 12 on.
+        let (members, _) = wgsl_layout(&modules[3], "Work");
+        assert_eq!((members[0].1, members[1].1), (0, 12), "{members:?}");
+    }
+
+    #[test]
+    fn constants_of_ray_shaders_have_one_value() {
+        let modules = RAY_SHADERS.map(parsed);
+        let shared = [
+            ("NOTHING", NOTHING),
+            ("LEAF", LEAF),
+            ("BACK_IS_COVERED", BACK_IS_COVERED),
+            ("HAS_HOLES", HAS_HOLES),
+            ("TEXELS_A_LINE", TEXELS_A_LINE),
+            ("ELEMENTS_A_LINE", ELEMENTS_A_LINE),
+            ("INNER", INNER),
+            ("MAX_EXPLICIT_LIGHTS", MAX_EXPLICIT_LIGHTS as u32),
+            ("SUN", MAX_EXPLICIT_LIGHTS as u32),
+            ("NO_LIGHT", NO_LIGHT),
+            ("LANES", LANES),
+            ("RAYS_PER_SHADOW_RAY", RAYS_PER_SHADOW_RAY),
+            ("OPEN", OPEN),
+            ("BACK", BACK),
+            ("FIRST_ELEMENT", FIRST_ELEMENT),
+        ];
+        for (name, value) in shared {
+            let found: Vec<_> = modules.iter().filter_map(|m| constant_if_there(m, name)).collect();
+            assert!(!found.is_empty(), "no shader has {name}");
+            found.iter().for_each(|&found| assert_eq!(found, naga::Literal::U32(value), "{name}"));
+        }
+        // No sun's middle is hidden by a horizon that its disc is above.
+        let sine = naga::Literal::F32(Sun::SINE as f32);
+        assert_eq!(constant_if_there(&modules[3], "SINE_OF_SUN"), Some(sine));
+        // One node of each level waits on the stack, and what ends the walk.
+        assert!(constant(&modules[0], "STACK") >= MAX_LEVELS + 2);
+        // Of a light and the sun, of either half; the shaders have the numbers as they are.
+        assert_eq!([SOURCES, size_of::<PointState>()], [9, 544]);
+        // A workgroup is one point's, a ray a lane; the host counts workgroups of as many.
+        for module in &modules {
+            for entry_point in &module.entry_points {
+                assert_eq!(entry_point.workgroup_size, [LANES, 1, 1], "{}", entry_point.name);
+            }
+        }
+    }
+
+    /// So many bindings and so much memory of a workgroup as every WebGPU device has.
+    #[test]
+    fn ray_shaders_keep_to_the_limits_of_webgpu() {
+        for module in RAY_SHADERS.map(parsed) {
+            let of_space = |space: fn(&naga::AddressSpace) -> bool| {
+                module.global_variables.iter().filter(move |(_, v)| space(&v.space)).collect()
+            };
+            let storage: Vec<_> =
+                of_space(|space| matches!(space, naga::AddressSpace::Storage { .. }));
+            assert!(storage.len() <= 8, "{} storage buffers", storage.len());
+            let workgroup: Vec<_> = of_space(|space| *space == naga::AddressSpace::WorkGroup);
+            let size = |v: &naga::GlobalVariable| module.types[v.ty].inner.size(module.to_ctx());
+            let bytes: u32 = workgroup.iter().map(|(_, v)| size(v)).sum();
+            assert!(bytes <= 16_384, "{bytes} bytes of a workgroup");
+        }
     }
 }

@@ -1,14 +1,16 @@
-//! What the tests that compare shaders with their twins share: a scene, reading back, pictures.
+//! What the tests that compare shaders with their twins share: scenes, reading back, pictures.
 
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::device::Gpu;
+use crate::gather::GatherPoint;
 use crate::mesh::Mesh;
+use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
-use crate::scene::{Material, Rgb, Scene, Triangle};
+use crate::scene::{Material, Rgb, Scene, Sky, SkyDistribution, Specular, Sun, Triangle};
 
 /// Shifts of pixel centres, pixels: none, then the other points of a grid of ±1/128 in steps of
 /// 1/256. Devices round corners of triangles to a grid of 1/256 pixel, and edge functions in 32
@@ -92,6 +94,252 @@ pub fn scene() -> Mesh {
     let mesh = mesh.split(&split).unwrap();
     let split: Vec<usize> = (0..mesh.element_count()).filter(|e| e % 5 == 2).collect();
     mesh.split(&split).unwrap()
+}
+
+/// Scenes with all that rays may meet, by name.
+pub fn traced_scenes() -> Vec<(&'static str, Mesh)> {
+    vec![
+        ("quadtrees", scene()),
+        ("textures", textured_scene()),
+        ("sky and sun", under_sky_and_sun()),
+        ("panes", room_with_panes()),
+        ("cut-outs", sheets_with_holes()),
+        ("wide lights", wide_lights()),
+        ("many lights", many_lights()),
+        ("doubled faces", room_with_doubled_leaf()),
+    ]
+}
+
+/// The scene under a sky that differs by direction, with a sun.
+pub fn under_sky_and_sun() -> Mesh {
+    let mesh = scene();
+    let distribution = SkyDistribution::cie(12).unwrap();
+    let (up, sun) = (DVec3::new(0.1, 0.3, 1.0), DVec3::new(0.2, 0.1, 1.0));
+    let sky = Sky::new(distribution, Rgb::new(1.0, 2.0, 3.0), up, sun).unwrap();
+    let sky = sky.with_sun(Sun { direction: sun, irradiance: Rgb::new(3.0, 2.0, 1.0) }).unwrap();
+    mesh.with_scene(mesh.scene().clone().with_sky(sky).unwrap()).unwrap()
+}
+
+/// Corners of a quadrilateral, counter-clockwise seen from its front.
+type Quad = [[f64; 3]; 4];
+
+fn facing_up([x0, x1]: [f64; 2], [y0, y1]: [f64; 2], z: f64) -> Quad {
+    [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]
+}
+
+fn facing_down(x: [f64; 2], y: [f64; 2], z: f64) -> Quad {
+    let [a, b, c, d] = facing_up(x, y, z);
+    [a, d, c, b]
+}
+
+/// Walls of a unit cube seen from inside: x low and high, y, z.
+fn walls() -> [Quad; 6] {
+    let (a, x) = (0.0, 1.0);
+    [
+        [[a, a, a], [a, x, a], [a, x, x], [a, a, x]],
+        [[x, a, a], [x, a, x], [x, x, x], [x, x, a]],
+        [[a, a, a], [a, a, x], [x, a, x], [x, a, a]],
+        [[a, x, a], [x, x, a], [x, x, x], [a, x, x]],
+        [[a, a, a], [x, a, a], [x, x, a], [a, x, a]],
+        [[a, a, x], [a, x, x], [x, x, x], [x, a, x]],
+    ]
+}
+
+fn emitting(exitance: [f64; 3]) -> Material {
+    Material { exitance: exitance.into(), ..Material::grey("lamp", 0.5) }
+}
+
+fn glass(transmittance: [f64; 3]) -> Material {
+    let transmittance = transmittance.into();
+    let specular = Some(Specular::Glass { refractive_index: 1.5, transmittance });
+    Material { specular, ..Material::grey("glass", 0.0) }
+}
+
+/// Triangles of quadrilaterals, each of a material of its own.
+struct Parts {
+    positions: Vec<DVec3>,
+    triangles: Vec<Triangle>,
+    materials: Vec<Material>,
+}
+
+impl Parts {
+    fn new(quads: &[(Quad, Material)]) -> Parts {
+        let mut parts = Parts { positions: vec![], triangles: vec![], materials: vec![] };
+        for ([a, b, c, d], material) in quads {
+            parts.add(&[[*a, *b, *c], [*a, *c, *d]], material.clone());
+        }
+        parts
+    }
+
+    fn add(&mut self, triangles: &[[[f64; 3]; 3]], material: Material) {
+        let number = self.materials.len() as u32;
+        self.materials.push(material);
+        for corners in triangles {
+            let first = self.positions.len() as u32;
+            self.positions.extend(corners.map(DVec3::from_array));
+            let corners = [first, first + 1, first + 2];
+            self.triangles.push(Triangle { corners, material: number, ..Default::default() });
+        }
+    }
+
+    fn mesh(self, sky: Sky, element_size: f64) -> Mesh {
+        let Parts { positions, triangles, materials } = self;
+        let scene = Scene::new(positions, triangles, vec!["all".into()], materials).unwrap();
+        Mesh::new(scene.with_sky(sky).unwrap(), element_size).unwrap()
+    }
+}
+
+/// A room that is open to one side, to a sun low in the sky, with a lamp above two tinted panes,
+/// which are wider than the room, and a third before the open side.
+fn room_with_panes() -> Mesh {
+    let mut parts: Vec<(Quad, Material)> =
+        walls().map(|wall| (wall, Material::grey("wall", 0.5))).to_vec();
+    parts.remove(1);
+    parts.push((facing_down([0.3, 0.7], [0.4, 0.7], 0.99), emitting([7.0, 5.0, 3.0])));
+    let wide = [-0.5, 1.5];
+    parts.push((facing_up(wide, [-0.4, 1.5], 0.61), glass([0.9, 0.5, 0.7])));
+    parts.push((facing_up(wide, [-0.4, 1.5], 0.72), glass([0.3, 0.8, 1.0])));
+    let upright = [[1.2, 1.7, -0.3], [1.2, -0.6, -0.3], [1.2, -0.6, 0.5], [1.2, 1.7, 0.5]];
+    parts.push((upright, glass([0.6, 0.6, 0.25])));
+    let sun = Sun { direction: DVec3::new(1.0, 0.2, 0.3), irradiance: Rgb::new(2.0, 1.5, 1.0) };
+    let sky = Sky::uniform(Rgb::new(0.1, 0.2, 0.3)).with_sun(sun).unwrap();
+    Parts::new(&parts).mesh(sky, 0.4)
+}
+
+/// Above a floor a sheet whose mask repeats, below a lamp with holes whose mask ends at its border;
+/// a second lamp shines through the sheet alone.
+fn sheets_with_holes() -> Mesh {
+    let parts = Parts::new(&[
+        (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5)),
+        (facing_up([-0.1, 1.3], [0.1, 1.9], 0.55), Material::grey("sheet", 0.5)),
+        (facing_down([0.4, 1.5], [0.3, 1.6], 1.2), emitting([3.0, 2.0, 1.0])),
+        (facing_down([-0.6, -0.2], [0.3, 0.9], 0.9), emitting([1.0, 2.0, 3.0])),
+    ]);
+    let solid = |k: usize| [if k * k % 7 % 3 == 1 { 0 } else { 255 }; 3];
+    let texture = Arc::new(Texture::new(5, 7, (0..35).map(solid).collect()).unwrap());
+    let mask = |clamped: bool, scale: DVec2| {
+        let (factor, ceiling, mean) = (Rgb::ONE, f64::MAX, Rgb::ONE);
+        let offset = DVec2::new(0.3, -1.7) * f64::from(!clamped);
+        let texture = texture.clone();
+        let mask = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
+        MaterialTextures { mask: Some(mask), ..Default::default() }
+    };
+    let of_materials = [(1, mask(false, DVec2::new(2.3, 1.4))), (2, mask(true, DVec2::splat(1.2)))];
+    let (low, high) = ([DVec2::ZERO, DVec2::X, DVec2::ONE], [DVec2::ZERO, DVec2::ONE, DVec2::Y]);
+    let places = (0..parts.triangles.len()).map(|t| if t % 2 == 0 { low } else { high }).collect();
+    let Parts { positions, triangles, materials } = parts;
+    let groups = vec!["all".into()];
+    let textures = of_materials.into_iter().collect();
+    let scene =
+        Scene::with_textures(positions, triangles, groups, materials, places, textures).unwrap();
+    Mesh::new(scene.with_sky(Sky::uniform(Rgb::new(0.2, 0.1, 0.3))).unwrap(), 0.7).unwrap()
+}
+
+/// A floor under lights that fill much of its sky, one of them with a fold, so that one part of it
+/// hides another; a small light with a fold, an ordinary one, one that is so dim that it does not
+/// count, and a block in between.
+fn wide_lights() -> Mesh {
+    let mut parts = Parts::new(&[
+        (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5)),
+        (facing_down([-0.2, 1.1], [-0.2, 2.2], 0.4), emitting([2.0, 3.0, 1.0])),
+        (facing_up([0.3, 0.6], [0.4, 0.8], 0.15), Material::grey("block", 0.5)),
+        (facing_down([0.3, 0.6], [0.4, 0.8], 0.14), Material::grey("block", 0.5)),
+        (facing_down([2.2, 2.4], [0.2, 0.5], 0.8), emitting([5.0, 1.0, 2.0])),
+        (facing_down([-0.9, -0.8], [1.5, 1.6], 0.5), emitting([4e-3, 3e-3, 2e-3])),
+    ]);
+    // Along the line from q to r two triangles meet whose fronts look at each other.
+    let mut folded = |q: [f64; 3], r: [f64; 3], ends: [[f64; 3]; 2], exitance| {
+        parts.add(&[[r, q, ends[0]], [q, r, ends[1]]], emitting(exitance));
+    };
+    folded(
+        [1.6, 0.1, 0.75],
+        [1.6, 1.9, 0.75],
+        [[1.15, 1.0, 0.3], [2.2, 1.0, 0.3]],
+        [1.0, 1.5, 2.0],
+    );
+    folded(
+        [-0.6, 0.5, 0.9],
+        [-0.6, 0.8, 0.9],
+        [[-0.7, 0.6, 0.75], [-0.4, 0.6, 0.75]],
+        [4.0, 4.5, 6.0],
+    );
+    parts.mesh(Sky::uniform(Rgb::new(0.2, 0.1, 0.3)), 0.9)
+}
+
+/// More lights than a workgroup has lanes above a floor, two of them in the same place.
+fn many_lights() -> Mesh {
+    let floor = (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5));
+    let mut parts = Parts::new(&[floor]);
+    for k in 0..70 {
+        let (x, y) = (f64::from(k % 10) * 0.21, f64::from(k / 10) * 0.3);
+        let z = 0.7 + 0.05 * f64::from(k * 7 % 9);
+        let corners = [[x, y, z], [x + 0.03, y + 0.14, z], [x + 0.12, y + 0.02, z + 0.01]];
+        let power = 0.3 * f64::from(1 + k * 37 % 11);
+        parts.add(&[corners], emitting([power, 2.0 * power, 0.5 * power]));
+    }
+    let bright = [[0.6, 0.8, 0.5], [0.7, 1.2, 0.5], [0.9, 0.7, 0.52]];
+    parts.add(&[bright], emitting([30.0, 20.0, 10.0]));
+    parts.add(&[bright], emitting([20.0, 30.0, 15.0]));
+    parts.mesh(Sky::default(), 0.8)
+}
+
+/// A room with a lamp and a table leaf that is there once for each side, in one place.
+fn room_with_doubled_leaf() -> Mesh {
+    let mut parts: Vec<(Quad, Material)> =
+        walls().map(|wall| (wall, Material::grey("wall", 0.5))).to_vec();
+    let leaf = facing_up([0.3, 0.7], [0.25, 0.75], 0.4);
+    let [a, b, c, d] = leaf;
+    parts.push((leaf, Material::grey("leaf", 0.5)));
+    parts.push(([d, c, b, a], Material::grey("leaf from below", 0.5)));
+    parts.push((facing_down([0.4, 0.7], [0.2, 0.6], 0.99), emitting([1.0, 2.0, 3.0])));
+    Parts::new(&parts).mesh(Sky::default(), 0.5)
+}
+
+/// `count` places just above the elements of `mesh`, spread over all of these.
+pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
+    let random = |k: usize| unit_interval(split_mix64_nth(k as u64));
+    let place = |k: usize| {
+        let node = mesh.element(k * mesh.element_count() / count);
+        let [a, b, c] = mesh.corners(node);
+        let (u, v) = (random(2 * k), random(2 * k + 1));
+        let on = a + (b - a) * (0.05 + 0.9 * u) + (c - a) * (0.9 * v * (1.0 - u));
+        let lift = 1e-4 * mesh.area(node).sqrt();
+        let normal = mesh.normal(node);
+        GatherPoint { position: on + lift * normal, normal, near: 0.25 * lift }
+    };
+    (0..count).map(place).collect()
+}
+
+/// Radiosity at each corner of each element of `mesh`: corners, and the values there.
+pub fn random_radiosity(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<Rgb>) {
+    let random = |k: u64| unit_interval(split_mix64_nth(k));
+    let corners: Vec<[u32; 3]> =
+        (0..mesh.element_count() as u32).map(|e| [3 * e, 3 * e + 1, 3 * e + 2]).collect();
+    let values = (0..3 * corners.len() as u64)
+        .map(|k| Rgb::new(random(3 * k), random(3 * k + 1), random(3 * k + 2)));
+    let values = values.collect();
+    (corners, values)
+}
+
+/// Directions across `direction` and places about an origin that rounding may turn a ray to, and
+/// none: a ray is what the twin casts along one of these, or between them.
+///
+/// Directions: devices met compute sines and cosines to 2⁻²⁰, and what else there is of rounding in
+/// a direction, some ten of 2⁻²⁴, is less. Origins: a test of a triangle rounds differences of
+/// coordinates, which are below 2 in units of the scene's size, some four times by 2⁻²⁴ of that.
+pub fn shifts() -> Vec<(Vec2, Vec3)> {
+    let steps = [-1.0, 0.0, 1.0];
+    let across = steps.iter().flat_map(|&y| steps.map(|x| Vec2::new(x, y)));
+    let across = across.filter(|a| *a != Vec2::ZERO).map(|a| (a * 2f32.powi(-20), Vec3::ZERO));
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+    let along = axes.map(|axis| (Vec2::ZERO, axis * 2f32.powi(-21)));
+    std::iter::once((Vec2::ZERO, Vec3::ZERO)).chain(across).chain(along).collect()
+}
+
+/// `direction` turned by angles in the plane across it.
+pub fn turned_by(direction: Vec3, across: Vec2) -> Vec3 {
+    let (x, y) = direction.any_orthonormal_pair();
+    (direction + x * across.x + y * across.y).normalize()
 }
 
 /// Layer `layer` of a texture, line by line.

@@ -111,7 +111,7 @@ pub const MAX_POINTS: u32 = 32_768;
 const DISPATCH_SECONDS: f64 = 0.02;
 
 /// Rays to lights for one over the hemisphere, as `shared/gather_state.wgsl` has it.
-const RAYS_PER_SHADOW_RAY: u32 = 4;
+pub(super) const RAYS_PER_SHADOW_RAY: u32 = 4;
 
 impl TracedGather {
     /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
@@ -582,3 +582,6 @@ impl Gather for TracedGather {
         IN_FLIGHT * self.batch_len(MAX_POINTS) as usize
     }
 }
+
+#[cfg(test)]
+mod twin_tests;

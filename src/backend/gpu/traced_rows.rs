@@ -355,3 +355,6 @@ impl FormFactors for TracedRows {
         format!("{} rays on the device, all from {}", self.count, self.full_share)
     }
 }
+
+#[cfg(test)]
+mod twin_tests;

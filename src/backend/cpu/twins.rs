@@ -1,0 +1,14 @@
+//! Twins of the shaders that cast rays, each named as its WGSL file is: the same functions over the
+//! same arrays, one ray after the other.
+
+pub(in crate::backend) mod compact_rows;
+mod element;
+mod field;
+pub(in crate::backend) mod gather_state;
+pub(in crate::backend) mod hemisphere_rays;
+pub(in crate::backend) mod light_rays;
+pub(in crate::backend) mod lights;
+pub(in crate::backend) mod rank_lights;
+pub(in crate::backend) mod row_rays;
+pub(in crate::backend) mod settle;
+pub(in crate::backend) mod trace;

@@ -1,0 +1,172 @@
+//! Twin of `shaders/hemisphere_rays.wgsl`: cosine-distributed rays from points.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3, Vec4};
+
+use super::field::reflected;
+use super::gather_state::{LANES, PointState, RaySums, SOURCES, Visible, added_up};
+use super::lights::{passed, ray_from};
+use super::trace::{FAR, Ray, meet, nearest, turned};
+use crate::backend::gpu::layout::{GatherSettings, NOTHING, TracedLight, TracedPoint};
+use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
+
+/// What the shader is bound to.
+#[derive(Clone, Copy, Debug)]
+pub struct HemisphereRays<'a> {
+    pub scene: &'a TracedArrays,
+    pub quadtrees: &'a [u32],
+    pub elements: &'a [[f32; 4]],
+    /// Along two tangents and the normal, ray by ray.
+    pub directions: &'a [[f32; 4]],
+}
+
+/// What rays find, wide lights by their places among those of the point.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Found {
+    pub sums: RaySums,
+    pub lights: [Visible; MAX_EXPLICIT_LIGHTS],
+}
+
+impl Found {
+    pub fn add(&mut self, other: &Found) {
+        let largest = self.sums.largest.max(other.sums.largest);
+        let terms = bytemuck::cast_slice::<Found, f32>(std::slice::from_ref(other));
+        let sums = bytemuck::cast_slice_mut::<Found, f32>(std::slice::from_mut(self));
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        self.sums.largest = largest;
+    }
+}
+
+/// Rays of a pass over a point in `state` that has cast `total` of them before: the first time all
+/// of them, in two halves; then as many again, which are the second half. Where they start, where
+/// the second half does and where they end.
+pub fn range(total: u32, state: &PointState, settings: &GatherSettings) -> [u32; 3] {
+    let [start, middle, end] =
+        if state.pending == 3 { [0, total / 2, total] } else { [total, total, 2 * total] };
+    let from = start + settings.first;
+    [from, middle, (from + settings.pass_rays).min(end)]
+}
+
+impl HemisphereRays<'_> {
+    /// The rays of one pass from a point.
+    pub fn cast_rays(
+        &self,
+        point: &TracedPoint,
+        settings: &GatherSettings,
+        state: &mut PointState,
+    ) {
+        let [from, middle, to] = range(state.ray_count, state, settings);
+        let mut lanes = [[Found::default(); LANES as usize]; 2];
+        for k in from..to {
+            let found = self.cast_ray(point, self.direction(k, point), state);
+            let half = usize::from(k >= middle);
+            lanes[half][((k - from) % LANES) as usize].add(&found);
+        }
+        for (half, lanes) in lanes.into_iter().enumerate() {
+            let sum = |of: &dyn Fn(&Found) -> Vec4| added_up(lanes.each_ref().map(of));
+            let vector = |v: [f32; 3], last: f32| Vec3::from(v).extend(last);
+            let light = sum(&|f| vector(f.sums.light, f.sums.escaped));
+            let emitted = sum(&|f| vector(f.sums.lamps, f.sums.back));
+            let rest = sum(&|f| vector([f.sums.inverse_distance, 0.0, 0.0], 0.0));
+            let out = &mut state.rays[half];
+            out.light = (Vec3::from(out.light) + light.truncate()).to_array();
+            out.escaped += light.w;
+            out.lamps = (Vec3::from(out.lamps) + emitted.truncate()).to_array();
+            out.back += emitted.w;
+            out.inverse_distance += rest.x;
+            out.largest = lanes.iter().map(|f| f.sums.largest).fold(out.largest, f32::max);
+            for k in 0..state.light_count as usize {
+                if state.lights[k].is_wide != 0 {
+                    let of_light = sum(&|f| vector(f.lights[k].seen, f.lights[k].all));
+                    let out = &mut state.visible[half * SOURCES + k];
+                    out.seen = (Vec3::from(out.seen) + of_light.truncate()).to_array();
+                    out.all += of_light.w;
+                }
+            }
+        }
+    }
+
+    /// The direction of ray `k`.
+    pub fn direction(&self, k: u32, point: &TracedPoint) -> Vec3 {
+        let local = Vec4::from(self.directions[k as usize]).truncate();
+        turned(local, point.normal.into(), point.rotation)
+    }
+
+    /// What one ray finds.
+    pub fn cast_ray(&self, point: &TracedPoint, direction: Vec3, state: &PointState) -> Found {
+        let scene = self.scene;
+        let ray = ray_from(point, direction);
+        let hit = nearest(scene, &ray);
+        let is_surface = hit.triangle != NOTHING;
+        let share = passed(scene, &ray, if is_surface { hit.distance } else { FAR });
+        let mut found = Found::default();
+        let mut of_light = NO_LIGHT;
+        if is_surface && hit.front {
+            of_light = scene.triangles[hit.triangle as usize].light;
+        }
+        let mut is_known = false;
+        for (ranked, visible) in state.ranked().iter().zip(&mut found.lights) {
+            let is_met = ranked.light == of_light;
+            is_known |= is_met;
+            if ranked.is_wide != 0 {
+                if is_met {
+                    visible.seen = share.to_array();
+                }
+                let light = &scene.lights[ranked.light as usize];
+                visible.all = f32::from(is_met || is_towards(scene, &ray, light));
+            }
+        }
+        let sums = &mut found.sums;
+        if !is_surface {
+            let light = from_sky(scene, direction) * share;
+            sums.escaped = 1.0;
+            sums.light = light.to_array();
+            sums.largest = light.length();
+            return found;
+        }
+        sums.inverse_distance = 1.0 / hit.distance;
+        if !hit.front {
+            sums.back = 1.0;
+            return found;
+        }
+        let index = scene.triangles[hit.triangle as usize].index;
+        let weights = Vec2::new(hit.u, hit.v);
+        let light = reflected(self.quadtrees, self.elements, index, weights) * share;
+        sums.light = light.to_array();
+        sums.largest = light.length();
+        if of_light != NO_LIGHT && !is_known {
+            let exitance = Vec3::from(scene.lights[of_light as usize].exitance);
+            sums.lamps = (exitance * share).to_array();
+        }
+        found
+    }
+}
+
+/// Light that the sky sends along a direction, as the radiosity of a surface.
+pub fn from_sky(scene: &TracedArrays, direction: Vec3) -> Vec3 {
+    let info = &scene.info;
+    if info.sky_side == 0 {
+        return info.sky.into();
+    }
+    let along = Vec3::from_array(
+        [info.sky_x, info.sky_y, info.sky_z].map(|axis| Vec3::from(axis).dot(direction)),
+    );
+    let d = along / along.abs().element_sum();
+    let side = info.sky_side as f32;
+    let last = info.sky_side - 1;
+    let column = (((d.x + d.y + 1.0) * 0.5 * side).max(0.0) as u32).min(last);
+    let line = (((d.x - d.y + 1.0) * 0.5 * side).max(0.0) as u32).min(last);
+    let square = if d.z < 0.0 { info.sky_side } else { 0 };
+    Vec4::from(scene.sky[((square + line) * info.sky_side + column) as usize]).truncate()
+}
+
+/// Whether a light lies along the ray, behind whatever hides it.
+fn is_towards(scene: &TracedArrays, ray: &Ray, light: &TracedLight) -> bool {
+    let lamps = &scene.lamps[light.first as usize..(light.first + light.count) as usize];
+    lamps.iter().any(|lamp| {
+        let hit = meet(scene, lamp.triangle, ray, FAR, 1.0);
+        hit.triangle != NOTHING && hit.front
+    })
+}

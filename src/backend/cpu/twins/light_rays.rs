@@ -1,0 +1,83 @@
+//! Twin of `shaders/light_rays.wgsl`: rays from points to places on lights and on the sun.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::gather_state::{LANES, PointState, SOURCES, SUN, added_up};
+use super::hemisphere_rays::range;
+use super::lights::{ANY_LIGHT, passed, ray_from, rotated_sobol, to_light};
+use super::trace::{FAR, is_hidden};
+use crate::backend::gpu::layout::{GatherSettings, TracedPoint};
+use crate::backend::gpu::traced_scene::TracedArrays;
+
+/// The rays of one pass from a point.
+pub fn cast_rays(
+    scene: &TracedArrays,
+    point: &TracedPoint,
+    settings: &GatherSettings,
+    state: &mut PointState,
+) {
+    for source in sources(scene, state) {
+        let [from, middle, to] = range(state.shadow_count, state, settings);
+        let mut lanes = [[Vec4::ZERO; LANES as usize]; 2];
+        for i in from..to {
+            let visible = cast_ray(scene, point, state, source, rotated_sobol(i, point));
+            lanes[usize::from(i >= middle)][((i - from) % LANES) as usize] += visible;
+        }
+        for (half, lanes) in lanes.into_iter().enumerate() {
+            let sum = added_up(lanes);
+            let out = &mut state.visible[half * SOURCES + source];
+            out.seen = (Vec3::from(out.seen) + sum.truncate()).to_array();
+            out.all += sum.w;
+        }
+    }
+}
+
+/// Places in `visible` of the lights and the sun that rays are cast to.
+pub fn sources(scene: &TracedArrays, state: &PointState) -> Vec<usize> {
+    let lights = state.ranked().iter().enumerate().filter(|(_, ranked)| ranked.is_wide == 0);
+    let sun = (scene.info.has_sun != 0).then_some(SUN);
+    lights.map(|(k, _)| k).chain(sun).collect()
+}
+
+/// Of one place, in the unit square, on a light or the sun: what is seen, and all of it.
+pub fn cast_ray(
+    scene: &TracedArrays,
+    point: &TracedPoint,
+    state: &PointState,
+    source: usize,
+    at: Vec2,
+) -> Vec4 {
+    if source == SUN {
+        return to_sun(scene, point, towards_sun(scene, at));
+    }
+    let number = state.lights[source].light;
+    let to = to_light(scene, &scene.lights[number as usize], point, at);
+    if to.factor <= 0.0 {
+        return Vec4::ZERO;
+    }
+    let is_seen = to.is_solid && !is_hidden(scene, &to.ray, to.distance, number);
+    let seen = if is_seen { to.factor * passed(scene, &to.ray, to.distance) } else { Vec3::ZERO };
+    seen.extend(to.factor)
+}
+
+/// The direction to a place on the sun.
+pub fn towards_sun(scene: &TracedArrays, at: Vec2) -> Vec3 {
+    let info = &scene.info;
+    let [middle, right, up] = [info.sun_middle, info.sun_right, info.sun_up].map(Vec3::from);
+    let (sine, cosine) = (2.0 * PI * at.y).sin_cos();
+    (middle + (right * cosine + up * sine) * at.x.sqrt()).normalize()
+}
+
+/// What is seen of the sun in a direction, and all of it.
+pub fn to_sun(scene: &TracedArrays, point: &TracedPoint, direction: Vec3) -> Vec4 {
+    let cosine = Vec3::from(point.normal).dot(direction);
+    if cosine <= 0.0 {
+        return Vec4::ZERO;
+    }
+    let ray = ray_from(point, direction);
+    let is_seen = !is_hidden(scene, &ray, FAR, ANY_LIGHT);
+    let seen = if is_seen { cosine * passed(scene, &ray, FAR) } else { Vec3::ZERO };
+    seen.extend(cosine)
+}

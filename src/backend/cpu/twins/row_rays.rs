@@ -1,0 +1,67 @@
+//! Twin of `shaders/row_rays.wgsl`: cosine-distributed rays from patches, and how many meet each
+//! element.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::element::element_at;
+use super::lights::passed;
+use super::trace::{FAR, Ray, nearest_but, turned};
+use crate::backend::gpu::layout::{BACK, FIRST_ELEMENT, NOTHING, OPEN, RowSettings, TracedPatch};
+use crate::backend::gpu::traced_scene::TracedArrays;
+
+/// What the shader is bound to.
+#[derive(Clone, Copy, Debug)]
+pub struct RowRays<'a> {
+    pub scene: &'a TracedArrays,
+    pub quadtrees: &'a [u32],
+    /// Along two tangents and the normal, ray by ray.
+    pub directions: &'a [[f32; 4]],
+}
+
+impl RowRays<'_> {
+    /// Of each slot of a patch the rays that meet it; where there are panes, then what these let
+    /// through, a row a channel.
+    pub fn row_rays(&self, patch: &TracedPatch, settings: &RowSettings) -> Vec<u32> {
+        let slots = settings.slots as usize;
+        let rows = if self.scene.info.panes == NOTHING { 1 } else { 4 };
+        let mut counts = vec![0; rows * slots];
+        for k in 0..settings.rays {
+            let (slot, share) = self.cast_ray(patch, self.direction(k, patch));
+            counts[slot as usize] += 1;
+            for channel in 0..rows - 1 {
+                counts[(channel + 1) * slots + slot as usize] += amount(share[channel], settings);
+            }
+        }
+        counts
+    }
+
+    /// The direction of ray `k`.
+    pub fn direction(&self, k: u32, patch: &TracedPatch) -> Vec3 {
+        let local = Vec4::from(self.directions[k as usize]).truncate();
+        turned(local, patch.normal.into(), patch.rotation)
+    }
+
+    /// The slot that a ray meets, and what passes panes on the way.
+    pub fn cast_ray(&self, patch: &TracedPatch, direction: Vec3) -> (u32, Vec3) {
+        let scene = self.scene;
+        let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
+        let ray = Ray { origin, origin_low, direction, near: patch.near };
+        let hit = nearest_but(scene, &ray, patch.own_triangle);
+        let mut slot = OPEN;
+        if hit.triangle != NOTHING {
+            slot = BACK;
+            if hit.front {
+                let index = scene.triangles[hit.triangle as usize].index;
+                let at = element_at(self.quadtrees, index, Vec2::new(hit.u, hit.v));
+                slot = FIRST_ELEMENT + at.element;
+            }
+        }
+        let end = if hit.triangle != NOTHING { hit.distance } else { FAR };
+        (slot, passed(scene, &ray, end))
+    }
+}
+
+/// What a ray counts in the sums of a channel of which panes let this share through.
+pub fn amount(share: f32, settings: &RowSettings) -> u32 {
+    (share * settings.unit + 0.5) as u32
+}

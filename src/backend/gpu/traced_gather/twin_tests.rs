@@ -1,0 +1,808 @@
+//! `rank_lights.wgsl`, `hemisphere_rays.wgsl`, `light_rays.wgsl` and `settle.wgsl` against their
+//! twins, pass by pass; and the same bits however points are handed over.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::backend::cpu::twins::gather_state::{PointState, SOURCES, SUN};
+use crate::backend::cpu::twins::hemisphere_rays::{Found, HemisphereRays, range};
+use crate::backend::cpu::twins::light_rays;
+use crate::backend::cpu::twins::lights::{ray_from, rotated_sobol};
+use crate::backend::cpu::twins::rank_lights::{
+    MIN_IRRADIANCE_SHARE, Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
+};
+use crate::backend::cpu::twins::settle::{Settled, settle};
+use crate::backend::cpu::twins::trace::nearest;
+use crate::backend::gpu::field::{element_texels, quadtrees};
+use crate::backend::gpu::layout::{NOTHING, TracedLight};
+use crate::backend::gpu::test_support::{
+    gpu, places, random_radiosity, read_buffer, shifts, traced_scenes, turned_by, under_sky_and_sun,
+};
+use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::sampling::hash::{split_mix64_nth, unit_interval};
+use crate::visibility::ray_scene::Hit;
+
+/// A rounding of 32-bit numbers, as a share.
+const ROUNDING: f64 = f32::EPSILON as f64 / 2.0;
+
+/// A gather whose passes are run one at a time, and what the twins read.
+struct Passes {
+    gpu: Gpu,
+    gather: TracedGather,
+    slot: Slot,
+    bound: Bound,
+    arrays: TracedArrays,
+    quadtrees: Vec<u32>,
+    elements: Vec<[f32; 4]>,
+    directions: Vec<[f32; 4]>,
+    points: Vec<TracedPoint>,
+}
+
+/// Workgroups of a pass.
+#[derive(Clone, Copy, Debug)]
+enum Groups {
+    Count(u32),
+    /// As many as the work list of rays, or of rays to lights, has points.
+    Rays,
+    ShadowRays,
+}
+
+impl Passes {
+    /// `count` places of `mesh`, with `rays` rays each at first and 16 times as many in the end.
+    fn new(mesh: &Mesh, count: usize, rays: u32) -> Passes {
+        let gpu = gpu();
+        let gather = TracedGather::with_noise(&gpu, mesh, rays, (1e-6, 0.0)).unwrap();
+        let mut slots = Slots::new(gpu.memory(), count as u32, 1).unwrap();
+        let mut slot = slots.slots.remove(0);
+        // Buffers that are read and written here.
+        let buffer = |bytes: u64, usage| {
+            use wgpu::BufferUsages as Usage;
+            let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST | usage;
+            gpu.memory().buffer("test", bytes, usage).unwrap()
+        };
+        let states = buffer(count as u64 * POINT_STATE_BYTES, wgpu::BufferUsages::empty());
+        let work = WORK_HEADER_BYTES + 2 * count as u64 * 4;
+        let work = buffer(work, wgpu::BufferUsages::INDIRECT);
+        (slot.states, slot.work) = (states, work);
+        let (corners, reflected) = random_radiosity(mesh);
+        let field = RadiosityField { mesh, corners: &corners, reflected: &reflected };
+        let arrays = TracedArrays::new(&gather.lights);
+        let buffers = FieldBuffers::new(gpu.memory(), &field, arrays.radiance_unit).unwrap();
+        let bound = gather.bind(&slot, &buffers);
+        let max_rays = gather.max_rays;
+        let samples = match mesh.scene().sky().uniform_radiance() {
+            Some(_) => HemisphereSamples::progressive(max_rays),
+            None => HemisphereSamples::centred(max_rays, gather.min_rays),
+        };
+        let directions = ordered_directions(&samples, gather.min_rays);
+        let points: Vec<TracedPoint> =
+            places(mesh, count).iter().map(|p| gather.traced_point(p)).collect();
+        gpu.queue.write_buffer(&slot.points, 0, bytemuck::cast_slice(&points));
+        let (quadtrees, elements) = (quadtrees(mesh), element_texels(&field, arrays.radiance_unit));
+        Passes { gpu, gather, bound, arrays, quadtrees, elements, directions, points, slot }
+    }
+
+    fn rays(&self) -> HemisphereRays<'_> {
+        HemisphereRays {
+            scene: &self.arrays,
+            quadtrees: &self.quadtrees,
+            elements: &self.elements,
+            directions: &self.directions,
+        }
+    }
+
+    /// Rays of a half from `first` on, `pass_rays` at most; so little noise that all that may be
+    /// doubled is.
+    fn settings(&self, first: u32, pass_rays: u32) -> GatherSettings {
+        let TracedGather { min_rays, max_rays, .. } = self.gather;
+        let points = self.points.len() as u32;
+        let (noise, dim) = (1e-6, 0.0);
+        GatherSettings { min_rays, max_rays, noise, dim, points, first, pass_rays, padding: 0 }
+    }
+
+    /// Settings of all rays of a half at once.
+    fn whole(&self) -> GatherSettings {
+        self.settings(0, hemisphere::MAX_RAYS)
+    }
+
+    fn run(
+        &self,
+        (bound, pipeline): (&BoundPass, &wgpu::ComputePipeline),
+        settings: &GatherSettings,
+        groups: Groups,
+    ) {
+        let slot = &self.slot;
+        self.gpu.queue.write_buffer(&slot.settings[0], 0, bytemuck::bytes_of(settings));
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        bound.set(&mut pass, pipeline, 0);
+        match groups {
+            Groups::Count(count) => pass.dispatch_workgroups(count, 1, 1),
+            Groups::Rays => pass.dispatch_workgroups_indirect(&slot.work, 0),
+            Groups::ShadowRays => pass.dispatch_workgroups_indirect(&slot.work, 12),
+        }
+        drop(pass);
+        self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    fn states(&self) -> Vec<PointState> {
+        read_buffer(&self.gpu, &self.slot.states)
+    }
+
+    /// Runs `settle`: states and samples of all points, then those that it lists.
+    fn settle(&self, settings: &GatherSettings) -> (Vec<PointState>, Vec<Sample>, [Vec<u32>; 2]) {
+        let slot = &self.slot;
+        let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
+        self.gpu.queue.write_buffer(&slot.work, 0, bytemuck::cast_slice(&header));
+        let pipelines = self.gpu.gather_pipelines();
+        let count = self.points.len();
+        let groups = Groups::Count(count.div_ceil(64) as u32);
+        self.run((&self.bound.settle, &pipelines.settle), settings, groups);
+        let mut samples: Vec<Sample> = read_buffer(&self.gpu, &slot.samples);
+        samples.truncate(count);
+        let work: Vec<u32> = read_buffer(&self.gpu, &slot.work);
+        let (header, lists) = work.split_at(WORK_HEADER_BYTES as usize / 4);
+        assert_eq!([header[1], header[2], header[4], header[5]], [1; 4]);
+        let mut lists = [&lists[..header[0] as usize], &lists[count..][..header[3] as usize]]
+            .map(<[u32]>::to_vec);
+        lists.iter_mut().for_each(|list| list.sort_unstable());
+        (self.states(), samples, lists)
+    }
+}
+
+/// Checks `found` against `expected`, off by `width` and by so many roundings of it at most.
+fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl Fn() -> String) {
+    let off = (f64::from(found) - f64::from(expected)).abs();
+    let most = width + roundings * ROUNDING * f64::from(expected).abs();
+    assert!(off <= most, "{}: {found}, not {expected}: off by {off:e} of {most:e}", what());
+}
+
+// ---------------------------------------------------------------------------------------------
+// Exact rays.
+
+/// The nearest hits of the twin are those of exact rays along the same directions, but for rays so
+/// near an edge that rounding decides: exact rays turned by 2⁻²⁰ meet what the twin does. Distances
+/// are as near as a hit says.
+#[test]
+fn twin_meets_what_exact_rays_meet() {
+    for (name, mesh) in traced_scenes() {
+        let lights = Lights::new(mesh.shared_scene());
+        let arrays = TracedArrays::new(&lights);
+        let exact = RayScene::of_scene(mesh.scene());
+        let unit = 1.0 / arrays.coordinates.length_unit();
+        let samples = HemisphereSamples::progressive(1024);
+        let (mut rays, mut differ) = (0, 0);
+        for place in places(&mesh, 12) {
+            let point = traced(&arrays, &place);
+            for direction in samples.directions(place.normal, 0.3) {
+                let direction = direction.as_vec3().normalize();
+                let hit = nearest(&arrays, &ray_from(&point, direction));
+                let along =
+                    |d: Vec3| exact.closest_hit(place.position, d.as_dvec3(), place.near, None);
+                let truth = along(direction);
+                let index = (hit.triangle != NOTHING)
+                    .then(|| arrays.triangles[hit.triangle as usize].index as usize);
+                rays += 1;
+                let is_same = |h: Option<Hit>| {
+                    h.map(|h| (h.triangle, h.front)) == index.map(|index| (index, hit.front))
+                };
+                if !is_same(truth) {
+                    differ += 1;
+                    let turned = |&(across, _): &(Vec2, Vec3)| along(turned_by(direction, across));
+                    assert!(
+                        shifts().iter().map(turned).any(is_same),
+                        "{name}, {place:?}, {direction}: {hit:?}, not {truth:?}"
+                    );
+                } else if let Some(truth) = truth {
+                    let distance = f64::from(hit.distance) * unit;
+                    // The direction is of unit length but for a rounding.
+                    let most = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
+                    let off = (distance - truth.distance).abs();
+                    assert!(off <= most, "{name}: {off:e} of {most:e}, {hit:?}, {truth:?}");
+                }
+            }
+        }
+        println!("{name}: {differ} of {rays} rays meet something else");
+        // An outline is within 2⁻²⁰ of a ray where it crosses a strip of that width: some hundred
+        // sides, each a radian long, are in 1e-4 of the hemisphere.
+        assert!(differ * 1000 < rays, "{name}: {differ} of {rays} rays");
+    }
+}
+
+/// A point as the device gets it, but for its rotation.
+fn traced(arrays: &TracedArrays, place: &GatherPoint) -> TracedPoint {
+    let [position, position_low] = arrays.coordinates.parts(place.position);
+    TracedPoint {
+        position,
+        near: arrays.coordinates.length(place.near),
+        position_low,
+        normal: place.normal.as_vec3().to_array(),
+        ..Default::default()
+    }
+}
+
+/// Form factors to lights are those of the closed form in 64 bits: off by 3e-5 where it cancels
+/// most, in a triangle of 5e-3 of its distance, and by the lights' own terms.
+#[test]
+fn twin_ranks_lights_as_closed_forms_do() {
+    for (name, mesh) in traced_scenes() {
+        let lights = Lights::new(mesh.shared_scene());
+        let arrays = TracedArrays::new(&lights);
+        for place in places(&mesh, 24) {
+            let point = traced(&arrays, &place);
+            for (number, truth) in lights.importance_ranked(&place) {
+                let found = factor_of(&arrays, &arrays.lights[number as usize], &point);
+                // Near the horizon what is seen of a light is a sliver, good to a few roundings of
+                // the whole.
+                let most = 1e-4 * truth + 16.0 * ROUNDING;
+                assert!(
+                    (f64::from(found) - truth).abs() <= most,
+                    "{name}, light {number}, {place:?}: {found}, not {truth}"
+                );
+            }
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------
+// Pass by pass.
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn gather_passes_equal_their_twins() {
+    let mut met = Met::default();
+    for (name, mesh) in traced_scenes() {
+        compare(name, &Passes::new(&mesh, 7, 256), &mut met);
+    }
+    println!("{met:?}");
+    // All that there is to compare has been there.
+    assert!(met.wide > 0 && met.folded > 0 && met.full > 0 && met.escaped > 0.0);
+    assert!(met.back > 0.0 && met.lamps > 0.0 && met.dim > 0 && met.rounds >= 6);
+}
+
+/// What the scenes have shown.
+#[derive(Debug, Default)]
+struct Met {
+    /// Lights that rays over the hemisphere look for, those that are not convex, points with as many
+    /// lights as are sampled apart.
+    wide: usize,
+    folded: usize,
+    full: usize,
+    /// Lights that are left out since they are dim.
+    dim: usize,
+    escaped: f32,
+    back: f32,
+    lamps: f32,
+    rounds: usize,
+}
+
+fn compare(name: &str, passes: &Passes, met: &mut Met) {
+    let pipelines = passes.gpu.gather_pipelines();
+    let bound = &passes.bound;
+    let all = Groups::Count(passes.points.len() as u32);
+    passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
+    let mut states = passes.states();
+    compare_ranks(name, passes, &states, met);
+    let every: Vec<u32> = (0..passes.points.len() as u32).collect();
+    let mut lists = [every.clone(), every];
+    let mut round = 0;
+    while lists.iter().any(|list| !list.is_empty()) {
+        let what = format!("{name}, round {round}");
+        let first = round == 0;
+        let (rays, shadow_rays) = match first {
+            true => (
+                (&bound.hemisphere_rays, &pipelines.hemisphere_rays, all),
+                (&bound.light_rays, &pipelines.light_rays, all),
+            ),
+            false => (
+                (&bound.more_hemisphere_rays, &pipelines.more_hemisphere_rays, Groups::Rays),
+                (&bound.more_light_rays, &pipelines.more_light_rays, Groups::ShadowRays),
+            ),
+        };
+        // In several passes, the last of them not full; points of the list may have cast different
+        // numbers of rays.
+        let half = |of: &dyn Fn(&PointState) -> u32, list: &[u32]| {
+            list.iter().map(|&p| of(&states[p as usize])).max().unwrap_or(0)
+        };
+        let most = half(&|state| state.ray_count, &lists[0]);
+        let most_shadow = half(&|state| state.shadow_count, &lists[1]);
+        let parts = |most: u32| {
+            let len = most * 5 / 8 + 1;
+            (0..most).step_by(len as usize).map(move |from| (from, len))
+        };
+        for (from, len) in parts(most) {
+            let settings = passes.settings(from, len);
+            passes.run((rays.0, rays.1), &settings, rays.2);
+            let after = passes.states();
+            let what = format!("{what}, rays from {from}");
+            compare_rays(&what, passes, &settings, &lists[0], [&states, &after]);
+            states = after;
+        }
+        if passes.gather.has_lights() {
+            for (from, len) in parts(most_shadow) {
+                let settings = passes.settings(from, len);
+                passes.run((shadow_rays.0, shadow_rays.1), &settings, shadow_rays.2);
+                let after = passes.states();
+                let what = format!("{what}, rays to lights from {from}");
+                compare_shadow_rays(&what, passes, &settings, &lists[1], [&states, &after]);
+                states = after;
+            }
+        }
+        let (after, samples, listed) = passes.settle(&passes.whole());
+        compare_settled(&what, passes, &passes.whole(), [&states, &after], &samples, &listed);
+        for sums in after.iter().flat_map(|state| &state.rays) {
+            met.escaped += sums.escaped;
+            met.back += sums.back;
+            met.lamps += sums.lamps[0];
+        }
+        (states, lists) = (after, listed);
+        round += 1;
+        met.rounds = met.rounds.max(round);
+    }
+    // All have cast as many rays as they may, unless these agree.
+    let most = passes.gather.max_rays;
+    let settled = passes.settle(&passes.whole()).1;
+    assert!(settled.iter().all(|s| s.rays == most || s.noise < 1e-5), "{name}: {settled:?}");
+}
+
+// ---------------------------------------------------------------------------------------------
+// Lights.
+
+/// Lights are the same, in the same order but where they send the same within rounding.
+fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut Met) {
+    let arrays = &passes.arrays;
+    for (p, (point, state)) in passes.points.iter().zip(device).enumerate() {
+        let what = format!("{name}, point {p}");
+        let twin = rank_lights(arrays, point, &passes.whole());
+        assert_eq!(state.light_count, twin.light_count, "{what}: {state:?}, not {twin:?}");
+        let irradiance = |light: u32| {
+            let light = &arrays.lights[light as usize];
+            f64::from(irradiance_of(light, factor_of(arrays, light, point)))
+        };
+        for (a, b) in state.ranked().iter().zip(twin.ranked()) {
+            let light = &arrays.lights[a.light as usize];
+            let off = factor_error(arrays, light, point);
+            if a.light != b.light {
+                let (sent, other) = (irradiance(a.light), irradiance(b.light));
+                let brightest = f64::from(Vec3::from(light.exitance).max_element());
+                assert!((sent - other).abs() < 4.0 * off * brightest, "{what}: {a:?}, not {b:?}");
+            }
+            check(a.factor, factor_of(arrays, light, point), (off, 0.0), || what.clone());
+            let of_twin = twin.ranked().iter().find(|other| other.light == a.light);
+            assert_eq!(Some(a.is_wide), of_twin.map(|b| b.is_wide), "{what}: {a:?}, not {b:?}");
+            met.wide += a.is_wide as usize;
+            met.folded += usize::from(light.is_convex == 0);
+        }
+        // Of lights that send the same the lower number comes first.
+        for pair in state.ranked().windows(2) {
+            let sent =
+                |k: usize| irradiance_of(&arrays.lights[pair[k].light as usize], pair[k].factor);
+            assert!(sent(0) > sent(1) || pair[0].light < pair[1].light, "{what}: {pair:?}");
+        }
+        met.full += usize::from(state.light_count == 8);
+        let all: f64 = (0..arrays.info.lights).map(irradiance).sum();
+        met.dim += (0..arrays.info.lights)
+            .filter(|&k| {
+                let sent = irradiance(k);
+                sent > 0.0 && sent <= f64::from(MIN_IRRADIANCE_SHARE) * all
+            })
+            .count();
+        let rest = PointState { lights: state.lights, ..twin };
+        assert_eq!(*state, rest, "{what}: nothing has been cast");
+    }
+}
+
+/// What a device may be off in the form factor of a light. Each side of a polygon is an angle times
+/// a cosine: lavapipe's arc tangent is off by 2.1e-5 of itself, and by less where it is large; the
+/// rest of it is some 20 roundings. What counts by its middle has no more of these.
+fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint) -> f64 {
+    let share = 2.1e-5 + 20.0 * ROUNDING;
+    let of_triangle = |t| match seen(t, point) {
+        Seen::Back => 0.0,
+        Seen::Small(factor) => 20.0 * ROUNDING * f64::from(factor),
+        Seen::Cut(corners) => {
+            let next = corners.iter().cycle().skip(1);
+            let sides = corners.iter().zip(next);
+            let normal = point.normal.into();
+            let sum: f32 = sides.map(|(&a, &b)| side(a, b, normal).abs()).sum();
+            share * f64::from(sum / (2.0 * PI))
+        }
+    };
+    triangles(arrays, light).map(of_triangle).sum()
+}
+
+// ---------------------------------------------------------------------------------------------
+// Rays over the hemisphere.
+
+/// Numbers of [`Found`], and which of them is the largest ray.
+const NUMBERS: usize = size_of::<Found>() / 4;
+const LARGEST: usize = 9;
+
+fn numbers(found: &Found) -> [f32; NUMBERS] {
+    bytemuck::cast(*found)
+}
+
+/// Between what a ray may find.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    /// Most less least of each number, of all rays; of the largest ray least and most.
+    widths: [f64; NUMBERS],
+    largest: [f32; 2],
+    unsure: usize,
+    rays: usize,
+}
+
+impl Spread {
+    const NONE: Spread = Spread { widths: [0.0; NUMBERS], largest: [0.0; 2], unsure: 0, rays: 0 };
+
+    /// One ray more, which may find any of these.
+    fn add(&mut self, found: &[[f32; NUMBERS]]) {
+        let mut low = found[0];
+        let mut high = found[0];
+        for other in found {
+            for k in 0..NUMBERS {
+                low[k] = low[k].min(other[k]);
+                high[k] = high[k].max(other[k]);
+            }
+        }
+        let mut is_unsure = false;
+        for k in 0..NUMBERS {
+            let width = high[k] - low[k];
+            self.widths[k] += f64::from(width);
+            is_unsure |= width > 0.05 * high[k].abs();
+        }
+        self.largest = [self.largest[0].max(low[LARGEST]), self.largest[1].max(high[LARGEST])];
+        self.unsure += usize::from(is_unsure);
+        self.rays += 1;
+    }
+}
+
+/// Sums over rays are those of the twin, but for what the rays that rounding may turn aside find:
+/// see [`shifts`].
+fn compare_rays(
+    what: &str,
+    passes: &Passes,
+    settings: &GatherSettings,
+    list: &[u32],
+    [before, after]: [&[PointState]; 2],
+) {
+    let rays = passes.rays();
+    let shifts = shifts();
+    let compare = |p: usize| {
+        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
+        let what = format!("{what}, point {p}");
+        if !list.contains(&(p as u32)) {
+            assert_eq!(was, is, "{what} is not listed");
+            return;
+        }
+        let mut twin = *was;
+        rays.cast_rays(point, settings, &mut twin);
+        let [from, middle, to] = range(was.ray_count, was, settings);
+        let mut spreads = [Spread::NONE; 2];
+        for k in from..to {
+            let direction = rays.direction(k, point);
+            let found = shifts.iter().map(|&(across, origin)| {
+                let low = (Vec3::from(point.position_low) + origin).to_array();
+                let shifted = TracedPoint { position_low: low, ..*point };
+                numbers(&rays.cast_ray(&shifted, turned_by(direction, across), was))
+            });
+            spreads[usize::from(k >= middle)].add(&found.collect::<Vec<_>>());
+        }
+        for (half, spread) in spreads.iter().enumerate() {
+            // A lane adds up its rays, then 64 lanes are; a term takes some 40 operations.
+            let roundings = spread.rays as f64 / 64.0 + 6.0 + 40.0;
+            let of = |state: &PointState| {
+                let mut found = Found { sums: state.rays[half], ..Default::default() };
+                let visible = &state.visible[half * SOURCES..][..SOURCES - 1];
+                found.lights.copy_from_slice(visible);
+                numbers(&found)
+            };
+            let (found, expected) = (of(is), of(&twin));
+            for k in (0..NUMBERS).filter(|&k| k != LARGEST) {
+                let name = || format!("{what}, half {half}, number {k}");
+                check(found[k], expected[k], (spread.widths[k], roundings), name);
+            }
+            let [low, high] = spread.largest.map(|l| l.max(was.rays[half].largest));
+            let largest = found[LARGEST];
+            let slack = 40.0 * ROUNDING as f32 * high;
+            assert!(
+                largest >= low - slack && largest <= high + slack,
+                "{what}, half {half}: largest {largest}, not {low} to {high}"
+            );
+            // The rule is worth something only where few rays are near an edge: some hundred sides
+            // a radian long, and as many lines between elements, are in 2e-4 of the hemisphere, and
+            // those between pieces of a sky, 2⁻⁹ apart, in 2⁻¹⁰ of it.
+            assert!(
+                spread.unsure <= 2 + spread.rays / 100,
+                "{what}: {} of {} rays are unsure",
+                spread.unsure,
+                spread.rays
+            );
+        }
+        let rest = PointState { rays: is.rays, visible: is.visible, ..*was };
+        assert_eq!(*is, rest, "{what}: nothing else is written");
+        for k in (0..SOURCES).filter(|&k| k == SUN || was.lights[k].is_wide == 0) {
+            for k in [k, k + SOURCES] {
+                assert_eq!(is.visible[k], was.visible[k], "{what}: light {k} is not wide");
+            }
+        }
+    };
+    (0..passes.points.len()).into_par_iter().for_each(compare);
+}
+
+// ---------------------------------------------------------------------------------------------
+// Rays to lights.
+
+/// As much of each light is seen as the twin sees, but for rays that rounding may turn aside, or to
+/// another texel of a mask.
+fn compare_shadow_rays(
+    what: &str,
+    passes: &Passes,
+    settings: &GatherSettings,
+    list: &[u32],
+    [before, after]: [&[PointState]; 2],
+) {
+    let arrays = &passes.arrays;
+    let shifts = shifts();
+    let compare = |p: usize| {
+        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
+        let what = format!("{what}, point {p}");
+        if !list.contains(&(p as u32)) {
+            assert_eq!(was, is, "{what} is not listed");
+            return;
+        }
+        let mut twin = *was;
+        light_rays::cast_rays(arrays, point, settings, &mut twin);
+        let [from, middle, to] = range(was.shadow_count, was, settings);
+        for source in light_rays::sources(arrays, was) {
+            let mut widths = [[0f64; 4]; 2];
+            let (mut unsure, mut rays) = (0, [0u32; 2]);
+            for i in from..to {
+                let at = rotated_sobol(i, point);
+                // Places move as directions do: a light is no wider than the hemisphere. The sun's
+                // are turned, since it is far smaller.
+                let found = shifts.iter().map(|&(across, origin)| {
+                    let low = (Vec3::from(point.position_low) + origin).to_array();
+                    let shifted = TracedPoint { position_low: low, ..*point };
+                    if source == SUN {
+                        let direction = turned_by(light_rays::towards_sun(arrays, at), across);
+                        return light_rays::to_sun(arrays, &shifted, direction);
+                    }
+                    let moved = (at + across).clamp(Vec2::ZERO, Vec2::ONE);
+                    light_rays::cast_ray(arrays, &shifted, was, source, moved)
+                });
+                let found: Vec<_> = found.collect();
+                let low = found.iter().fold(found[0], |low, f| low.min(*f));
+                let high = found.iter().fold(found[0], |high, f| high.max(*f));
+                let half = usize::from(i >= middle);
+                rays[half] += 1;
+                for k in 0..4 {
+                    widths[half][k] += f64::from(high[k] - low[k]);
+                }
+                unsure += u32::from((high - low).max_element() > 0.05 * high.max_element());
+            }
+            for (half, widths) in widths.iter().enumerate() {
+                let roundings = f64::from(rays[half]) / 64.0 + 6.0 + 40.0;
+                let k = half * SOURCES + source;
+                let (found, expected) = (is.visible[k], twin.visible[k]);
+                let numbers = found.seen.into_iter().chain([found.all]);
+                let numbers = numbers.zip(expected.seen.into_iter().chain([expected.all]));
+                for ((found, expected), &width) in numbers.zip(widths) {
+                    let name = || format!("{what}, half {half}, light {source}");
+                    check(found, expected, (width, roundings), name);
+                }
+            }
+            // A place is near an outline, or a side of a texel, as seldom as a ray is; near the
+            // horizon and a light's own plane a factor is small, and may be off by much of itself.
+            let all = rays[0] + rays[1];
+            assert!(unsure <= 2 + all / 50, "{what}, light {source}: {unsure} of {all} are unsure");
+        }
+        let mut rest = PointState { visible: is.visible, ..*was };
+        assert_eq!(*is, rest, "{what}: nothing else is written");
+        for source in light_rays::sources(arrays, was) {
+            for k in [source, source + SOURCES] {
+                rest.visible[k] = was.visible[k];
+            }
+        }
+        assert_eq!(rest, *was, "{what}: no other light is written");
+    };
+    (0..passes.points.len()).into_par_iter().for_each(compare);
+}
+
+// ---------------------------------------------------------------------------------------------
+// What rays amount to.
+
+/// Samples within rounding, the same decisions, and what is added up bit for bit.
+fn compare_settled(
+    what: &str,
+    passes: &Passes,
+    settings: &GatherSettings,
+    [before, after]: [&[PointState]; 2],
+    samples: &[Sample],
+    listed: &[Vec<u32>; 2],
+) {
+    for (p, (was, is)) in before.iter().zip(after).enumerate() {
+        let what = format!("{what}, point {p}");
+        let mut twin = *was;
+        let Some(settled) = settle(&passes.arrays, &passes.points[p], settings, &mut twin) else {
+            assert_eq!(was, is, "{what} is settled");
+            continue;
+        };
+        compare_samples(&what, &samples[p], &settled);
+        // Errors are differences of means, which are some 40 roundings off.
+        let of_means = |mean: [f32; 3]| Vec3::from(mean).length();
+        let slack = 160.0 * ROUNDING as f32 * of_means(settled.sample.irradiance);
+        let Settled { ray_error, shadow_error, allowed, .. } = settled;
+        if is.pending != twin.pending {
+            let is_near = (settled.sample.noise - allowed).abs() <= 2.0 * slack
+                || (ray_error - shadow_error).abs() <= 2.0 * slack;
+            assert!(is_near, "{what}: next {}, not {}", is.pending, twin.pending);
+            continue;
+        }
+        if is.pending != 0 {
+            assert!((is.ray_error - ray_error).abs() <= slack, "{what}: {is:?}, not {twin:?}");
+            assert!((is.shadow_error - shadow_error).abs() <= slack, "{what}: {is:?}, {twin:?}");
+        }
+        let rest = PointState { ray_error: is.ray_error, shadow_error: is.shadow_error, ..twin };
+        assert_eq!(*is, rest, "{what}");
+    }
+    for (k, list) in listed.iter().enumerate() {
+        let points = (0..after.len() as u32).zip(after);
+        let pending = points.filter(|(_, state)| state.pending == k as u32 + 1);
+        assert_eq!(*list, pending.map(|(p, _)| p).collect::<Vec<_>>(), "{what}, list {k}");
+    }
+}
+
+/// All that is summed is positive: some 40 roundings of the sum, which is as long as any channel;
+/// the noise is a difference of halves, either of which may be twice their mean.
+fn compare_samples(what: &str, found: &Sample, settled: &Settled) {
+    let expected = &settled.sample;
+    let whole = f64::from(Vec3::from(expected.irradiance).length());
+    let width = 40.0 * ROUNDING * whole;
+    let vectors = [(found.irradiance, expected.irradiance), (found.direct, expected.direct)];
+    for (found, expected) in vectors {
+        for (a, b) in found.into_iter().zip(expected) {
+            check(a, b, (width, 0.0), || what.to_string());
+        }
+    }
+    check(found.noise, expected.noise, (4.0 * width, 0.0), || format!("{what}, noise"));
+    let shares = [
+        (found.escaped, expected.escaped),
+        (found.back, expected.back),
+        (found.inverse_distance, expected.inverse_distance),
+    ];
+    for (found, expected) in shares {
+        // A sum and a division, which are off by three roundings.
+        check(found, expected, (0.0, 8.0), || format!("{what}, share"));
+    }
+    assert_eq!([found.rays, found.shadow_rays], [expected.rays, expected.shadow_rays], "{what}");
+}
+
+/// States of all kinds, in several workgroups: with so much noise that many points have enough.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn settle_equals_its_twin_from_any_state() {
+    let mut decided = [0; 4];
+    for (name, mesh) in traced_scenes() {
+        let passes = Passes::new(&mesh, 150, 64);
+        let settings = GatherSettings { noise: 0.05, dim: 0.3, ..passes.whole() };
+        let lights = passes.arrays.info.lights;
+        let states: Vec<PointState> = (0..150).map(|k| any_state(k, lights, &settings)).collect();
+        let slot = &passes.slot;
+        passes.gpu.queue.write_buffer(&slot.states, 0, bytemuck::cast_slice(&states));
+        let (after, samples, listed) = passes.settle(&settings);
+        compare_settled(name, &passes, &settings, [&states, &after], &samples, &listed);
+        for (was, is) in states.iter().zip(&after) {
+            decided[if was.pending == 0 { 3 } else { is.pending as usize }] += 1;
+        }
+    }
+    println!("enough, more rays, more rays to lights, settled before: {decided:?}");
+    assert!(decided.iter().all(|&count| count > 50), "{decided:?}");
+}
+
+/// A state that rays may leave: halves that are much alike.
+fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
+    let mut next = 1000 * seed;
+    let mut random = || {
+        next += 1;
+        unit_interval(split_mix64_nth(next)) as f32
+    };
+    let pending = (4.0 * random()) as u32;
+    let halving = |random: f32| (5.0 * random) as u32;
+    let mut state = PointState {
+        light_count: lights.min((9.0 * random()) as u32),
+        // Before this doubling.
+        ray_count: settings.min_rays << halving(random()),
+        shadow_count: (settings.min_rays / RAYS_PER_SHADOW_RAY) << halving(random()),
+        pending,
+        ray_error: 0.1 * random(),
+        shadow_error: 0.1 * random(),
+        ..Default::default()
+    };
+    if pending == 1 {
+        state.ray_count = (state.ray_count / 2).max(settings.min_rays);
+    }
+    if pending == 2 {
+        state.shadow_count = (state.shadow_count / 2).max(settings.min_rays / RAYS_PER_SHADOW_RAY);
+    }
+    let rays = state.ray_count as f32;
+    let apart = 0.3 * random();
+    for (k, light) in state.lights.iter_mut().enumerate() {
+        light.light = k as u32 % lights.max(1);
+        (light.factor, light.is_wide) = (0.2 * random(), u32::from(random() < 0.3));
+    }
+    for sums in &mut state.rays {
+        let mut term = |most: f32| rays * most * (1.0 + apart * random());
+        sums.light = [term(0.3), term(0.2), term(0.4)];
+        sums.lamps = [term(0.1), term(0.1), term(0.05)];
+        (sums.escaped, sums.back) = (term(0.1).floor(), term(0.1).floor());
+        sums.inverse_distance = term(1.0);
+        sums.largest = random();
+    }
+    for visible in &mut state.visible {
+        visible.all = 1.0 + random();
+        visible.seen = [(); 3].map(|_| visible.all * (1.0 - apart * random()));
+    }
+    state
+}
+
+// ---------------------------------------------------------------------------------------------
+// The same bits.
+
+/// Gathers at these places, no more than `most` at once.
+fn gathered(
+    gather: &mut TracedGather,
+    field: &RadiosityField,
+    points: &[GatherPoint],
+    most: u32,
+) -> Vec<IrradianceSample> {
+    let traced: Vec<TracedPoint> = points.iter().map(|p| gather.traced_point(p)).collect();
+    let buffers = gather.gpu.field_buffers(&gather.scene, field).unwrap();
+    gather.gather_all(&buffers, &traced, most).unwrap()
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn gathers_have_the_same_bits_in_any_batches() {
+    let gpu = gpu();
+    for (name, mesh) in traced_scenes() {
+        let (corners, reflected) = random_radiosity(&mesh);
+        let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+        let new = || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap();
+        // More batches of 64 than are under way at once.
+        let points = places(&mesh, 300);
+        let mut gather = new();
+        let all = gathered(&mut gather, &field, &points, MAX_POINTS);
+        assert!(all.iter().any(|sample| sample.noise > 0.0));
+        for most in [MAX_POINTS, 64, 7, 100, 256] {
+            let again = gathered(&mut gather, &field, &points, most);
+            assert!(again == all, "{name}: batches of {most}");
+        }
+        assert!(new().gather(&field, &points).unwrap() == all, "{name}: another gather");
+        for k in (0..300).step_by(23) {
+            let alone = gather.gather(&field, &points[k..=k]).unwrap();
+            assert_eq!(alone, [all[k]], "{name}: point {k} alone");
+        }
+    }
+}
+
+/// More rays than one pass casts: passes add up to what one does, but for the order of sums.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn many_rays_are_cast_in_several_passes() {
+    let (gpu, mesh) = (gpu(), under_sky_and_sun());
+    let (corners, reflected) = random_radiosity(&mesh);
+    let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+    let points = places(&mesh, 5);
+    let few = TracedGather::new(&gpu, &mesh, PASS_RAYS).unwrap().gather(&field, &points).unwrap();
+    let mut gather = TracedGather::new(&gpu, &mesh, 16 * PASS_RAYS).unwrap();
+    let many = gather.gather(&field, &points).unwrap();
+    assert_eq!(gather.rays(), 5 * u64::from(16 * PASS_RAYS + 4 * PASS_RAYS));
+    for (a, b) in few.iter().zip(&many) {
+        // Standard error of stratified samples: less than that of independent ones, 1/√n each.
+        let most = 4.0 / f64::from(PASS_RAYS).sqrt() * b.irradiance.length();
+        assert!(a.irradiance.distance(b.irradiance) <= most, "{a:?}, not {b:?}");
+    }
+}

@@ -1,0 +1,224 @@
+//! `row_rays.wgsl` and `compact_rows.wgsl` against their twins; and the same bits however patches
+//! are handed over.
+
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::backend::cpu::twins::compact_rows::compact_rows;
+use crate::backend::cpu::twins::row_rays::{RowRays, amount};
+use crate::backend::gpu::layout::TEXELS_A_LINE;
+use crate::backend::gpu::test_support::{gpu, read_buffer, shifts, traced_scenes, turned_by};
+use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::sampling::hash::split_mix64_nth;
+
+/// Rows with counts that can be read and written here.
+fn open_rows(gpu: &Gpu, mesh: &Mesh, rays: u32) -> TracedRows {
+    use wgpu::BufferUsages as Usage;
+    let mut rows = TracedRows::new(gpu, mesh, rays).unwrap();
+    let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
+    let bytes = u64::from(MAX_BATCH * rows.slots) * 16;
+    rows.buffers.counts = gpu.memory().buffer("test", bytes, usage).unwrap();
+    rows
+}
+
+impl TracedRows {
+    fn settings(&self, rays: u32) -> RowSettings {
+        let unit = passed_unit(rays.max(1)) as f32;
+        RowSettings { rays, slots: self.slots, unit, entries: self.buffers.entries }
+    }
+}
+
+fn sorted(mut entries: Vec<RowEntry>) -> Vec<RowEntry> {
+    entries.sort_unstable_by_key(|e| (e.patch_, e.slot));
+    entries
+}
+
+/// Patches of several sizes on triangles all over the mesh.
+fn patches(mesh: &Mesh) -> Vec<NodeId> {
+    let elements = (0..6).map(|k| mesh.element(k * mesh.element_count() / 6));
+    elements.chain([mesh.root(0)]).collect()
+}
+
+/// Each slot is met by as many rays as the twin says, but for those that rounding may turn aside:
+/// see [`shifts`]; and what panes let through of them is its sum, but for one unit a ray.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn row_rays_equal_their_twin() {
+    let gpu = gpu();
+    let shifts = shifts();
+    let (mut open, mut back, mut dimmed) = (0, 0, 0);
+    for (name, mesh) in traced_scenes() {
+        // Some lanes idle; directions in two lines of their texture.
+        let count = TEXELS_A_LINE + 500;
+        let rows = open_rows(&gpu, &mesh, count);
+        let lights = Lights::new(mesh.shared_scene());
+        let (arrays, quadtrees) = (TracedArrays::new(&lights), quadtrees(&mesh));
+        let local = |&[x, y, z]: &[f64; 3]| [x as f32, y as f32, z as f32, 0.0];
+        let samples = HemisphereSamples::new(count).unwrap();
+        let directions: Vec<[f32; 4]> = samples.local().iter().map(local).collect();
+        let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
+        let traced: Vec<TracedPatch> =
+            patches(&mesh).iter().map(|&patch| rows.traced_patch(&mesh, patch)).collect();
+        let settings = rows.settings(count);
+        let entries = rows.entries(&traced, settings, 0).unwrap().unwrap();
+        let channels = if rows.has_panes { 4 } else { 1 };
+        let slots = settings.slots as usize;
+        for (k, patch) in traced.iter().enumerate() {
+            let what = format!("{name}, patch {k}");
+            let expected = twin.row_rays(patch, &settings);
+            assert_eq!(expected.len(), channels * slots);
+            let mut found = vec![0; channels * slots];
+            for entry in entries.iter().filter(|entry| entry.patch_ == k as u32) {
+                found[entry.slot as usize] = entry.count;
+                for channel in 0..channels - 1 {
+                    found[(channel + 1) * slots + entry.slot as usize] = entry.passed[channel];
+                }
+            }
+            assert_eq!(found[..slots].iter().sum::<u32>(), count, "{what}");
+            // Between which each number may be.
+            let (mut low, mut high) = (vec![0; channels * slots], vec![0; channels * slots]);
+            let mut unsure = 0;
+            for ray in 0..count {
+                let direction = twin.direction(ray, patch);
+                let may_find = |&(across, origin): &(Vec2, Vec3)| {
+                    let at = (Vec3::from(patch.position_low) + origin).to_array();
+                    let shifted = TracedPatch { position_low: at, ..*patch };
+                    twin.cast_ray(&shifted, turned_by(direction, across))
+                };
+                let found: Vec<(u32, Vec3)> = shifts.iter().map(may_find).collect();
+                let is_sure = found.iter().all(|other| other.0 == found[0].0);
+                unsure += u32::from(!is_sure);
+                let mut seen = vec![];
+                for &(slot, _) in &found {
+                    if seen.contains(&slot) {
+                        continue;
+                    }
+                    seen.push(slot);
+                    let shares = found.iter().filter(|other| other.0 == slot).map(|other| other.1);
+                    let most = shares.clone().fold(Vec3::ZERO, Vec3::max);
+                    let least = shares.fold(Vec3::ONE, Vec3::min);
+                    let slot = slot as usize;
+                    high[slot] += 1;
+                    low[slot] += u32::from(is_sure);
+                    for channel in 0..channels - 1 {
+                        let at = (channel + 1) * slots + slot;
+                        high[at] += amount(most[channel], &settings) + 1;
+                        let least = amount(least[channel], &settings).saturating_sub(1);
+                        low[at] += if is_sure { least } else { 0 };
+                    }
+                }
+            }
+            for k in 0..channels * slots {
+                let (n, row) = (found[k], k / slots);
+                assert!(
+                    (low[k]..=high[k]).contains(&n),
+                    "{what}, slot {} of row {row}: {n}, not {} to {}; the twin has {}",
+                    k % slots,
+                    low[k],
+                    high[k],
+                    expected[k]
+                );
+            }
+            // Some hundred sides of triangles and elements, a radian long each, are within 2⁻²⁰ of
+            // 2e-4 of all rays.
+            assert!(unsure * 200 < count, "{what}: {unsure} of {count} rays are unsure");
+            (open, back) = (open + found[OPEN as usize], back + found[BACK as usize]);
+            dimmed += (0..slots * usize::from(channels > 1))
+                .filter(|&k| found[slots + k] > 0 && found[slots + k] != found[2 * slots + k])
+                .count();
+        }
+        // Nothing is left for the next batch.
+        let counts: Vec<u32> = read_buffer(&gpu, &rows.buffers.counts);
+        assert!(counts.iter().all(|&count| count == 0), "{name}");
+    }
+    println!("{open} rays meet nothing, {back} backs; {dimmed} slots lie behind coloured glass");
+    assert!(open > 0 && back > 0 && dimmed > 0);
+}
+
+/// Entries are exactly the slots that are not 0, and these are 0 then; of more entries than there
+/// is room for as many are written, and all are counted.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn compact_rows_equals_its_twin() {
+    let gpu = gpu();
+    for (name, mesh) in traced_scenes() {
+        let rows = open_rows(&gpu, &mesh, 1000);
+        let patches: Vec<TracedPatch> = vec![Default::default(); 40];
+        let channels = if rows.has_panes { 4 } else { 1 };
+        let slots = rows.slots as usize;
+        // A third of the slots, the first and the last among them, of any number.
+        let random = |k: usize| split_mix64_nth(k as u64) as u32;
+        let count = |k: usize| match (k % slots, k / slots % channels) {
+            (slot, 0) if slot == 0 || slot == slots - 1 || random(k).is_multiple_of(3) => {
+                random(k + 1).max(1)
+            }
+            (_, 0) => 0,
+            _ => random(k),
+        };
+        let mut counts: Vec<u32> = (0..patches.len() * channels * slots).map(count).collect();
+        // What panes let through of no ray is nothing.
+        for row in counts.chunks_mut(channels * slots) {
+            let (rays, passed) = row.split_at_mut(slots);
+            for channel in passed.chunks_mut(slots) {
+                let unmet = channel.iter_mut().zip(&*rays).filter(|(_, rays)| **rays == 0);
+                unmet.for_each(|(sum, _)| *sum = 0);
+            }
+        }
+        let write = || {
+            gpu.queue.write_buffer(&rows.buffers.counts, 0, bytemuck::cast_slice(&counts));
+        };
+        write();
+        // No ray is cast.
+        let settings = rows.settings(0);
+        let found = rows.entries(&patches, settings, 0).unwrap().unwrap();
+        let mut left = counts.clone();
+        let expected = compact_rows(&mut left, &settings, rows.has_panes);
+        assert!(expected.len() > 2 * patches.len());
+        assert!(words(&sorted(found)) == words(&sorted(expected.clone())), "{name}");
+        let on_device = || read_buffer::<u32>(&gpu, &rows.buffers.counts);
+        assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{name}");
+
+        // Room for two thirds of them, after which there is what was there.
+        let room = expected.len() * 2 / 3;
+        let found: Vec<u32> = read_buffer(&gpu, &rows.buffers.found);
+        let before = entries_in(&found);
+        write();
+        let settings = RowSettings { entries: room as u32, ..settings };
+        assert!(rows.entries(&patches, settings, 0).unwrap().is_none(), "{name}");
+        let found: Vec<u32> = read_buffer(&gpu, &rows.buffers.found);
+        assert_eq!(found[0] as usize, expected.len(), "{name}");
+        let after = entries_in(&found);
+        let expected: Vec<_> = expected.iter().map(bytemuck::bytes_of).collect();
+        let are_entries = after[..room].iter().all(|e| expected.contains(&bytemuck::bytes_of(e)));
+        assert!(are_entries, "{name}");
+        assert!(words(&after[room..]) == words(&before[room..]), "{name}: beyond its end");
+        assert!(on_device().iter().all(|&n| n == 0), "{name}");
+    }
+}
+
+fn words(entries: &[RowEntry]) -> &[u32] {
+    bytemuck::cast_slice(entries)
+}
+
+fn entries_in(found: &[u32]) -> &[RowEntry] {
+    bytemuck::cast_slice(&found[ROW_ENTRIES_HEADER_BYTES as usize / 4..])
+}
+
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn rows_have_the_same_bits_in_any_batches() {
+    let gpu = gpu();
+    for (name, mesh) in traced_scenes() {
+        let mut rows = TracedRows::new(&gpu, &mesh, 1000).unwrap();
+        let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
+        let all = rows.rows(&mesh, &patches, 1.0).unwrap();
+        assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: again");
+        let alone = patches.iter().map(|&p| rows.rows(&mesh, &[p], 1.0).unwrap().remove(0));
+        assert!(alone.collect::<Vec<_>>() == all, "{name}: one by one");
+        // Batches that have no room for their entries are made in two.
+        rows.buffers.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
+        assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
+        rows.buffers.patches_at_once = 3;
+        assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: three at once");
+    }
+}
