@@ -1,6 +1,7 @@
 //! What casting rays on a device takes, made once for a device: pipelines, and the scene and light
 //! that were used last.
 
+use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use super::device::Gpu;
@@ -46,18 +47,45 @@ pub struct GatherPipelines {
 impl GatherPipelines {
     fn new(device: &wgpu::Device) -> GatherPipelines {
         let module = |label, source| pipeline::shader(device, label, source);
-        let rank = module("rank_lights.wgsl", RANK_LIGHTS_WGSL);
-        let hemisphere = module("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL);
-        let lights = module("light_rays.wgsl", LIGHT_RAYS_WGSL);
-        let settle = module("settle.wgsl", SETTLE_WGSL);
-        let compute = |module, entry_point| pipeline::compute(device, module, entry_point);
+        let [rank, hemisphere, lights, settle] = [
+            ("rank_lights.wgsl", RANK_LIGHTS_WGSL),
+            ("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL),
+            ("light_rays.wgsl", LIGHT_RAYS_WGSL),
+            ("settle.wgsl", SETTLE_WGSL),
+        ]
+        .map(|(label, source)| module(label, source));
+        // Drivers take up to a second for one, on one core.
+        let entries = [
+            (&rank, "rank_lights"),
+            (&hemisphere, "hemisphere_rays"),
+            (&hemisphere, "more_hemisphere_rays"),
+            (&lights, "light_rays"),
+            (&lights, "more_light_rays"),
+            (&settle, "settle"),
+        ];
+        // Not by the pool: a thread of it may be waiting for them.
+        let compiled = std::thread::scope(|scope| {
+            entries
+                .map(|(module, entry_point)| {
+                    scope.spawn(move || pipeline::compute(device, module, entry_point))
+                })
+                .map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        });
+        let [
+            rank_lights,
+            hemisphere_rays,
+            more_hemisphere_rays,
+            light_rays,
+            more_light_rays,
+            settle,
+        ] = compiled;
         GatherPipelines {
-            rank_lights: compute(&rank, "rank_lights"),
-            hemisphere_rays: compute(&hemisphere, "hemisphere_rays"),
-            more_hemisphere_rays: compute(&hemisphere, "more_hemisphere_rays"),
-            light_rays: compute(&lights, "light_rays"),
-            more_light_rays: compute(&lights, "more_light_rays"),
-            settle: compute(&settle, "settle"),
+            rank_lights,
+            hemisphere_rays,
+            more_hemisphere_rays,
+            light_rays,
+            more_light_rays,
+            settle,
         }
     }
 }
@@ -95,6 +123,15 @@ impl Gpu {
             self.queue.submit([]);
             self.wait()
         })
+    }
+
+    /// Starts to compile all passes of rays, so that they are there when the scene is read.
+    pub(super) fn compile_ahead(&self) {
+        let gpu = self.clone();
+        std::thread::spawn(move || {
+            gpu.gather_pipelines();
+            gpu.row_pipelines();
+        });
     }
 
     /// The passes of rows: compiled at the first call.
