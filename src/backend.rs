@@ -187,7 +187,8 @@ impl Backend {
 
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
     /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
-    /// doubled where they disagree, up to 16 times. What is darker than a twentieth of the mean reflected radiosity has that share of this instead.
+    /// doubled where they disagree, up to 16 times. What is darker than a twentieth of the mean
+    /// reflected radiosity has that share of this instead.
     /// Where the device fails, rays on the CPU go on.
     ///
     /// # Errors

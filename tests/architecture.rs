@@ -18,10 +18,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("form_factor", "error geometry mesh ranks scene"),
     ("solver", "error form_factor geometry mesh progress scene visibility"),
     ("vertex", "error form_factor geometry mesh scene"),
-    (
-        "gather",
-        "error form_factor geometry hemicube mesh progress ranks sampling scene vertex visibility",
-    ),
+    ("gather", "error form_factor geometry mesh progress ranks sampling scene vertex visibility"),
     ("grid", "error gather geometry scene visibility"),
     ("probe", "error gather progress scene visibility"),
     ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),

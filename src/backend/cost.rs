@@ -1,7 +1,7 @@
 //! What a row costs, by a hemicube and by rays: bakes choose by it.
 //!
 //! ```text
-//! hemicube               hemicube + triangle · T + pixel · 3 N²        T triangles, N pixels an edge
+//! hemicube               hemicube + triangle · T + pixel · 3 N²      T triangles, N pixels an edge
 //! N² rays on the device  device_row + device_ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
 //! N² rays on the CPU     ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
 //! ```

@@ -1,7 +1,7 @@
 //! Irradiance at points anywhere: on surfaces or in the air, each with its standard error.
 //!
 //! A point gathers four times, from heights a hair apart. Each is another cell of the rotation, so
-//! that rays and hemicubes look elsewhere, while the light is the same. The mean is the irradiance,
+//! that rays look elsewhere, while the light is the same. The mean is the irradiance,
 //! and how far the four are apart its standard error:
 //!
 //! ```text

@@ -49,8 +49,8 @@ impl Panes {
         self.rays.is_none()
     }
 
-    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and the share
-    /// per channel that passes each.
+    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and what
+    /// passes each: a share per channel.
     pub fn hierarchy(&self) -> Option<(&RayScene, &[Rgb])> {
         Some((self.rays.as_ref()?, &self.transmittance))
     }

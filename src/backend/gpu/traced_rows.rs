@@ -2,7 +2,7 @@
 //! compacted there.
 //!
 //! ```text
-//! patches ─► a ray a lane ─► counts, dense: patch × slot ─► entries of all rows in one list ─► readback
+//! patches ─► a ray a lane ─► counts, dense: patch × slot ─► entries, row by row ─► readback
 //!                                                 ▲  zeros  │
 //!                                                 └─────────┘
 //! ```

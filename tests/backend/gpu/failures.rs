@@ -346,8 +346,8 @@ fn little_memory_gathers_the_same_in_smaller_batches() {
     let gather =
         |gpu: &Gpu| TracedGather::new(gpu, &mesh, 64)?.gather(&light.radiosity_field(), &places);
     let all = gather(&gpu).unwrap();
-    // The light of 4 096 elements, whose texture has whole lines of 2 048, is half of it; a batch of
-    // 64 points takes some 50 KB, one of one a sixty-fourth of that.
+    // The light, in whole lines of 2 048 texels, takes most of it; a batch of 64 points some 50 KB,
+    // one of one point a sixty-fourth of that.
     let one: u64 = 1 << 17;
     let mut fits = vec![];
     // In steps of an eighth: somewhere there is room for all but the light that comes last.

@@ -160,7 +160,7 @@ fn direct_light_is_the_closed_form() {
         // What could give less than 1e-3 of it all is left to the rays over the hemisphere.
         let least = 1e-3 * factors.iter().sum::<f64>();
         let want = lamp(LAMP).exitance * factors.iter().filter(|&&f| f > least).sum::<f64>();
-        // Every ray to the light arrives: the closed form as it is, and rays that meet what is left.
+        // Every ray to the light arrives: the closed form as it is, and rays meet what is left.
         let left = lamp(LAMP).exitance * factors.iter().filter(|&&f| f <= least).sum::<f64>();
         let off = (got.direct - want).max_element();
         let a_ray = 3.0 * LAMP[2] / 64.0;
@@ -206,9 +206,9 @@ fn half_hidden_light_matches_clipped_polygon() {
         let (want, whole) = (factor(&place, &left), factor(&place, &square));
         let error = (got.direct.x - want) / whole;
         worst[k / 20] = error.abs().max(worst[k / 20]);
-        // Of 1024 points on the light, a (0,2)-net turned along both axes, an edge has wrong no more
-        // than those in the cells of 1/32 that it crosses, two times 32 at most, evenly to either
-        // side: 6 √(64/12) = 14 of them.
+        // Of 1024 points on the light, a (0,2)-net turned along both axes, an edge has wrong no
+        // more than those in the cells of 1/32 that it crosses, two times 32 at most, evenly to
+        // either side: 6 √(64/12) = 14 of them.
         assert!(error.abs() < 14.0 / 1024.0, "{k}: {error}");
     }
     println!("worst errors {worst:.4?} of the light, by angle");
@@ -345,9 +345,10 @@ fn sky_backs_and_distance_match_closed_forms() {
             plane.reverse();
         }
         let got = gather_all(&dark(&[(plane, grey())]), &gpu, 4096, &[place])[0];
-        // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Rays start at the
-        // inner rims of their rings: the mean cosine is 1/(2 n) too much (`sampling::hemisphere`),
-        // 3/(4 n) of itself. The plane ends at 1e-3 above the horizon: one ray in 10⁶.
+        // Mean of 1/distance under a plane: ∫ 2 cos θ sin θ · cos θ/z dθ = 2/(3z). Rays start at
+        // the inner rims of their rings: the mean cosine is 1/(2 n) too much, as in
+        // `sampling::hemisphere`, 3/(4 n) of itself. The plane ends at 1e-3 above the horizon: one
+        // ray in 10⁶.
         assert_eq!(got.escaped, 0.0);
         assert!((got.backface - f64::from(u8::from(back))).abs() < 1e-5, "{got:?}");
         assert!((got.inverse_distance * 1.5 * z - 1.0).abs() < 1.0 / 4096.0, "{got:?}");

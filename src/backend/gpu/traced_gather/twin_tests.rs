@@ -265,8 +265,8 @@ fn gather_passes_equal_their_twins() {
 /// What the scenes have shown.
 #[derive(Debug, Default)]
 struct Met {
-    /// Lights that rays over the hemisphere look for, those that are not convex, points with as many
-    /// lights as are sampled apart.
+    /// Lights that rays over the hemisphere look for, those that are not convex, points with as
+    /// many lights as are sampled apart.
     wide: usize,
     folded: usize,
     full: usize,
