@@ -1,5 +1,7 @@
-// The slots of rows that any ray has met, and zeros in their place: a lane a slot, a line of
-// workgroups a patch.
+// The slots of rows that any ray has met, those of a row one after the other, and zeros in their
+// place: a workgroup a row, a lane a run of its slots.
+
+const COMPACT_LANES: u32 = 256u;
 
 struct RowSettings {
     rays: u32,            // of a patch
@@ -27,36 +29,70 @@ struct RowEntries {
 @group(1) @binding(3) var<uniform> settings: RowSettings;
 @group(1) @binding(4) var<storage, read_write> found: RowEntries;
 
-@compute @workgroup_size(64)
-fn compact_rows(@builtin(global_invocation_id) id: vec3u) {
-    compact(id.x, id.y, id.y * settings.slots + id.x, false);
+var<workgroup> ends: array<u32, COMPACT_LANES>;   // of what lanes have, up to each
+var<workgroup> first: u32;
+
+@compute @workgroup_size(256)
+fn compact_rows(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    compact(group.x, group.x * settings.slots, lane, false);
 }
 
 // The same of rows through panes.
-@compute @workgroup_size(64)
-fn compact_rows_through_panes(@builtin(global_invocation_id) id: vec3u) {
-    compact(id.x, id.y, 4u * id.y * settings.slots + id.x, true);
+@compute @workgroup_size(256)
+fn compact_rows_through_panes(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    compact(group.x, 4u * group.x * settings.slots, lane, true);
 }
 
-fn compact(slot: u32, patch_: u32, at: u32, has_panes: bool) {
-    if slot >= settings.slots {
-        return;
+// The row of a patch, whose counts begin at `row`.
+fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
+    let run = (settings.slots + COMPACT_LANES - 1u) / COMPACT_LANES;
+    let start = min(lane * run, settings.slots);
+    let end = min(start + run, settings.slots);
+    var met = 0u;
+    for (var slot = start; slot < end; slot++) {
+        met += u32(counts[row + slot] != 0u);
     }
-    let count = counts[at];
-    if count == 0u {
-        return;
-    }
-    counts[at] = 0u;
-    var entry = RowEntry(patch_, slot, count, 0u, vec3u(0u), 0u);
-    if has_panes {
-        for (var channel = 0u; channel < 3u; channel++) {
-            let passed = at + (channel + 1u) * settings.slots;
-            entry.passed[channel] = counts[passed];
-            counts[passed] = 0u;
+    // Sums over all lanes before (Hillis and Steele 1986).
+    ends[lane] = met;
+    for (var step = 1u; step < COMPACT_LANES; step *= 2u) {
+        workgroupBarrier();
+        var before = 0u;
+        if lane >= step {
+            before = ends[lane - step];
         }
+        workgroupBarrier();
+        ends[lane] += before;
     }
-    let place = atomicAdd(&found.count, 1u);
-    if place < settings.entries {
-        found.entries[place] = entry;
+    workgroupBarrier();
+    if lane == 0u {
+        first = atomicAdd(&found.count, ends[COMPACT_LANES - 1u]);
+    }
+    workgroupBarrier();
+    var place = first + ends[lane] - met;
+    for (var slot = start; slot < end; slot++) {
+        let at = row + slot;
+        let count = counts[at];
+        if count == 0u {
+            continue;
+        }
+        counts[at] = 0u;
+        var entry = RowEntry(patch_, slot, count, 0u, vec3u(0u), 0u);
+        if has_panes {
+            for (var channel = 0u; channel < 3u; channel++) {
+                let passed = at + (channel + 1u) * settings.slots;
+                entry.passed[channel] = counts[passed];
+                counts[passed] = 0u;
+            }
+        }
+        if place < settings.entries {
+            found.entries[place] = entry;
+        }
+        place += 1u;
     }
 }

@@ -24,7 +24,8 @@ fn side(a: vec3f, b: vec3f, normal: vec3f) -> f32 {
 // The form factor from a point to a triangle that faces it: Lambert's formula, of the part above
 // the horizon (Baum, Rushmeier and Winget 1989, eq. 8). A triangle far smaller than it is far away
 // counts by its middle, which is off by the square of that ratio s; the formula is off by rounding
-// over s, since its terms cancel: both by 3e-5 where s is 5e-3.
+// over s, since its terms cancel: both by 3e-5 where s is 5e-3. Terms of a light that grazes the
+// surface cancel too: what is left is off by 1e-7, absolutely.
 fn to_triangle(t: TracedTriangle, point: TracedPoint) -> f32 {
     let a = (t.corner - point.position) + (t.corner_low - point.position_low);
     let area_normal = cross(t.edge_u, t.edge_v);

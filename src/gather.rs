@@ -137,6 +137,12 @@ pub trait Gather {
         let [first, second] = fields;
         Ok([self.gather(first, points)?, self.gather(second, points)?])
     }
+
+    /// How many points a call should have for all of the machine to be used. Callers begin with so
+    /// many where there are as many, and go by the clock from then on.
+    fn preferred_batch_len(&self) -> usize {
+        256
+    }
 }
 
 impl<G: Gather + ?Sized> Gather for Box<G> {
@@ -154,6 +160,10 @@ impl<G: Gather + ?Sized> Gather for Box<G> {
         points: &[GatherPoint],
     ) -> Result<[Vec<IrradianceSample>; 2], Error> {
         (**self).gather_both(fields, points)
+    }
+
+    fn preferred_batch_len(&self) -> usize {
+        (**self).preferred_batch_len()
     }
 }
 

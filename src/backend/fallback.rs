@@ -105,6 +105,13 @@ impl<A: Gather, B: Gather> Gather for Fallback<'_, A, B> {
             |second| second.gather_both(sources, places),
         )
     }
+
+    fn preferred_batch_len(&self) -> usize {
+        match &self.second {
+            Some(second) => second.preferred_batch_len(),
+            None => self.first.preferred_batch_len(),
+        }
+    }
 }
 
 impl<A: fmt::Debug, B: fmt::Debug> fmt::Debug for Fallback<'_, A, B> {

@@ -36,10 +36,6 @@ use crate::solver::Ledger;
 use crate::verify::{PathTracer, SurfacePoint as PathStart};
 use crate::visibility::ray_scene::Hit;
 
-/// Points that are gathered at before progress is reported first: a bake that is stopped uses
-/// these.
-const FIRST_BATCH: usize = 16;
-
 /// How far points are drawn towards the centroid of their face, a share of the way: on a side,
 /// where walls meet, it is undefined what is seen.
 const INSET: f64 = 0.03;
@@ -237,7 +233,8 @@ impl ErrorEstimator<'_> {
         let mut gathers = vec![None; samples.len()];
         let order = golden_ratio_order(samples.len());
         let mut remaining = &order[..];
-        let mut batches = BatchSizer::new(FIRST_BATCH);
+        // Three gathers a point, and paths.
+        let mut batches = BatchSizer::new((gatherer.preferred_batch_len() / 16).max(1));
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
                 let points: Vec<TwoSidedPoint> = batch.iter().map(|&k| samples[k].point).collect();

@@ -42,10 +42,6 @@ use crate::scene::{Aabb, Rgb};
 /// Called with the progress after every batch; may stop the gather.
 pub(crate) type ProgressCallback<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 
-/// Vertices in the first batch; later ones follow the clock. Chosen by hand: results do not depend
-/// on it.
-const FIRST_BATCH: usize = 256;
-
 /// Error of the mesh and smallest edge of a pass, over those of the next one: what a pass gets
 /// wrong is averaged over the hemisphere by the next. Chosen by hand; no measurement kept.
 const PASS_COARSENING: f64 = 3.0;
@@ -346,7 +342,7 @@ impl<'a> AdaptiveGather<'a> {
         let source = self.source.field();
         let scale = (self.scale.radiosity_floor, self.scale.touching);
         let mut queue = &unseen[..];
-        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
+        let mut batch_sizer = BatchSizer::new(scout.preferred_batch_len());
         while !queue.is_empty() {
             let (samples, scouts) = (&self.samples, &mut self.scouts);
             batch_sizer
@@ -439,7 +435,7 @@ impl<'a> AdaptiveGather<'a> {
         let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
         let total = pending.len();
         let mut gathered = 0;
-        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
+        let mut batch_sizer = BatchSizer::new(gatherer.preferred_batch_len());
         let mut attempt = 0;
         while !pending.is_empty() {
             let mut retries = vec![];

@@ -34,10 +34,6 @@ const RAYS: (f64, f64) = (32.0, 16384.0);
 /// of all gathers together those that a bake begins with at a vertex.
 const RAYS_TIMES_NOISE: f64 = 5.0;
 
-/// Points in the first batch; later ones follow the clock. Chosen by hand: results do not depend
-/// on it.
-const FIRST_BATCH: usize = 64;
-
 /// Irradiance at a point, and how well it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointIrradiance {
@@ -114,7 +110,7 @@ pub(crate) fn two_sided_irradiance_at(
     let field = light.radiosity_field();
     let mut found = Vec::with_capacity(points.len());
     let mut remaining = points;
-    let mut batches = BatchSizer::new(FIRST_BATCH);
+    let mut batches = BatchSizer::new(gatherer.preferred_batch_len().div_ceil(GATHERS));
     while !remaining.is_empty() {
         let samples = batches.next(&mut remaining, |batch| {
             let heights = |&point| (0..GATHERS).map(move |k| raised(point, k));

@@ -71,6 +71,9 @@ impl Gpu {
             };
             record(&lost, format!("the device was lost: {why}"));
         });
+        if gpu.assumed != AdapterKind::Cpu {
+            gpu.compile_ahead();
+        }
         Ok(gpu)
     }
 

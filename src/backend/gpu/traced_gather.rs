@@ -577,6 +577,10 @@ impl Gather for TracedGather {
         self.seconds += start.elapsed().as_secs_f64();
         samples
     }
+
+    fn preferred_batch_len(&self) -> usize {
+        IN_FLIGHT * self.batch_len(MAX_POINTS) as usize
+    }
 }
 
 #[cfg(test)]

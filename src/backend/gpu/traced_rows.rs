@@ -45,8 +45,8 @@ pub struct TracedRows {
     has_panes: bool,
     slots: u32,
     pub(crate) full_share: f64,
-    made: u64,
-    rays: u64,
+    /// Entries of a batch to be copied from the device without asking how many there are.
+    expected: u64,
 }
 
 #[derive(Debug)]
@@ -105,8 +105,7 @@ impl TracedRows {
             has_panes,
             slots,
             full_share: crate::RayRows::FULL_SHARE,
-            made: 0,
-            rays: 0,
+            expected: FIRST_ENTRIES,
         };
         rows.add_directions(&samples, count)?;
         Ok(rows)
@@ -156,34 +155,48 @@ impl TracedRows {
             entries: self.buffers.entries,
         };
         let gpu = self.gpu.clone();
-        let entries = gpu.with_error_scopes(|| self.entries(&traced, settings, at))?;
-        let Some(mut entries) = entries else {
+        let rows = gpu.with_error_scopes(|| {
+            self.entries(&traced, settings, at, |entries| {
+                self.rows_of(entries, patches.len(), rays)
+            })
+        })?;
+        let Some((entries, rows)) = rows else {
             // There was no room for all entries.
             let (first, second) = patches.split_at(patches.len() / 2);
             let mut rows = self.batch(mesh, first, (rays, at))?;
             rows.extend(self.batch(mesh, second, (rays, at))?);
             return Ok(rows);
         };
-        entries.par_sort_unstable_by_key(|e| (e.patch_, item(e.slot)));
-        let of_patches: Vec<&[RowEntry]> = entries.chunk_by(|a, b| a.patch_ == b.patch_).collect();
-        let counted = |row: &&[RowEntry]| {
-            row.iter().map(|e| u64::from(e.count)).sum::<u64>() == u64::from(rays)
-        };
-        if of_patches.len() != patches.len() || !of_patches.iter().all(counted) {
-            return Err(gpu.invalid_result("rows of another number of rays".into()));
-        }
-        self.made += patches.len() as u64;
-        self.rays += patches.len() as u64 * u64::from(rays);
-        Ok(of_patches.par_iter().map(|row| self.row(row, rays)).collect())
+        self.expected = entries + entries / 4;
+        rows.map_err(|found| gpu.invalid_result(found))
     }
 
-    /// Entries of all rows; none where there is no room for them.
-    fn entries(
+    /// The rows of entries, or what is wrong with these.
+    fn rows_of(&self, entries: &[RowEntry], patches: usize, rays: u32) -> Result<Vec<Row>, String> {
+        let mut of_patches = vec![&entries[..0]; patches];
+        for row in entries.chunk_by(|a, b| a.patch_ == b.patch_) {
+            let number = row[0].patch_ as usize;
+            *of_patches.get_mut(number).ok_or_else(|| format!("row {number} of {patches}"))? = row;
+        }
+        let row = |row: &&[RowEntry]| {
+            let counted: u64 = row.iter().map(|e| u64::from(e.count)).sum();
+            match counted == u64::from(rays) && row.is_sorted_by_key(|e| e.slot) {
+                true => Ok(self.row(row, rays)),
+                false => Err(format!("a row of {counted} rays, not {rays}")),
+            }
+        };
+        of_patches.par_iter().map(row).collect()
+    }
+
+    /// How many entries all rows have, and what `read` makes of these, row by row in any order,
+    /// slots ascending; none where there is no room for them.
+    fn entries<T>(
         &self,
         patches: &[TracedPatch],
         settings: RowSettings,
         at: usize,
-    ) -> Result<Option<Vec<RowEntry>>, Error> {
+        read: impl Fn(&[RowEntry]) -> T,
+    ) -> Result<Option<(u64, T)>, Error> {
         let (gpu, buffers) = (&self.gpu, &self.buffers);
         let Buffers { counts, found, staging, settings: uniform, .. } = buffers;
         gpu.queue.write_buffer(&buffers.patches, 0, bytemuck::cast_slice(patches));
@@ -230,39 +243,42 @@ impl TracedRows {
             pass.set_pipeline(compact);
             let lists = [batch[1].clone(), batch[3].clone(), (4, found.as_entire_binding())];
             pass.set_bind_group(1, &group(compact, 1, &lists), &[]);
-            pass.dispatch_workgroups(settings.slots.div_ceil(64), patches.len() as u32, 1);
+            pass.dispatch_workgroups(patches.len() as u32, 1, 1);
         }
-        // As many as there may be, if that is little; else how many there are is asked first.
+        // Those of the batch before and some more; if that is too few, the rest is copied then.
         let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
+        let room = most.min(settings.entries.into()).max(1);
         let bytes =
             |entries: u64| ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
-        let guess = most.min(u64::from(settings.entries)).min(FIRST_ENTRIES);
+        let guess = room.min(self.expected);
         encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
         let submission = gpu.queue.submit([encoder.finish()]);
-        let read = |submission, upto: u64| {
-            let entries = gpu.read_mapped(staging.slice(..bytes(upto)), submission, |bytes| {
+        let read_up_to = |submission, copied: u64| {
+            let entries = gpu.read_mapped(staging.slice(..bytes(copied)), submission, |bytes| {
                 let count = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
                 let list: &[RowEntry] =
                     bytemuck::cast_slice(&bytes[ROW_ENTRIES_HEADER_BYTES as usize..]);
-                let within = list.get(..count as usize).map(<[RowEntry]>::to_vec);
-                (u64::from(count), within)
+                (u64::from(count), list.get(..count as usize).map(&read))
             });
             staging.unmap();
             entries
         };
-        let (count, entries) = read(submission, guess)?;
+        let (count, entries) = read_up_to(submission, guess)?;
         if entries.is_some() || count > u64::from(settings.entries) {
-            return Ok(entries);
+            return Ok(entries.map(|entries| (count, entries)));
         }
         let mut encoder = device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(count));
         let submission = gpu.queue.submit([encoder.finish()]);
-        Ok(read(submission, count)?.1)
+        Ok(read_up_to(submission, count)?.1.map(|entries| (count, entries)))
     }
 
-    /// The row of entries in the order of their items.
+    /// The row of entries in the order of their slots.
     fn row(&self, entries: &[RowEntry], rays: u32) -> Row {
-        let row = row_of_counts(entries.iter().map(|e| (item(e.slot), e.count)), rays as usize);
+        // Elements come first in a row, then what is lost.
+        let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
+        let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
+        let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
         let unit = passed_unit(rays);
         let mean = |e: &RowEntry| {
             let sum = Rgb::from_array(e.passed.map(f64::from));
@@ -289,7 +305,7 @@ fn passed_unit(rays: u32) -> f64 {
     f64::from((u32::MAX / rays).min(1 << 16))
 }
 
-/// Entries that are read back without asking how many there are: 2 MiB of them.
+/// As many of the first batch: 2 MiB of them.
 const FIRST_ENTRIES: u64 = 65_536;
 
 /// What `row_of_counts` calls a slot.

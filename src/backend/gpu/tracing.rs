@@ -1,6 +1,7 @@
 //! What casting rays on a device takes, made once for a device: pipelines, and the scene and light
 //! that were used last.
 
+use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use super::device::Gpu;
@@ -12,10 +13,14 @@ use super::shaders::{
 };
 use super::traced_gather::Slots;
 use super::traced_scene::TracedScene;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
 use crate::gather::lights::Lights;
 use crate::scene::Scene;
+
+/// Fields that are kept on a device: what vertices gather from, and what they have gathered, which
+/// an estimate of the error compares.
+const FIELDS: usize = 2;
 
 /// Kept with a device, for all that cast rays on it.
 #[derive(Debug, Default)]
@@ -23,7 +28,8 @@ pub struct Tracing {
     gather: OnceLock<GatherPipelines>,
     rows: OnceLock<RowPipelines>,
     scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
-    light: Mutex<Option<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
+    /// By their keys and scenes, the one used last at the end.
+    fields: Mutex<Vec<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
     pub slots: Mutex<Option<Slots>>,
 }
 
@@ -41,18 +47,45 @@ pub struct GatherPipelines {
 impl GatherPipelines {
     fn new(device: &wgpu::Device) -> GatherPipelines {
         let module = |label, source| pipeline::shader(device, label, source);
-        let rank = module("rank_lights.wgsl", RANK_LIGHTS_WGSL);
-        let hemisphere = module("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL);
-        let lights = module("light_rays.wgsl", LIGHT_RAYS_WGSL);
-        let settle = module("settle.wgsl", SETTLE_WGSL);
-        let compute = |module, entry_point| pipeline::compute(device, module, entry_point);
+        let [rank, hemisphere, lights, settle] = [
+            ("rank_lights.wgsl", RANK_LIGHTS_WGSL),
+            ("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL),
+            ("light_rays.wgsl", LIGHT_RAYS_WGSL),
+            ("settle.wgsl", SETTLE_WGSL),
+        ]
+        .map(|(label, source)| module(label, source));
+        // Drivers take up to a second for one, on one core.
+        let entries = [
+            (&rank, "rank_lights"),
+            (&hemisphere, "hemisphere_rays"),
+            (&hemisphere, "more_hemisphere_rays"),
+            (&lights, "light_rays"),
+            (&lights, "more_light_rays"),
+            (&settle, "settle"),
+        ];
+        // Not by the pool: a thread of it may be waiting for them.
+        let compiled = std::thread::scope(|scope| {
+            entries
+                .map(|(module, entry_point)| {
+                    scope.spawn(move || pipeline::compute(device, module, entry_point))
+                })
+                .map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        });
+        let [
+            rank_lights,
+            hemisphere_rays,
+            more_hemisphere_rays,
+            light_rays,
+            more_light_rays,
+            settle,
+        ] = compiled;
         GatherPipelines {
-            rank_lights: compute(&rank, "rank_lights"),
-            hemisphere_rays: compute(&hemisphere, "hemisphere_rays"),
-            more_hemisphere_rays: compute(&hemisphere, "more_hemisphere_rays"),
-            light_rays: compute(&lights, "light_rays"),
-            more_light_rays: compute(&lights, "more_light_rays"),
-            settle: compute(&settle, "settle"),
+            rank_lights,
+            hemisphere_rays,
+            more_hemisphere_rays,
+            light_rays,
+            more_light_rays,
+            settle,
         }
     }
 }
@@ -92,6 +125,15 @@ impl Gpu {
         })
     }
 
+    /// Starts to compile all passes of rays, so that they are there when the scene is read.
+    pub(super) fn compile_ahead(&self) {
+        let gpu = self.clone();
+        std::thread::spawn(move || {
+            gpu.gather_pipelines();
+            gpu.row_pipelines();
+        });
+    }
+
     /// The passes of rows: compiled at the first call.
     pub(super) fn row_pipelines(&self) -> &RowPipelines {
         self.tracing.rows.get_or_init(|| RowPipelines::new(&self.device))
@@ -115,30 +157,43 @@ impl Gpu {
             return Ok(traced.clone());
         }
         *kept = None;
+        self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner).clear();
         let traced = self.with_error_scopes(|| TracedScene::new(self.memory(), lights))?;
         let traced = Arc::new(traced);
         *kept = Some((Arc::downgrade(scene), traced.clone()));
         Ok(traced)
     }
 
-    /// `field` on the device: uploaded unless it is the one before.
+    /// `field` on the device: uploaded unless it is one of those before.
     pub(super) fn field_buffers(
         &self,
         scene: &Arc<TracedScene>,
         field: &RadiosityField,
     ) -> Result<Arc<FieldBuffers>, Error> {
         let key = field::key(field);
-        let mut kept = self.tracing.light.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((of, owner, buffers)) = &*kept
-            && *of == key
-            && Arc::ptr_eq(owner, scene)
-        {
-            return Ok(buffers.clone());
-        }
-        *kept = None;
-        let buffers = FieldBuffers::new(self.memory(), field, scene.radiance_unit)?;
-        let buffers = Arc::new(buffers);
-        *kept = Some((key, scene.clone(), buffers.clone()));
+        let mut kept = self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_same = |(of, owner, _): &(u64, Arc<TracedScene>, Arc<FieldBuffers>)| {
+            *of == key && Arc::ptr_eq(owner, scene)
+        };
+        let found = kept.iter().position(is_same).map(|k| kept.remove(k).2);
+        let buffers = match found {
+            Some(buffers) => buffers,
+            None => {
+                if kept.len() >= FIELDS {
+                    kept.remove(0);
+                }
+                let new = || FieldBuffers::new(self.memory(), field, scene.radiance_unit);
+                Arc::new(new().or_else(|e| match e.kind() {
+                    // The others make room.
+                    ErrorKind::Memory if !kept.is_empty() => {
+                        kept.clear();
+                        new()
+                    }
+                    _ => Err(e),
+                })?)
+            }
+        };
+        kept.push((key, scene.clone(), buffers.clone()));
         Ok(buffers)
     }
 }

@@ -181,9 +181,11 @@ fn fallback_passes_on_errors_of_no_device() {
 fn gathering_falls_back_to_rays() {
     let gpu = gpu();
     let mesh = furnace();
-    let light =
-        GatheredMesh::from_elements(&mesh, &vec![Rgb::splat(2.0); mesh.element_count()]).unwrap();
-    // Nothing bends in a furnace: split it whatever the light says, so that there are two batches.
+    // Uneven, so that 64 rays and 1024 find nowhere the same.
+    let uneven = |e: usize| Rgb::splat(2.0 + (e % 7) as f64);
+    let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(uneven).collect();
+    let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+    // It is split whatever the light says, so that there are two batches.
     let settings = RefinementSettings {
         initial_subdivisions: 1,
         interpolation_tolerance: f64::INFINITY,

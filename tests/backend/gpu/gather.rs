@@ -165,7 +165,8 @@ fn direct_light_is_the_closed_form() {
         let off = (got.direct - want).max_element();
         let a_ray = 3.0 * LAMP[2] / 64.0;
         let most = if left == Rgb::ZERO { 0.0 } else { left.max_element() + a_ray };
-        let within = ROUNDING * want.max_element();
+        // Where the light grazes the surface, terms of up to a half cancel: some roundings of them.
+        let within = ROUNDING * want.max_element() + 2e-7 * LAMP[2];
         assert!(off > -within && off < within + most, "{place:?}: {got:?} {want}");
         assert_eq!(got.direct, got.irradiance);
     }
