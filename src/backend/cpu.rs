@@ -8,11 +8,11 @@
 //! |---|---|---|
 //! | `item_buffer.wgsl` | `item_buffer` | `gpu/rows/twin_tests.rs`: items equal |
 //! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
-//! | `rank_lights.wgsl` | `twins/rank_lights` | `gpu/traced_gather/twin_tests.rs`: within rounding |
+//! | `rank_lights.wgsl` | `twins/rank_lights` | `gpu/traced_gather/twin_tests.rs`: rounding |
 //! | `hemisphere_rays.wgsl` | `twins/hemisphere_rays` | the same, but for rays near an edge |
 //! | `light_rays.wgsl` | `twins/light_rays` | the same |
 //! | `settle.wgsl` | `twins/settle` | the same decisions, samples within rounding |
-//! | `row_rays.wgsl` | `twins/row_rays` | `gpu/traced_rows/twin_tests.rs`: but for rays near an edge |
+//! | `row_rays.wgsl` | `twins/row_rays` | `gpu/traced_rows/twin_tests.rs`: but for edges |
 //! | `compact_rows.wgsl` | `twins/compact_rows` | the same: entries equal |
 //! | `shared/*.wgsl` | `shared`, `twins` | with the shaders that need them |
 
