@@ -219,7 +219,7 @@ fn sheets_with_holes() -> Mesh {
     let texture = Arc::new(Texture::new(5, 7, (0..35).map(solid).collect()).unwrap());
     let mask = |clamped: bool, scale: DVec2| {
         let (factor, ceiling, mean) = (Rgb::ONE, f64::MAX, Rgb::ONE);
-        let offset = DVec2::new(0.3, -1.7) * f64::from(!clamped);
+        let offset = DVec2::new(0.31, -1.7) * f64::from(!clamped);
         let texture = texture.clone();
         let mask = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
         MaterialTextures { mask: Some(mask), ..Default::default() }
@@ -236,8 +236,8 @@ fn sheets_with_holes() -> Mesh {
 }
 
 /// A floor under lights that fill much of its sky, one of them with a fold, so that one part of it
-/// hides another; a small light with a fold, an ordinary one, one that is so dim that it does not
-/// count, and a block in between.
+/// hides another; a small light with a fold, one with two parts above one another, an ordinary one,
+/// one that is so dim that it does not count, and a block in between.
 fn wide_lights() -> Mesh {
     let mut parts = Parts::new(&[
         (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5)),
@@ -263,10 +263,25 @@ fn wide_lights() -> Mesh {
         [[-0.7, 0.6, 0.75], [-0.4, 0.6, 0.75]],
         [4.0, 4.5, 6.0],
     );
+    // Two that face down and share a corner: the lower one is before much of the upper one.
+    let (a, b, c) = ([-0.6, 1.1, 0.9], [-0.6, 1.4, 0.9], [-0.2, 1.2, 0.9]);
+    parts.add(&[[a, b, c], [a, [-0.5, 1.5, 0.75], [-0.1, 1.1, 0.75]]], emitting([3.0, 2.0, 4.0]));
     parts.mesh(Sky::uniform(Rgb::new(0.2, 0.1, 0.3)), 0.9)
 }
 
-/// More lights than a workgroup has lanes above a floor, two of them in the same place.
+/// A floor, and a lamp in the plane of a ceiling that goes on behind it.
+pub fn lamp_within_ceiling() -> Mesh {
+    let x = [0.0, 1.0];
+    let parts = [
+        (facing_up(x, x, 0.0), Material::grey("floor", 0.5)),
+        (facing_down(x, x, 0.7), Material::grey("ceiling", 0.5)),
+        (facing_down([0.13, 0.61], [0.37, 0.83], 0.7), emitting([1.0, 2.0, 3.0])),
+    ];
+    Parts::new(&parts).mesh(Sky::default(), 0.3)
+}
+
+/// More lights than a workgroup has lanes above a floor, two of them in the same place, and a pane
+/// over some of the floor.
 fn many_lights() -> Mesh {
     let floor = (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5));
     let mut parts = Parts::new(&[floor]);
@@ -280,11 +295,13 @@ fn many_lights() -> Mesh {
     let bright = [[0.6, 0.8, 0.5], [0.7, 1.2, 0.5], [0.9, 0.7, 0.52]];
     parts.add(&[bright], emitting([30.0, 20.0, 10.0]));
     parts.add(&[bright], emitting([20.0, 30.0, 15.0]));
+    let pane = [[-0.2, -0.2, 0.3], [1.0, -0.2, 0.33], [0.8, 2.2, 0.36]];
+    parts.add(&[pane], glass([0.9, 0.4, 0.6]));
     parts.mesh(Sky::default(), 0.8)
 }
 
 /// A room with a lamp and a table leaf that is there once for each side, in one place.
-fn room_with_doubled_leaf() -> Mesh {
+pub fn room_with_doubled_leaf() -> Mesh {
     let mut parts: Vec<(Quad, Material)> =
         walls().map(|wall| (wall, Material::grey("wall", 0.5))).to_vec();
     let leaf = facing_up([0.3, 0.7], [0.25, 0.75], 0.4);
@@ -308,6 +325,17 @@ pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
         GatherPoint { position: on + lift * normal, normal, near: 0.25 * lift }
     };
     (0..count).map(place).collect()
+}
+
+/// Places on the sides of all triangles of `mesh`'s scene, `count` on each.
+pub fn on_sides(mesh: &Mesh, count: usize) -> Vec<DVec3> {
+    let scene = mesh.scene();
+    let sides = (0..scene.triangles().len()).flat_map(|t| {
+        let [a, b, c] = scene.corners(t);
+        [(a, b), (b, c), (c, a)]
+    });
+    let share = |k: usize| (k as f64 + 0.37) / count as f64;
+    sides.flat_map(|(a, b)| (0..count).map(move |k| a.lerp(b, share(k)))).collect()
 }
 
 /// Radiosity at each corner of each element of `mesh`: corners, and the values there.

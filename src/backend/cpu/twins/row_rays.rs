@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::element::element_at;
 use super::lights::passed;
-use super::trace::{FAR, Ray, nearest_but, turned};
+use super::trace::{FAR, Hit, Ray, nearest_but, turned};
 use crate::backend::gpu::layout::{BACK, FIRST_ELEMENT, NOTHING, OPEN, RowSettings, TracedPatch};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
@@ -41,12 +41,17 @@ impl RowRays<'_> {
         turned(local, patch.normal.into(), patch.rotation)
     }
 
+    /// A ray, and what it meets.
+    pub fn met(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
+        let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
+        let ray = Ray { origin, origin_low, direction, near: patch.near };
+        (ray, nearest_but(self.scene, &ray, patch.own_triangle))
+    }
+
     /// The slot that a ray meets, and what passes panes on the way.
     pub fn cast_ray(&self, patch: &TracedPatch, direction: Vec3) -> (u32, Vec3) {
         let scene = self.scene;
-        let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
-        let ray = Ray { origin, origin_low, direction, near: patch.near };
-        let hit = nearest_but(scene, &ray, patch.own_triangle);
+        let (ray, hit) = self.met(patch, direction);
         let mut slot = OPEN;
         if hit.triangle != NOTHING {
             slot = BACK;

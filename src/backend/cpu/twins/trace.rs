@@ -57,8 +57,8 @@ pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hi
         && distance - off * t.extent > ray.near
         && distance <= end
         && (facing > 0.0 || t.flags & BACK_IS_COVERED == 0);
-    // Not `clamp`, which panics where the ray is in the triangle's plane.
-    let u = u.max(0.0).min(1.0);
+    let u = u.clamp(0.0, 1.0);
+    // Not `clamp`, which panics where the ray is in the triangle's plane and u is no number.
     let v = v.max(0.0).min(1.0 - u);
     let is_there = is_met && (t.flags & HAS_HOLES == 0 || is_solid(scene, t.index, u, v));
     let triangle = if is_there { k } else { NOTHING };

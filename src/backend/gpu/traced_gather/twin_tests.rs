@@ -3,7 +3,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::*;
 use crate::backend::cpu::twins::gather_state::{PointState, SOURCES, SUN};
@@ -18,7 +18,8 @@ use crate::backend::cpu::twins::trace::nearest;
 use crate::backend::gpu::field::{element_texels, quadtrees};
 use crate::backend::gpu::layout::{NOTHING, TracedLight};
 use crate::backend::gpu::test_support::{
-    gpu, places, random_radiosity, read_buffer, shifts, traced_scenes, turned_by, under_sky_and_sun,
+    gpu, lamp_within_ceiling, on_sides, places, random_radiosity, read_buffer, shifts,
+    traced_scenes, turned_by, under_sky_and_sun,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
@@ -163,52 +164,82 @@ fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl F
 // Exact rays.
 
 /// The nearest hits of the twin are those of exact rays along the same directions, but for rays so
-/// near an edge that rounding decides: exact rays turned by 2⁻²⁰ meet what the twin does. Distances
-/// are as near as a hit says.
+/// near an edge that rounding decides: exact rays turned by 2⁻²⁰ meet what the twin does, or where
+/// it meets a side, something as far off. Distances are as near as a hit says. So it is with rays
+/// to the sides of triangles, for which rounding often decides; the twin's triangles are wider than
+/// they are there, by more the longer and thinner they are: by 2⁻¹⁷ at most here.
 #[test]
 fn twin_meets_what_exact_rays_meet() {
+    let mut at_sides = 0;
     for (name, mesh) in traced_scenes() {
         let lights = Lights::new(mesh.shared_scene());
         let arrays = TracedArrays::new(&lights);
         let exact = RayScene::of_scene(mesh.scene());
-        let unit = 1.0 / arrays.coordinates.length_unit();
         let samples = HemisphereSamples::progressive(1024);
+        let sides = on_sides(&mesh, 7);
         let (mut rays, mut differ) = (0, 0);
         for place in places(&mesh, 12) {
             let point = traced(&arrays, &place);
+            let what = format!("{name}, {place:?}");
             for direction in samples.directions(place.normal, 0.3) {
-                let direction = direction.as_vec3().normalize();
-                let hit = nearest(&arrays, &ray_from(&point, direction));
-                let along =
-                    |d: Vec3| exact.closest_hit(place.position, d.as_dvec3(), place.near, None);
-                let truth = along(direction);
-                let index = (hit.triangle != NOTHING)
-                    .then(|| arrays.triangles[hit.triangle as usize].index as usize);
                 rays += 1;
-                let is_same = |h: Option<Hit>| {
-                    h.map(|h| (h.triangle, h.front)) == index.map(|index| (index, hit.front))
-                };
-                if !is_same(truth) {
-                    differ += 1;
-                    let turned = |&(across, _): &(Vec2, Vec3)| along(turned_by(direction, across));
-                    assert!(
-                        shifts().iter().map(turned).any(is_same),
-                        "{name}, {place:?}, {direction}: {hit:?}, not {truth:?}"
-                    );
-                } else if let Some(truth) = truth {
-                    let distance = f64::from(hit.distance) * unit;
-                    // The direction is of unit length but for a rounding.
-                    let most = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
-                    let off = (distance - truth.distance).abs();
-                    assert!(off <= most, "{name}: {off:e} of {most:e}, {hit:?}, {truth:?}");
-                }
+                differ +=
+                    u32::from(differs(&what, (&arrays, &exact), &point, &place, direction, 1.0));
+            }
+            let to_sides = sides.iter().map(|side| (side - place.position).normalize());
+            for direction in to_sides.filter(|d| d.dot(place.normal) > 0.0) {
+                at_sides +=
+                    u32::from(differs(&what, (&arrays, &exact), &point, &place, direction, 8.0));
             }
         }
         println!("{name}: {differ} of {rays} rays meet something else");
-        // An outline is within 2⁻²⁰ of a ray where it crosses a strip of that width: some hundred
-        // sides, each a radian long, are in 1e-4 of the hemisphere.
+        // A ray is within 2⁻²⁰ of some hundred sides, each a radian long, in 1e-4 of the
+        // hemisphere.
         assert!(differ * 1000 < rays, "{name}: {differ} of {rays} rays");
     }
+    println!("{at_sides} rays to sides meet something else");
+    assert!(at_sides > 0);
+}
+
+/// Whether the twin meets something else than an exact ray, which has to meet it where it is turned
+/// by `apart` times 2⁻²⁰.
+fn differs(
+    what: &str,
+    (arrays, exact): (&TracedArrays, &RayScene),
+    point: &TracedPoint,
+    place: &GatherPoint,
+    direction: DVec3,
+    apart: f32,
+) -> bool {
+    let unit = 1.0 / arrays.coordinates.length_unit();
+    let direction = direction.as_vec3().normalize();
+    let hit = nearest(arrays, &ray_from(point, direction));
+    let along = |d: Vec3| exact.closest_hit(place.position, d.as_dvec3(), place.near, None);
+    let truth = along(direction);
+    let found = (hit.triangle != NOTHING)
+        .then(|| (arrays.triangles[hit.triangle as usize].index as usize, hit.front));
+    let is_same = |h: Option<Hit>| h.map(|h| (h.triangle, h.front)) == found;
+    let is_as_far = |truth: &Hit| {
+        // The direction is of unit length but for a rounding.
+        let most = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
+        (f64::from(hit.distance) * unit - truth.distance).abs() <= most
+    };
+    if is_same(truth) {
+        assert!(truth.as_ref().is_none_or(is_as_far), "{what}: {hit:?}, {truth:?}");
+        return false;
+    }
+    let turned =
+        shifts().into_iter().map(|(across, _)| along(turned_by(direction, apart * across)));
+    let turned: Vec<Option<Hit>> = turned.collect();
+    // Of two triangles that share a side, one may be met only there: exact rays meet the other, as
+    // far off but for what a turn moves it at a cosine of 2⁻⁷ or more.
+    let is_on_side = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) <= apart * 2f32.powi(-20);
+    let moved = f64::from(apart) * 2f64.powi(-13);
+    let is_near = |h: &Hit| (f64::from(hit.distance) * unit / h.distance - 1.0).abs() <= moved;
+    let is_explained =
+        turned.iter().any(|&h| is_same(h)) || is_on_side && turned.iter().flatten().any(is_near);
+    assert!(is_explained, "{what}, {direction}: {hit:?}, not {truth:?}");
+    true
 }
 
 /// A point as the device gets it, but for its rotation.
@@ -611,6 +642,27 @@ fn compare_shadow_rays(
     (0..passes.points.len()).into_par_iter().for_each(compare);
 }
 
+/// What lies in a light's own plane does not hide it, whichever of both rounding puts first.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn rays_to_lights_end_at_their_plane() {
+    let passes = Passes::new(&lamp_within_ceiling(), 40, 1024);
+    let (pipelines, bound) = (passes.gpu.gather_pipelines(), &passes.bound);
+    let all = Groups::Count(40);
+    passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
+    passes.run((&bound.light_rays, &pipelines.light_rays), &passes.whole(), all);
+    let mut lit = 0;
+    for (point, state) in passes.points.iter().zip(passes.states()) {
+        let mut twin = rank_lights(&passes.arrays, point, &passes.whole());
+        light_rays::cast_rays(&passes.arrays, point, &passes.whole(), &mut twin);
+        for visible in [state, twin].iter().flat_map(|state| &state.visible) {
+            assert_eq!(visible.seen, [visible.all; 3], "{point:?}");
+            lit += usize::from(visible.all > 0.0);
+        }
+    }
+    assert!(lit > 40, "{lit}");
+}
+
 // ---------------------------------------------------------------------------------------------
 // What rays amount to.
 
@@ -772,16 +824,16 @@ fn gathers_have_the_same_bits_in_any_batches() {
         let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
         let new = || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap();
         // More batches of 64 than are under way at once.
-        let points = places(&mesh, 300);
+        let points = places(&mesh, 200);
         let mut gather = new();
         let all = gathered(&mut gather, &field, &points, MAX_POINTS);
         assert!(all.iter().any(|sample| sample.noise > 0.0));
-        for most in [MAX_POINTS, 64, 7, 100, 256] {
+        for most in [MAX_POINTS, 64, 23] {
             let again = gathered(&mut gather, &field, &points, most);
             assert!(again == all, "{name}: batches of {most}");
         }
         assert!(new().gather(&field, &points).unwrap() == all, "{name}: another gather");
-        for k in (0..300).step_by(23) {
+        for k in (0..200).step_by(41) {
             let alone = gather.gather(&field, &points[k..=k]).unwrap();
             assert_eq!(alone, [all[k]], "{name}: point {k} alone");
         }

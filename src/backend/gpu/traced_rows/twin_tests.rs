@@ -1,13 +1,17 @@
 //! `row_rays.wgsl` and `compact_rows.wgsl` against their twins; and the same bits however patches
 //! are handed over.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use rustc_hash::FxHashSet;
 
 use super::*;
 use crate::backend::cpu::twins::compact_rows::compact_rows;
 use crate::backend::cpu::twins::row_rays::{RowRays, amount};
-use crate::backend::gpu::layout::TEXELS_A_LINE;
-use crate::backend::gpu::test_support::{gpu, read_buffer, shifts, traced_scenes, turned_by};
+use crate::backend::cpu::twins::trace::turned;
+use crate::backend::gpu::layout::{NOTHING, TEXELS_A_LINE};
+use crate::backend::gpu::test_support::{
+    gpu, on_sides, read_buffer, room_with_doubled_leaf, shifts, traced_scenes, turned_by,
+};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::split_mix64_nth;
 
@@ -16,7 +20,7 @@ fn open_rows(gpu: &Gpu, mesh: &Mesh, rays: u32) -> TracedRows {
     use wgpu::BufferUsages as Usage;
     let mut rows = TracedRows::new(gpu, mesh, rays).unwrap();
     let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-    let bytes = u64::from(MAX_BATCH * rows.slots) * 16;
+    let bytes = u64::from(MAX_BATCH * rows.slots.max(1024)) * 16;
     rows.buffers.counts = gpu.memory().buffer("test", bytes, usage).unwrap();
     rows
 }
@@ -57,8 +61,14 @@ fn row_rays_equal_their_twin() {
         let samples = HemisphereSamples::new(count).unwrap();
         let directions: Vec<[f32; 4]> = samples.local().iter().map(local).collect();
         let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
-        let traced: Vec<TracedPatch> =
+        let mut traced: Vec<TracedPatch> =
             patches(&mesh).iter().map(|&patch| rows.traced_patch(&mesh, patch)).collect();
+        // One above its own triangle that does not see what lies before it.
+        let met = |k: u32| twin.met(&traced[0], twin.direction(k, &traced[0])).1.triangle;
+        let before = (0..count).map(met).find(|&triangle| triangle != NOTHING).unwrap();
+        let own_triangle = arrays.triangles[before as usize].index;
+        let lifted = Vec3::from(traced[0].position) + 1e-3 * Vec3::from(traced[0].normal);
+        traced.push(TracedPatch { position: lifted.to_array(), own_triangle, ..traced[0] });
         let settings = rows.settings(count);
         let (_, entries) = rows.entries(&traced, settings, 0, <[_]>::to_vec).unwrap().unwrap();
         let channels = if rows.has_panes { 4 } else { 1 };
@@ -135,6 +145,45 @@ fn row_rays_equal_their_twin() {
     assert!(open > 0 && back > 0 && dimmed > 0);
 }
 
+/// No ray goes through a side that two triangles share: in a closed room none meets nothing, though
+/// all are cast to sides.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn no_ray_goes_through_a_shared_side() {
+    let (gpu, mesh) = (gpu(), room_with_doubled_leaf());
+    let (arrays, quadtrees) =
+        (TracedArrays::new(&Lights::new(mesh.shared_scene())), quadtrees(&mesh));
+    let mut cast = 0;
+    for patch in patches(&mesh) {
+        let from = mesh.viewpoint(patch);
+        let mut rows = open_rows(&gpu, &mesh, 64);
+        let traced = rows.traced_patch(&mesh, patch);
+        // Along the tangents and the normal that the device makes of these.
+        let [x, y, z] =
+            [Vec3::X, Vec3::Y, Vec3::Z].map(|v| turned(v, traced.normal.into(), traced.rotation));
+        let local = |to: DVec3| {
+            let d = to.normalize().as_vec3();
+            [d.dot(x), d.dot(y), d.dot(z), 0.0]
+        };
+        let directions: Vec<[f32; 4]> = on_sides(&mesh, 40)
+            .into_iter()
+            .map(|side| local(side - from))
+            .filter(|direction| direction[2] > 0.01)
+            .collect();
+        let count = directions.len() as u32;
+        rows.directions = vec![(count, gpu.memory().lines("directions", &directions).unwrap())];
+        let settings = rows.settings(count);
+        let (_, entries) = rows.entries(&[traced], settings, 0, <[_]>::to_vec).unwrap().unwrap();
+        assert_eq!(entries.iter().map(|entry| entry.count).sum::<u32>(), count);
+        let open = entries.iter().find(|entry| entry.slot == OPEN);
+        assert!(open.is_none(), "{patch:?}: {open:?} of {count}");
+        let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
+        assert_eq!(twin.row_rays(&traced, &settings)[OPEN as usize], 0, "{patch:?}");
+        cast += count;
+    }
+    assert!(cast > 5000, "{cast}");
+}
+
 /// Entries are exactly the slots that are not 0, and these are 0 then; of more entries than there
 /// is room for as many are written, and all are counted.
 #[test]
@@ -143,61 +192,68 @@ fn compact_rows_equals_its_twin() {
     let gpu = gpu();
     for (name, mesh) in traced_scenes() {
         let rows = open_rows(&gpu, &mesh, 1000);
-        let patches: Vec<TracedPatch> = vec![Default::default(); 40];
-        let channels = if rows.has_panes { 4 } else { 1 };
-        let slots = rows.slots as usize;
-        // A third of the slots, the first and the last among them, of any number.
-        let random = |k: usize| split_mix64_nth(k as u64) as u32;
-        let count = |k: usize| match (k % slots, k / slots % channels) {
-            (slot, 0) if slot == 0 || slot == slots - 1 || random(k).is_multiple_of(3) => {
-                random(k + 1).max(1)
-            }
-            (_, 0) => 0,
-            _ => random(k),
-        };
-        let mut counts: Vec<u32> = (0..patches.len() * channels * slots).map(count).collect();
-        // What panes let through of no ray is nothing.
-        for row in counts.chunks_mut(channels * slots) {
-            let (rays, passed) = row.split_at_mut(slots);
-            for channel in passed.chunks_mut(slots) {
-                let unmet = channel.iter_mut().zip(&*rays).filter(|(_, rays)| **rays == 0);
-                unmet.for_each(|(sum, _)| *sum = 0);
-            }
+        // As many slots as the mesh has, one for each lane, and several for most.
+        for slots in [rows.slots, 256, 1001] {
+            compare_entries(&format!("{name}, {slots} slots"), &gpu, &rows, slots);
         }
-        let write = || {
-            gpu.queue.write_buffer(&rows.buffers.counts, 0, bytemuck::cast_slice(&counts));
-        };
-        write();
-        // No ray is cast.
-        let settings = rows.settings(0);
-        let (_, found) = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
-        // Rows come in any order, each in that of its slots.
-        let in_rows = found.chunk_by(|a, b| a.patch_ == b.patch_);
-        assert_eq!(in_rows.clone().count(), patches.len(), "{name}");
-        assert!(in_rows.into_iter().all(|row| row.is_sorted_by_key(|e| e.slot)), "{name}");
-        let mut left = counts.clone();
-        let expected = compact_rows(&mut left, &settings, rows.has_panes);
-        assert!(expected.len() > 2 * patches.len());
-        assert!(words(&sorted(found)) == words(&sorted(expected.clone())), "{name}");
-        let on_device = || read_buffer::<u32>(&gpu, &rows.buffers.counts);
-        assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{name}");
-
-        // Room for two thirds of them, after which there is what was there.
-        let room = expected.len() * 2 / 3;
-        let found: Vec<u32> = read_buffer(&gpu, &rows.buffers.found);
-        let before = entries_in(&found);
-        write();
-        let settings = RowSettings { entries: room as u32, ..settings };
-        assert!(rows.entries(&patches, settings, 0, |_| ()).unwrap().is_none(), "{name}");
-        let found: Vec<u32> = read_buffer(&gpu, &rows.buffers.found);
-        assert_eq!(found[0] as usize, expected.len(), "{name}");
-        let after = entries_in(&found);
-        let expected: Vec<_> = expected.iter().map(bytemuck::bytes_of).collect();
-        let are_entries = after[..room].iter().all(|e| expected.contains(&bytemuck::bytes_of(e)));
-        assert!(are_entries, "{name}");
-        assert!(words(&after[room..]) == words(&before[room..]), "{name}: beyond its end");
-        assert!(on_device().iter().all(|&n| n == 0), "{name}");
     }
+}
+
+fn compare_entries(what: &str, gpu: &Gpu, rows: &TracedRows, slot_count: u32) {
+    let patches: Vec<TracedPatch> = vec![Default::default(); 40];
+    let channels = if rows.has_panes { 4 } else { 1 };
+    let slots = slot_count as usize;
+    // A third of the slots, the first and the last among them, of any number.
+    let random = |k: usize| split_mix64_nth(k as u64) as u32;
+    let count = |k: usize| match (k % slots, k / slots % channels) {
+        (slot, 0) if slot == 0 || slot == slots - 1 || random(k).is_multiple_of(3) => {
+            random(k + 1).max(1)
+        }
+        (_, 0) => 0,
+        _ => random(k),
+    };
+    let mut counts: Vec<u32> = (0..patches.len() * channels * slots).map(count).collect();
+    // What panes let through of no ray is nothing.
+    for row in counts.chunks_mut(channels * slots) {
+        let (rays, passed) = row.split_at_mut(slots);
+        for channel in passed.chunks_mut(slots) {
+            let unmet = channel.iter_mut().zip(&*rays).filter(|(_, rays)| **rays == 0);
+            unmet.for_each(|(sum, _)| *sum = 0);
+        }
+    }
+    let write = || {
+        gpu.queue.write_buffer(&rows.buffers.counts, 0, bytemuck::cast_slice(&counts));
+    };
+    write();
+    // No ray is cast.
+    let settings = RowSettings { slots: slot_count, ..rows.settings(0) };
+    let (_, found) = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
+    // Rows come in any order, each in that of its slots.
+    let in_rows = found.chunk_by(|a, b| a.patch_ == b.patch_);
+    assert_eq!(in_rows.clone().count(), patches.len(), "{what}");
+    assert!(in_rows.into_iter().all(|row| row.is_sorted_by_key(|e| e.slot)), "{what}");
+    let mut left = counts.clone();
+    let expected = compact_rows(&mut left, &settings, rows.has_panes);
+    assert!(expected.len() > 2 * patches.len());
+    assert!(words(&sorted(found)) == words(&sorted(expected.clone())), "{what}");
+    let on_device = || read_buffer::<u32>(gpu, &rows.buffers.counts);
+    assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{what}");
+
+    // Room for two thirds of them, after which there is what was there: nothing.
+    let room = expected.len() * 2 / 3;
+    let nothing = vec![0; size_of_val(&expected[..])];
+    gpu.queue.write_buffer(&rows.buffers.found, ROW_ENTRIES_HEADER_BYTES, &nothing);
+    write();
+    let settings = RowSettings { entries: room as u32, ..settings };
+    assert!(rows.entries(&patches, settings, 0, |_| ()).unwrap().is_none(), "{what}");
+    let found: Vec<u32> = read_buffer(gpu, &rows.buffers.found);
+    assert_eq!(found[0] as usize, expected.len(), "{what}");
+    let (written, beyond) = entries_in(&found)[..expected.len()].split_at(room);
+    let expected: FxHashSet<[u32; 8]> = expected.iter().map(|e| bytemuck::cast(*e)).collect();
+    let is_expected = |e: &RowEntry| expected.contains::<[u32; 8]>(&bytemuck::cast(*e));
+    assert!(written.iter().all(is_expected), "{what}");
+    assert!(words(beyond).iter().all(|&n| n == 0), "{what}: beyond its end");
+    assert!(on_device().iter().all(|&n| n == 0), "{what}");
 }
 
 fn words(entries: &[RowEntry]) -> &[u32] {
@@ -217,8 +273,10 @@ fn rows_have_the_same_bits_in_any_batches() {
         let patches: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
         let all = rows.rows(&mesh, &patches, 1.0).unwrap();
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: again");
-        let alone = patches.iter().map(|&p| rows.rows(&mesh, &[p], 1.0).unwrap().remove(0));
-        assert!(alone.collect::<Vec<_>>() == all, "{name}: one by one");
+        for k in (0..patches.len()).step_by(7) {
+            let alone = rows.rows(&mesh, &patches[k..=k], 1.0).unwrap();
+            assert!(alone == all[k..=k], "{name}: patch {k} alone");
+        }
         // Batches that have no room for their entries are made in two.
         rows.buffers.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
