@@ -38,7 +38,7 @@ fn main() -> Result<(), Error> {
     let gpu = Gpu::new(None)?;
     let adapter = gpu.adapter();
     println!("adapter\t{}\t{}\t{}", adapter.name, adapter.kind, adapter.driver);
-    println!("threads\t{}", std::thread::available_parallelism().map_or(1, |n| n.get()));
+    println!("threads\t{}", std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
     let scenes: Vec<(String, Arc<Scene>)> = match paths.is_empty() {
         true => [32, 4_000, 128_000].map(|n| (format!("room of {n}"), room(n).into())).into(),
         false => paths

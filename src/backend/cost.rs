@@ -45,21 +45,26 @@ const SOFTWARE: RowCost = RowCost {
     ray_level: 8.5e-9,
 };
 
-/// NVIDIA H200 (Vulkan, driver 580): hemicubes in batches of 16 that are read one after the other;
-/// rays by the fit of a compute shader of the same kind apart from this crate, and a wait of 1 ms
-/// for a batch of 256. `docs/data/device.tsv` has both.
+/// NVIDIA H200 (Vulkan, driver 580) beside 16 cores: rooms of 38 and 4 010 triangles, 64 to 256
+/// pixels (`docs/data/device.tsv`). Hemicubes are off by a tenth of that, rays on the device by a
+/// third.
 const DISCRETE: RowCost = RowCost {
-    hemicube: 3.6e-5,
-    triangle: 1.3e-8,
-    pixel: 4.4e-10,
+    hemicube: 7.9e-5,
+    triangle: 1.4e-8,
+    pixel: 3.9e-10,
     device_row: 6e-6,
-    device_ray_level: 2.5e-11,
-    ..SOFTWARE
+    device_ray_level: 8e-11,
+    ray_level: 2.5e-9,
 };
 
-/// Not measured: a twentieth of the other's rays and a tenth of its pixels.
-const INTEGRATED: RowCost =
-    RowCost { pixel: 4.4e-9, device_row: 1e-5, device_ray_level: 5e-10, ..DISCRETE };
+/// Not measured: an eighth of the other's rays, a tenth of its pixels, and the two cores.
+const INTEGRATED: RowCost = RowCost {
+    pixel: 3.9e-9,
+    device_row: 1e-5,
+    device_ray_level: 6.4e-10,
+    ray_level: SOFTWARE.ray_level,
+    ..DISCRETE
+};
 
 /// Rays that a row takes for the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
 /// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
@@ -68,6 +73,10 @@ pub const RAYS_AT_EQUAL_ERROR: f64 = 1.7;
 /// Scenes of fewer triangles count as so many: with less than that, rays slow down faster from
 /// triangle to triangle than hemicubes do, and more triangles could bring hemicubes back.
 const MIN_TRIANGLES: usize = 512;
+
+/// The same of rays on a device: an H200 takes 1.0 ns for one among 38 triangles and 1.2 ns among
+/// 4 010.
+const MIN_DEVICE_TRIANGLES: usize = 8192;
 
 impl RowCost {
     /// The cost where the adapter is of `kind`; the fastest where the driver does not say.
@@ -93,7 +102,8 @@ impl RowCost {
 
     /// Seconds of a row of `rays` rays on the device.
     pub fn device_ray_seconds(&self, triangles: usize, rays: f64) -> f64 {
-        self.device_row + self.device_ray_level * tree_levels(triangles) * rays
+        let levels = tree_levels(triangles.max(MIN_DEVICE_TRIANGLES));
+        self.device_row + self.device_ray_level * levels * rays
     }
 
     /// Of `makers` the one that makes a row in the least time, to the error of a hemicube of

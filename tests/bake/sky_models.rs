@@ -121,7 +121,9 @@ fn the_sun_lights_by_the_cosine() {
     for degrees in [0.0f64, 30.0, 60.0, 85.0, 89.0] {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let found = gathered(&scene, DVec3::ZERO, cosine * direction + sine * tangent);
-        check(found, cosine * SUN, 1e-12);
+        check([found[0]; 2], cosine * SUN, 1e-12);
+        // The device has its normal in 32 bits, 6e-8 of a cosine of down to 0.017.
+        check([found[1]; 2], cosine * SUN, 1e-5);
         assert!(found.iter().all(|sample| sample.direct == sample.irradiance));
     }
     // With its middle on the horizon: half of the disc, whose points are at sines up to its radius,
@@ -148,10 +150,13 @@ fn the_edge_of_a_shadow_is_as_wide_as_the_sun() {
             let found = gathered(&open(sunny(DVec3::Z), &[shutter]), DVec3::ZERO, DVec3::Z);
             let truth: f64 = share(f64::clamp(x, -1.0, 1.0));
             for sample in found {
-                // A line of 32 pixels, or as many strata of rays.
+                // As many strata of rays. In 32 bits the sides of the shutter are as wide as the
+                // rounding of its test, 5e-7 of its length: 0.01 radii, in which a ray or two lie.
                 let off = (sample.direct / SUN - truth).abs().max_element() - 1e-12;
+                let is_sharp = sample == found[0];
+                let rounding = if is_sharp { 0.0 } else { 2.0 / 4096.0 };
                 assert!(
-                    off < 1.5 / 32.0 * (1.0 - x * x).max(0.0).sqrt(),
+                    off < 1.5 / 32.0 * (1.0 - x * x).max(0.0).sqrt() + rounding,
                     "{x}: {sample:?} {truth}"
                 );
             }

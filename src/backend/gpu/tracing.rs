@@ -28,9 +28,17 @@ pub struct Tracing {
     gather: OnceLock<GatherPipelines>,
     rows: OnceLock<RowPipelines>,
     scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
-    /// By their keys and scenes, the one used last at the end.
-    fields: Mutex<Vec<(u64, Arc<TracedScene>, Arc<FieldBuffers>)>>,
+    /// The one used last at the end.
+    fields: Mutex<Vec<KeptField>>,
     pub slots: Mutex<Option<Slots>>,
+}
+
+/// A field on the device, of a scene there.
+#[derive(Debug)]
+struct KeptField {
+    key: u64,
+    scene: Arc<TracedScene>,
+    buffers: Arc<FieldBuffers>,
 }
 
 /// The passes of a gather.
@@ -172,10 +180,8 @@ impl Gpu {
     ) -> Result<Arc<FieldBuffers>, Error> {
         let key = field::key(field);
         let mut kept = self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_same = |(of, owner, _): &(u64, Arc<TracedScene>, Arc<FieldBuffers>)| {
-            *of == key && Arc::ptr_eq(owner, scene)
-        };
-        let found = kept.iter().position(is_same).map(|k| kept.remove(k).2);
+        let is_same = |kept: &KeptField| kept.key == key && Arc::ptr_eq(&kept.scene, scene);
+        let found = kept.iter().position(is_same).map(|k| kept.remove(k).buffers);
         let buffers = match found {
             Some(buffers) => buffers,
             None => {
@@ -193,7 +199,7 @@ impl Gpu {
                 })?)
             }
         };
-        kept.push((key, scene.clone(), buffers.clone()));
+        kept.push(KeptField { key, scene: scene.clone(), buffers: buffers.clone() });
         Ok(buffers)
     }
 }
