@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use radiosity::backend::RowMaker;
 use radiosity::backend::cost::{self, RowCost};
+use radiosity::backend::gpu::TracedRows;
 use radiosity::form_factor::Row;
 use radiosity::mesh::NodeId;
 use radiosity::{BakeSettings, Error, FormFactors, Gpu, HemicubeRows, Mesh, RayRows, Scene};
@@ -31,11 +32,12 @@ const ERROR: f64 = 0.1;
 /// Rays of the rows that others are compared with.
 const TRUTH_RAYS: u32 = 1 << 20;
 
-/// Seconds of one row, two ways.
+/// Seconds of one row, three ways.
 struct Sample {
     triangles: usize,
     resolution: u32,
     hemicube: f64,
+    on_device: f64,
     rays: f64,
 }
 
@@ -79,10 +81,12 @@ pub fn measure(gpu: &Gpu, scenes: &[Arc<Scene>]) -> Result<(), Error> {
 
 type Part = (&'static str, fn(&RowCost) -> f64);
 
-const PARTS: [Part; 4] = [
+const PARTS: [Part; 6] = [
     ("hemicube", |cost| cost.hemicube),
     ("triangle", |cost| cost.triangle),
     ("pixel", |cost| cost.pixel),
+    ("row of rays, device", |cost| cost.device_row),
+    ("ray, a level, device", |cost| cost.device_ray_level),
     ("ray, a level", |cost| cost.ray_level),
 ];
 
@@ -93,7 +97,8 @@ fn over_resolutions(gpu: &Gpu, scene: &Scene) -> Result<Vec<Sample>, Error> {
     for resolution in RESOLUTIONS {
         let hemicube = seconds(&mut HemicubeRows::new(gpu, &mesh, resolution)?, &mesh)?;
         let rays = seconds(&mut RayRows::new(&mesh, resolution.pow(2))?, &mesh)?;
-        samples.push(Sample { triangles, resolution, hemicube, rays });
+        let on_device = seconds(&mut TracedRows::new(gpu, &mesh, resolution.pow(2))?, &mesh)?;
+        samples.push(Sample { triangles, resolution, hemicube, on_device, rays });
     }
     Ok(samples)
 }
@@ -127,7 +132,12 @@ fn fit(samples: &[Sample]) -> RowCost {
         ([rays * cost::tree_levels(s.triangles)], s.rays)
     });
     let [ray_level] = least_squares(rays);
-    RowCost { hemicube, triangle, pixel, ray_level }
+    let on_device = samples.iter().map(|s| {
+        let levels = cost::tree_levels(s.triangles.max(cost::MIN_DEVICE_TRIANGLES));
+        ([1.0, f64::from(s.resolution).powi(2) * levels], s.on_device)
+    });
+    let [device_row, device_ray_level] = least_squares(on_device);
+    RowCost { hemicube, triangle, pixel, device_row, device_ray_level, ray_level }
 }
 
 /// x for the least Σ (row·x / value − 1)², by the normal equations.

@@ -76,7 +76,7 @@ const MIN_TRIANGLES: usize = 512;
 
 /// The same of rays on a device: an H200 takes 1.0 ns for one among 38 triangles and 1.2 ns among
 /// 4 010.
-const MIN_DEVICE_TRIANGLES: usize = 8192;
+pub const MIN_DEVICE_TRIANGLES: usize = 8192;
 
 impl RowCost {
     /// The cost where the adapter is of `kind`; the fastest where the driver does not say.
