@@ -45,15 +45,16 @@ struct Sample {
 pub fn measure(gpu: &Gpu, scenes: &[Arc<Scene>]) -> Result<(), Error> {
     let mut samples = vec![];
     println!(
-        "{:>9} {:>6} {:>12} {:>12}   seconds a row",
-        "triangles", "pixels", "hemicube", "rays"
+        "{:>9} {:>6} {:>12} {:>12} {:>12}   seconds a row",
+        "triangles", "pixels", "hemicube", "rays, device", "rays"
     );
     for scene in scenes {
         let mut scene = Scene::clone(scene);
         loop {
             for sample in over_resolutions(gpu, &scene)? {
-                let Sample { triangles, resolution, hemicube, rays } = sample;
-                println!("{triangles:9} {resolution:6} {hemicube:12.2e} {rays:12.2e}");
+                let Sample { triangles, resolution, hemicube, on_device, rays } = sample;
+                let seconds = format!("{hemicube:12.2e} {on_device:12.2e} {rays:12.2e}");
+                println!("{triangles:9} {resolution:6} {seconds}");
                 samples.push(sample);
             }
             if 4 * scene.triangles().len() > MAX_TRIANGLES {

@@ -125,7 +125,9 @@ impl TracedGather {
     }
 
     /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
-    /// `noise`·max(E, `dim`): see [`RayGather::with_noise`](crate::RayGather::with_noise).
+    /// `noise`·max(E, `dim`): see [`RayGather::with_noise`].
+    ///
+    /// [`RayGather::with_noise`]: crate::backend::cpu::RayGather::with_noise
     ///
     /// # Errors
     /// Those of [`TracedGather::new`].
