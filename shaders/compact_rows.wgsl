@@ -3,13 +3,6 @@
 
 const COMPACT_LANES: u32 = 256u;
 
-struct RowSettings {
-    rays: u32,            // of a patch
-    slots: u32,           // of a row
-    unit: f32,
-    entries: u32,         // that there is room for
-}
-
 struct RowEntry {
     patch_: u32,          // in its batch
     slot: u32,
@@ -26,7 +19,6 @@ struct RowEntries {
 }
 
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
-@group(1) @binding(3) var<uniform> settings: RowSettings;
 @group(1) @binding(4) var<storage, read_write> found: RowEntries;
 
 var<workgroup> ends: array<u32, COMPACT_LANES>;   // of what lanes have, up to each

@@ -5,12 +5,6 @@
 @group(0) @binding(7) var sky_pieces: texture_2d<f32>;
 // Unit vectors along two tangents and the normal, ray by ray.
 @group(1) @binding(2) var directions: texture_2d<f32>;
-@group(1) @binding(4) var<storage, read> work: WorkRead;
-
-struct WorkRead {
-    groups: array<u32, 8>,
-    points: array<u32>,
-}
 
 var<private> light_sums: array<Visible, 16>;
 

@@ -1,13 +1,6 @@
 // Rays from each point to places on its lights and on the sun: a workgroup a point. Needs
 // shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
 
-@group(1) @binding(4) var<storage, read> work: WorkRead;
-
-struct WorkRead {
-    groups: array<u32, 8>,
-    points: array<u32>,
-}
-
 // All points.
 @compute @workgroup_size(64)
 fn light_rays(

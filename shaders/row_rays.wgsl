@@ -9,13 +9,6 @@ const OPEN: u32 = 0u;
 const BACK: u32 = 1u;
 const FIRST_ELEMENT: u32 = 2u;
 
-struct RowSettings {
-    rays: u32,            // of a patch
-    slots: u32,           // of a row
-    unit: f32,
-    entries: u32,         // that there is room for
-}
-
 struct TracedPatch {
     position: vec3f,
     near: f32,
@@ -28,7 +21,6 @@ struct TracedPatch {
 @group(1) @binding(0) var<storage, read> patches: array<TracedPatch>;
 @group(1) @binding(1) var<storage, read_write> counts: array<atomic<u32>>;
 @group(1) @binding(2) var directions: texture_2d<f32>;
-@group(1) @binding(3) var<uniform> settings: RowSettings;
 
 @compute @workgroup_size(64)
 fn row_rays(@builtin(global_invocation_id) id: vec3u) {

@@ -16,7 +16,7 @@
 //! | `compact_rows.wgsl` | `twins/compact_rows` | the same: entries equal |
 //! | `shared/*.wgsl` | `shared`, `twins` | with the shaders that need them |
 
-mod gather;
+pub(crate) mod gather;
 #[cfg(all(test, feature = "gpu"))]
 pub(super) mod item_buffer;
 #[cfg(all(test, feature = "gpu"))]

@@ -63,7 +63,7 @@ pub struct RayGather {
 const MAX_OVERSAMPLING: u32 = 16;
 
 /// Rays over the hemisphere for one shadow ray to each light. Chosen by hand; no measurement kept.
-const RAYS_PER_SHADOW_RAY: u32 = 4;
+pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
 
 impl RayGather {
     /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
@@ -71,12 +71,7 @@ impl RayGather {
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        if count == 0 || count > hemisphere::MAX_RAYS {
-            let place = format!("{count} rays a place");
-            let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
-            return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
-        }
-        let min_rays = 1 << f64::from(count).log2().round().max(1.0) as u32;
+        let min_rays = least_rays(count)?;
         Ok(RayGather {
             scene: RayScene::of_scene(mesh.scene()),
             panes: Panes::of_scene(mesh.scene()),
@@ -97,11 +92,7 @@ impl RayGather {
     /// squares add up; the larger says which are doubled. Few points need more rays, such as those
     /// that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
-        let max_rays = if noise.is_finite() {
-            (self.min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS)
-        } else {
-            self.min_rays
-        };
+        let max_rays = most_rays(self.min_rays, noise);
         let samples = samples(self.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
@@ -211,10 +202,31 @@ impl RayGather {
     }
 }
 
+/// The power of two nearest to `count`: rays that a point casts at least.
+///
+/// # Errors
+/// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
+pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
+    if count == 0 || count > hemisphere::MAX_RAYS {
+        let place = format!("{count} rays a place");
+        let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
+        return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
+    }
+    Ok(1 << f64::from(count).log2().round().max(1.0) as u32)
+}
+
+/// Rays that a point casts at most, which casts `min_rays` and more where a finite `noise` asks.
+pub(crate) fn most_rays(min_rays: u32, noise: f64) -> u32 {
+    match noise.is_finite() {
+        true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
+        false => min_rays,
+    }
+}
+
 /// Directions of `max_rays` rays in `scene`, of which `min_rays` are cast at least. Under a sky
 /// that is brighter above than at its sides all places would be off alike by rays that are nearer
 /// to the normal than they should.
-fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
+pub(crate) fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
     match scene.sky().uniform_radiance() {
         Some(_) => HemisphereSamples::progressive(max_rays),
         None => HemisphereSamples::centred(max_rays, min_rays),

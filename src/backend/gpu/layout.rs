@@ -256,8 +256,8 @@ mod tests {
         COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, ITEM_BUFFER_WGSL, LIGHT_RAYS_WGSL,
         RANK_LIGHTS_WGSL, REDUCE_WGSL, ROW_RAYS_WGSL, SETTLE_WGSL,
     };
-    use super::super::traced_gather::RAYS_PER_SHADOW_RAY;
     use super::*;
+    use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
     use crate::backend::cpu::twins::gather_state::{
         LANES, PointState, RankedLight, RaySums, SOURCES, Visible,
     };

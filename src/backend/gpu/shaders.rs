@@ -1,7 +1,7 @@
 //! Sources of the shaders; what two of them share stands once, in `shaders/shared`.
 
-/// Draw shaders begin with what they share.
-macro_rules! draw_shader {
+/// Shaders begin with what they share.
+macro_rules! shader {
     ($file:literal, $($shared:literal),*) => {
         concat!(
             $(include_str!(concat!("../../../shaders/shared/", $shared)),)*
@@ -10,13 +10,13 @@ macro_rules! draw_shader {
     };
 }
 
-pub const ITEM_BUFFER_WGSL: &str = draw_shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
+pub const ITEM_BUFFER_WGSL: &str = shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
 pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
 
 /// Shaders that cast rays begin with how these meet the scene.
 macro_rules! ray_shader {
     ($file:literal $(, $shared:literal)*) => {
-        draw_shader!(
+        shader!(
             $file,
             "trace.wgsl",
             "lights.wgsl"
@@ -29,11 +29,14 @@ pub const RANK_LIGHTS_WGSL: &str = ray_shader!("rank_lights.wgsl", "gather_state
 pub const HEMISPHERE_RAYS_WGSL: &str = ray_shader!(
     "hemisphere_rays.wgsl",
     "gather_state.wgsl",
+    "work_list.wgsl",
     "lattice.wgsl",
     "element.wgsl",
     "field.wgsl"
 );
-pub const LIGHT_RAYS_WGSL: &str = ray_shader!("light_rays.wgsl", "gather_state.wgsl");
+pub const LIGHT_RAYS_WGSL: &str =
+    ray_shader!("light_rays.wgsl", "gather_state.wgsl", "work_list.wgsl");
 pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl");
-pub const ROW_RAYS_WGSL: &str = ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl");
-pub const COMPACT_ROWS_WGSL: &str = include_str!("../../../shaders/compact_rows.wgsl");
+pub const ROW_RAYS_WGSL: &str =
+    ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl", "row_settings.wgsl");
+pub const COMPACT_ROWS_WGSL: &str = shader!("compact_rows.wgsl", "row_settings.wgsl");

@@ -25,12 +25,13 @@ use super::memory::Memory;
 use super::pipeline::bind_group;
 use super::traced_scene::TracedScene;
 use crate::backend::adapter::AdapterKind;
+use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, least_rays, most_rays, samples};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
 use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
-use crate::sampling::hemisphere::{self, HemisphereSamples};
+use crate::sampling::hemisphere::HemisphereSamples;
 use crate::sampling::rotation::{CellRotation, second_rotation};
 use crate::scene::Rgb;
 use crate::visibility::panes::Panes;
@@ -92,9 +93,6 @@ struct InFlight {
     submission: wgpu::SubmissionIndex,
 }
 
-/// Most times as many rays as at first, where they disagree: as on the CPU.
-const MAX_OVERSAMPLING: u32 = 16;
-
 /// Batches under way at once: one is read while one runs and one is ready. With two the device
 /// waits for the host between batches.
 const IN_FLIGHT: usize = 3;
@@ -109,9 +107,6 @@ pub const MAX_POINTS: u32 = 32_768;
 /// Seconds that one dispatch may take: drivers end those of seconds, and a desktop stands still
 /// meanwhile.
 const DISPATCH_SECONDS: f64 = 0.02;
-
-/// Rays to lights for one over the hemisphere, as `shared/gather_state.wgsl` has it.
-pub(super) const RAYS_PER_SHADOW_RAY: u32 = 4;
 
 impl TracedGather {
     /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
@@ -137,24 +132,13 @@ impl TracedGather {
         count: u32,
         (noise, dim): (f64, f64),
     ) -> Result<TracedGather, Error> {
-        if count == 0 || count > hemisphere::MAX_RAYS {
-            let place = format!("{count} rays a place");
-            let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
-            return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
-        }
-        let min_rays = 1 << f64::from(count).log2().round().max(1.0) as u32;
-        let max_rays = match noise.is_finite() {
-            true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
-            false => min_rays,
-        };
+        let min_rays = least_rays(count)?;
+        let max_rays = most_rays(min_rays, noise);
         check_textures(gpu.limits().texture)?;
         let scene = mesh.scene();
         let lights = Arc::new(Lights::new(mesh.shared_scene()));
         let traced = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
-        let samples = match scene.sky().uniform_radiance() {
-            Some(_) => HemisphereSamples::progressive(max_rays),
-            None => HemisphereSamples::centred(max_rays, min_rays),
-        };
+        let samples = samples(scene, max_rays, min_rays);
         let memory = gpu.memory();
         let directions = ordered_directions(&samples, min_rays);
         let directions = gpu.with_error_scopes(|| memory.lines("directions", &directions))?;
@@ -384,13 +368,7 @@ impl TracedGather {
         let pipelines = self.gpu.gather_pipelines();
         let Slot { points, states, samples, work, settings, .. } = slot;
         let view = wgpu::BindingResource::TextureView;
-        let geometry = [
-            (0, scene.nodes.as_entire_binding()),
-            (1, scene.triangles.as_entire_binding()),
-            (2, scene.info.as_entire_binding()),
-            (3, view(&scene.mask_places)),
-            (4, view(&scene.masks)),
-        ];
+        let geometry = scene.geometry();
         let without_nodes = geometry[1..].to_vec();
         let lights = [(5, scene.lights.as_entire_binding()), (6, scene.lamps.as_entire_binding())];
         let sky = [(7, view(&scene.sky))];

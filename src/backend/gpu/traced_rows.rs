@@ -215,14 +215,8 @@ impl TracedRows {
             bind_group(device, "rows", &layout, entries)
         };
         let scene = &*self.scene;
-        let geometry = [
-            (0, scene.nodes.as_entire_binding()),
-            (1, scene.triangles.as_entire_binding()),
-            (2, scene.info.as_entire_binding()),
-            (3, view(&scene.mask_places)),
-            (4, view(&scene.masks)),
-            (5, scene.lights.as_entire_binding()),
-        ];
+        let lights = [(5, scene.lights.as_entire_binding())];
+        let geometry = [&scene.geometry()[..], &lights].concat();
         let batch = [
             (0, buffers.patches.as_entire_binding()),
             (1, counts.as_entire_binding()),

@@ -75,6 +75,17 @@ impl TracedScene {
             _memory: memory,
         })
     }
+
+    /// What `shared/trace.wgsl` binds to group 0.
+    pub fn geometry(&self) -> [(u32, wgpu::BindingResource<'_>); 5] {
+        [
+            (0, self.nodes.as_entire_binding()),
+            (1, self.triangles.as_entire_binding()),
+            (2, self.info.as_entire_binding()),
+            (3, wgpu::BindingResource::TextureView(&self.mask_places)),
+            (4, wgpu::BindingResource::TextureView(&self.masks)),
+        ]
+    }
 }
 
 impl TracedArrays {
@@ -99,6 +110,7 @@ impl TracedArrays {
             sky: vec![[0.0; 4]],
         };
         let has_holes = arrays.add_masks(scene);
+        arrays.add_nodes(&rays, 0);
         let triangle = |t: usize, light: u32| arrays.coordinates.traced(scene, t, light);
         let with_holes = |mut triangle: TracedTriangle| {
             if has_holes.get(triangle.index as usize) == Some(&true) {
@@ -119,21 +131,17 @@ impl TracedArrays {
                     .map(|k| with_holes(triangle(clear[k], (first_row + k) as u32))),
             );
             arrays.lights = transmittance.iter().map(pane_row).collect();
-            arrays.add_nodes(&rays, 0);
             arrays.info.panes = arrays.nodes.len() as u32;
             arrays.add_nodes(hierarchy, blocking);
-        } else {
-            arrays.add_nodes(&rays, 0);
         }
         arrays.triangles = triangles;
         arrays.add_lights(lights, blocking);
         arrays.add_light_from_outside(scene);
         // A buffer has a size, whether anything looks into it or not.
-        let first = |is_empty: bool| if is_empty { 1 } else { 0 };
         let TracedArrays { triangles, lights, lamps, .. } = &mut arrays;
-        triangles.resize(triangles.len() + first(triangles.is_empty()), Zeroable::zeroed());
-        lights.resize(lights.len() + first(lights.is_empty()), Zeroable::zeroed());
-        lamps.resize(lamps.len() + first(lamps.is_empty()), Zeroable::zeroed());
+        triangles.resize(triangles.len().max(1), Zeroable::zeroed());
+        lights.resize(lights.len().max(1), Zeroable::zeroed());
+        lamps.resize(lamps.len().max(1), Zeroable::zeroed());
         arrays
     }
 

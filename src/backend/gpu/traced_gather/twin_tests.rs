@@ -105,7 +105,7 @@ impl Passes {
 
     /// Settings of all rays of a half at once.
     fn whole(&self) -> GatherSettings {
-        self.settings(0, hemisphere::MAX_RAYS)
+        self.settings(0, crate::sampling::hemisphere::MAX_RAYS)
     }
 
     fn run(
