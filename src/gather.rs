@@ -202,6 +202,7 @@ impl RadiosityField<'_> {
         self.interpolated(element, local)
     }
 
+    /// The same at barycentric position (`u`, `v`) of an element.
     fn interpolated(&self, element: usize, [u, v]: [f64; 2]) -> Rgb {
         let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);
         a * (1.0 - u - v) + b * u + c * v

@@ -2,6 +2,8 @@
 //! out.
 
 mod adapters;
+mod clock;
+mod compacted_rows;
 mod device;
 mod draw_list;
 mod error;
@@ -12,7 +14,6 @@ pub(crate) mod layout;
 mod limits;
 mod memory;
 mod pipeline;
-mod readback;
 mod reduce;
 mod render_targets;
 mod resolution;

@@ -79,10 +79,12 @@ impl GatheredFrom<'_> {
     /// Reflected radiosity of the light at `hit` less that of its source, W/m².
     fn difference_at(&self, hit: &SurfaceHit) -> Rgb {
         let mesh = &self.samples.mesh;
-        let node = mesh.element(hit.element as usize);
+        let element = hit.element as usize;
+        let node = mesh.element(element);
         let [u, v] = mesh.cell(node).in_triangle(hit.barycentric);
-        let t = mesh.triangle(node);
-        self.light.reflected_at(t, u, v) - self.source.reflected_at(t, u, v)
+        let light = self.light.interpolated(element, hit.barycentric);
+        light * mesh.relative_reflectance(element)
+            - self.source.reflected_at(mesh.triangle(node), u, v)
     }
 
     /// The corner nearest to `hit` of its element, of those that are not buried.

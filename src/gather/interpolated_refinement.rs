@@ -122,7 +122,7 @@ fn put_on_interpolants(
         let middle = refined.corners()[e + 3 * k + 3];
         for (value, corner) in values.into_iter().zip([2, 0, 1]) {
             let (sum, count) = &mut sums[middle[corner] as usize];
-            *sum += value.max(Rgb::ZERO);
+            *sum += value;
             *count += 1.0;
         }
     }

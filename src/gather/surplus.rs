@@ -162,9 +162,19 @@ impl HierarchicalSurplus {
         self.midside_surplus().iter().sum::<Rgb>() / 12.0
     }
 
-    /// Values of the quadratic interpolant at the midsides of child `k`, W/m² per channel: the
-    /// shape functions λ(2λ − 1) of the corners and 4 λ λ' of the midsides.
+    /// Values of the quadratic interpolant at the midsides of child `k`, W/m² per channel, within
+    /// those of the six nodes: beside the edge of a shadow the interpolant leaves them, down to
+    /// where no light is, and that it is smooth between its nodes is not known.
     pub fn child_midsides(&self, k: usize) -> [Rgb; 3] {
+        let nodes = || self.corners.iter().chain(&self.midsides).map(|node| node.value);
+        let least = nodes().fold(Rgb::INFINITY, Rgb::min);
+        let most = nodes().fold(Rgb::NEG_INFINITY, Rgb::max);
+        self.quadratic_at_child_midsides(k).map(|value| value.clamp(least, most))
+    }
+
+    /// The quadratic interpolant there: the shape functions λ(2λ − 1) of the corners and 4 λ λ' of
+    /// the midsides.
+    fn quadratic_at_child_midsides(&self, k: usize) -> [Rgb; 3] {
         let corner = |i: usize| self.corners[i].value;
         let midside =
             |i: usize, j: usize| self.midsides[if (i + 1) % 3 == j { i } else { j }].value;
@@ -213,4 +223,41 @@ pub(super) fn mean_preserving(samples: &SampledMesh) -> Vec<Rgb> {
     }
     let values = samples.reflected.iter().zip(sums);
     values.map(|(&b, (shift, area))| (b + shift / area).max(Rgb::ZERO)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nodes(corners: [f64; 3], midsides: [f64; 3]) -> HierarchicalSurplus {
+        let node = |value: f64| NodeValue { value: Rgb::splat(value), noise: 0.0, buried: false };
+        HierarchicalSurplus { corners: corners.map(node), midsides: midsides.map(node) }
+    }
+
+    #[test]
+    fn quadratics_are_followed_between_the_nodes() {
+        // 1 + x + x², with x the weight of the second corner.
+        let f = |x: f64| 1.0 + x + x * x;
+        let nodes = nodes([f(0.0), f(1.0), f(0.0)], [f(0.5), f(0.5), f(0.0)]);
+        // The second child: its midsides are at x = ¾, ¾ and ½.
+        for (value, x) in nodes.child_midsides(1).into_iter().zip([0.75, 0.75, 0.5]) {
+            assert!((value.x - f(x)).abs() < 1e-15, "{value} at {x}");
+        }
+    }
+
+    #[test]
+    fn no_value_is_beyond_those_of_the_nodes() {
+        // Beside the edge of a shadow, where the interpolant goes down to 0.1; and beside that of
+        // light, where it goes up to 1.1.
+        let dark = ([1.0, 1.0, 0.2], [1.0, 0.2, 0.2]);
+        let bright = ([0.2, 0.2, 1.0], [0.2, 1.0, 1.0]);
+        for ((corners, midsides), beyond) in [(dark, 0.1), (bright, 1.1)] {
+            let nodes = nodes(corners, midsides);
+            let raw = |k: usize| nodes.quadratic_at_child_midsides(k).map(|value| value.x);
+            assert!((0..4).flat_map(raw).any(|value| (value - beyond).abs() < 1e-12));
+            for value in (0..4).flat_map(|k| nodes.child_midsides(k)) {
+                assert!((0.2..=1.0).contains(&value.x), "{value}");
+            }
+        }
+    }
 }

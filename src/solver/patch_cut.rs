@@ -22,6 +22,7 @@ use std::collections::{BinaryHeap, HashSet};
 use std::ops::Range;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::flux_state::Flux;
@@ -224,8 +225,8 @@ impl<'m> PatchCut<'m> {
             let share = flux.unshot_share(&patch.elements);
             (share > 0.0).then(|| (patch.is_unshot_emitter, tie_stable_key(share), Reverse(k)))
         };
-        let mut queue: BinaryHeap<_> =
-            self.patches.iter().zip(0..).filter_map(|(patch, k)| entry(patch, k)).collect();
+        let all = self.patches.par_iter().enumerate().filter_map(|(k, patch)| entry(patch, k));
+        let mut queue = BinaryHeap::from(all.collect::<Vec<_>>());
         let mut rows_left = max_rows.max(1);
         let mut shots: Vec<Shot> = vec![];
         // Of the first shot: whether it is that of an emitter, and the least flux of the others.

@@ -17,6 +17,7 @@
 
 use std::hash::BuildHasher;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 use hashbrown::HashTable;
@@ -159,49 +160,65 @@ impl Vertices {
                 old_elements.push(Some(e));
             }
         }
-        let places_of = |f: usize| {
+        let place_of = |f: usize, k: usize| {
             let node = finer.element(f);
-            let t = finer.triangle(node);
-            lattice_corners(finer.cell(node)).map(|point| (t, point))
+            (finer.triangle(node), lattice_corners(finer.cell(node))[k])
         };
+        let key_of = |(t, point): (usize, [u32; 2])| vertex_key(topology, t, point);
+        // Of the corners of each element their old numbers; from there on those of new vertices.
         let old_corners = |(f, old): (usize, &Option<usize>)| match old {
-            Some(e) => self.corners[*e].map(Some),
-            None => places_of(f).map(|(t, point)| self.index_of(&vertex_key(topology, t, point))),
+            Some(e) => self.corners[*e],
+            None => [0, 1, 2].map(|k| {
+                let old = self.index_of(&key_of(place_of(f, k)));
+                old.unwrap_or(UNNUMBERED)
+            }),
         };
-        let old_corners: Vec<[Option<u32>; 3]> =
+        let mut corners: Vec<[u32; 3]> =
             old_elements.par_iter().enumerate().map(old_corners).collect();
-        // New vertices alone are in its index at first.
-        let mut split = Vertices::default();
-        split.corners.reserve_exact(finer.element_count());
-        let mut numbers = vec![UNNUMBERED; self.keys.len()];
-        for (f, old_corners) in old_corners.into_iter().enumerate() {
-            let places = places_of(f);
-            let corners = [0, 1, 2].map(|k| {
-                let (t, point) = places[k];
-                let Some(old) = old_corners[k] else {
-                    return split.number(finer, topology, places[k]);
-                };
-                let number = &mut numbers[old as usize];
-                if *number == UNNUMBERED {
-                    // Its first element may be in another triangle than before.
-                    let old = old as usize;
-                    let position = match self.places[old] == (t as u32, point) {
-                        true => self.positions[old],
-                        false => lattice_position(finer.scene(), topology, t, point),
-                    };
-                    *number = split.push(self.keys[old], position, places[k]);
-                }
-                *number
-            });
-            split.corners.push(corners);
+        let old_count = self.keys.len();
+        let mut new = Vertices::default();
+        for (f, corners) in corners.iter_mut().enumerate() {
+            for (k, v) in corners.iter_mut().enumerate().filter(|(_, v)| **v == UNNUMBERED) {
+                *v = old_count as u32 + new.number(finer, topology, place_of(f, k));
+            }
         }
-        let mut old_numbers = vec![None; split.keys.len()];
-        for (old, &number) in (0..).zip(&numbers) {
-            old_numbers[number as usize] = Some(old);
+        // Vertices are numbered in the order in which the corners of elements name them.
+        let count = old_count + new.keys.len();
+        let slots = naming_corners(corners.as_flattened(), count);
+        let by_number: Vec<u32> =
+            slots.par_iter().map(|&slot| corners.as_flattened()[slot as usize]).collect();
+        let mut numbers = vec![UNNUMBERED; count];
+        for (number, &v) in (0..).zip(&by_number) {
+            numbers[v as usize] = number;
         }
-        let new_index = std::mem::replace(&mut split.index, self.index.clone());
+        corners.as_flattened_mut().par_iter_mut().for_each(|v| *v = numbers[*v as usize]);
+        let places = slots.par_iter().map(|&slot| {
+            let (t, point) = place_of(slot as usize / 3, slot as usize % 3);
+            (t as u32, point)
+        });
+        let places: Vec<(u32, [u32; 2])> = places.collect();
+        let key = |&v: &u32| match self.keys.get(v as usize) {
+            Some(key) => *key,
+            None => new.keys[v as usize - old_count],
+        };
+        let position = |(&v, &place): (&u32, &(u32, [u32; 2]))| match v as usize {
+            // The first element of an old vertex may be in another triangle than before.
+            v if v >= old_count => new.positions[v - old_count],
+            v if self.places[v] == place => self.positions[v],
+            _ => lattice_position(finer.scene(), topology, place.0 as usize, place.1),
+        };
+        let mut split = Vertices {
+            keys: by_number.par_iter().map(key).collect(),
+            positions: by_number.par_iter().zip(&places).map(position).collect(),
+            places,
+            corners,
+            outlines: ElementLoops::default(),
+            index: self.index.clone(),
+        };
         split.index.iter_mut().for_each(|v| *v = numbers[*v as usize]);
-        new_index.iter().for_each(|&v| split.add_to_index(v));
+        numbers[old_count..].iter().for_each(|&v| split.add_to_index(v));
+        let old_number = |v: u32| Some(v).filter(|&v| (v as usize) < old_count);
+        let old_numbers = by_number.into_par_iter().map(old_number).collect();
         split.outlines = outlines_of(finer, |f, outline| {
             let old_outline = old_elements[f].map(|e| self.outlines.of(e)).filter(|old| {
                 let is_at_split = |k: usize| is_at_split[old[k % old.len()] as usize];
@@ -309,6 +326,17 @@ pub(super) fn by_task<T: Send>(elements: usize, work: impl Fn(Range<usize>) -> T
     let tasks = (0..elements.div_ceil(ELEMENTS_A_TASK)).into_par_iter();
     let range = |k: usize| k * ELEMENTS_A_TASK..elements.min((k + 1) * ELEMENTS_A_TASK);
     tasks.map(|k| work(range(k))).collect()
+}
+
+/// Where in `corners` each of so many vertices is named for the first time, ascending.
+fn naming_corners(corners: &[u32], vertices: usize) -> Vec<u32> {
+    let mut first = vec![];
+    first.resize_with(vertices, || AtomicU32::new(u32::MAX));
+    corners.par_iter().enumerate().for_each(|(k, &v)| {
+        first[v as usize].fetch_min(k as u32, Ordering::Relaxed);
+    });
+    let all = (0..corners.len() as u32).into_par_iter();
+    all.filter(|&k| first[corners[k as usize] as usize].load(Ordering::Relaxed) == k).collect()
 }
 
 fn hash(key: &VertexKey) -> u64 {

@@ -212,7 +212,16 @@ impl Gpu {
         self.check()?;
         let found = match waited {
             Ok(Ok(_)) => return Ok(()),
-            Ok(Err(e)) => format!("no answer for {} s: {e}", DEVICE_TIMEOUT.as_secs()),
+            Ok(Err(wgpu::PollError::Timeout)) => {
+                format!("no answer for {} s", DEVICE_TIMEOUT.as_secs())
+            }
+            Ok(Err(e)) => {
+                // A device that was lost before the submission says so when it is polled again.
+                let poll = || self.device.poll(wgpu::PollType::Poll);
+                let _ = catch_unwind(AssertUnwindSafe(poll));
+                self.check()?;
+                e.to_string()
+            }
             Err(_) => "the device was lost".into(),
         };
         record(&self.lost, found);

@@ -55,6 +55,7 @@ impl Reduce {
         let slot_of_item = memory.storage("slots", bytemuck::cast_slice(slot_of_item))?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
+        // Zero at first, and after each batch.
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
         let module = pipeline::shader(device, "reduce.wgsl", REDUCE_WGSL);
         let pipeline = pipeline::compute(device, &module, "reduce");
@@ -78,7 +79,7 @@ impl Reduce {
     }
 
     /// Records the reduction of the first `count` hemicubes on `targets`, with the bindings for
-    /// their resolution and a timestamp after it (query 2).
+    /// their resolution and a timestamp after it (query 2). It adds to rows that are 0 before.
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -88,7 +89,6 @@ impl Reduce {
         queries: Option<&wgpu::QuerySet>,
     ) {
         let pixels = targets.texture.width();
-        encoder.clear_buffer(&self.rows, 0, None);
         targets.copy(encoder, &self.items, stride(pixels) * 4, count);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("reduce"),

@@ -1,9 +1,9 @@
-//! Form-factor rows from hemicubes: batches drawn, reduced and read back.
+//! Form-factor rows from hemicubes: batches drawn, reduced, compacted and read back.
 //!
 //! ```text
 //! patches ─► views (frame, turned by a hash of the patch; 5 faces) ─► item buffer ─► reduce
 //!                                                                                      │
-//! rows ◄─ mean over rotations ◄─ sparse(dense row), sum checked ◄─ readback ◄──────────┘
+//! rows ◄─ mean over rotations ◄─ sum checked ◄─ readback of entries ◄─ compact ◄───────┘
 //! ```
 //!
 //! A batch holds as many hemicubes as [`BATCH_BYTES`], [`MAX_BATCH`] and the device's limits allow,
@@ -15,18 +15,20 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::clock::Clock;
+use super::compacted_rows::{CompactedRows, by_row};
 use super::device::Gpu;
 use super::draw_list::DrawList;
 use super::error::check_hemicubes_see;
 use super::item_buffer::{ItemBuffer, View};
 use super::item_table::ItemTable;
-use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN};
+use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN, RowEntry, RowSettings};
 use super::limits::GpuLimits;
 use super::memory::Memory;
-use super::readback::{Readback, Results, Timer};
 use super::reduce::{BatchSize, Reduce};
 use super::resolution::Resolution;
 use super::split_float::SplitFloat;
+use crate::backend::AdapterKind;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
@@ -66,7 +68,8 @@ struct Batches {
     reduce: Reduce,
     /// The full resolution, then what it is halved to.
     resolutions: Vec<Resolution>,
-    readback: Readback,
+    compacted: CompactedRows,
+    clock: Option<Clock>,
     /// Hemicubes at once, at most.
     max_hemicubes: u32,
     _memory: Memory,
@@ -76,8 +79,12 @@ struct Batches {
 /// that much in a fraction of a second.
 const BATCH_BYTES: u64 = 32 << 20;
 
-/// Hemicubes in a batch at most. Chosen by hand; no measurement kept.
-const MAX_BATCH: u32 = 16;
+/// Hemicubes in a batch at most: as many as textures have layers on any WebGPU device, so that a
+/// submission and the way back, a millisecond on hardware, are shared by many.
+const MAX_BATCH: u32 = 256;
+
+/// The same of software devices, which are as fast with fewer. Chosen by hand; no measurement kept.
+const MAX_SOFTWARE_BATCH: u32 = 16;
 
 impl HemicubeRows {
     /// Share of the emitted flux from which on a patch gets the full resolution, unless set. With
@@ -100,7 +107,11 @@ impl HemicubeRows {
         check_mesh_fits(limits, mesh)?;
         let slots = slots(mesh);
         let item_bytes = Reduce::items_bytes(resolution);
-        let preferred_batch = MAX_BATCH
+        let most = match gpu.assumed_kind() {
+            AdapterKind::Cpu => MAX_SOFTWARE_BATCH,
+            _ => MAX_BATCH,
+        };
+        let preferred_batch = most
             .min((BATCH_BYTES / item_bytes).max(1) as u32)
             .min(limits.layers)
             .min((limits.buffer / item_bytes) as u32)
@@ -115,12 +126,15 @@ impl HemicubeRows {
             let size = BatchSize { resolution, slots, hemicubes };
             let reduce = Reduce::new(&memory, &table.slots, size)?;
             let resolutions = Resolution::halved(&memory, &reduce, resolution, hemicubes)?;
-            let readback = Readback::new(&memory, reduce.rows.size())?;
+            let row_entries = slots.min(3 * resolution * resolution);
+            let compacted = CompactedRows::new(&memory, hemicubes, row_entries)?;
+            let clock = Clock::new(&memory)?;
             Ok(Batches {
                 item_buffer,
                 reduce,
                 resolutions,
-                readback,
+                compacted,
+                clock,
                 max_hemicubes: hemicubes,
                 _memory: memory,
             })
@@ -206,31 +220,47 @@ impl HemicubeRows {
         at: usize,
     ) -> Result<Vec<Row>, Error> {
         let start = Instant::now();
-        let views: Vec<View> =
-            patches.iter().flat_map(|&(p, angle)| self.views(mesh, p, angle)).collect();
+        let views: Vec<[View; 5]> =
+            patches.par_iter().map(|&(p, angle)| self.views(mesh, p, angle)).collect();
         let count = patches.len() as u32;
         let (gpu, slots) = (&self.gpu, self.slots);
-        let Batches { item_buffer, reduce, resolutions, readback, .. } = &mut self.batches;
-        let Resolution { targets, bindings, drawn, .. } = &mut resolutions[at];
-        let timer = Timer { start, timings: &mut self.timings };
-        let rows: Result<Vec<Row>, String> = gpu.with_error_scopes(|| {
+        let Batches { item_buffer, reduce, resolutions, compacted, clock, .. } = &mut self.batches;
+        let Resolution { pixels, targets, bindings, drawn } = &mut resolutions[at];
+        let settings = RowSettings { slots, entries: compacted.entries, ..Default::default() };
+        let most = u64::from(slots.min(3 * *pixels * *pixels)) * u64::from(count);
+        let rows = gpu.with_error_scopes(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let queries = readback.queries();
-            item_buffer.draw(&gpu.queue, &mut encoder, targets, &views, queries);
+            let queries = clock.as_ref().map(|clock| &clock.queries);
+            item_buffer.draw(&gpu.queue, &mut encoder, targets, views.as_flattened(), queries);
             reduce.reduce(&mut encoder, targets, bindings, count, queries);
-            let results = Results { buffer: &reduce.rows, bytes: u64::from(count * slots) * 4 };
-            readback.finish(gpu, encoder, results, timer, |bytes| {
-                let dense: &[u32] = bytemuck::cast_slice(bytes);
-                let rows = dense.chunks_exact(slots as usize).zip(patches);
-                rows.map(|(dense, &(patch, _))| sparse(dense, patch)).collect()
-            })
+            compacted.compact(gpu, &mut encoder, &reduce.rows, count, false);
+            if let Some(clock) = clock {
+                clock.resolve(&mut encoder);
+            }
+            let rows = compacted.finish(gpu, encoder, settings, most, |entries| {
+                let rows = by_row(entries, patches.len())?;
+                rows.par_iter().zip(patches).map(|(row, &(p, _))| row_of(row, p)).collect()
+            })?;
+            let seconds = clock.as_ref().map(|clock| clock.seconds(gpu)).transpose()?;
+            let (draw, reduce) = seconds.unwrap_or_default();
+            self.timings.draw += draw;
+            self.timings.reduce += reduce;
+            self.timings.readback += (start.elapsed().as_secs_f64() - draw - reduce).max(0.0);
+            Ok::<Option<Result<Vec<Row>, String>>, Error>(rows)
         })?;
         *drawn += u64::from(count);
+        let Some(rows) = rows else {
+            // There was no room for all entries.
+            let (first, second) = patches.split_at(patches.len() / 2);
+            let mut rows = self.draw_batch(mesh, first, at)?;
+            rows.extend(self.draw_batch(mesh, second, at)?);
+            return Ok(rows);
+        };
         rows.map_err(|found| gpu.invalid_result(found))
     }
 }
 
-/// Bytes that a buffer of rows is larger than its rows, at least: alignment and the three ticks.
+/// Bytes that a buffer of rows is larger than its rows, at least.
 const ROW_MARGIN: u64 = 64;
 
 /// Words of a dense row over `mesh`.
@@ -300,16 +330,17 @@ fn rotation(patch: NodeId) -> f64 {
     unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
 }
 
-/// The row of `patch` from the device's dense row; or what is wrong with that.
-fn sparse(dense: &[u32], patch: NodeId) -> Result<Row, String> {
-    let seen = dense[FIRST_ELEMENT as usize..].iter();
-    let entries = (0..)
-        .zip(seen)
-        .filter(|&(_, &share)| share != 0)
-        .map(|(element, &share)| Entry { element, share })
-        .collect();
-    let (escaped, backface) = (dense[OPEN as usize], dense[BACK as usize]);
-    let row = Row { entries, escaped, backface, passed: vec![] };
+/// The row of `patch` by its entries; or what is wrong with these.
+fn row_of(entries: &[RowEntry], patch: NodeId) -> Result<Row, String> {
+    let (lost, seen) = entries.split_at(entries.partition_point(|e| e.slot < FIRST_ELEMENT));
+    let entry = |e: &RowEntry| Entry { element: e.slot - FIRST_ELEMENT, share: e.count };
+    let share = |slot: u32| lost.iter().find(|e| e.slot == slot).map_or(0, |e| e.count);
+    let row = Row {
+        entries: seen.iter().map(entry).collect(),
+        escaped: share(OPEN),
+        backface: share(BACK),
+        passed: vec![],
+    };
     if row.sum() != u64::from(Row::TOTAL) {
         return Err(format!("shares of patch {} that sum to {}", patch.0, row.closure()));
     }

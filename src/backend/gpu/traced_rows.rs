@@ -11,11 +11,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::compacted_rows::{CompactedRows, by_row};
 use super::device::Gpu;
 use super::field::quadtrees;
-use super::layout::{
-    BACK, FIRST_ELEMENT, OPEN, ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings, TracedPatch,
-};
+use super::layout::{BACK, FIRST_ELEMENT, OPEN, RowEntry, RowSettings, TracedPatch};
 use super::memory::Memory;
 use super::pipeline::bind_group;
 use super::traced_gather::check_textures;
@@ -45,8 +44,6 @@ pub struct TracedRows {
     has_panes: bool,
     slots: u32,
     pub(crate) full_share: f64,
-    /// Entries of a batch to be copied from the device without asking how many there are.
-    expected: u64,
 }
 
 #[derive(Debug)]
@@ -54,12 +51,9 @@ struct Buffers {
     quadtrees: wgpu::Buffer,
     patches: wgpu::Buffer,
     counts: wgpu::Buffer,
-    settings: wgpu::Buffer,
-    found: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    /// Patches of a batch, and entries that there is room for.
+    compacted: CompactedRows,
+    /// Patches of a batch.
     patches_at_once: u32,
-    entries: u32,
     memory: Memory,
 }
 
@@ -68,9 +62,6 @@ const MAX_BATCH: u32 = 256;
 
 /// Counts of a batch take at most this many bytes: what any WebGPU device binds.
 const COUNT_BYTES: u64 = 128 << 20;
-
-/// Bytes of entries that a batch has room for; rows that have more are made again in two batches.
-const ENTRY_BYTES: u64 = 32 << 20;
 
 impl TracedRows {
     /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
@@ -94,7 +85,7 @@ impl TracedRows {
         }
         let patches_at_once = ((most / row_bytes) as u32).min(MAX_BATCH);
         let buffers = gpu.with_error_scopes(|| {
-            Buffers::new(gpu.memory(), mesh, (row_bytes, count), patches_at_once)
+            Buffers::new(gpu.memory(), mesh, (row_bytes, count.min(slots)), patches_at_once)
         })?;
         let mut rows = TracedRows {
             gpu: gpu.clone(),
@@ -105,7 +96,6 @@ impl TracedRows {
             has_panes,
             slots,
             full_share: crate::RayRows::FULL_SHARE,
-            expected: FIRST_ENTRIES,
         };
         rows.add_directions(&samples, count)?;
         Ok(rows)
@@ -152,155 +142,110 @@ impl TracedRows {
             rays,
             slots: self.slots,
             unit: passed_unit(rays) as f32,
-            entries: self.buffers.entries,
+            entries: self.buffers.compacted.entries,
         };
         let gpu = self.gpu.clone();
+        let (has_panes, count) = (self.has_panes, patches.len());
         let rows = gpu.with_error_scopes(|| {
-            self.entries(&traced, settings, at, |entries| {
-                self.rows_of(entries, patches.len(), rays)
-            })
+            self.entries(&traced, settings, at, |entries| rows_of(entries, count, rays, has_panes))
         })?;
-        let Some((entries, rows)) = rows else {
+        let Some(rows) = rows else {
             // There was no room for all entries.
             let (first, second) = patches.split_at(patches.len() / 2);
             let mut rows = self.batch(mesh, first, (rays, at))?;
             rows.extend(self.batch(mesh, second, (rays, at))?);
             return Ok(rows);
         };
-        self.expected = entries + entries / 4;
         rows.map_err(|found| gpu.invalid_result(found))
     }
 
-    /// The rows of entries, or what is wrong with these.
-    fn rows_of(&self, entries: &[RowEntry], patches: usize, rays: u32) -> Result<Vec<Row>, String> {
-        let mut of_patches = vec![&entries[..0]; patches];
-        for row in entries.chunk_by(|a, b| a.patch_ == b.patch_) {
-            let number = row[0].patch_ as usize;
-            *of_patches.get_mut(number).ok_or_else(|| format!("row {number} of {patches}"))? = row;
-        }
-        let row = |row: &&[RowEntry]| {
-            let counted: u64 = row.iter().map(|e| u64::from(e.count)).sum();
-            match counted == u64::from(rays) && row.is_sorted_by_key(|e| e.slot) {
-                true => Ok(self.row(row, rays)),
-                false => Err(format!("a row of {counted} rays, not {rays}")),
-            }
-        };
-        of_patches.par_iter().map(row).collect()
-    }
-
-    /// How many entries all rows have, and what `read` makes of these, row by row in any order,
-    /// slots ascending; none where there is no room for them.
+    /// What `read` makes of the entries of all rows, row by row in any order, slots ascending; none
+    /// where there is no room for them.
     fn entries<T>(
-        &self,
+        &mut self,
         patches: &[TracedPatch],
         settings: RowSettings,
         at: usize,
         read: impl Fn(&[RowEntry]) -> T,
-    ) -> Result<Option<(u64, T)>, Error> {
-        let (gpu, buffers) = (&self.gpu, &self.buffers);
-        let Buffers { counts, found, staging, settings: uniform, .. } = buffers;
-        gpu.queue.write_buffer(&buffers.patches, 0, bytemuck::cast_slice(patches));
-        gpu.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&settings));
-        let pipelines = gpu.row_pipelines();
-        let compact = match self.has_panes {
-            true => &pipelines.compact_rows_through_panes,
-            false => &pipelines.compact_rows,
-        };
-        let device = &gpu.device;
-        let view = wgpu::BindingResource::TextureView;
-        let group = |pipeline: &wgpu::ComputePipeline,
-                     group: u32,
-                     entries: &[(u32, wgpu::BindingResource)]| {
+    ) -> Result<Option<T>, Error> {
+        let Buffers { quadtrees, patches: patch_buffer, counts, compacted, .. } = &mut self.buffers;
+        let gpu = &self.gpu;
+        gpu.queue.write_buffer(patch_buffer, 0, bytemuck::cast_slice(patches));
+        let pipeline = &gpu.row_pipelines().row_rays;
+        let group = |group: u32, entries: &[(u32, wgpu::BindingResource)]| {
             let layout = pipeline.get_bind_group_layout(group);
-            bind_group(device, "rows", &layout, entries)
+            bind_group(&gpu.device, "rows", &layout, entries)
         };
-        let scene = &*self.scene;
-        let lights = [(5, scene.lights.as_entire_binding())];
-        let geometry = [&scene.geometry()[..], &lights].concat();
+        let lights = [(5, self.scene.lights.as_entire_binding())];
+        let geometry = [&self.scene.geometry()[..], &lights].concat();
         let batch = [
-            (0, buffers.patches.as_entire_binding()),
+            (0, patch_buffer.as_entire_binding()),
             (1, counts.as_entire_binding()),
-            (2, view(&self.directions[at].1)),
-            (3, uniform.as_entire_binding()),
+            (2, wgpu::BindingResource::TextureView(&self.directions[at].1)),
+            (3, compacted.settings.as_entire_binding()),
         ];
-        let rays = &pipelines.row_rays;
-        let mut encoder = device.create_command_encoder(&Default::default());
-        encoder.clear_buffer(found, 0, Some(ROW_ENTRIES_HEADER_BYTES));
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(rays);
-            pass.set_bind_group(0, &group(rays, 0, &geometry), &[]);
-            pass.set_bind_group(1, &group(rays, 1, &batch), &[]);
-            let quadtrees = [(0, buffers.quadtrees.as_entire_binding())];
-            pass.set_bind_group(2, &group(rays, 2, &quadtrees), &[]);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group(0, &geometry), &[]);
+            pass.set_bind_group(1, &group(1, &batch), &[]);
+            pass.set_bind_group(2, &group(2, &[(0, quadtrees.as_entire_binding())]), &[]);
             pass.dispatch_workgroups(settings.rays.div_ceil(64), patches.len() as u32, 1);
-            pass.set_pipeline(compact);
-            let lists = [batch[1].clone(), batch[3].clone(), (4, found.as_entire_binding())];
-            pass.set_bind_group(1, &group(compact, 1, &lists), &[]);
-            pass.dispatch_workgroups(patches.len() as u32, 1, 1);
         }
-        // Those of the batch before and some more; if that is too few, the rest is copied then.
+        compacted.compact(gpu, &mut encoder, counts, patches.len() as u32, self.has_panes);
         let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
-        let room = most.min(settings.entries.into()).max(1);
-        let bytes =
-            |entries: u64| ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
-        let guess = room.min(self.expected);
-        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
-        let submission = gpu.queue.submit([encoder.finish()]);
-        let read_up_to = |submission, copied: u64| {
-            let entries = gpu.read_mapped(staging.slice(..bytes(copied)), submission, |bytes| {
-                let count = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                let list: &[RowEntry] =
-                    bytemuck::cast_slice(&bytes[ROW_ENTRIES_HEADER_BYTES as usize..]);
-                (u64::from(count), list.get(..count as usize).map(&read))
-            });
-            staging.unmap();
-            entries
-        };
-        let (count, entries) = read_up_to(submission, guess)?;
-        if entries.is_some() || count > u64::from(settings.entries) {
-            return Ok(entries.map(|entries| (count, entries)));
-        }
-        let mut encoder = device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(count));
-        let submission = gpu.queue.submit([encoder.finish()]);
-        Ok(read_up_to(submission, count)?.1.map(|entries| (count, entries)))
+        compacted.finish(gpu, encoder, settings, most, read)
     }
+}
 
-    /// The row of entries in the order of their slots.
-    fn row(&self, entries: &[RowEntry], rays: u32) -> Row {
-        // Elements come first in a row, then what is lost.
-        let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
-        let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
-        let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
-        let unit = passed_unit(rays);
-        let mean = |e: &RowEntry| {
-            let sum = Rgb::from_array(e.passed.map(f64::from));
-            (sum / (unit * f64::from(e.count))).min(Rgb::ONE)
-        };
-        // A ray that nothing dims adds the whole unit.
-        let is_clear = |e: &RowEntry| e.passed == [e.count * unit as u32; 3];
-        if !self.has_panes || entries.iter().all(is_clear) {
-            return row;
+/// The rows of entries, by so many `rays` each, or what is wrong with these.
+fn rows_of(
+    entries: &[RowEntry],
+    patches: usize,
+    rays: u32,
+    has_panes: bool,
+) -> Result<Vec<Row>, String> {
+    let row = |row: &&[RowEntry]| {
+        let counted: u64 = row.iter().map(|e| u64::from(e.count)).sum();
+        match counted == u64::from(rays) && row.is_sorted_by_key(|e| e.slot) {
+            true => Ok(row_of(row, rays, has_panes)),
+            false => Err(format!("a row of {counted} rays, not {rays}")),
         }
-        let of = |item_of: u32| {
-            let entry = entries.iter().find(|e| item(e.slot) == item_of);
-            Row::passed(entry.map_or(Rgb::ONE, mean))
-        };
-        let elements = entries.iter().filter(|e| e.slot >= FIRST_ELEMENT);
-        let passed = elements.map(|e| Row::passed(mean(e)));
-        let passed = passed.chain([of(cpu::OPEN), of(cpu::BACK)]).collect();
-        Row { passed, ..row }
+    };
+    by_row(entries, patches)?.par_iter().map(row).collect()
+}
+
+/// The row of entries in the order of their slots.
+fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
+    // Elements come first in a row, then what is lost.
+    let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
+    let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
+    let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
+    let unit = passed_unit(rays);
+    let mean = |e: &RowEntry| {
+        let sum = Rgb::from_array(e.passed.map(f64::from));
+        (sum / (unit * f64::from(e.count))).min(Rgb::ONE)
+    };
+    // A ray that nothing dims adds the whole unit.
+    let is_clear = |e: &RowEntry| e.passed == [e.count * unit as u32; 3];
+    if !has_panes || entries.iter().all(is_clear) {
+        return row;
     }
+    let of = |item_of: u32| {
+        let entry = entries.iter().find(|e| item(e.slot) == item_of);
+        Row::passed(entry.map_or(Rgb::ONE, mean))
+    };
+    let elements = entries.iter().filter(|e| e.slot >= FIRST_ELEMENT);
+    let passed = elements.map(|e| Row::passed(mean(e)));
+    let passed = passed.chain([of(cpu::OPEN), of(cpu::BACK)]).collect();
+    Row { passed, ..row }
 }
 
 /// What a ray counts in sums of what panes let through: all rays together stay within 32 bits.
 fn passed_unit(rays: u32) -> f64 {
     f64::from((u32::MAX / rays).min(1 << 16))
 }
-
-/// As many of the first batch: 2 MiB of them.
-const FIRST_ENTRIES: u64 = 65_536;
 
 /// What `row_of_counts` calls a slot.
 fn item(slot: u32) -> u32 {
@@ -315,13 +260,10 @@ impl Buffers {
     fn new(
         memory: Memory,
         mesh: &Mesh,
-        (row_bytes, rays): (u64, u32),
+        (row_bytes, row_entries): (u64, u32),
         patches_at_once: u32,
     ) -> Result<Buffers, Error> {
         use wgpu::BufferUsages as Usage;
-        // Those of one row at least.
-        let entries = (ENTRY_BYTES / size_of::<RowEntry>() as u64).max(rays.into());
-        let found = ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64;
         let patches = u64::from(patches_at_once);
         let storage = Usage::STORAGE | Usage::COPY_DST;
         Ok(Buffers {
@@ -333,11 +275,8 @@ impl Buffers {
             )?,
             // Zero at first, and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
-            settings: memory.uniform("settings", &[0; size_of::<RowSettings>()])?,
-            found: memory.buffer("entries", found, storage | Usage::COPY_SRC)?,
-            staging: memory.buffer("staging", found, Usage::MAP_READ | Usage::COPY_DST)?,
+            compacted: CompactedRows::new(&memory, patches_at_once, row_entries)?,
             patches_at_once,
-            entries: entries as u32,
             memory,
         })
     }

@@ -76,15 +76,22 @@ fn nearer_of_two_is_seen() {
 
 #[test]
 fn row_check_rejects_invalid_rows() {
-    // OPEN, BACK and three elements.
     let total = Row::TOTAL;
-    let good = sparse(&[total - 10, 3, 0, 7, 0], NodeId(5)).unwrap();
+    let entries = |counts: &[(u32, u32)]| -> Vec<RowEntry> {
+        let entry = |&(slot, count): &(u32, u32)| RowEntry { slot, count, ..Default::default() };
+        counts.iter().map(entry).collect()
+    };
+    let seen = FIRST_ELEMENT + 1;
+    let good = [(OPEN, total - 10), (BACK, 3), (seen, 7)];
+    let good = row_of(&entries(&good), NodeId(5)).unwrap();
     assert_eq!((good.escaped, good.backface), (total - 10, 3));
     assert_eq!(good.entries, [Entry { element: 1, share: 7 }]);
     // Nothing written, all bits set, one unit too few, one too many: sums beyond 32 bits count.
-    let bad = [[0; 5], [total; 5], [total - 10, 3, 0, 6, 0], [total, 0, 0, 1, 0]];
-    for dense in bad {
-        let e = sparse(&dense, NodeId(5)).unwrap_err();
+    let all = [OPEN, BACK, FIRST_ELEMENT, seen].map(|slot| (slot, total));
+    let bad: [&[(u32, u32)]; 4] =
+        [&[], &all, &[(OPEN, total - 10), (BACK, 3), (seen, 6)], &[(OPEN, total), (seen, 1)]];
+    for counts in bad {
+        let e = row_of(&entries(counts), NodeId(5)).unwrap_err();
         assert!(e.contains("patch 5"), "{e}");
     }
 }

@@ -30,7 +30,7 @@ fn item_buffer_and_reduce_equal_their_twins() {
     for n in [8, 30, 64, 72] {
         let mut rows = HemicubeRows::new(&gpu, &mesh, n).unwrap();
         let patches = [(mesh.element(0), 0.3), (mesh.element(2), 1.1), (mesh.root(1), 0.7)];
-        rows.draw_batch(&mesh, &patches, 0).unwrap();
+        let drawn = rows.draw_batch(&mesh, &patches, 0).unwrap();
         let order = &rows.draw_list.order;
         let corners = rows.coordinates.corners(mesh.scene(), order);
         let triangles: Vec<_> = order.iter().map(|&t| table.triangles[t as usize]).collect();
@@ -38,7 +38,8 @@ fn item_buffer_and_reduce_equal_their_twins() {
         let slots = rows.slots;
         let reduction = Reduction { resolution: n, slots, stride: stride(n) };
         let weights = hemicube::weights(n).unwrap();
-        let dense: Vec<u32> = read_buffer(&gpu, &rows.batches.reduce.rows);
+        let left: Vec<u32> = read_buffer(&gpu, &rows.batches.reduce.rows);
+        assert!(left.iter().all(|&share| share == 0), "rows are 0 for the next batch");
         let mut lines = vec![];
         for (k, &(patch, angle)) in (0..).zip(&patches) {
             let views = rows.views(&mesh, patch, angle).map(|v| v.face);
@@ -55,7 +56,11 @@ fn item_buffer_and_reduce_equal_their_twins() {
                 lines.resize(lines.len().next_multiple_of(stride(n) as usize), u32::MAX);
             }
             let row = reduce::reduce(&lines, &weights, &table.slots, reduction, k);
-            let device = &dense[(k * slots) as usize..((k + 1) * slots) as usize];
+            let Row { entries, escaped, backface, .. } = &drawn[k as usize];
+            let mut device = vec![0; slots as usize];
+            device[OPEN as usize] = *escaped;
+            device[BACK as usize] = *backface;
+            entries.iter().for_each(|e| device[(FIRST_ELEMENT + e.element) as usize] = e.share);
             let differ: Vec<_> = (0..row.len())
                 .filter(|&s| row[s] != device[s])
                 .map(|s| (s, device[s], row[s]))

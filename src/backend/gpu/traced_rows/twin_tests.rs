@@ -8,7 +8,7 @@ use super::*;
 use crate::backend::cpu::twins::compact_rows::compact_rows;
 use crate::backend::cpu::twins::row_rays::{RowRays, amount};
 use crate::backend::cpu::twins::trace::turned;
-use crate::backend::gpu::layout::{NOTHING, TEXELS_A_LINE};
+use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_A_LINE};
 use crate::backend::gpu::test_support::{
     gpu, on_sides, read_buffer, room_with_doubled_leaf, shifts, traced_scenes, turned_by,
 };
@@ -28,7 +28,7 @@ fn open_rows(gpu: &Gpu, mesh: &Mesh, rays: u32) -> TracedRows {
 impl TracedRows {
     fn settings(&self, rays: u32) -> RowSettings {
         let unit = passed_unit(rays.max(1)) as f32;
-        RowSettings { rays, slots: self.slots, unit, entries: self.buffers.entries }
+        RowSettings { rays, slots: self.slots, unit, entries: self.buffers.compacted.entries }
     }
 }
 
@@ -54,7 +54,7 @@ fn row_rays_equal_their_twin() {
     for (name, mesh) in traced_scenes() {
         // Some lanes idle; directions in two lines of their texture.
         let count = TEXELS_A_LINE + 500;
-        let rows = open_rows(&gpu, &mesh, count);
+        let mut rows = open_rows(&gpu, &mesh, count);
         let lights = Lights::new(mesh.shared_scene());
         let (arrays, quadtrees) = (TracedArrays::new(&lights), quadtrees(&mesh));
         let local = |&[x, y, z]: &[f64; 3]| [x as f32, y as f32, z as f32, 0.0];
@@ -70,7 +70,7 @@ fn row_rays_equal_their_twin() {
         let lifted = Vec3::from(traced[0].position) + 1e-3 * Vec3::from(traced[0].normal);
         traced.push(TracedPatch { position: lifted.to_array(), own_triangle, ..traced[0] });
         let settings = rows.settings(count);
-        let (_, entries) = rows.entries(&traced, settings, 0, <[_]>::to_vec).unwrap().unwrap();
+        let entries = rows.entries(&traced, settings, 0, <[_]>::to_vec).unwrap().unwrap();
         let channels = if rows.has_panes { 4 } else { 1 };
         let slots = settings.slots as usize;
         for (k, patch) in traced.iter().enumerate() {
@@ -173,7 +173,7 @@ fn no_ray_goes_through_a_shared_side() {
         let count = directions.len() as u32;
         rows.directions = vec![(count, gpu.memory().lines("directions", &directions).unwrap())];
         let settings = rows.settings(count);
-        let (_, entries) = rows.entries(&[traced], settings, 0, <[_]>::to_vec).unwrap().unwrap();
+        let entries = rows.entries(&[traced], settings, 0, <[_]>::to_vec).unwrap().unwrap();
         assert_eq!(entries.iter().map(|entry| entry.count).sum::<u32>(), count);
         let open = entries.iter().find(|entry| entry.slot == OPEN);
         assert!(open.is_none(), "{patch:?}: {open:?} of {count}");
@@ -191,15 +191,15 @@ fn no_ray_goes_through_a_shared_side() {
 fn compact_rows_equals_its_twin() {
     let gpu = gpu();
     for (name, mesh) in traced_scenes() {
-        let rows = open_rows(&gpu, &mesh, 1000);
+        let mut rows = open_rows(&gpu, &mesh, 1000);
         // As many slots as the mesh has, one for each lane, and several for most.
         for slots in [rows.slots, 256, 1001] {
-            compare_entries(&format!("{name}, {slots} slots"), &gpu, &rows, slots);
+            compare_entries(&format!("{name}, {slots} slots"), &gpu, &mut rows, slots);
         }
     }
 }
 
-fn compare_entries(what: &str, gpu: &Gpu, rows: &TracedRows, slot_count: u32) {
+fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32) {
     let patches: Vec<TracedPatch> = vec![Default::default(); 40];
     let channels = if rows.has_panes { 4 } else { 1 };
     let slots = slot_count as usize;
@@ -221,13 +221,12 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &TracedRows, slot_count: u32) {
             unmet.for_each(|(sum, _)| *sum = 0);
         }
     }
-    let write = || {
-        gpu.queue.write_buffer(&rows.buffers.counts, 0, bytemuck::cast_slice(&counts));
-    };
+    let on_device = rows.buffers.counts.clone();
+    let write = || gpu.queue.write_buffer(&on_device, 0, bytemuck::cast_slice(&counts));
     write();
     // No ray is cast.
     let settings = RowSettings { slots: slot_count, ..rows.settings(0) };
-    let (_, found) = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
+    let found = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
     // Rows come in any order, each in that of its slots.
     let in_rows = found.chunk_by(|a, b| a.patch_ == b.patch_);
     assert_eq!(in_rows.clone().count(), patches.len(), "{what}");
@@ -236,17 +235,17 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &TracedRows, slot_count: u32) {
     let expected = compact_rows(&mut left, &settings, rows.has_panes);
     assert!(expected.len() > 2 * patches.len());
     assert!(words(&sorted(found)) == words(&sorted(expected.clone())), "{what}");
-    let on_device = || read_buffer::<u32>(gpu, &rows.buffers.counts);
+    let on_device = || read_buffer::<u32>(gpu, &on_device);
     assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{what}");
 
     // Room for two thirds of them, after which there is what was there: nothing.
     let room = expected.len() * 2 / 3;
     let nothing = vec![0; size_of_val(&expected[..])];
-    gpu.queue.write_buffer(&rows.buffers.found, ROW_ENTRIES_HEADER_BYTES, &nothing);
+    gpu.queue.write_buffer(&rows.buffers.compacted.found, ROW_ENTRIES_HEADER_BYTES, &nothing);
     write();
     let settings = RowSettings { entries: room as u32, ..settings };
     assert!(rows.entries(&patches, settings, 0, |_| ()).unwrap().is_none(), "{what}");
-    let found: Vec<u32> = read_buffer(gpu, &rows.buffers.found);
+    let found: Vec<u32> = read_buffer(gpu, &rows.buffers.compacted.found);
     assert_eq!(found[0] as usize, expected.len(), "{what}");
     let (written, beyond) = entries_in(&found)[..expected.len()].split_at(room);
     let expected: FxHashSet<[u32; 8]> = expected.iter().map(|e| bytemuck::cast(*e)).collect();
@@ -278,7 +277,7 @@ fn rows_have_the_same_bits_in_any_batches() {
             assert!(alone == all[k..=k], "{name}: patch {k} alone");
         }
         // Batches that have no room for their entries are made in two.
-        rows.buffers.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
+        rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
         rows.buffers.patches_at_once = 3;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: three at once");

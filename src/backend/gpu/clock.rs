@@ -1,0 +1,57 @@
+//! Seconds that passes take on the device.
+
+use super::device::Gpu;
+use super::memory::Memory;
+use crate::error::Error;
+
+/// Timestamps: before drawing (query 0), after it (1) and after the reduction (2).
+#[derive(Debug)]
+pub struct Clock {
+    pub queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    seconds_per_tick: f64,
+}
+
+/// Bytes of the three ticks.
+const TICK_BYTES: u64 = 24;
+
+impl Clock {
+    /// The clock of a device that has one.
+    pub fn new(memory: &Memory) -> Result<Option<Clock>, Error> {
+        use wgpu::BufferUsages as Usage;
+        let device = &memory.device;
+        if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return Ok(None);
+        }
+        let queries = device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("clock"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 3,
+        });
+        let resolve = Usage::QUERY_RESOLVE | Usage::COPY_SRC;
+        let resolved = memory.buffer("clock", TICK_BYTES, resolve)?;
+        let staging = memory.buffer("ticks", TICK_BYTES, Usage::MAP_READ | Usage::COPY_DST)?;
+        let seconds_per_tick = f64::from(memory.queue.get_timestamp_period()) * 1e-9;
+        Ok(Some(Clock { queries, resolved, staging, seconds_per_tick }))
+    }
+
+    /// Records that timestamps are to be read, after all passes that write them.
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.resolve_query_set(&self.queries, 0..3, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, TICK_BYTES);
+    }
+
+    /// Seconds of drawing, and from there to the end of the reduction, in what was submitted last.
+    pub fn seconds(&self, gpu: &Gpu) -> Result<(f64, f64), Error> {
+        let submission = gpu.queue.submit([]);
+        let seconds = gpu.read_mapped(self.staging.slice(..), submission, |bytes| {
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+            let span =
+                |a: usize| ticks[a + 1].saturating_sub(ticks[a]) as f64 * self.seconds_per_tick;
+            (span(0), span(1))
+        });
+        self.staging.unmap();
+        seconds
+    }
+}
