@@ -162,14 +162,18 @@ impl HierarchicalSurplus {
         self.midside_surplus().iter().sum::<Rgb>() / 12.0
     }
 
-    /// Values of the quadratic interpolant at the midsides of child `k`, W/m² per channel, within
-    /// those of the six nodes: beside the edge of a shadow the interpolant leaves them, down to
-    /// where no light is, and that it is smooth between its nodes is not known.
+    /// Values of the quadratic interpolant at the midsides of child `k`, W/m² per channel. In a
+    /// channel with a surplus of more than [`MAX_CERTAIN_SURPLUS`] of its darkest node they are
+    /// kept within the six nodes: beside the edge of a shadow the interpolant leaves them, down to
+    /// where no light is. With less it leaves them by a fraction of that share.
     pub fn child_midsides(&self, k: usize) -> [Rgb; 3] {
         let nodes = || self.corners.iter().chain(&self.midsides).map(|node| node.value);
         let least = nodes().fold(Rgb::INFINITY, Rgb::min);
         let most = nodes().fold(Rgb::NEG_INFINITY, Rgb::max);
-        self.quadratic_at_child_midsides(k).map(|value| value.clamp(least, most))
+        let surplus = self.midside_surplus().map(Rgb::abs).into_iter().fold(Rgb::ZERO, Rgb::max);
+        let is_smooth = surplus.cmple(MAX_CERTAIN_SURPLUS * least);
+        let within = |value: Rgb| Rgb::select(is_smooth, value, value.clamp(least, most));
+        self.quadratic_at_child_midsides(k).map(within)
     }
 
     /// The quadratic interpolant there: the shape functions λ(2λ − 1) of the corners and 4 λ λ' of
@@ -246,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn no_value_is_beyond_those_of_the_nodes() {
+    fn no_value_is_beyond_the_nodes_at_an_edge_of_light() {
         // Beside the edge of a shadow, where the interpolant goes down to 0.1; and beside that of
         // light, where it goes up to 1.1.
         let dark = ([1.0, 1.0, 0.2], [1.0, 0.2, 0.2]);
