@@ -17,7 +17,7 @@ pub struct Clock {
 const TICK_BYTES: u64 = 24;
 
 impl Clock {
-    /// The clock of a device that has one.
+    /// None for a device without [`wgpu::Features::TIMESTAMP_QUERY`].
     pub fn new(memory: &Memory) -> Result<Option<Clock>, Error> {
         use wgpu::BufferUsages as Usage;
         let device = &memory.device;
@@ -36,15 +36,20 @@ impl Clock {
         Ok(Some(Clock { queries, resolved, staging, seconds_per_tick }))
     }
 
-    /// Records that timestamps are to be read, after all passes that write them.
+    /// Records the copy of the timestamps to where [`Clock::seconds`] reads them, after all passes
+    /// that write them.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..3, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, TICK_BYTES);
     }
 
-    /// Seconds of drawing, and from there to the end of the reduction, in what was submitted last.
-    pub fn seconds(&self, gpu: &Gpu) -> Result<(f64, f64), Error> {
-        let submission = gpu.queue.submit([]);
+    /// Seconds of drawing, and from there to the end of the reduction, in this submission: of an
+    /// encoder that was passed to [`Clock::resolve`].
+    pub fn seconds(
+        &self,
+        gpu: &Gpu,
+        submission: wgpu::SubmissionIndex,
+    ) -> Result<(f64, f64), Error> {
         let seconds = gpu.read_mapped(self.staging.slice(..), submission, |bytes| {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
             let span =

@@ -13,7 +13,8 @@ use super::device::Gpu;
 use super::layout::{ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings};
 use super::memory::Memory;
 use super::pipeline::bind_group;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
+use crate::form_factor::Row;
 
 /// Room for the entries of a batch of rows.
 #[derive(Debug)]
@@ -24,23 +25,43 @@ pub struct CompactedRows {
     pub entries: u32,
     pub(super) found: wgpu::Buffer,
     staging: wgpu::Buffer,
-    /// Entries of a batch to be copied from the device without asking how many there are.
+    /// Entries of the next batch that are copied to `staging` in the submission that makes them.
     expected: u64,
 }
 
-/// Bytes of entries that a batch has room for; rows that have more are made again in two batches.
+/// A batch of rows that the device makes.
+#[derive(Debug)]
+pub struct SubmittedRows {
+    pub submission: wgpu::SubmissionIndex,
+    /// Entries that it copies to `staging`.
+    copied: u64,
+    /// Entries that it has room for.
+    room: u64,
+}
+
+/// Bytes of entries that a batch has room for, or those of one row where these are more.
 const ENTRY_BYTES: u64 = 32 << 20;
 
 /// Entries that the first batch is expected to have: 2 MiB of them.
 const FIRST_ENTRIES: u64 = 65_536;
 
 impl CompactedRows {
-    /// Room for batches of up to `rows` rows, of up to `row_entries` entries each; for one row at
-    /// least.
-    pub fn new(memory: &Memory, rows: u32, row_entries: u32) -> Result<CompactedRows, Error> {
+    /// Rows of a batch, at most. A submission and its readback take a millisecond on hardware,
+    /// which so many rows share; and a hemicube takes a layer of a texture, of which every WebGPU
+    /// device has 256. The size of a batch decides the order of shots.
+    pub const MAX_BATCH: u32 = 256;
+
+    /// Room for batches of up to `rows` rows, of up to `row_entries` entries each, as far as it
+    /// fits a buffer of `buffer_bytes`.
+    pub fn new(
+        memory: &Memory,
+        buffer_bytes: u64,
+        (rows, row_entries): (u32, u32),
+    ) -> Result<CompactedRows, Error> {
         use wgpu::BufferUsages as Usage;
-        let of_row = u64::from(row_entries);
-        let most = (ENTRY_BYTES / size_of::<RowEntry>() as u64).max(of_row);
+        let (of_row, entry_bytes) = (u64::from(row_entries), size_of::<RowEntry>() as u64);
+        let fits = buffer_bytes.saturating_sub(ROW_ENTRIES_HEADER_BYTES) / entry_bytes;
+        let most = (ENTRY_BYTES / entry_bytes).max(of_row).min(fits);
         let entries = most.min(u64::from(rows) * of_row);
         let storage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         Ok(CompactedRows {
@@ -50,6 +71,37 @@ impl CompactedRows {
             staging: memory.buffer("staging", bytes(entries), Usage::MAP_READ | Usage::COPY_DST)?,
             expected: FIRST_ENTRIES,
         })
+    }
+
+    /// All rows of `patches`, in their order, from what `make` gives for `batch_len` patches at
+    /// once, at most: the rows of these, or none where there is no room for their entries. It is
+    /// then asked for the first half of them and for the second.
+    ///
+    /// # Errors
+    /// Those of `make`, and [`ErrorKind::Memory`] where there is no room for a single row.
+    pub fn in_batches<P>(
+        gpu: &Gpu,
+        patches: &[P],
+        batch_len: u32,
+        mut make: impl FnMut(&[P]) -> Result<Option<Vec<Row>>, Error>,
+    ) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::with_capacity(patches.len());
+        // The next batch is the last.
+        let mut batches: Vec<&[P]> = patches.chunks(batch_len as usize).rev().collect();
+        while let Some(batch) = batches.pop() {
+            match make(batch)? {
+                Some(made) => rows.extend(made),
+                None if batch.len() > 1 => {
+                    let (first, second) = batch.split_at(batch.len() / 2);
+                    batches.extend([second, first]);
+                }
+                None => {
+                    let found = "a row of more entries than there is room for".into();
+                    return Err(gpu.device_error(ErrorKind::Memory, found));
+                }
+            }
+        }
+        Ok(rows)
     }
 
     /// Records how the first `rows` rows in `counts` are compacted, and these set to 0. Each has
@@ -81,22 +133,31 @@ impl CompactedRows {
         pass.dispatch_workgroups(rows, 1, 1);
     }
 
-    /// Runs what `encoder` recorded, and gives what `read` makes of all entries, `many` at most:
-    /// row by row in any order, slots ascending. None where `settings` leave no room for them.
-    pub fn finish<T>(
-        &mut self,
+    /// Runs what `encoder` recorded, by these `settings`: passes that count, then
+    /// [`CompactedRows::compact`]. All rows together have `most` entries, at most.
+    pub fn submit(
+        &self,
         gpu: &Gpu,
         mut encoder: wgpu::CommandEncoder,
         settings: RowSettings,
-        many: u64,
+        most: u64,
+    ) -> SubmittedRows {
+        let room = u64::from(settings.entries);
+        let copied = self.expected.min(most).min(room).max(1);
+        gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
+        encoder.copy_buffer_to_buffer(&self.found, 0, &self.staging, 0, bytes(copied));
+        SubmittedRows { submission: gpu.queue.submit([encoder.finish()]), copied, room }
+    }
+
+    /// What `read` makes of all entries of the rows, the last that were submitted: row by row in
+    /// any order, slots ascending. None where there is no room for them.
+    pub fn read<T>(
+        &mut self,
+        gpu: &Gpu,
+        rows: &SubmittedRows,
         read: impl Fn(&[RowEntry]) -> T,
     ) -> Result<Option<T>, Error> {
         let Self { found, staging, .. } = self;
-        // Those of the batch before and some more; if that is too few, the rest is copied then.
-        let guess = self.expected.min(many).min(settings.entries.into()).max(1);
-        gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
-        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
-        let submission = gpu.queue.submit([encoder.finish()]);
         let read_up_to = |submission, copied: u64| {
             let entries = gpu.read_mapped(staging.slice(..bytes(copied)), submission, |bytes| {
                 let count = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
@@ -107,14 +168,16 @@ impl CompactedRows {
             staging.unmap();
             entries
         };
-        let (count, entries) = read_up_to(submission, guess)?;
-        if count > settings.entries.into() {
+        let (count, entries) = read_up_to(rows.submission.clone(), rows.copied)?;
+        if count > rows.room {
             return Ok(None);
         }
+        // The next batch is likely to have about as many.
         self.expected = count + count / 4;
         if entries.is_some() {
             return Ok(entries);
         }
+        // More than were copied: once more, all of them.
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(count));
         let submission = gpu.queue.submit([encoder.finish()]);
@@ -122,7 +185,7 @@ impl CompactedRows {
     }
 }
 
-/// The entries of each of `rows` rows, or what is wrong with them.
+/// The entries of each of `rows` rows, by their numbers in the batch; or what is wrong with them.
 pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, String> {
     let mut of_rows = vec![&entries[..0]; rows];
     for row in entries.chunk_by(|a, b| a.patch_ == b.patch_) {
@@ -135,4 +198,33 @@ pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, Str
 /// Bytes of so many entries with their header.
 fn bytes(entries: u64) -> u64 {
     ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_support::gpu;
+    use super::*;
+
+    #[test]
+    #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+    fn batches_without_room_are_made_in_halves() {
+        let gpu = gpu();
+        let patches: Vec<u32> = (0..10).collect();
+        let make_all = |room: usize| {
+            let mut asked = vec![];
+            let made = CompactedRows::in_batches(&gpu, &patches, 8, |batch| {
+                asked.push(batch.len());
+                let row = |&patch: &u32| Row { escaped: patch, ..Row::default() };
+                Ok((batch.len() <= room).then(|| batch.iter().map(row).collect()))
+            });
+            (made, asked)
+        };
+        let (rows, asked) = make_all(3);
+        let found: Vec<u32> = rows.unwrap().iter().map(|row| row.escaped).collect();
+        assert_eq!(found, patches);
+        assert_eq!(asked, [8, 4, 2, 2, 4, 2, 2, 2]);
+        let (rows, asked) = make_all(0);
+        assert_eq!(rows.unwrap_err().kind(), ErrorKind::Memory);
+        assert_eq!(asked, [8, 4, 2, 1]);
+    }
 }

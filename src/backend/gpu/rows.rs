@@ -6,8 +6,8 @@
 //! rows ◄─ mean over rotations ◄─ sum checked ◄─ readback of entries ◄─ compact ◄───────┘
 //! ```
 //!
-//! A batch holds as many hemicubes as [`BATCH_BYTES`], [`MAX_BATCH`] and the device's limits allow,
-//! and a half or a quarter of them where memory is short.
+//! A batch holds as many hemicubes as [`BATCH_BYTES`], [`CompactedRows::MAX_BATCH`] and the limits
+//! of the device allow, and a half or a quarter of them where memory is short.
 
 use std::f64::consts::FRAC_PI_2;
 use std::num::NonZeroU32;
@@ -79,11 +79,8 @@ struct Batches {
 /// that much in a fraction of a second.
 const BATCH_BYTES: u64 = 32 << 20;
 
-/// Hemicubes in a batch at most: as many as textures have layers on any WebGPU device, so that a
-/// submission and the way back, a millisecond on hardware, are shared by many.
-const MAX_BATCH: u32 = 256;
-
-/// The same of software devices, which are as fast with fewer. Chosen by hand; no measurement kept.
+/// Hemicubes of a batch on a software device, at most: it is as fast with so few. Chosen by hand;
+/// no measurement kept.
 const MAX_SOFTWARE_BATCH: u32 = 16;
 
 impl HemicubeRows {
@@ -109,13 +106,12 @@ impl HemicubeRows {
         let item_bytes = Reduce::items_bytes(resolution);
         let most = match gpu.assumed_kind() {
             AdapterKind::Cpu => MAX_SOFTWARE_BATCH,
-            _ => MAX_BATCH,
+            _ => CompactedRows::MAX_BATCH,
         };
-        let preferred_batch = most
-            .min((BATCH_BYTES / item_bytes).max(1) as u32)
-            .min(limits.layers)
-            .min((limits.buffer / item_bytes) as u32)
-            .min(((limits.buffer - ROW_MARGIN) / (u64::from(slots) * 4)) as u32);
+        let preferred_batch = u64::from(most.min(limits.layers))
+            .min((BATCH_BYTES / item_bytes).max(1))
+            .min(limits.buffer / item_bytes)
+            .min(limits.buffer / row_bytes(slots)) as u32;
         let coordinates = SplitFloat::new(mesh.scene());
         let (table, draw_list) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
         let order = &draw_list.order;
@@ -126,8 +122,8 @@ impl HemicubeRows {
             let size = BatchSize { resolution, slots, hemicubes };
             let reduce = Reduce::new(&memory, &table.slots, size)?;
             let resolutions = Resolution::halved(&memory, &reduce, resolution, hemicubes)?;
-            let row_entries = slots.min(3 * resolution * resolution);
-            let compacted = CompactedRows::new(&memory, hemicubes, row_entries)?;
+            let batch_size = (hemicubes, row_entries(slots, resolution));
+            let compacted = CompactedRows::new(&memory, limits.buffer, batch_size)?;
             let clock = Clock::new(&memory)?;
             Ok(Batches {
                 item_buffer,
@@ -212,13 +208,14 @@ impl HemicubeRows {
         })
     }
 
-    /// One hemicube a patch, each turned by its angle, of resolution number `at`.
+    /// One hemicube a patch, each turned by its angle, of resolution number `at`; none where there
+    /// is no room for their entries.
     fn draw_batch(
         &mut self,
         mesh: &Mesh,
         patches: &[(NodeId, f64)],
         at: usize,
-    ) -> Result<Vec<Row>, Error> {
+    ) -> Result<Option<Vec<Row>>, Error> {
         let start = Instant::now();
         let views: Vec<[View; 5]> =
             patches.par_iter().map(|&(p, angle)| self.views(mesh, p, angle)).collect();
@@ -227,7 +224,7 @@ impl HemicubeRows {
         let Batches { item_buffer, reduce, resolutions, compacted, clock, .. } = &mut self.batches;
         let Resolution { pixels, targets, bindings, drawn } = &mut resolutions[at];
         let settings = RowSettings { slots, entries: compacted.entries, ..Default::default() };
-        let most = u64::from(slots.min(3 * *pixels * *pixels)) * u64::from(count);
+        let most = u64::from(row_entries(slots, *pixels)) * u64::from(count);
         let rows = gpu.with_error_scopes(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let queries = clock.as_ref().map(|clock| &clock.queries);
@@ -237,35 +234,34 @@ impl HemicubeRows {
             if let Some(clock) = clock {
                 clock.resolve(&mut encoder);
             }
-            let rows = compacted.finish(gpu, encoder, settings, most, |entries| {
-                let rows = by_row(entries, patches.len())?;
-                rows.par_iter().zip(patches).map(|(row, &(p, _))| row_of(row, p)).collect()
-            })?;
-            let seconds = clock.as_ref().map(|clock| clock.seconds(gpu)).transpose()?;
-            let (draw, reduce) = seconds.unwrap_or_default();
+            let submitted = compacted.submit(gpu, encoder, settings, most);
+            let rows = compacted.read(gpu, &submitted, |entries| rows_of(entries, patches))?;
+            let seconds = clock.as_ref().map(|clock| clock.seconds(gpu, submitted.submission));
+            let (draw, reduce) = seconds.transpose()?.unwrap_or_default();
             self.timings.draw += draw;
             self.timings.reduce += reduce;
             self.timings.readback += (start.elapsed().as_secs_f64() - draw - reduce).max(0.0);
-            Ok::<Option<Result<Vec<Row>, String>>, Error>(rows)
+            Ok(rows)
         })?;
         *drawn += u64::from(count);
-        let Some(rows) = rows else {
-            // There was no room for all entries.
-            let (first, second) = patches.split_at(patches.len() / 2);
-            let mut rows = self.draw_batch(mesh, first, at)?;
-            rows.extend(self.draw_batch(mesh, second, at)?);
-            return Ok(rows);
-        };
-        rows.map_err(|found| gpu.invalid_result(found))
+        rows.transpose().map_err(|found| gpu.invalid_result(found))
     }
 }
-
-/// Bytes that a buffer of rows is larger than its rows, at least.
-const ROW_MARGIN: u64 = 64;
 
 /// Words of a dense row over `mesh`.
 fn slots(mesh: &Mesh) -> u32 {
     mesh.element_count() as u32 + FIRST_ELEMENT
+}
+
+/// Bytes of a dense row of so many words.
+fn row_bytes(slots: u32) -> u64 {
+    u64::from(slots) * 4
+}
+
+/// Entries of a row, at most: as many as the hemicube has pixels, a top face of `resolution`² and
+/// four side faces of half as many.
+fn row_entries(slots: u32, resolution: u32) -> u32 {
+    slots.min(3 * resolution * resolution)
 }
 
 fn check_resolution_fits(limits: GpuLimits, resolution: u32) -> Result<(), Error> {
@@ -281,15 +277,15 @@ fn check_resolution_fits(limits: GpuLimits, resolution: u32) -> Result<(), Error
 }
 
 fn check_mesh_fits(limits: GpuLimits, mesh: &Mesh) -> Result<(), Error> {
-    let (row_bytes, items) = (u64::from(slots(mesh)) * 4, ItemTable::count(mesh));
+    let items = ItemTable::count(mesh);
     let triangles = mesh.scene().triangles().len() as u64;
     let triangle_bytes = 3 * size_of::<Corner>() as u64;
-    let largest = (row_bytes + ROW_MARGIN).max(items * 4).max(triangles * triangle_bytes);
+    let largest = row_bytes(slots(mesh)).max(items * 4).max(triangles * triangle_bytes);
     if largest <= limits.buffer {
         return Ok(());
     }
     let found = format!("{items} finest cells of elements in {triangles} triangles");
-    let (cells, most) = (limits.buffer / 4 - 16, limits.buffer / triangle_bytes);
+    let (cells, most) = (limits.buffer / 4, limits.buffer / triangle_bytes);
     let remedy = format!("this device holds {cells} and {most}");
     Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy))
 }
@@ -302,10 +298,9 @@ impl FormFactors for HemicubeRows {
         let step = FRAC_PI_2 / f64::from(count);
         let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
         let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
-        let mut rows = Vec::with_capacity(turned.len());
-        for batch in turned.chunks(self.batches.max_hemicubes as usize) {
-            rows.extend(self.draw_batch(mesh, batch, at)?);
-        }
+        let (gpu, batch_len) = (self.gpu.clone(), self.batches.max_hemicubes);
+        let draw = |batch: &[_]| self.draw_batch(mesh, batch, at);
+        let rows = CompactedRows::in_batches(&gpu, &turned, batch_len, draw)?;
         if count == 1 {
             return Ok(rows);
         }
@@ -328,6 +323,12 @@ impl FormFactors for HemicubeRows {
 /// not repeat one another's pixel pattern and every run turns alike.
 fn rotation(patch: NodeId) -> f64 {
     unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
+}
+
+/// The rows of `patches` by the entries of all; or what is wrong with these.
+fn rows_of(entries: &[RowEntry], patches: &[(NodeId, f64)]) -> Result<Vec<Row>, String> {
+    let rows = by_row(entries, patches.len())?;
+    rows.par_iter().zip(patches).map(|(row, &(patch, _))| row_of(row, patch)).collect()
 }
 
 /// The row of `patch` by its entries; or what is wrong with these.

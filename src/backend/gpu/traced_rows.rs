@@ -52,13 +52,10 @@ struct Buffers {
     patches: wgpu::Buffer,
     counts: wgpu::Buffer,
     compacted: CompactedRows,
-    /// Patches of a batch.
+    /// Patches of a batch, at most.
     patches_at_once: u32,
     memory: Memory,
 }
-
-/// Rows made at once, at most: what a solver asks for. It decides the order of shots.
-const MAX_BATCH: u32 = 256;
 
 /// Counts of a batch take at most this many bytes: what any WebGPU device binds.
 const COUNT_BYTES: u64 = 128 << 20;
@@ -83,9 +80,9 @@ impl TracedRows {
             let remedy = format!("this device has room for {most}");
             return Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy));
         }
-        let patches_at_once = ((most / row_bytes) as u32).min(MAX_BATCH);
+        let patches_at_once = (most / row_bytes).min(CompactedRows::MAX_BATCH.into()) as u32;
         let buffers = gpu.with_error_scopes(|| {
-            Buffers::new(gpu.memory(), mesh, (row_bytes, count.min(slots)), patches_at_once)
+            Buffers::new(gpu, mesh, (row_bytes, count.min(slots)), patches_at_once)
         })?;
         let mut rows = TracedRows {
             gpu: gpu.clone(),
@@ -129,13 +126,14 @@ impl TracedRows {
         }
     }
 
-    /// The rows of a batch by so many `rays` in the directions of number `at`.
+    /// The rows of a batch by so many `rays` in the directions of number `at`; none where there is
+    /// no room for their entries.
     fn batch(
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
         (rays, at): (u32, usize),
-    ) -> Result<Vec<Row>, Error> {
+    ) -> Result<Option<Vec<Row>>, Error> {
         let traced: Vec<TracedPatch> =
             patches.par_iter().map(|&p| self.traced_patch(mesh, p)).collect();
         let settings = RowSettings {
@@ -149,14 +147,7 @@ impl TracedRows {
         let rows = gpu.with_error_scopes(|| {
             self.entries(&traced, settings, at, |entries| rows_of(entries, count, rays, has_panes))
         })?;
-        let Some(rows) = rows else {
-            // There was no room for all entries.
-            let (first, second) = patches.split_at(patches.len() / 2);
-            let mut rows = self.batch(mesh, first, (rays, at))?;
-            rows.extend(self.batch(mesh, second, (rays, at))?);
-            return Ok(rows);
-        };
-        rows.map_err(|found| gpu.invalid_result(found))
+        rows.transpose().map_err(|found| gpu.invalid_result(found))
     }
 
     /// What `read` makes of the entries of all rows, row by row in any order, slots ascending; none
@@ -195,11 +186,13 @@ impl TracedRows {
         }
         compacted.compact(gpu, &mut encoder, counts, patches.len() as u32, self.has_panes);
         let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
-        compacted.finish(gpu, encoder, settings, most, read)
+        let submitted = compacted.submit(gpu, encoder, settings, most);
+        compacted.read(gpu, &submitted, read)
     }
 }
 
-/// The rows of entries, by so many `rays` each, or what is wrong with these.
+/// The rows of so many `patches` by the entries of all, of so many `rays` a row; or what is wrong
+/// with these.
 fn rows_of(
     entries: &[RowEntry],
     patches: usize,
@@ -216,9 +209,9 @@ fn rows_of(
     by_row(entries, patches)?.par_iter().map(row).collect()
 }
 
-/// The row of entries in the order of their slots.
+/// The row by its entries, slots ascending.
 fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
-    // Elements come first in a row, then what is lost.
+    // OPEN and BACK are the first slots, and as items the last and the one before it.
     let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
     let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
     let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
@@ -258,14 +251,16 @@ fn item(slot: u32) -> u32 {
 
 impl Buffers {
     fn new(
-        memory: Memory,
+        gpu: &Gpu,
         mesh: &Mesh,
         (row_bytes, row_entries): (u64, u32),
         patches_at_once: u32,
     ) -> Result<Buffers, Error> {
         use wgpu::BufferUsages as Usage;
+        let memory = gpu.memory();
         let patches = u64::from(patches_at_once);
         let storage = Usage::STORAGE | Usage::COPY_DST;
+        let batch_size = (patches_at_once, row_entries);
         Ok(Buffers {
             quadtrees: memory.storage("quadtrees", bytemuck::cast_slice(&quadtrees(mesh)))?,
             patches: memory.buffer(
@@ -275,7 +270,7 @@ impl Buffers {
             )?,
             // Zero at first, and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
-            compacted: CompactedRows::new(&memory, patches_at_once, row_entries)?,
+            compacted: CompactedRows::new(&memory, gpu.limits().buffer, batch_size)?,
             patches_at_once,
             memory,
         })
@@ -289,15 +284,13 @@ impl FormFactors for TracedRows {
             Some(at) => at,
             None => self.add_directions(&HemisphereSamples::new(rays)?, rays)?,
         };
-        let mut rows = Vec::with_capacity(patches.len());
-        for batch in patches.chunks(self.buffers.patches_at_once as usize) {
-            rows.extend(self.batch(mesh, batch, (rays, at))?);
-        }
-        Ok(rows)
+        let (gpu, batch_len) = (self.gpu.clone(), self.buffers.patches_at_once);
+        let make = |batch: &[_]| self.batch(mesh, batch, (rays, at));
+        CompactedRows::in_batches(&gpu, patches, batch_len, make)
     }
 
     fn preferred_batch_len(&self) -> usize {
-        MAX_BATCH as usize
+        CompactedRows::MAX_BATCH as usize
     }
 
     fn fingerprint(&self) -> String {

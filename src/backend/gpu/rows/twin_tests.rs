@@ -30,7 +30,7 @@ fn item_buffer_and_reduce_equal_their_twins() {
     for n in [8, 30, 64, 72] {
         let mut rows = HemicubeRows::new(&gpu, &mesh, n).unwrap();
         let patches = [(mesh.element(0), 0.3), (mesh.element(2), 1.1), (mesh.root(1), 0.7)];
-        let drawn = rows.draw_batch(&mesh, &patches, 0).unwrap();
+        let drawn = rows.draw_batch(&mesh, &patches, 0).unwrap().unwrap();
         let order = &rows.draw_list.order;
         let corners = rows.coordinates.corners(mesh.scene(), order);
         let triangles: Vec<_> = order.iter().map(|&t| table.triangles[t as usize]).collect();

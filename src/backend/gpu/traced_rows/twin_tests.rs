@@ -20,7 +20,7 @@ fn open_rows(gpu: &Gpu, mesh: &Mesh, rays: u32) -> TracedRows {
     use wgpu::BufferUsages as Usage;
     let mut rows = TracedRows::new(gpu, mesh, rays).unwrap();
     let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-    let bytes = u64::from(MAX_BATCH * rows.slots.max(1024)) * 16;
+    let bytes = u64::from(CompactedRows::MAX_BATCH * rows.slots.max(1024)) * 16;
     rows.buffers.counts = gpu.memory().buffer("test", bytes, usage).unwrap();
     rows
 }
