@@ -193,16 +193,21 @@ impl RadiosityField<'_> {
     /// textured material reflects the mean of its own piece of the texture.
     pub fn reflected_at(&self, t: usize, u: f64, v: f64) -> Rgb {
         let (element, local) = self.mesh.element_at(t, u, v);
+        self.reflected_on_element(element, local)
+    }
+
+    /// The same at barycentric position (`u`, `v`) of an element.
+    fn reflected_on_element(&self, element: usize, local: [f64; 2]) -> Rgb {
         self.interpolated(element, local) * self.mesh.relative_reflectance(element)
     }
 
-    /// The same as if all of the material reflected alike.
+    /// What [`RadiosityField::reflected_at`] gives if all of the material reflects alike.
     pub(crate) fn untextured_at(&self, t: usize, u: f64, v: f64) -> Rgb {
         let (element, local) = self.mesh.element_at(t, u, v);
         self.interpolated(element, local)
     }
 
-    /// The same at barycentric position (`u`, `v`) of an element.
+    /// The same at barycentric position (`u`, `v`) of an element, W/m² per channel.
     fn interpolated(&self, element: usize, [u, v]: [f64; 2]) -> Rgb {
         let [a, b, c] = self.corners[element].map(|k| self.reflected[k as usize]);
         a * (1.0 - u - v) + b * u + c * v

@@ -82,8 +82,7 @@ impl GatheredFrom<'_> {
         let element = hit.element as usize;
         let node = mesh.element(element);
         let [u, v] = mesh.cell(node).in_triangle(hit.barycentric);
-        let light = self.light.interpolated(element, hit.barycentric);
-        light * mesh.relative_reflectance(element)
+        self.light.reflected_on_element(element, hit.barycentric)
             - self.source.reflected_at(mesh.triangle(node), u, v)
     }
 
