@@ -165,13 +165,11 @@ impl Vertices {
             (finer.triangle(node), lattice_corners(finer.cell(node))[k])
         };
         let key_of = |(t, point): (usize, [u32; 2])| vertex_key(topology, t, point);
-        // Of the corners of each element their old numbers; from there on those of new vertices.
+        // Until all are known, old vertices have their old numbers, and new ones those from the
+        // number of old ones on.
         let old_corners = |(f, old): (usize, &Option<usize>)| match old {
             Some(e) => self.corners[*e],
-            None => [0, 1, 2].map(|k| {
-                let old = self.index_of(&key_of(place_of(f, k)));
-                old.unwrap_or(UNNUMBERED)
-            }),
+            None => [0, 1, 2].map(|k| self.index_of(&key_of(place_of(f, k))).unwrap_or(UNNUMBERED)),
         };
         let mut corners: Vec<[u32; 3]> =
             old_elements.par_iter().enumerate().map(old_corners).collect();
@@ -182,18 +180,18 @@ impl Vertices {
                 *v = old_count as u32 + new.number(finer, topology, place_of(f, k));
             }
         }
-        // Vertices are numbered in the order in which the corners of elements name them.
+        // They are numbered in the order in which the corners of elements name them.
         let count = old_count + new.keys.len();
-        let slots = naming_corners(corners.as_flattened(), count);
+        let naming = naming_corners(corners.as_flattened(), count);
         let by_number: Vec<u32> =
-            slots.par_iter().map(|&slot| corners.as_flattened()[slot as usize]).collect();
+            naming.par_iter().map(|&corner| corners.as_flattened()[corner as usize]).collect();
         let mut numbers = vec![UNNUMBERED; count];
         for (number, &v) in (0..).zip(&by_number) {
             numbers[v as usize] = number;
         }
         corners.as_flattened_mut().par_iter_mut().for_each(|v| *v = numbers[*v as usize]);
-        let places = slots.par_iter().map(|&slot| {
-            let (t, point) = place_of(slot as usize / 3, slot as usize % 3);
+        let places = naming.par_iter().map(|&corner| {
+            let (t, point) = place_of(corner as usize / 3, corner as usize % 3);
             (t as u32, point)
         });
         let places: Vec<(u32, [u32; 2])> = places.collect();
@@ -253,18 +251,13 @@ impl Vertices {
     ) -> u32 {
         let key = vertex_key(topology, t, point);
         self.index_of(&key).unwrap_or_else(|| {
-            let position = lattice_position(mesh.scene(), topology, t, point);
-            let v = self.push(key, position, (t, point));
+            let v = self.keys.len() as u32;
+            self.keys.push(key);
+            self.positions.push(lattice_position(mesh.scene(), topology, t, point));
+            self.places.push((t as u32, point));
             self.add_to_index(v);
             v
         })
-    }
-
-    fn push(&mut self, key: VertexKey, position: DVec3, (t, point): (usize, [u32; 2])) -> u32 {
-        self.keys.push(key);
-        self.positions.push(position);
-        self.places.push((t as u32, point));
-        self.keys.len() as u32 - 1
     }
 
     fn add_to_index(&mut self, v: u32) {
@@ -328,10 +321,9 @@ pub(super) fn by_task<T: Send>(elements: usize, work: impl Fn(Range<usize>) -> T
     tasks.map(|k| work(range(k))).collect()
 }
 
-/// Where in `corners` each of so many vertices is named for the first time, ascending.
+/// The indices in `corners`, ascending, that are the first to name one of so many `vertices`.
 fn naming_corners(corners: &[u32], vertices: usize) -> Vec<u32> {
-    let mut first = vec![];
-    first.resize_with(vertices, || AtomicU32::new(u32::MAX));
+    let first: Vec<AtomicU32> = (0..vertices).map(|_| AtomicU32::new(u32::MAX)).collect();
     corners.par_iter().enumerate().for_each(|(k, &v)| {
         first[v as usize].fetch_min(k as u32, Ordering::Relaxed);
     });
