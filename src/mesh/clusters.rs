@@ -38,7 +38,7 @@ pub(crate) struct Clusters {
     clusters: Vec<Cluster>,
     /// The two parts of each cluster that is not a triangle.
     parts: Vec<[u32; 2]>,
-    /// Clusters that are part of no other, ascending.
+    /// Clusters without a parent, ascending.
     roots: Vec<u32>,
 }
 

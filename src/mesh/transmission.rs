@@ -4,9 +4,9 @@
 //! ([`Scene::other_side`](crate::Scene)). Each is cut into elements by itself, so that light
 //! arriving at one element leaves from all elements behind it, in proportion to the shared area:
 //!
+//! ```text
 //!      ●──────── e ────────●        of the light received by e, f emits     τ · |e ∩ f| / |e|
 //!      ┊     │             ┊        of the light received by f, e emits     τ · |e ∩ f| / |f|
-//!      ┊     │             ┊        and of what f receives e       τ · |e ∩ f| / |f|
 //!      ●─ f ─●────── g ────●
 //! ```
 

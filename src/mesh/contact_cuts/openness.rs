@@ -47,9 +47,9 @@ impl Openness {
         Openness { rays: RayScene::of_scene(scene), directions, beside, above }
     }
 
-    /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
-    /// the triangle with these `corners`, or the side that is not is a slit. What is too short to
-    /// be looked beside counts as the line that it is the end of.
+    /// Whether, somewhere along the `segment` of the triangle with these `corners`, neither side is
+    /// inside a solid that stands there, or the side that is not is a slit. A segment too short for
+    /// a test beside it is tested as the whole line that it ends.
     pub fn is_worth_a_cut(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
         let Some(ends) = clipped(segment.ends).filter(|ends| !is_on_side(ends)) else {
             return false;
