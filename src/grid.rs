@@ -83,7 +83,7 @@ impl MeasuringGrid {
     }
 
     /// The grid `height` metres above the group of this name: above its highest side that faces
-    /// `up` or, if none does, in front of the side with the largest area.
+    /// `up` or, if none does, in front of the side that faces along its mean normal.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when there is no such group, or it is not flat, or too small for the

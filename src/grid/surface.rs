@@ -74,11 +74,11 @@ impl LevelSurface {
         floors
     }
 
-    /// The highest side of a group that faces unit `up` or, if none does, the side with the largest
-    /// area.
+    /// The highest side of a group that faces unit `up` or, if none does, the side that faces along
+    /// its mean normal, weighted by area.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when there is no such group, or no side has the largest area.
+    /// [`ErrorKind::Setting`] when there is no such group, or no side faces that way.
     pub fn of_group(
         scene: &Scene,
         group: &str,

@@ -20,7 +20,7 @@ use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 /// Writes the matrix as CSV: a header row and a first column of names, rows emit, columns receive;
 /// then `open`, the fraction that leaves the scene, `back`, the fraction that hits backs of
 /// surfaces, and the `area` of each row's group. Values have nine decimals; below 1e-5, five
-/// digits. Zero is `0`; pairs not seen by any ray are left empty.
+/// digits. Zero is `0`; pairs not seen by any pixel or ray are left empty.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.

@@ -116,7 +116,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
         others.sort_unstable();
         let mut segments = vec![];
         for s in others {
-            // Clear panes cast no shadow.
+            // No shadow begins at clear panes.
             if scene.is_clear(s) {
                 continue;
             }
@@ -312,7 +312,8 @@ mod tests {
         let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
         assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
-        // The floor is visible through a hole in the lid, at 1/30 of the hemisphere beside a wall.
+        // The floor is visible through a hole in the lid, which fills 1/30 of the view from floor
+        // beside a wall.
         let lid = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {
             [[x0, y0, 2.0], [x1, y0, 2.0], [x1, y1, 2.0], [x0, y1, 2.0]]
         };

@@ -68,7 +68,7 @@ impl Octaves {
         self.split(&triangle, WHOLE, (area, is_split), take);
     }
 
-    /// Distance of the part, at least the width of the dense region; 1 if all is one octave.
+    /// Distance of the part plus the diagonal of the dense region; 1 if all is one octave.
     fn reach(&self, corners: [DVec3; 3]) -> f64 {
         let Some(centre) = &self.centre else { return 1.0 };
         let bounds = Aabb::from_points(corners);
