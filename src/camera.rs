@@ -6,8 +6,8 @@
 //!                                    └─ at mirrors and glass on to others: camera/second_pass.rs
 //! ```
 //!
-//! Rays lie on a grid sheared by one sub-pixel per row and column (n-rooks), so that an edge along
-//! the pixels crosses them one by one, which makes n² levels of antialiasing instead of n.
+//! Rays lie on a grid sheared by one sub-pixel per row and column (n-rooks): an edge along the
+//! pixels then crosses the rays one by one, which gives n² levels of antialiasing instead of n.
 
 mod framing;
 mod gathered;
@@ -39,10 +39,10 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 pub struct Camera {
     /// Position of the pinhole, scene unit.
     pub eye: DVec3,
-    /// A point that is seen in the middle of the image, scene unit.
+    /// A point in the middle of the image, scene unit.
     pub target: DVec3,
-    /// The direction that is up in the image, of any length; only its part across the view counts.
-    /// Where the camera looks along it −z takes its place, or +y where it is not ±y.
+    /// Up direction of the image, of any length; only its component across the view counts. If the
+    /// camera looks along it, −z is used instead, or +y if it is not ±y.
     pub up: DVec3,
     /// Vertical field of view, from the image's lower to its upper edge: degrees, in (0, 180).
     pub vertical_fov: f64,
@@ -57,31 +57,31 @@ pub struct RadianceImage {
     pub height: u32,
     /// `width` × `height` pixels.
     pub pixels: Vec<Rgb>,
-    /// Of each pixel, whether there is nothing but sky in it.
+    /// Of each pixel, whether all of its rays see the sky.
     pub sky: Vec<bool>,
 }
 
-/// Largest image side, pixels. Chosen by hand: memory for the pixels is 24 GiB there.
+/// Largest image side, pixels. Plain choice: memory for the pixels is 24 GiB there.
 const MAX_SIDE: u32 = 1 << 15;
 
-/// Primary rays along a pixel's side, at most. Chosen by hand.
+/// Maximum number of primary rays along a pixel's side. Plain choice.
 const MAX_SAMPLES: u32 = 256;
 
-/// Cosine between the view direction and the camera's up from which on another direction is up in
-/// the image. Chosen by hand.
+/// Cosine of the angle between the view direction and the camera's up above which another up
+/// direction is used. Plain choice.
 const VERTICAL_VIEW: f64 = 0.9999;
 
-/// Surfaces met at distances that differ by no more than this share lie in one place: rounding is
-/// far below it but for rays that graze.
+/// Largest relative difference of the distances of two surfaces that count as coincident. Rounding
+/// is far below it except for grazing rays.
 const SAME_PLACE: f64 = 1e-9;
 
 impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
     /// `samples` primary rays on an n-rooks grid: no two in one row or column.
     ///
-    /// Radiance is the interpolated radiosity over π. Backs of faces are black, and rays that meet
-    /// nothing see the sky, [`VertexMesh::sky`]. A mesh of vertices knows no mirrors and no glass:
-    /// [`Camera::interpolated_image`] shows these.
+    /// Radiance is the interpolated radiosity over π. Backs of faces are black, and rays that miss
+    /// see the sky, [`VertexMesh::sky`]. A mesh of vertices has no mirrors and no glass:
+    /// [`Camera::interpolated_image`] draws these.
     ///
     /// # Errors
     /// Those of [`Camera::check`].
@@ -113,7 +113,7 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
-    /// Whether [`Camera::image`] would take these settings: worth asking before a long solve.
+    /// Whether [`Camera::image`] would accept these settings, to be checked before a long solve.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a size of 0 or above 32768, no samples, a field of view outside
@@ -144,18 +144,18 @@ impl Camera {
     }
 }
 
-/// What a ray sees first.
+/// The first surface or sky along a ray.
 enum Seen {
     Front(Hit),
     /// In this direction, unit length.
     Sky(DVec3),
 }
 
-/// The primary rays through the pixels of an image, and the surface that they meet.
+/// The primary rays through the pixels of an image, and the surface that they hit.
 struct PrimaryRays<'a> {
     surface: &'a VertexMesh,
-    /// The mesh whose elements its faces are, if that is known: hits are on triangles of its scene
-    /// then, and else on faces.
+    /// The mesh whose elements its faces are, if given: hits are on triangles of its scene then,
+    /// otherwise on faces.
     mesh: Option<&'a Mesh>,
     met: Arc<RayScene>,
     eye: DVec3,
@@ -163,7 +163,7 @@ struct PrimaryRays<'a> {
     corner: DVec3,
     /// Unit direction of the view's axis.
     forward: DVec3,
-    /// Steps of a sub-pixel to the right and downwards there.
+    /// Steps of one sub-pixel to the right and downwards, at distance 1.
     right: DVec3,
     down: DVec3,
     /// Pixels in a row.
@@ -210,8 +210,7 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// The same for the surface of `light`, which knows its holes and what its backs are covered
-    /// by.
+    /// The same for the surface of `light`, whose mesh has the holes and the covers of backs.
     fn of_light<'a>(
         camera: &Camera,
         light: &'a GatheredMesh,
@@ -223,15 +222,15 @@ impl PrimaryRays<'_> {
         PrimaryRays::new(camera, (surface, Some(mesh)), width, height, samples)
     }
 
-    /// Ranges of the first `pixels`, in order, with about `rays` primary rays each.
+    /// Ranges of the first `pixels` pixels, in order, with about `rays` primary rays each.
     fn bands(&self, pixels: u32, rays: u32) -> impl Iterator<Item = Range<u32>> + use<> {
         let band = (rays / (self.samples * self.samples)).max(1);
         let end = move |start: u32| start.saturating_add(band).min(pixels);
         (0..pixels).step_by(band as usize).map(move |start| start..end(start))
     }
 
-    /// Radiance of these pixels, of the radiosity (W/m²) of what is seen, and whether that is sky
-    /// alone.
+    /// Radiance of these pixels from the radiosity (W/m²) at their hits, and whether all rays see
+    /// the sky.
     fn pixels<'b>(
         &'b self,
         range: Range<u32>,
@@ -254,7 +253,7 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// What the rays of pixel `k` see. The other rays hit backs.
+    /// First hits of the rays of pixel `k`, or the sky. Rays that hit backs are left out.
     fn seen(&self, k: u32) -> impl Iterator<Item = Seen> {
         self.directions(k).filter_map(|direction| self.hit(direction))
     }
@@ -272,8 +271,8 @@ impl PrimaryRays<'_> {
         })
     }
 
-    /// What the ray along `direction` sees first; nothing if that is a back, and no front lies in
-    /// one place with it.
+    /// The first front hit along `direction`, or the sky; none if a back is hit first and no front
+    /// coincides with it.
     fn hit(&self, direction: DVec3) -> Option<Seen> {
         let Some(first) = self.met.closest_hit(self.eye, direction, 0.0, None) else {
             return Some(Seen::Sky(direction.normalize()));

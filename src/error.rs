@@ -1,11 +1,11 @@
-//! The crate's one error: where, what was found, what would be right.
+//! The crate's one error: place, finding and remedy.
 
 use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What went wrong, in a form that says *where*, *what was found* and *what would be right*.
+/// An error with its place, finding and remedy.
 ///
 /// Shown with `{}`, it is one line: `place: found; remedy`.
 #[derive(Clone)]
@@ -34,12 +34,12 @@ pub enum ErrorKind {
     Device,
     /// A graphics device without enough memory, however small the batches; it stays usable.
     Memory,
-    /// A form-factor row that breaks its contract, found by the solver.
+    /// A form-factor row that breaks its contract, reported by the solver.
     FormFactor,
 }
 
 impl Error {
-    /// An error of `kind` at `place`: `found` is wrong, `remedy` would be right.
+    /// An error of `kind` at `place`: `found` is the finding, `remedy` the correction.
     pub fn new(
         kind: ErrorKind,
         place: impl Into<String>,
@@ -76,7 +76,7 @@ impl Error {
         matches!(self.kind(), ErrorKind::Device | ErrorKind::Memory)
     }
 
-    /// Where in the input: a file and line, a material, a setting.
+    /// Place in the input: a file and line, a material, a setting.
     pub fn place(&self) -> &str {
         &self.0.place
     }
@@ -110,12 +110,12 @@ pub(crate) fn shortened(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Up to eight of `names`, quoted, and how many more there are.
+/// Up to eight of `names`, quoted, and the number of the others.
 pub(crate) fn quoted<S: AsRef<str>>(names: &[S]) -> String {
     quoted_few(names, 8)
 }
 
-/// Up to `shown` of `names`, quoted, and how many more there are.
+/// Up to `shown` of `names`, quoted, and the number of the others.
 pub(crate) fn quoted_few<S: AsRef<str>>(names: &[S], shown: usize) -> String {
     let name = |name: &S| format!("'{}'", shortened(name.as_ref()).escape_debug());
     let mut list = names.iter().take(shown).map(name).collect::<Vec<_>>().join(", ");
@@ -125,12 +125,12 @@ pub(crate) fn quoted_few<S: AsRef<str>>(names: &[S], shown: usize) -> String {
     list
 }
 
-/// Which of `names` is meant by `wrong`, perhaps: one in other letters, or a few typing errors off.
+/// The likely intended one of `names` for `wrong`: equal but for case, or a few typing errors off.
 pub(crate) fn nearest<'n>(
     wrong: &str,
     names: impl IntoIterator<Item = &'n str>,
 ) -> Option<&'n str> {
-    /// Letters that a typing error may be in, at least; and longest name that is looked at.
+    /// Least number of letters per typing error; longest name that is compared.
     const LETTERS_AN_ERROR: usize = 3;
     const LONGEST: usize = 100;
     let lower = |name: &str| name.to_lowercase();

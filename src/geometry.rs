@@ -1,4 +1,4 @@
-//! Geometry that knows nothing of light.
+//! Geometry, independent of light.
 
 pub(crate) mod aabb;
 pub(crate) mod barycentric;

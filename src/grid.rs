@@ -1,4 +1,4 @@
-//! Measuring grids: irradiance or illuminance at the points of a plane, and what they say together.
+//! Measuring grids: irradiance or illuminance at the points of a plane, and their statistics.
 //!
 //! ```text
 //!   plane given, above a group, or above each floor
@@ -11,7 +11,7 @@
 //!    └───────────────────────────┘
 //! ```
 //!
-//! [`MeasuringGrid`] is where the points are: geometry of the scene alone. It is
+//! [`MeasuringGrid`] has the positions: geometry of the scene alone. It is
 //! [measured](MeasuringGrid::measure) in the light of a bake. Strip and spacing are those of EN
 //! 12464-1 unless [`GridSettings`] say otherwise.
 
@@ -36,12 +36,12 @@ pub use settings::GridSettings;
 pub use statistics::GridStatistics;
 use surface::LevelSurface;
 
-/// A grid, and what was measured at its points.
+/// A grid with the values measured at its points.
 #[derive(Clone, Debug)]
 pub struct MeasuredGrid {
-    /// Where.
+    /// Positions.
     pub grid: MeasuringGrid,
-    /// What arrives, in the order of [`MeasuringGrid::points`]; `None` where there is none.
+    /// Irradiance, in the order of [`MeasuringGrid::points`]; `None` where there is no point.
     pub values: Vec<Option<PointIrradiance>>,
 }
 
@@ -65,8 +65,8 @@ impl MeasuringGrid {
         MeasuringGrid::filling(name, inner, settings, |_| true)
     }
 
-    /// Grids `height` metres above each floor of `scene`, the lowest first: above what faces `up`,
-    /// hangs together, has at least four square metres and is wider than both strips.
+    /// Grids `height` metres above each floor of `scene`, the lowest first. A floor faces `up`, is
+    /// connected, has at least four square metres and is wider than both strips.
     ///
     /// # Errors
     /// Those of [`GridSettings::counts`].
@@ -83,7 +83,7 @@ impl MeasuringGrid {
     }
 
     /// The grid `height` metres above the group of this name: above its highest side that faces
-    /// `up` or, if none does, before the side that most of it shows.
+    /// `up` or, if none does, in front of the side that faces along its mean normal.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when there is no such group, or it is not flat, or too small for the
@@ -109,8 +109,8 @@ impl MeasuringGrid {
         [0, 1].map(|axis| self.plane.edges[axis].length() / self.counts[axis] as f64)
     }
 
-    /// Measures the irradiance that `light` causes at the points: see [`irradiance_at`], which says
-    /// what `gatherer`, `progress` and `None` are.
+    /// Measures the irradiance that `light` causes at the points: see [`irradiance_at`] for
+    /// `gatherer`, `progress` and `None`.
     ///
     /// # Errors
     /// Those of [`GridPlane::normal`] and [`irradiance_at`].
@@ -134,7 +134,7 @@ impl MeasuringGrid {
 }
 
 impl MeasuredGrid {
-    /// What `quantity` the points outside of solids have, in their order, with its standard error.
+    /// Values of `quantity` at the points outside of solids, in their order, with standard errors.
     pub fn measured(&self, quantity: Quantity) -> impl Iterator<Item = Option<[f64; 2]>> {
         self.values.iter().map(move |value| {
             let value = value.filter(|value| !value.is_buried())?;
@@ -142,7 +142,7 @@ impl MeasuredGrid {
         })
     }
 
-    /// Mean, minimum and the like of `quantity`; `None` where there is no point outside of solids.
+    /// Statistics of `quantity`; `None` if no point is outside of solids.
     pub fn statistics(&self, quantity: Quantity) -> Option<GridStatistics> {
         GridStatistics::of(self.measured(quantity).flatten())
     }

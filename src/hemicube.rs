@@ -51,7 +51,7 @@ impl Frame {
     }
 }
 
-/// How one face of the hemicube looks out: a pinhole view from the patch.
+/// View of one face of the hemicube: a pinhole camera at the patch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Face {
     pub right: DVec3,
@@ -108,7 +108,7 @@ fn side_corner(y: f64, z: f64) -> f64 {
 /// Exact delta form factor of every pixel of a hemicube of resolution `n`: the integral of the
 /// density over the pixel, not its midpoint value. Image layout of this module; dimensionless.
 ///
-/// They sum to 1 but for rounding; nothing is normalised.
+/// Their sum is 1 up to rounding; they are not normalised.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] for an unusable resolution, see [`check_resolution`].
@@ -134,8 +134,8 @@ pub fn delta_form_factors(n: u32) -> Result<Vec<f64>, Error> {
 
 /// The delta form factors in units of 1/[`Row::TOTAL`], image layout of this module.
 ///
-/// Rounded by their running sum, so that any run of consecutive pixels of a face, and a whole image
-/// line above all, is off by less than one unit; the whole hemicube is [`Row::TOTAL`] exactly.
+/// Rounded by their running sum: any run of consecutive pixels of a face, such as an image line, is
+/// off by less than one unit, and the whole hemicube is [`Row::TOTAL`] exactly.
 pub(crate) fn weights(n: u32) -> Result<Vec<u32>, Error> {
     let exact = delta_form_factors(n)?;
     let (n, total) = (n as usize, f64::from(Row::TOTAL));

@@ -1,10 +1,11 @@
-//! Files in and out. No other module of the library opens one, but for saved solver states.
+//! Input and output files. No other module of the library opens one, except for saved solver
+//! states.
 //!
 //! | format | function | content |
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
-//! | IESNA LM-63, EULUMDAT | [`read_photometry`] | how a luminaire spreads its light |
+//! | IESNA LM-63, EULUMDAT | [`read_photometry`] | the light distribution of a luminaire |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -67,7 +68,7 @@ pub use radiance::read_radiance;
 pub use specular::SpecularSurfaces;
 pub use tone::ToneCurve;
 
-/// Creates `path` and hands it to `write`; any failure names the file.
+/// Creates `path` and passes it to `write`; any failure names the file.
 fn write_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,

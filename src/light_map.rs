@@ -6,13 +6,13 @@
 //!             coordinates   are seen with  of each     meet in space  empty texels
 //! ```
 //!
-//! Renderers show a surface point by the four texels around its texture coordinates, each by how
-//! near it is. So every texel gathers that any point of a surface is shown with: those whose
-//! squares a triangle touches, and some of their neighbours. A texel whose centre lies outside of
-//! all triangles gathers at the nearest point of one.
+//! Renderers interpolate a surface point from the four texels around its texture coordinates. So
+//! every texel that a surface point uses gathers: those whose squares a triangle touches, and some
+//! of their neighbours. A texel whose centre lies outside of all triangles gathers at the nearest
+//! point of one.
 //!
-//! Each side of a surface that reflects on both has triangles of its own
-//! ([`Scene::resolve_sides`](crate::Scene::resolve_sides)), and so texels of its own.
+//! Each side of a surface that reflects on both has its own triangles
+//! ([`Scene::resolve_sides`](crate::Scene::resolve_sides)), and so its own texels.
 
 mod atlas;
 mod coverage;

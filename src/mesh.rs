@@ -1,4 +1,4 @@
-//! Quadtrees on triangles: elements that receive, patches that shoot.
+//! Quadtrees on triangles: elements receive, patches shoot.
 //!
 //! Every scene triangle carries a quadtree of midpoint splits. Its leaves are *elements*; any node
 //! is a *patch*, which shoots for all elements below it. Elements are numbered depth first, so that
@@ -13,8 +13,8 @@
 //!     ╱_╲╱_╲╱__4_╲            └─ element 6, the middle part, which is turned over
 //! ```
 //!
-//! Above the triangle, neighbours that face much the same way form clusters (`mesh/clusters.rs`).
-//! Nodes are numbered: first the roots, one a triangle, then four consecutive children at a time.
+//! Above the triangle, neighbours with similar normals form clusters (`mesh/clusters.rs`). Nodes
+//! are numbered: first the roots, one per triangle, then four consecutive children at a time.
 
 mod box_overlap;
 mod clusters;
@@ -59,7 +59,7 @@ struct Node {
     children: u32,
 }
 
-/// What an element has for [`Node::children`].
+/// [`Node::children`] of an element.
 const LEAF: u32 = u32::MAX;
 
 impl Node {
@@ -81,31 +81,31 @@ pub struct Mesh {
     /// Unit normal and area of each triangle.
     normals: Arc<[DVec3]>,
     areas: Arc<[f64]>,
-    /// Made when they are asked for.
+    /// Built on first use.
     clusters: Arc<OnceLock<Clusters>>,
-    /// See [`Mesh::reflectance`]; empty without textures. Made when they are asked for.
+    /// See [`Mesh::reflectance`]; empty without textures. Built on first use.
     textured_reflectances: Arc<OnceLock<Vec<Rgb>>>,
-    /// See [`Mesh::solid_area`]; empty without holes. Made when they are asked for.
+    /// See [`Mesh::solid_area`]; empty without holes. Built on first use.
     solid_shares: Arc<OnceLock<Vec<f64>>>,
 }
 
 impl Mesh {
-    /// Levels of subdivision that a triangle can have at most: 4¹² elements.
+    /// Maximum number of levels of subdivision of a triangle: 4¹² elements.
     pub const MAX_DEPTH: u32 = 12;
 
-    /// Elements that a mesh can have at most: element numbers, and all that is kept per element,
-    /// stay within 32 bits and some gigabytes.
+    /// Maximum number of elements of a mesh: keeps element numbers within 32 bits, and all data per
+    /// element within some gigabytes.
     pub const MAX_ELEMENTS: usize = 1 << 26;
 
-    /// Neighbouring triangles of one smoothing group meet in a crease if their normals differ by
-    /// more than this many degrees: radiosity jumps there, whatever shading is wanted. Neighbours
-    /// of which no smoothing group is known do so at this angle or, in a bake to an error, at one
-    /// so small that what they share is not off by more. Chosen by hand; no measurement was kept.
+    /// Angle between the normals of neighbouring triangles of one smoothing group, degrees, above
+    /// which they meet in a crease: radiosity jumps there, whatever the shading. Neighbours without
+    /// a known smoothing group use this angle or, in a bake to an error, one small enough that
+    /// interpolation across the side stays within the error. Plain choice; no measurement was kept.
     pub const CREASE_DEGREES: f64 = 40.0;
 
-    /// All other neighbouring triangles, in two smoothing groups or in none, meet in a crease if
-    /// their normals differ by more than this many degrees: triangles of a polygon that is flat but
-    /// for the rounding of its coordinates in a file do not.
+    /// The same angle for all other neighbouring triangles, in two smoothing groups or in none: no
+    /// crease between triangles of a polygon that is flat but for the rounding of its coordinates
+    /// in a file.
     pub const COPLANAR_DEGREES: f64 = 1.0;
 
     /// Splits every triangle of `scene` until no element edge is longer than `element_size` (in
@@ -149,8 +149,7 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
-    /// Every triangle split wherever `is_inner` says of a triangle and a cell of it that the cell
-    /// has children.
+    /// Splits every triangle as long as `is_inner` returns true for the triangle and a cell of it.
     fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
         let mut mesh = Mesh {
@@ -204,7 +203,7 @@ impl Mesh {
             solid_shares: Arc::default(),
         };
         for root in 0..count {
-            // What a cell was before says whether it is split; of one that is new, nothing.
+            // A cell of the old mesh is split as it was, or if requested; a new one is not.
             split.build_subtree(root, Some(root), &|_, old: Option<usize>| {
                 let Node { children, first_element, .. } = self.nodes[old?];
                 if children != LEAF {
@@ -216,8 +215,8 @@ impl Mesh {
         Ok(split)
     }
 
-    /// Builds the subtree of node `n`, and numbers its elements. `children_of` says what is known
-    /// of the children of a node, given the node and what is known of it; none if it has none.
+    /// Builds the subtree of node `n`, and numbers its elements. `children_of` returns the data
+    /// known of a node's children, given the node and its own data; none if it has no children.
     fn build_subtree<T: Copy>(
         &mut self,
         n: usize,
@@ -243,7 +242,7 @@ impl Mesh {
     }
 
     /// The same elements in another `scene`: one whose materials, or positions of triangles, have
-    /// changed. Clusters of triangles stay what they were.
+    /// changed. Clusters of triangles are kept.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when `scene` has another number of triangles.
@@ -267,7 +266,7 @@ impl Mesh {
         self.clusters.get_or_init(|| Clusters::new(&self.scene))
     }
 
-    /// A number that depends on all that light does on this mesh: positions, materials, elements,
+    /// A hash of all that the light on this mesh depends on: positions, materials, elements,
     /// clusters. Names do not matter, nor does the order of vertices.
     pub(crate) fn fingerprint(&self) -> u64 {
         let mut all = Xxh3::new();
@@ -315,7 +314,7 @@ impl Mesh {
         all.digest()
     }
 
-    /// Whether elements of `other` have the same places in the same triangles.
+    /// Whether elements of `other` have the same positions in the same triangles.
     pub(crate) fn has_elements_of(&self, other: &Mesh) -> bool {
         let places = |mesh: &Mesh, e: usize| {
             let node = mesh.node(mesh.elements[e]);
@@ -330,7 +329,7 @@ impl Mesh {
         (node.0 as usize) < self.nodes.len()
     }
 
-    /// The scene that was cut.
+    /// The scene of the mesh.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -339,12 +338,12 @@ impl Mesh {
         self.scene.clone()
     }
 
-    /// How many nodes all quadtrees have.
+    /// Number of nodes of all quadtrees.
     pub(crate) fn node_count(&self) -> usize {
         self.nodes.len()
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.elements.len()
     }
@@ -378,12 +377,12 @@ impl Mesh {
         Some([0, 1, 2, 3].map(|k| NodeId(first + k)))
     }
 
-    /// Which of the four parts of its parent `node` is; none of a root.
+    /// Index of `node` among the four parts of its parent; none for a root.
     pub(crate) fn place_in_parent(&self, node: NodeId) -> Option<usize> {
         node.0.checked_sub(self.depths.len() as u32).map(|k| (k % 4) as usize)
     }
 
-    /// The element at corner `k` of `node`, which has it for its own corner `k`.
+    /// The element at corner `k` of `node`, whose own corner `k` it is.
     pub(crate) fn element_at_corner(&self, node: NodeId, k: usize) -> usize {
         let mut node = self.node(node);
         while node.children != LEAF {
@@ -409,8 +408,8 @@ impl Mesh {
         elements.map(|&node| self.solid_area(node)).sum()
     }
 
-    /// Mean albedo by area of the elements that scatter light, per channel; 0 where none does. What
-    /// is black is left out, since a black sky around a scene makes the scene no darker.
+    /// Mean albedo by area of the elements that scatter light, per channel; 0 if none does. Black
+    /// elements are left out, since a black sky around a scene does not make the scene darker.
     pub(crate) fn mean_albedo(&self) -> Rgb {
         let scattering = |(e, &node): (usize, &NodeId)| self.albedo(e) * self.solid_area(node);
         let area = self.scattering_area().max(f64::MIN_POSITIVE);
@@ -449,8 +448,8 @@ impl Mesh {
         self.scene.triangles()[self.triangle(node)].group
     }
 
-    /// The element at barycentric position (`u`, `v`) of triangle `t`: weights of its second and
-    /// third corner; and the same position in the element. Positions outside the triangle go to the
+    /// The element at barycentric position (`u`, `v`), weights of the second and third corner, of
+    /// triangle `t`, and the same position in the element. Positions outside the triangle go to the
     /// nearest element along the axes.
     pub fn element_at(&self, t: usize, u: f64, v: f64) -> (usize, [f64; 2]) {
         let mut node = self.node(self.root(t));
@@ -479,7 +478,7 @@ impl Mesh {
         self.depths[t]
     }
 
-    /// The place of `node` in its triangle.
+    /// The cell of `node` in its triangle.
     pub(crate) fn cell(&self, node: NodeId) -> Cell {
         self.node(node).cell
     }
@@ -491,6 +490,6 @@ impl Mesh {
 
 /// Corners of `cell` in the triangle with corners `a`, `b`, `c`, scene unit.
 fn cell_corners([a, b, c]: [DVec3; 3], cell: Cell) -> [DVec3; 3] {
-    // Weights that sum to one exactly, so that corners of the triangle stay what they are.
+    // Weights that sum to one exactly, so that corners of the triangle are reproduced exactly.
     cell.corners().map(|[u, v]| a * (1.0 - u - v) + b * u + c * v)
 }

@@ -1,4 +1,4 @@
-//! Probes: what arrives at points in the air from all sides, as spherical harmonics.
+//! Probes: irradiance at points in the air from all sides, as spherical harmonics.
 //!
 //! ```text
 //!          n_k                    26 directions around a probe, each a gather
@@ -7,11 +7,11 @@
 //!      ╱  │  ╲
 //! ```
 //!
-//! Irradiance as a function of the normal is so smooth that harmonics to order 2, nine numbers a
-//! channel, hold it to about 1 % of what arrives in usual light, and to 9 % of the brightest
-//! direction where all light comes from one (R. Ramamoorthi and P. Hanrahan 2001, "An efficient
-//! representation for irradiance environment maps"). Since each direction is gathered as vertices
-//! are, small lamps have their closed forms, and the sun, skies and glass are in it.
+//! Irradiance as a function of the normal is so smooth that harmonics to order 2, nine numbers per
+//! channel, represent it to about 1 % in usual light, and to 9 % of the brightest direction where
+//! all light comes from one (R. Ramamoorthi and P. Hanrahan 2001, "An efficient representation for
+//! irradiance environment maps"). Since each direction is gathered as vertices are, small lamps
+//! have their closed forms, and the sun, skies and glass are included.
 
 mod harmonics;
 mod probe_grid;
@@ -29,32 +29,32 @@ use harmonics::DIRECTIONS;
 pub use harmonics::Harmonics;
 pub use probe_grid::ProbeGrid;
 
-/// Probes in the first batch; later ones follow the clock. Chosen by hand: results do not depend on
-/// it.
+/// Probes in the first batch; later batches follow the clock. Plain choice: results do not depend
+/// on it.
 const FIRST_BATCH: usize = 16;
 
-/// What arrives at a point from all sides.
+/// Irradiance at a point from all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
-    /// Where, scene unit.
+    /// Position, scene unit.
     pub position: DVec3,
-    /// Irradiance over the normal, W/m² per channel.
+    /// Irradiance as a function of the normal, W/m² per channel.
     pub irradiance: Harmonics,
-    /// What `irradiance` is off by, W/m²: the root mean square over all normals, a length over the
-    /// channels, by how far it is from what was gathered in 26 directions. What harmonics of order
-    /// 2 leave out is in it, and the noise of the gathers; what the gathered light itself is off by
-    /// is not.
+    /// Error of `irradiance`, W/m²: the root mean square over all normals, a length over the
+    /// channels, of its difference from the values gathered in 26 directions. It includes the
+    /// harmonics above order 2 and the noise of the gathers, but not the error of the gathered
+    /// light itself.
     pub deviation: f64,
-    /// Share of all directions in which nothing is seen, in [0, 1].
+    /// Fraction of all directions in which nothing is seen, in [0, 1].
     pub escaped: f64,
-    /// Share of all directions in which backs of surfaces are seen, in [0, 1]: next to 1 inside of
-    /// a solid, and large behind walls that have but one side.
+    /// Fraction of all directions in which backs of surfaces are seen, in [0, 1]: close to 1 inside
+    /// a solid, and large behind walls that have only one side.
     pub backface: f64,
 }
 
 impl Probe {
-    /// Whether more backs than all else are seen: the probe lies inside of something, or behind a
-    /// wall, and its light is of no use to others.
+    /// Whether backs are seen in more than half of the directions: the probe lies inside a solid or
+    /// behind a wall, and its light is not valid for other points.
     pub fn is_inside(&self) -> bool {
         self.backface > buried::VIEWPOINT
     }
@@ -78,15 +78,14 @@ impl Probe {
     }
 }
 
-/// What `light` sends to each of `positions`, in their order: see [`Probe`]. `size` is the length
-/// across what a probe stands for, as the distance to the next (scene unit); nothing nearer than a
-/// small share of it is seen.
+/// Light that arrives from `light` at each of `positions`, in their order: see [`Probe`]. `size` is
+/// the width of the region that a probe represents, such as the distance to the next (scene unit);
+/// surfaces nearer than a small fraction of it are not seen.
 ///
-/// `gatherer` is of the scene of `light`; [`Backend::gather_to_noise`] makes one: what is rebuilt
-/// from harmonics has about that noise, or a fifth more. The same positions give the same bits
-/// whatever their order and however many threads there are. `progress` is called with the
-/// probes done and all of them, several times a second; where it stops the work, the result is
-/// `None`.
+/// `gatherer` is of the scene of `light`; [`Backend::gather_to_noise`] makes one: values rebuilt
+/// from harmonics have about that noise, or a fifth more. The same positions give the same bits
+/// whatever their order and the number of threads. `progress` is called with the number of probes
+/// done and of all probes, several times a second; if it stops the work, the result is `None`.
 ///
 /// [`Backend::gather_to_noise`]: crate::Backend::gather_to_noise
 ///
@@ -164,9 +163,9 @@ mod tests {
         let even = probe(|n| Rgb::new(2.0, 1.0 + n.x, 3.0 - n.y * n.z));
         assert!(even.deviation < 1e-14, "{}", even.deviation);
         // All light from direction s: E = max(0, n·s) = 1/4 + c/2 + 5/16 P_2(c) + …, with c = n·s
-        // and Legendre's P_2. Of its mean square, 1/6, orders above 2 are
-        // 1/6 − 1/16 − 1/12 − 5/256 = 0.0013. The rule sees the kink at the horizon in 26 places:
-        // by that it found 1.08, 0.89 and 1.39 of the root for these.
+        // and Legendre's P_2. Of its mean square, 1/6, orders above 2 are 1/6 − 1/16 − 1/12 − 5/256
+        // = 0.0013. The rule samples the kink at the horizon at 26 points: it measured 1.08, 0.89
+        // and 1.39 of the root for these.
         let wanted = (1.0f64 / 6.0 - 1.0 / 16.0 - 1.0 / 12.0 - 5.0 / 256.0).sqrt();
         for s in [DVec3::new(0.48, -0.6, 0.64), DVec3::new(0.1, 0.2, -0.9), DVec3::ONE] {
             let s = s.normalize();

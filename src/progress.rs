@@ -1,8 +1,8 @@
-//! Long work under way: why it stopped, how much to do between two reports, where the time went.
+//! Long work: reason of its stop, size of its batches, time by stage.
 //!
 //! Work that takes more than a second is done in batches. Between batches a progress callback is
-//! called with what is reached; it returns [`ControlFlow<()>`](std::ops::ControlFlow), and a break
-//! cancels the work: what was reached is returned with [`StopReason::Cancelled`].
+//! called with the state reached; it returns [`ControlFlow<()>`](std::ops::ControlFlow), and a
+//! break cancels the work: the state reached is returned with [`StopReason::Cancelled`].
 //!
 //! ```text
 //! items      ┌─┬──┬────┬────────┬────────┬────────┬───┐
@@ -16,15 +16,15 @@ use std::time::{Duration, Instant};
 /// Why a solve or a gather stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// What is left is as small as was asked for: the unshot share, or the error.
+    /// The unshot fraction, or the error, is at most the one requested.
     Converged,
-    /// The number of shots asked for is done.
+    /// The requested number of shots is done.
     Shots,
-    /// The number of steps asked for is done: bounces, sweeps or products.
+    /// The requested number of steps is done: bounces, sweeps or products.
     Steps,
-    /// There are as many elements as there may be.
+    /// The maximum number of elements is reached.
     Elements,
-    /// The progress callback said so; the solution is what was reached.
+    /// The progress callback cancelled; the solution is the state reached.
     Cancelled,
 }
 
@@ -44,8 +44,8 @@ impl fmt::Display for StopReason {
 /// second.
 const BATCH_DURATION: Duration = Duration::from_millis(250);
 
-/// Splits a list of like items into batches of similar duration. Results must not depend on where
-/// batches end, since that follows the clock.
+/// Splits a list of like items into batches of similar duration. Results must not depend on batch
+/// ends, which follow the clock.
 pub(crate) struct BatchSizer {
     /// Items in the next batch.
     size: usize,
@@ -57,9 +57,9 @@ impl BatchSizer {
         BatchSizer { size: first }
     }
 
-    /// Takes the next batch off the front of `remaining`, and gives what `work` makes of it. The
-    /// batch after one that took too long is half as large, after a full one that took less than a
-    /// third of the time twice as large.
+    /// Takes the next batch off the front of `remaining` and returns the result of `work` on it.
+    /// The batch after one that took too long is half as large; after a full one that took less
+    /// than a third of [`BATCH_DURATION`], twice as large.
     pub fn next<'t, T, R>(
         &mut self,
         remaining: &mut &'t [T],
@@ -119,7 +119,7 @@ impl std::ops::AddAssign for Timings {
     }
 }
 
-/// Seconds since `start`, which becomes now.
+/// Seconds since `start`, which is set to the present.
 pub(crate) fn lap(start: &mut Instant) -> f64 {
     let seconds = start.elapsed().as_secs_f64();
     *start = Instant::now();

@@ -1,13 +1,13 @@
-//! Sample points, directions and hashes that know nothing of light.
+//! Sample points, directions and hashes, independent of light.
 //!
 //! | module | gives |
 //! |---|---|
 //! | [`hash`] | pseudo-random bits from an index |
 //! | [`low_discrepancy`] | evenly spread points of the unit interval and square |
 //! | [`hemisphere`] | cosine-weighted directions |
-//! | [`octaves`] | parts of wide triangles, as fine as they are near |
-//! | [`random`] | random numbers from words |
-//! | [`rotation`] | how far to rotate them from point to point |
+//! | [`octaves`] | parts of wide triangles, with sizes in proportion to their distance |
+//! | [`random`] | seeded random number generators |
+//! | [`rotation`] | rotations of direction sets from point to point |
 //! | [`surface`] | points in proportion to area |
 
 pub(crate) mod hash;

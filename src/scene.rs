@@ -1,11 +1,11 @@
 //! The scene: triangles and materials as given, checked once.
 //!
-//! [`Scene::new`] is the boundary. It rejects what has no meaning (numbers that are not finite,
-//! indices out of range, reflectances of 1 or more) and drops triangles without area. Everything
-//! after it relies on that and checks nothing again.
+//! [`Scene::new`] validates its input. It rejects invalid values (numbers that are not finite,
+//! indices out of range, reflectances of 1 or more) and drops triangles without area. Later code
+//! relies on that and does not check again.
 //!
 //! A scene is immutable: changed materials or moved groups make another scene
-//! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), which a solve can go over to.
+//! ([`Scene::with_materials`], [`Scene::with_transformed_group`]), with which a solve can continue.
 
 mod clear_panes;
 mod covered_backs;
@@ -67,14 +67,14 @@ pub struct Triangle {
     pub group: u32,
     /// Index into the materials.
     pub material: u32,
-    /// Smoothing group: says with angles where a surface has creases
-    /// ([`crate::Mesh::CREASE_DEGREES`]). `Some(0)` is in none; `None` means that nothing is known.
+    /// Smoothing group: determines with angles where a surface has creases
+    /// ([`crate::Mesh::CREASE_DEGREES`]). `Some(0)` is in none; `None` means unknown.
     pub smoothing: Option<u32>,
 }
 
 /// A checked scene: every index in range, every number finite, every triangle with area.
 ///
-/// Lengths are in whatever unit the positions are in; radiosity does not depend on it.
+/// Lengths are in the unit of the positions; radiosity does not depend on it.
 #[derive(Clone, Debug)]
 pub struct Scene {
     positions: Vec<DVec3>,
@@ -89,22 +89,22 @@ pub struct Scene {
     sky: Sky,
     /// See [`Scene::luminaires`].
     luminaires: Arc<[Luminaire]>,
-    /// Textures of materials, and where they lie on triangles.
+    /// Textures of materials, and texture coordinates of triangles.
     textures: Arc<SceneTextures>,
     /// Per triangle, the sides across which its surface does not continue; empty for none.
     cut_sides: Vec<[bool; 3]>,
     /// See [`Scene::crease_degrees`].
     crease_degrees: Option<f64>,
-    /// See [`Scene::is_back_covered`]; looked at when it is first asked for.
+    /// See [`Scene::is_back_covered`]; computed on first use.
     covered_backs: OnceLock<Covers>,
-    /// See [`Scene::clear_panes`]; looked for when they are first asked for.
+    /// See [`Scene::clear_panes`]; computed on first use.
     clear_panes: OnceLock<Option<ClearPanes>>,
     /// See [`Scene::derived`].
     derived: Derived,
 }
 
 impl Scene {
-    /// Checks and takes a scene: `positions` in any length unit, `groups` by name.
+    /// Checks its input and makes a scene: `positions` in any length unit, `groups` by name.
     ///
     /// ```
     /// use radiosity::glam::DVec3;
@@ -257,12 +257,12 @@ impl Scene {
         (0..self.triangles.len()).any(|t| self.exitance(t) != Rgb::ZERO)
     }
 
-    /// How many triangles were dropped for having no area.
+    /// Number of triangles dropped for having no area.
     pub fn degenerate(&self) -> usize {
         self.degenerate
     }
 
-    /// What was accepted but deserves a look, one kind each.
+    /// Accepted defects, one warning per kind.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
@@ -272,8 +272,8 @@ impl Scene {
         self.triangles[t].corners.map(|k| self.positions[k as usize])
     }
 
-    /// Of all triangles the corners by the numbers of their positions, of which equal ones have
-    /// one; and how many numbers there are.
+    /// Corners of all triangles by position numbers, equal positions having one number; and the
+    /// count of numbers.
     pub(crate) fn welded_corners(&self) -> (Vec<[u32; 3]>, usize) {
         let mut weld = Weld::default();
         let mut numbers = vec![None; self.positions.len()];
@@ -300,14 +300,14 @@ impl Scene {
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Whether all of the back of triangle `t` lies where others have their fronts: nothing meets
-    /// it, and what comes from that side meets those.
+    /// Whether the whole back of triangle `t` coincides with fronts of others: no ray hits it, and
+    /// rays from that side hit those fronts.
     pub(crate) fn is_back_covered(&self, t: usize) -> bool {
         self.covered_backs().is_covered(t)
     }
 
-    /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back: what passes
-    /// through it leaves from them. None of others.
+    /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back, from which
+    /// its transmitted light leaves. None for others.
     pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {
         let is_translucent = |t: usize| self.material(t).is_translucent();
         let covers = if is_translucent(t) { self.covered_backs().of(t) } else { &[] };
@@ -318,7 +318,7 @@ impl Scene {
         self.covered_backs.get_or_init(|| covered_backs::covered_backs(self))
     }
 
-    /// The panes that light passes; none in a scene without.
+    /// The panes that light passes; none in a scene without them.
     pub(crate) fn clear_panes(&self) -> Option<&ClearPanes> {
         self.clear_panes.get_or_init(|| glass_bodies::clear_panes(self)).as_ref()
     }
@@ -328,7 +328,7 @@ impl Scene {
         self.clear_panes().is_some()
     }
 
-    /// What hemicubes do not see of the scene, in words; none where they see all.
+    /// Parts of the scene that hemicubes do not see, in words; none if they see all.
     #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
     pub(crate) fn hidden_from_hemicubes(&self) -> Option<&'static str> {
         match (self.has_clear_panes(), self.has_cut_outs()) {
@@ -339,7 +339,7 @@ impl Scene {
         }
     }
 
-    /// Whether light passes triangle `t` straight on: nothing meets it.
+    /// Whether light passes triangle `t` straight on: rays do not hit it.
     pub(crate) fn is_clear(&self, t: usize) -> bool {
         self.clear_panes().is_some_and(|panes| panes.transmittance(t).is_some())
     }
@@ -356,8 +356,8 @@ impl Scene {
         if corners.peek().is_some() { Aabb::from_points(corners) } else { self.bounds() }
     }
 
-    /// The step between 64-bit coordinates of the scene's largest size, scene unit: points of one
-    /// plane may be off it by a few of these.
+    /// The step between 64-bit coordinates of the scene's largest size, scene unit: coplanar points
+    /// may deviate by a few of these.
     pub(crate) fn coordinate_ulp(&self) -> f64 {
         self.coordinate_ulp
     }
@@ -367,11 +367,11 @@ impl Scene {
         &self.materials[self.triangles[t].material as usize]
     }
 
-    /// The same scene with `materials` in the place of its own, one for one. Textures stay: where
-    /// a material has one, its reflectance or exitance is the mean that the texture is scaled to.
+    /// The same scene with its materials replaced by `materials`, one for one. Textures stay: if a
+    /// material has one, its reflectance or exitance is the mean that the texture is scaled to.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] when their number is another, or one is out of range.
+    /// [`ErrorKind::Scene`] when their number differs, or one is out of range.
     pub fn with_materials(&self, materials: Vec<Material>) -> Result<Scene, Error> {
         let (count, wanted) = (materials.len(), self.materials.len());
         if count != wanted {
@@ -382,14 +382,14 @@ impl Scene {
         let mut scene = Scene { materials, ..self.clone() };
         let mut both = scene.materials.iter().zip(&self.materials);
         if both.any(|(new, old)| new.clear_transmittance() != old.clear_transmittance()) {
-            // What covers what, too, depends on which are clear.
+            // Covers, too, depend on which materials are clear.
             (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
         }
         Ok(scene)
     }
 
-    /// The same scene with all triangles of `group` transformed by `transform`. Vertices that they
-    /// share with other groups are copied, so that those stay where they are.
+    /// The same scene with all triangles of `group` transformed by `transform`. Vertices shared
+    /// with other groups are copied, so that those do not move.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when there is no such group, or when a triangle no longer has area or
@@ -426,8 +426,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Angle between normals, degrees, from which on neighbouring triangles of which no smoothing
-    /// group is known meet in a crease; none where nobody chose one.
+    /// Angle between normals, degrees, above which neighbouring triangles without a known smoothing
+    /// group meet in a crease; none if unset.
     pub(crate) fn crease_degrees(&self) -> Option<f64> {
         self.crease_degrees
     }
@@ -437,8 +437,8 @@ impl Scene {
         Scene { crease_degrees: Some(degrees), ..self.clone() }
     }
 
-    /// What `make` makes of the scene, once for each type: the hierarchy that rays are cast at, and
-    /// its smooth surfaces, of which the scene knows nothing.
+    /// The result of `make` for the scene, computed once for each type: the ray hierarchy, the
+    /// smooth surfaces and other data that this module does not define.
     pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
         self.derived.get(|| make(self))
     }

@@ -1,13 +1,14 @@
-//! A camera for a scene that nobody has chosen one for.
+//! Automatic choice of a camera for a scene that has none.
 //!
 //! ```text
-//!   up axis ──► outside: directions around the scene, as near as all of it fits in the picture
-//!           └─► inside:  points of the scene's box, at mid-height of the room that they are in
+//!   up axis ──► outside: directions around the scene, from the distance at which it fits
+//!           └─► inside:  points of the scene's box, at mid-height of their room
 //!                          └─► scored coarsely ──► the best in all directions ──► best score
 //! ```
 //!
-//! Inside and outside compete by what is seen ([`ViewScorer`]): from outside, a room shows the
-//! backs of its walls, and an object shows nothing else from within. Everything is deterministic.
+//! Views from inside and outside compete by their score ([`ViewScorer`]): from outside, a room
+//! shows only the backs of its walls, and from within, an object shows only itself. Everything is
+//! deterministic.
 
 use std::f64::consts::TAU;
 
@@ -22,57 +23,59 @@ use crate::geometry::aabb::Aabb;
 use crate::sampling::low_discrepancy::{r2_point, radical_inverse};
 use crate::scene::Scene;
 
-/// Vertical field of view from outside and from inside, degrees. Chosen by hand: a room asks for a
-/// wide one.
+/// Vertical field of view from outside and from inside, degrees. Plain choice: rooms need a wide
+/// one.
 const OUTSIDE_FOV: f64 = 40.0;
 const INSIDE_FOV: f64 = 70.0;
 
-/// How far above the horizon a view from outside is taken, degrees, and how much such a view is
-/// liked. Chosen by hand.
+/// Elevations above the horizon of views from outside, degrees, and factors of their scores. Plain
+/// choice.
 const ELEVATIONS: [(f64, f64); 5] =
     [(0.0, 0.98), (10.0, 0.95), (25.0, 1.0), (40.0, 0.95), (-25.0, 0.5)];
 
-/// How far below the horizon a view from inside looks, degrees. Chosen by hand.
+/// Angles below the horizon of views from inside, degrees. Plain choice.
 const PITCHES: [f64; 2] = [0.0, 12.0];
 
-/// Directions around the vertical axis; and how many of them points inside are looked at with
-/// first. Chosen by hand.
+/// Number of directions around the vertical axis, for the final and for the coarse scores of points
+/// inside. Plain choice.
 const AZIMUTHS: u32 = 16;
 const COARSE_AZIMUTHS: u32 = 8;
 
-/// Points inside that are looked at, and how many of them in all directions. Chosen by hand.
+/// Number of points inside that are scored coarsely, and in all directions. Plain choice.
 const INSIDE_POINTS: usize = 256;
 const BEST_POINTS: usize = 24;
 
-/// Rays along a side of the picture: for a first look, and for a choice. Chosen by hand.
+/// Rays along a side of the picture for coarse and for final scores. Plain choice.
 const COARSE_RAYS: usize = 8;
 const RAYS: usize = 20;
 
-/// Margin around a scene seen from outside, as a share of the picture. Chosen by hand.
+/// Margin around a scene seen from outside, as a fraction of the picture. Plain choice.
 const MARGIN: f64 = 0.04;
 
-/// Height of an eye between floor and ceiling. Chosen by hand: that of a person who stands.
+/// Height of an eye as a fraction of that between floor and ceiling. Plain choice: a standing
+/// person.
 const EYE_HEIGHT: f64 = 0.55;
 
-/// Share of all directions in which an eye inside sees fronts, at least, and directions that are
-/// tried. Chosen by hand: a room may lack a wall, a sixth of all, but a street is no room.
+/// Least fraction of directions in which an eye inside sees fronts, and number of directions
+/// tested. Plain choice: a room may lack a wall, 1/6 of all directions; a street is not a room.
 const ENCLOSURE: f64 = 0.75;
 const ENCLOSURE_RAYS: usize = 64;
 
-/// How far back an eye inside is moved of what is free behind it: to the wall nearly. Chosen by
-/// hand.
+/// Distances that an eye inside is moved back, as fractions of the free distance behind it. Plain
+/// choice: 0.85 is nearly at the wall.
 const STEPS_BACK: [f64; 2] = [0.0, 0.85];
 
-/// Share of the vertices along each level axis that may be outlying on either side; the largest
-/// core without them, as a share of the scene's diagonal, and the least height, as a share of the
-/// scene's. Chosen by hand: objects on a large ground have a core, furniture in a room has none.
+/// Fraction of the vertices along each horizontal axis that may be outliers on either side; largest
+/// core without them, as a fraction of the scene's diagonal; least height of the core, as a
+/// fraction of the scene's. Plain choice: objects on a large ground have a core, furniture in a
+/// room has none.
 const OUTLYING_SHARE: f64 = 0.02;
 const CORE_SIZE: f64 = 0.6;
 const CORE_HEIGHT: f64 = 0.8;
 
-/// Share of the reflected light that may lie outside of the box where the light is, at either end
-/// of an axis; and how many times smaller than the scene that box has to be to be framed instead.
-/// Chosen by hand: in an ordinary room the light fills the room.
+/// Fraction of the reflected light that may lie outside the lit box, at either end of an axis;
+/// least ratio of the diagonals of the scene and of that box for the box to be framed instead.
+/// Plain choice: in an ordinary room the light fills the room.
 const UNLIT_SHARE: f64 = 0.01;
 const LIT_CONCENTRATION: f64 = 4.0;
 
@@ -80,16 +83,16 @@ impl Camera {
     /// Chooses a view of `light`, for a picture of this width over height: from inside where the
     /// scene is a room, from outside where it is an object.
     ///
-    /// Of views from many places in many directions it is the one whose rays meet most of the
-    /// scene's parts, on lit fronts, few backs, and nothing right before the eye. +y or +z is up,
-    /// whichever the scene suggests. The same light gives the same view. It costs some 500 000
+    /// The view is the one, of many points and directions, whose rays hit most of the scene's
+    /// parts, on lit fronts, few backs, and nothing right before the eye. +y or +z is up, whichever
+    /// is more likely for the scene. The same light gives the same view. It costs some 500 000
     /// rays.
     pub fn framing(light: &GatheredMesh, aspect: f64) -> Camera {
         let scene = light.mesh.scene();
         let up = up_axis(scene);
         let points = reflecting_points(scene);
         let (core, inside) = match lit_box(light) {
-            // A lamp in a long tunnel: where it is dark, there is nothing to see.
+            // A lamp in a long tunnel: only the lit part is worth framing.
             Some(lit) => (lit.corners().to_vec(), lit),
             None => (core(&points, up), scene.reflecting_bounds()),
         };
@@ -105,12 +108,12 @@ impl Camera {
     }
 }
 
-/// A view, and how much views of its kind are liked: a factor of its score.
+/// A view, and a factor of its score by its kind.
 type View = (Camera, f64);
 
 struct Framing<'a> {
     scorer: ViewScorer<'a>,
-    /// Where eyes inside are looked for, scene unit.
+    /// Box of the candidate eyes inside, scene unit.
     inside: Aabb,
     up: DVec3,
     aspect: f64,
@@ -137,7 +140,8 @@ impl Framing<'_> {
         first * cosine + first.cross(self.up) * sine
     }
 
-    /// Views from outside, each as near as all of `points` fit in the picture.
+    /// Views from outside, each from the least distance at which all of `points` fit in the
+    /// picture.
     fn outside(&self, points: &[DVec3]) -> Vec<View> {
         let mut directions = vec![];
         for (elevation, liking) in ELEVATIONS {
@@ -151,15 +155,16 @@ impl Framing<'_> {
         directions.par_iter().map(view).collect()
     }
 
-    /// The view along `forward`, unit length, from as near as all of `points` are in the picture.
+    /// The view along unit `forward` from the least distance at which all of `points` are in the
+    /// picture.
     fn fitted(&self, points: &[DVec3], forward: DVec3) -> Camera {
         let centre = self.scorer.focus.centre();
         let frame =
             Camera { eye: DVec3::ZERO, target: forward, up: self.up, vertical_fov: OUTSIDE_FOV };
         let [right, up, _] = frame.frame();
         let half = (OUTSIDE_FOV.to_radians() / 2.0).tan() * (1.0 - 2.0 * MARGIN);
-        // A plane of the frustum through the outermost point on its side, for each of two sides:
-        // the eye lies where both meet.
+        // On each of two opposite sides, the plane of the frustum through the outermost point: the
+        // eye lies where both planes meet.
         let sides = |axis: DVec3, tangent: f64| {
             let reach = |axis: DVec3| {
                 let behind =
@@ -171,7 +176,7 @@ impl Framing<'_> {
         };
         let (x, back_x) = sides(right, half * self.aspect);
         let (y, back_y) = sides(up, half);
-        // A flat scene seen along its plane has no depth: keep a distance.
+        // A flat scene seen along its plane has no depth: keep a minimum distance.
         let diagonal = self.scorer.focus.diagonal();
         let back = back_x.min(back_y).min(-0.05 * diagonal);
         let eye = centre + right * x + up * y + forward * back;
@@ -179,7 +184,7 @@ impl Framing<'_> {
         Camera { eye, target, ..frame }
     }
 
-    /// Views in all directions from the points inside that show most.
+    /// Views in all directions from the points inside with the best coarse scores.
     fn inside(&self) -> Vec<View> {
         let eyes: Vec<DVec3> =
             (0..INSIDE_POINTS).into_par_iter().filter_map(|k| self.inside_eye(k)).collect();
@@ -208,8 +213,8 @@ impl Framing<'_> {
         order.iter().flat_map(|&k| look(&eyes[k], AZIMUTHS, &PITCHES)).collect()
     }
 
-    /// The view along `forward`, unit length, from a part of the way from `eye` to what is behind
-    /// it.
+    /// The view along unit `forward` from `eye`, moved back by the fraction `step` of the free
+    /// distance behind it.
     fn inside_view(&self, eye: DVec3, forward: DVec3, step: f64) -> Camera {
         let diagonal = self.scorer.focus.diagonal();
         let free = self.scorer.rays.closest_hit(eye, -forward, 0.0, None);
@@ -239,8 +244,7 @@ impl Framing<'_> {
         (self.scorer.enclosure(eye, ENCLOSURE_RAYS) >= ENCLOSURE).then_some(eye)
     }
 
-    /// The same view with as few digits as show no difference: steps below a ten-thousandth of the
-    /// scene.
+    /// The same view with rounded coordinates: steps below 1e-4 of the scene's size.
     fn rounded(&self, camera: Camera) -> Camera {
         let digits = 4 - self.scorer.focus.diagonal().log10().floor() as i32;
         let round = |x: f64| {
@@ -253,7 +257,7 @@ impl Framing<'_> {
     }
 }
 
-/// Vertices of what reflects, or of all where nothing does.
+/// Vertices of reflecting triangles, or of all where none reflects.
 fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
     let triangles = 0..scene.triangles().len();
     let any = triangles.clone().any(|t| scene.material(t).scatters());
@@ -266,7 +270,7 @@ fn reflecting_points(scene: &Scene) -> Vec<DVec3> {
     scene.positions().iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| *p).collect()
 }
 
-/// The box where nearly all light is reflected; none where that is not much smaller than the scene.
+/// The box with nearly all of the reflected light; none unless it is much smaller than the scene.
 fn lit_box(light: &GatheredMesh) -> Option<Aabb> {
     let flux = |face: Face| (face.centre, face.area * face.reflected.length());
     let places: Vec<(DVec3, f64)> = faces(light).map(flux).collect();
@@ -274,8 +278,7 @@ fn lit_box(light: &GatheredMesh) -> Option<Aabb> {
     Aabb::around_most(&places, UNLIT_SHARE).filter(|lit| lit.diagonal() * LIT_CONCENTRATION < whole)
 }
 
-/// Those of `points` that are not among the outlying ones; all, if what is left is not much
-/// smaller.
+/// `points` without the outliers; all of them unless the remaining box is much smaller.
 fn core(points: &[DVec3], up: DVec3) -> Vec<DVec3> {
     let skipped = (points.len() as f64 * OUTLYING_SHARE).ceil() as usize;
     let mut inner = Aabb::EVERYTHING;

@@ -1,4 +1,4 @@
-//! Images with gathered light: every pixel gathers the irradiance where it looks.
+//! Images with gathered light: every pixel gathers the irradiance at its hits.
 //!
 //! ```text
 //!   pixel's primary rays ── group by smooth surface ── split groups with an edge of a shadow
@@ -29,28 +29,27 @@ use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 
-/// Primary rays that are cast at once: bounds the memory for their hits, some 10 MiB. Chosen by
-/// hand.
+/// Primary rays cast at once: bounds the memory for their hits, some 10 MiB. Plain choice.
 const RAYS_PER_BAND: u32 = 1 << 16;
 
-/// Gather points in the first batch; later ones follow the clock. Chosen by hand: results do not
+/// Gather points in the first batch; later batches follow the clock. Plain choice: results do not
 /// depend on it.
 const FIRST_BATCH: usize = 64;
 
-/// Rays share a gather unless the interpolated radiosity differs among them by more than this share
-/// of its mean: there is an edge of a shadow between them. Chosen by hand; no measurement kept.
+/// Relative spread of the interpolated radiosity among rays above which they do not share a gather:
+/// an edge of a shadow lies between them. Plain choice; no measurement kept.
 const EDGE_CONTRAST: f64 = 0.1;
 
 impl Camera {
-    /// Draws `light` with the primary rays of [`Camera::image`], but with irradiance gathered where
-    /// they meet the surface: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr).
+    /// Draws `light` with the primary rays of [`Camera::image`], but with irradiance gathered at
+    /// their hits: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr).
     ///
-    /// Rays of one pixel that meet the same smooth surface share one gather in their middle, unless
+    /// Rays of one pixel that hit the same smooth surface share one gather in their middle, unless
     /// the radiosity at the vertices shows an edge of a shadow between them. So most pixels gather
     /// once, while edges are as clean as the rays are dense. Surfaces that reflect nothing do not
-    /// gather. Mirrors and glass show what is seen in and through them, as in
-    /// [`Camera::interpolated_image`]. `progress` is called with the number of pixels done and of
-    /// all pixels, several times a second. It may stop the work; the result is `None` then.
+    /// gather. Mirrors and glass are followed as in [`Camera::interpolated_image`]. `progress` is
+    /// called with the number of pixels done and of all pixels, several times a second. It may stop
+    /// the work; the result is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`] and of `gatherer`.
@@ -102,24 +101,24 @@ impl Camera {
     }
 }
 
-/// A group of a pixel's rays that meet one smooth surface and share a gather.
+/// A group of a pixel's rays that hit one smooth surface and share a gather.
 struct PixelPart {
     pixel: usize,
     point: TwoSidedPoint,
     /// Square root of the element's area, scene unit.
     size: f64,
-    /// Share of the pixel's rays per channel, in [0, 1].
+    /// Fraction of the pixel's rays per channel, in [0, 1].
     weight: Rgb,
     exitance: Rgb,
     albedo: Rgb,
-    /// What it adds to the pixel by the radiosity at vertices, W/(m² sr).
+    /// Radiance that it adds to the pixel by the radiosity at vertices, W/(m² sr).
     interpolated: Rgb,
-    /// Whether the pixel is nothing but sky.
+    /// Whether all rays of the pixel see the sky.
     is_whole_sky: bool,
 }
 
 impl PixelPart {
-    /// What it adds to the pixel by the irradiance gathered at its point, W/(m² sr).
+    /// Radiance that it adds to the pixel by the irradiance gathered at its point, W/(m² sr).
     fn radiance(&self, sample: &IrradianceSample) -> Rgb {
         if is_buried(sample, self.size) {
             return self.interpolated;
@@ -128,27 +127,28 @@ impl PixelPart {
     }
 }
 
-/// A hit on a front, as a part of what a ray sees.
+/// A front hit of a ray or of a branch of it.
 struct SeenHit {
     hit: Hit,
-    /// What of its radiance comes to the camera, per channel, in [0, 1].
+    /// Fraction of its radiance that reaches the camera, per channel, in [0, 1].
     weight: Rgb,
     sight: Sight,
 }
 
-/// What the rays of a pixel see of the sky.
+/// Sky seen by the rays of a pixel.
 #[derive(Default)]
 struct SkySeen {
-    /// Rays that meet nothing on their way there.
+    /// Rays that reach the sky directly, without mirrors or glass.
     direct_rays: u32,
     /// Sum over all rays, W/(m² sr).
     radiance: Rgb,
 }
 
-/// Hits with the same history on the same smooth surface. The history is 0 where it was met first.
+/// Hits with the same history on the same smooth surface. The history is 0 for hits of primary
+/// rays.
 type Group = ((u64, u32), Vec<SeenHit>);
 
-/// A solution as the camera's rays meet it.
+/// A solution as seen by the camera's rays.
 struct GatheredView<'a> {
     lit: LitSurface<'a>,
     second_pass: Option<SecondPass>,
@@ -206,7 +206,7 @@ impl GatheredView<'_> {
         parts
     }
 
-    /// The rays of a pixel that see the sky, where nothing is to be gathered.
+    /// The part of a pixel's rays that see the sky: nothing is gathered.
     fn sky_part(&self, pixel: usize, sky: SkySeen) -> PixelPart {
         let PrimaryRays { weight, samples, .. } = self.lit.rays;
         let nowhere = GatherPoint { position: self.lit.rays.eye, normal: DVec3::Y, near: 0.0 };
@@ -257,8 +257,8 @@ impl GatheredView<'_> {
         });
     }
 
-    /// Mean albedo and exitance of what was hit, and the sum of the radiosity that the vertices
-    /// give it, W/m²: each by its weight.
+    /// Weighted means of albedo and exitance over the hits, and the weighted sum of their radiosity
+    /// from the vertices, W/m².
     fn seen_of(&self, hits: &[SeenHit]) -> (Rgb, Rgb, Rgb) {
         let interpolated =
             |seen: &SeenHit| seen.weight * self.lit.radiosity(&seen.hit, &seen.sight);
@@ -275,13 +275,13 @@ impl GatheredView<'_> {
             exitance += weight * emits;
             sum += weight;
         }
-        // What weighs nothing in a channel is 0 / that, and stays 0.
+        // Channels of weight 0 become 0 / MIN_POSITIVE = 0.
         let sum = sum.max(Rgb::splat(f64::MIN_POSITIVE));
         (albedo / sum, exitance / sum, interpolated)
     }
 
-    /// The hit of the ray through the mean position of `hits`, if it is on their surface, or else
-    /// the one of them that is nearest to it, as of those that are not `direct`. Light that is
+    /// The hit of the ray through the mean position of `hits`, if it is on their surface and they
+    /// are `direct`; otherwise the one of `hits` that is nearest to that position. Light that is
     /// linear over the surface has its mean there.
     fn middle_hit(&self, hits: &[SeenHit], direct: bool) -> Hit {
         let position =

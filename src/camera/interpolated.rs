@@ -1,4 +1,4 @@
-//! Images of a solution by the light between its vertices, with its textures and its mirrors.
+//! Images of a solution by the light interpolated between its vertices, with textures and mirrors.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -17,13 +17,13 @@ const RAYS_PER_BAND: u32 = 1 << 18;
 
 impl Camera {
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
-    /// meets a textured material, the irradiance between the vertices is reflected by the texture
-    /// at that point. Mirrors and glass ([`crate::Specular`]) show what is seen in and through
-    /// them: a ray goes on, and splits at glass, until it meets what is diffuse or the sky. Parts
-    /// that together weigh less than 1/1024 of the ray are not looked at, nor what lies behind 512
-    /// boundaries, as between two mirrors that face each other: they count as the mean of the
-    /// others. `progress` is called with the number of pixels done and of all pixels,
-    /// several times a second. It may stop the work; the result is `None` then.
+    /// hits a textured material, the irradiance between the vertices is reflected by the texture at
+    /// that point. Mirrors and glass ([`crate::Specular`]) are followed: a ray goes on, and splits
+    /// at glass, until it hits a diffuse surface or the sky. Branches that together weigh less than
+    /// 1/1024 of the ray are dropped, as are those behind 512 boundaries, for example between two
+    /// parallel mirrors: they count as the mean of the others. `progress` is called with the number
+    /// of pixels done and of all pixels, several times a second. It may stop the work; the result
+    /// is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`].

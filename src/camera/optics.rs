@@ -1,13 +1,12 @@
-//! What smooth boundaries reflect, refract and let through. Cosines are those of the angle of
+//! Reflection, refraction and transmission at smooth boundaries. Cosines are those of the angle of
 //! incidence, in [0, 1].
 
 use glam::DVec3;
 
 use crate::scene::Rgb;
 
-/// Reflectance of the boundary to a medium whose refractive index is `ratio` times as high, for
-/// unpolarised light: the mean of both polarisations (Fresnel 1823), and 1 beyond the critical
-/// angle.
+/// Reflectance of the boundary to a medium with `ratio` times the refractive index, for unpolarised
+/// light: the mean of both polarisations (Fresnel 1823), and 1 beyond the critical angle.
 pub(super) fn fresnel(cosine: f64, ratio: f64) -> f64 {
     if ratio == 1.0 {
         return 0.0;
@@ -22,27 +21,27 @@ pub(super) fn fresnel(cosine: f64, ratio: f64) -> f64 {
     (perpendicular * perpendicular + parallel * parallel) / 2.0
 }
 
-/// The direction behind a boundary with unit `normal`, which `direction` (unit length) meets from
-/// the side that the normal is on, to a medium whose refractive index is `ratio` times as high
-/// (Snell 1621); none beyond the critical angle.
+/// The direction behind a boundary with unit `normal`, which `direction` (unit length) hits from
+/// the side of the normal, to a medium with `ratio` times the refractive index (Snell 1621); none
+/// beyond the critical angle.
 pub(super) fn refracted(direction: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
     let cosine = -direction.dot(normal);
     let square = 1.0 - (1.0 - cosine * cosine) / (ratio * ratio);
     (square > 0.0).then(|| (direction + (cosine - ratio * square.sqrt()) * normal) / ratio)
 }
 
-/// The share of what is left of one, at normal incidence, that a polished surface reflects more at
-/// this angle (Schlick 1994, equation 15).
+/// Increase of a polished surface's reflectance R at this angle over that at normal incidence, as a
+/// fraction of 1 − R (Schlick 1994, equation 15).
 pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).powi(5)
 }
 
-/// What a pane reflects and lets through whose faces reflect `face`, and whose inside lets
-/// `transmittance` through from one to the other: the sums of all reflections between them.
+/// Reflectance and transmittance of a pane whose faces reflect `face` and whose inside transmits
+/// `transmittance` from one face to the other: the sums of all reflections between them.
 pub(super) fn pane(face: f64, transmittance: Rgb) -> [Rgb; 2] {
     let through = (1.0 - face) * (1.0 - face) * transmittance;
     let again = Rgb::ONE - face * face * transmittance * transmittance;
-    // At grazing incidence nothing goes in, and both are 0.
+    // At grazing incidence no light enters, and both are 0.
     let through = Rgb::select(again.cmpgt(Rgb::ZERO), through / again, Rgb::ZERO);
     [face + face * transmittance * through, through]
 }
@@ -62,7 +61,7 @@ mod tests {
             let normal = ((n - 1.0) / (n + 1.0)).powi(2);
             assert!((fresnel(1.0, n) - normal).abs() < 1e-16, "{n}");
             assert!((fresnel(0.0, n) - f64::from(n != 1.0)).abs() < 1e-15, "{n}");
-            // Brewster's angle, tan θ = n: what is reflected is polarised, r = cos² − sin² of it.
+            // Brewster's angle, tan θ = n: the reflected light is polarised, r = cos² − sin² of it.
             let cosine = 1.0 / (1.0 + n * n).sqrt();
             let polarised = (2.0 * cosine * cosine - 1.0).powi(2) / 2.0;
             assert!((fresnel(cosine, n) - polarised).abs() < 1e-15, "{n}");
@@ -75,7 +74,7 @@ mod tests {
             for k in 0..=100 {
                 let cosine = f64::from(k) / 100.0;
                 let behind = refracted_cosine(cosine, n);
-                // Where it grazes, the angle behind has half of the digits.
+                // At grazing angles the angle behind has half of the digits.
                 let off = fresnel(cosine, n) - fresnel(behind, 1.0 / n);
                 assert!(off.abs() < 1e-7, "{n} {cosine}: {off}");
             }

@@ -1,21 +1,22 @@
-//! The second pass: rays of the camera go on at mirrors and glass until they meet what is diffuse.
+//! The second pass: camera rays go on at mirrors and glass until they hit a diffuse surface.
 //!
 //! ```text
 //!   eye ──► mirror ──► one ray                       weight × reflectance
 //!       ──► glass  ──► one reflected, one refracted  weight × R,  weight × (1 − R) τ
 //!       ──► pane   ──► one reflected, one straight   the sums over both of its faces
 //!
-//!   at each of them, and in the end, a diffuse part: weight × its share × B/π
+//!   at each of them, and in the end, a diffuse part: weight × its fraction × B/π
 //! ```
 //!
 //! These are the paths from the light by diffuse reflections to a diffuse surface, and from there
-//! by specular ones to the eye: L D* S* E (Heckbert 1990; Wallace, Cohen and Greenberg 1987). What
-//! mirrors and glass send onto diffuse surfaces, such as caustics, is not among them.
+//! by specular ones to the eye: L D* S* E (Heckbert 1990; Wallace, Cohen and Greenberg 1987). Light
+//! from mirrors and glass onto diffuse surfaces, such as caustics, is not included.
 //!
-//! Both branches are followed, the heaviest first, until all that wait weigh less than
-//! [`LEFT_OUT`] together. These count as the mean of what the ray saw: off by at most that share of
-//! the brightest radiance that there is. More is left out of rays only that are caught, between
-//! mirrors or at the rim of a ball of triangles, where all angles are close to the critical one.
+//! Both branches are followed, the heaviest first, until all pending ones weigh less than
+//! [`LEFT_OUT`] together. These count as the mean of the radiance that the ray saw: the error is at
+//! most [`LEFT_OUT`] times the highest radiance of the scene. More is left out only for rays that
+//! are trapped, between mirrors or at the rim of a ball of triangles, where all angles are close to
+//! the critical one.
 
 use glam::DVec3;
 
@@ -29,21 +30,21 @@ use crate::scene::{Rgb, Specular};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 
-/// What is not looked at weighs less than this, in the channel where it weighs most. Chosen by
-/// hand: below a step of 8 bits for what is as bright as white.
+/// Total weight of pending branches, in the channel where it is largest, below which they are
+/// dropped. Plain choice: below one step of 8 bits at white.
 const LEFT_OUT: f64 = 1.0 / 1024.0;
 
-/// Boundaries that a ray and its branches meet, at most. Chosen by hand: between two mirrors that
-/// reflect 0.98 a ray is down to [`LEFT_OUT`] after 343.
+/// Maximum number of boundaries that a ray and its branches hit. Plain choice: between two mirrors
+/// of reflectance 0.98 a ray is down to [`LEFT_OUT`] after 343.
 const MAX_BOUNDARIES: usize = 512;
 
-/// What is seen along a ray of the camera or a branch of it.
+/// A surface or sky seen along a camera ray or a branch of it.
 pub(super) struct Sighting {
     pub seen: Seen,
-    /// What of its radiance comes to the camera, per channel, in [0, 1].
+    /// Fraction of its radiance that reaches the camera, per channel, in [0, 1].
     pub weight: Rgb,
     pub sight: Sight,
-    /// The same for rays that took the same way over mirrors and glass, and 0 for none.
+    /// Hash of the sequence of mirrors and glass on the path, 0 for none.
     pub history: u64,
 }
 
@@ -54,16 +55,16 @@ pub(super) struct SecondPass {
     media: Vec<Medium>,
     /// Per triangle of the scene, the smooth surface that it is a part of.
     surfaces: Vec<u32>,
-    /// Surfaces within this distance of each other are in one place, scene unit.
+    /// Surfaces within this distance of each other coincide, scene unit.
     contact: f64,
 }
 
-/// A ray that goes on.
+/// A pending branch of a ray.
 struct Branch {
     from: DVec3,
     /// Unit length.
     direction: DVec3,
-    /// Way from the camera, scene unit.
+    /// Path length from the camera, scene unit.
     length: f64,
     weight: Rgb,
     /// Bodies that it is in, the innermost last.
@@ -71,11 +72,11 @@ struct Branch {
     history: u64,
 }
 
-/// Where a branch meets a mirror or glass.
+/// A hit of a branch on a mirror or glass.
 struct Boundary {
     triangle: usize,
     position: DVec3,
-    /// Unit normals on the side that is met, of the triangle and of the smooth surface.
+    /// Unit normals on the side that is hit, of the triangle and of the smooth surface.
     plane: DVec3,
     normal: DVec3,
     front: bool,
@@ -101,7 +102,8 @@ impl SecondPass {
         })
     }
 
-    /// Hands over all that the rays of pixel `k` see, with a second pass where there is one.
+    /// Passes all sightings of the rays of pixel `k` to `found`, with the second pass if there is
+    /// one.
     pub fn sightings(
         second_pass: Option<&SecondPass>,
         lit: &LitSurface,
@@ -158,7 +160,7 @@ impl SecondPass {
             };
             let material = lit.scene().material(hit.triangle);
             let Some(specular) = material.specular else {
-                // A back is black, and seen.
+                // A back is black, and counts as seen.
                 seen_weight += weight;
                 if hit.front {
                     all.push(Sighting { seen: Seen::Front(hit), weight, sight, history });
@@ -175,7 +177,7 @@ impl SecondPass {
             }
         }
         let left_out: Rgb = pending.iter().map(|branch| branch.weight).sum();
-        // Where nothing is seen, nothing is known of the rest.
+        // With nothing seen there is no mean to use for the rest.
         let rise = left_out / seen_weight.max(Rgb::splat(f64::MIN_POSITIVE));
         let rise = Rgb::select(seen_weight.cmpgt(Rgb::ZERO), rise, Rgb::ZERO);
         for sighting in all {
@@ -183,8 +185,8 @@ impl SecondPass {
         }
     }
 
-    /// What `branch` meets next. Mirrors and glass in one place with where it starts are passed,
-    /// fronts of others there are met; so is a front in one place with glass: it lies against it.
+    /// The next hit of `branch`. Mirrors and glass that coincide with its start are passed, other
+    /// fronts there are hit; so is a front that coincides with glass: it lies against it.
     fn next_hit(&self, lit: &LitSurface, branch: &Branch) -> Option<Hit> {
         let Branch { from, direction, history, .. } = *branch;
         let specular = |hit: &Hit| lit.scene().material(hit.triangle).specular;
@@ -212,7 +214,7 @@ impl SecondPass {
         let plane = side * lit.scene().normal(triangle);
         let smooth = lit.rays.interpolate(hit, &lit.light.surface.normals);
         let smooth = side * smooth.normalize_or_zero();
-        // At the rim of a smooth body its normal may look away.
+        // At the rim of a smooth body its normal may point away from the ray.
         let normal = if smooth.dot(branch.direction) < 0.0 { smooth } else { plane };
         Boundary {
             triangle,
@@ -224,7 +226,7 @@ impl SecondPass {
         }
     }
 
-    /// Adds the branches that go on from a boundary, and tells what the diffuse part counts there.
+    /// Adds the branches that go on from a boundary, and returns the weight of its diffuse part.
     fn branch_out(
         &self,
         branch: &Branch,
@@ -295,7 +297,7 @@ impl SecondPass {
 }
 
 impl Boundary {
-    /// The direction of `branch` reflected, to the side that it comes from.
+    /// The direction of `branch` reflected, back to the side it comes from.
     fn mirrored(&self, branch: &Branch) -> DVec3 {
         let smooth = branch.direction.reflect(self.normal);
         if smooth.dot(self.plane) > 0.0 { smooth } else { branch.direction.reflect(self.plane) }

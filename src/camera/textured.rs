@@ -1,8 +1,7 @@
-//! What the camera's rays meet of a solution, with its textures.
+//! A solution with its textures, at the hits of camera rays.
 //!
-//! Vertices hold the light, which is smooth; the texture is looked up where a ray meets it. A
-//! look-up is filtered over what lies between neighbouring rays, so that a texture far away does
-//! not flicker.
+//! Vertices hold the light, which is smooth; the texture is looked up at each hit. A look-up is
+//! filtered over the area between neighbouring rays, so that distant textures do not flicker.
 
 use glam::DVec3;
 
@@ -11,18 +10,18 @@ use crate::gather::GatheredMesh;
 use crate::scene::{Rgb, Scene};
 use crate::visibility::ray_scene::Hit;
 
-/// A solution as the camera's rays meet it.
+/// A solution as seen by the camera's rays.
 pub(super) struct LitSurface<'a> {
     pub rays: PrimaryRays<'a>,
     pub light: &'a GatheredMesh,
 }
 
-/// From where a hit is seen, and along which axis: through mirrors, where their images are.
+/// Eye and view axis for a hit; behind mirrors, their mirror images.
 #[derive(Clone, Copy)]
 pub(super) struct Sight {
     /// Scene unit.
     pub eye: DVec3,
-    /// Its product with a way from the eye is the depth along the view's axis.
+    /// Its dot product with a vector from the eye is the depth along the view's axis.
     pub forward: DVec3,
 }
 
@@ -73,12 +72,12 @@ impl LitSurface<'_> {
         self.light.mesh.scene()
     }
 
-    /// The share of triangle `t` that lies between a ray to `position` on it and its neighbours.
+    /// The fraction of triangle `t` that lies between a ray to `position` on it and its neighbours.
     fn share(&self, t: usize, position: DVec3, sight: &Sight) -> f64 {
         let to = position - sight.eye;
         let depth = to.dot(sight.forward);
         let (scene, normal) = (self.scene(), self.scene().normal(t));
-        // A cross-section of the rays' pyramid there, and how much of the surface it covers.
+        // Cross-section of the rays' pyramid at that depth, and its projection onto the surface.
         let section = (self.rays.right.cross(self.rays.down).length() * depth * depth).abs();
         let facing = (normal.dot(to) / to.length()).abs();
         let across = (sight.forward.dot(to) / to.length()).abs();

@@ -1,45 +1,45 @@
-//! Which way is up in a scene whose file does not say: +y or +z.
+//! The up axis of a scene whose file does not give one: +y or +z.
 //!
 //! | evidence | for |
 //! |---|---|
 //! | nearly all area is level or upright about the axis | buildings that are turned about it |
-//! | the lowest slice is wider than the highest one | what stands: houses, furniture, cities |
+//! | the lowest slice is wider than the highest one | standing objects: houses, furniture, cities |
 //! | more area faces up than down | ground and roofs without undersides |
-//! | lamps shine down | rooms where nothing else tells |
+//! | lamps shine down | rooms without other evidence |
 //!
-//! The first alone takes the ridge of a roof for the vertical, the second tells nothing of rooms.
-//! Without clear evidence +y is up, as most OBJ files have it.
+//! The first alone would take the ridge of a roof for the vertical; the second says nothing about
+//! rooms. Without clear evidence +y is up, as in most OBJ files.
 
 use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Sine of the angle up to which a surface counts as level or upright: 5 degrees. Chosen by hand.
+/// Sine of the angle up to which a surface counts as level or upright: 5 degrees. Plain choice.
 const LEVEL_SINE: f64 = 0.087;
 
-/// Weights of the evidence that is not the share of level and upright area, which has 1. Chosen by
-/// hand on scenes of both kinds: the footing tells a house from one on its gable, where 0.3 of the
-/// area, its roof, is out of line; a room that lacks a wall, 0.2 of its area, stays as it is; a
-/// lamp decides what is otherwise alike.
+/// Weights of the other evidence; that of the fraction of level and upright area is 1. Chosen on
+/// scenes of both kinds: the footing distinguishes a house from one on its gable, where 0.3 of the
+/// area, its roof, is out of line; a room that lacks a wall, 0.2 of its area, keeps its axis; a
+/// lamp decides otherwise equal cases.
 const FOOTING_WEIGHT: f64 = 0.5;
 const UPWARD_WEIGHT: f64 = 0.3;
 const LAMP_WEIGHT: f64 = 0.08;
 
-/// Height of the lowest and of the highest slice, as a share of the scene's. Chosen by hand.
+/// Height of the lowest and of the highest slice, as a fraction of the scene's. Plain choice.
 const SLICE: f64 = 0.03;
 
-/// By how much the evidence for +z must be the stronger one. Chosen by hand.
+/// Least excess of the evidence for +z over that for +y. Plain choice.
 const MARGIN: f64 = 0.05;
 
-/// The axis, +y or +z, that seems to point up in `scene`: by what is level and upright, by what
-/// stands wider below than above, and by which way ground, roofs and lamps face. +y without clear
+/// The axis, +y or +z, that most likely points up in `scene`: by level and upright area, by objects
+/// that are wider below than above, and by which way ground, roofs and lamps face. +y without clear
 /// evidence.
 pub fn up_axis(scene: &Scene) -> DVec3 {
     if evidence(scene, DVec3::Z) > evidence(scene, DVec3::Y) + MARGIN { DVec3::Z } else { DVec3::Y }
 }
 
-/// How much speaks for `axis`: about 1 for a room, more for what stands on a ground.
+/// Evidence for `axis`: about 1 for a room, more for objects on a ground.
 fn evidence(scene: &Scene, axis: DVec3) -> f64 {
     let (mut area, mut aligned, mut upward) = (0.0, 0.0, 0.0);
     let (mut emitted, mut downward) = (0.0, 0.0);
@@ -67,8 +67,8 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
         + LAMP_WEIGHT * share(downward, emitted)
 }
 
-/// Size of the lowest slice less that of the highest one: the box around what reflects in it,
-/// across `axis`, as a share of the whole.
+/// Size of the lowest slice less that of the highest one, as a fraction of the whole: size across
+/// `axis` of the box around the reflecting triangles in the slice.
 fn footing(scene: &Scene, axis: DVec3) -> f64 {
     let bounds = scene.reflecting_bounds();
     let (low, height) = (bounds.low.dot(axis), bounds.size().dot(axis));

@@ -1,12 +1,12 @@
-//! How well a view shows a scene: rays through a grid over the picture, and what they meet.
+//! Score of a view of a scene: rays through a grid over the picture, and their hits.
 //!
 //! ```text
 //!   surface ── parts by group, cell of a box and direction; weights by √area and by group
 //!   view ── grid of rays ── parts seen × picture filled × no backs × nothing too near × lit
 //! ```
 //!
-//! Parts are what there is to see of a scene, however finely it is cut into triangles. Vázquez,
-//! Feixas, Sbert and Heidrich (2001) score views alike, by the entropy of the faces seen.
+//! Parts are the visible content of a scene, independent of its triangulation. Vázquez, Feixas,
+//! Sbert and Heidrich (2001) score views similarly, by the entropy of the faces seen.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -21,44 +21,45 @@ use crate::sampling::low_discrepancy::r2_point;
 use crate::scene::{Rgb, Scene};
 use crate::visibility::ray_scene::RayScene;
 
-/// Cells along the longest side of the focus that tell places apart. Chosen by hand.
+/// Cells along the longest side of the focus that separate parts. Plain choice.
 const CELLS: f64 = 5.0;
 
-/// Share of the picture from which on it counts as full: an object before nothing. Chosen by hand.
+/// Fraction of the picture that is filled above which it counts as full: an object on an empty
+/// background. Plain choice.
 const FULL_SHARE: f64 = 0.5;
 
-/// A back counts as that much of the picture lost, and something too near likewise: powers of the
-/// share of the picture that is free of them. Chosen by hand.
+/// Exponents of the fractions of the picture that are free of backs and of surfaces too near. Plain
+/// choice.
 const BACK_POWER: i32 = 6;
 const NEAR_POWER: i32 = 3;
 
-/// What is nearer than this share of the scene's diagonal is too near. Chosen by hand.
+/// Distance below which a surface is too near, as a fraction of the scene's diagonal. Plain choice.
 const NEAR_SHARE: f64 = 0.05;
 
-/// Of the radiosity from which on half of the reflected light is, the share from which on something
-/// is lit, and the score of a view of nothing that is lit. Chosen by hand.
+/// Radiosity above which a part is lit, as a fraction of the radiosity above which half of the
+/// reflected light lies; score of a view without lit parts. Plain choice.
 const LIT_SHARE: f64 = 0.05;
 const UNLIT_SCORE: f64 = 0.02;
 
-/// A part is as good as unseen at a few rays: n of them count n / (n + this). Chosen by hand.
+/// A part seen by n rays counts n / (n + this): few rays do not show it well. Plain choice.
 const HALF_SEEN: f64 = 1.0;
 
-/// By how much a ray at the picture's edge counts less than one in its middle. Chosen by hand.
+/// Loss of weight of a ray at the picture's edge against one in its middle. Plain choice.
 const EDGE_LOSS: f64 = 0.5;
 
-/// A scene with its light, as views of it are scored.
+/// A scene with its light, for scoring views.
 pub(super) struct ViewScorer<'a> {
     pub rays: Arc<RayScene>,
-    /// Box around what is to be seen; what reflects outside it counts as if on its boundary.
+    /// Box around the content of interest; reflecting surfaces outside it count as on its boundary.
     pub focus: Aabb,
     scene: &'a Scene,
     parts: FxHashMap<PartKey, Part>,
 }
 
-/// Group; cell of the focus along x, y and z, and which of the six axes it looks along.
+/// Group; cell of the focus along x, y and z, and which of the six axes it faces.
 type PartKey = (u32, [u8; 4]);
 
-/// What is of one group, in one cell, and faces one way.
+/// The surfaces of one group, in one cell, facing one way.
 #[derive(Clone, Copy, Default)]
 struct Part {
     index: usize,
@@ -66,7 +67,7 @@ struct Part {
     area: f64,
     /// Mean of the channels of its reflected radiosity, times area.
     flux: f64,
-    /// Share of what there is to see.
+    /// Fraction of the sum over all parts.
     weight: f64,
     lit: bool,
 }
@@ -99,7 +100,7 @@ pub(super) fn faces(light: &GatheredMesh) -> impl Iterator<Item = Face> {
 }
 
 impl ViewScorer<'_> {
-    /// For views of `light` in which the parts within `focus` matter most.
+    /// Scores views of `light`; parts within `focus` matter most.
     pub fn new(light: &GatheredMesh, focus: Aabb) -> ViewScorer<'_> {
         let scene = light.mesh.scene();
         let rays = RayScene::of_scene(scene);
@@ -109,7 +110,7 @@ impl ViewScorer<'_> {
         scorer
     }
 
-    /// Adds up area and light of each part of what reflects, or of all where nothing does.
+    /// Sums area and light of each part of the reflecting surfaces, or of all if none reflects.
     fn add_parts(&mut self, light: &GatheredMesh) {
         let any_reflects =
             (0..self.scene.triangles().len()).any(|t| self.scene.material(t).scatters());
@@ -127,13 +128,13 @@ impl ViewScorer<'_> {
         }
     }
 
-    /// Half of all weight goes to the parts by the square root of their areas, half is shared
-    /// equally by groups.
+    /// Half of all weight goes to the parts in proportion to the square root of their areas; the
+    /// other half is split equally among groups.
     fn weigh_parts(&mut self) {
         let cell_size = self.cell_size();
         let mut parts: Vec<(PartKey, Part)> = self.parts.drain().collect();
         parts.sort_unstable_by_key(|(_, part)| part.index);
-        // What lies outside the focus is no larger than a cell.
+        // A part outside the focus counts as no larger than a cell.
         let size = |part: &Part| part.area.sqrt().min(cell_size);
         let mut of_groups = vec![0.0; self.scene.groups().len()];
         for (key, part) in &parts {
@@ -156,7 +157,7 @@ impl ViewScorer<'_> {
         self.focus.longest_side().max(f64::MIN_POSITIVE) / CELLS
     }
 
-    /// The part that a point of triangle `t` is in.
+    /// The part of a point of triangle `t`.
     fn key(&self, t: usize, point: DVec3) -> PartKey {
         let cell = (point - self.focus.low) / self.cell_size();
         let cell = cell.clamp(DVec3::ZERO, DVec3::splat(CELLS - 1.0));
@@ -166,8 +167,8 @@ impl ViewScorer<'_> {
         (self.scene.triangles()[t].group, [cell.x as u8, cell.y as u8, cell.z as u8, facing])
     }
 
-    /// From 0, worthless, to 1: what `camera` shows by a grid of `side` × `side` rays over a
-    /// picture of this width over height.
+    /// Score of `camera` in [0, 1] by a grid of `side` × `side` rays over a picture of this width
+    /// over height.
     pub fn score(&self, camera: &Camera, aspect: f64, side: usize) -> f64 {
         let [right, up, forward] = camera.frame();
         let height = (camera.vertical_fov.to_radians() / 2.0).tan();
@@ -210,7 +211,7 @@ impl ViewScorer<'_> {
             * (UNLIT_SCORE + (1.0 - UNLIT_SCORE) * lit)
     }
 
-    /// The share of directions, `count` evenly over the sphere, in which `point` sees fronts.
+    /// Fraction of directions, `count` evenly over the sphere, in which `point` sees fronts.
     pub fn enclosure(&self, point: DVec3, count: usize) -> f64 {
         let fronts = (0..count).filter(|&k| {
             let [x, y] = r2_point(k, 0.5);
@@ -224,8 +225,8 @@ impl ViewScorer<'_> {
     }
 }
 
-/// The mean radiosity of the parts from which on half of all light is reflected: where most of a
-/// tunnel is dark, what is lit is still the place with the lamp.
+/// Radiosity above which half of all light is reflected, taken over parts: in a mostly dark tunnel
+/// it is that of the lit part.
 fn bright_radiosity(parts: &[(PartKey, Part)]) -> f64 {
     let radiosity = |part: &Part| part.flux / part.area;
     let mut order: Vec<&Part> = parts.iter().map(|(_, part)| part).collect();

@@ -11,7 +11,7 @@
 
 use glam::{BVec3, DVec3};
 
-/// Sides that differ by no more than this share are equal: coordinates are rounded.
+/// Largest relative difference of sides that count as equal: coordinates are rounded.
 const EQUAL: f64 = 1e-9;
 
 /// An axis-aligned box from its lowest to its highest coordinates, both within it.
@@ -34,8 +34,8 @@ impl Aabb {
     pub const FACES: [[usize; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-    /// The box around all of `points` but this `share` of their weight at either end of each axis;
-    /// none if they have no weight, or are all in one place.
+    /// The box around all of `points` except the fraction `share` of their weight at either end of
+    /// each axis; none if they have no weight or all coincide.
     pub fn around_most(points: &[(DVec3, f64)], share: f64) -> Option<Aabb> {
         let total: f64 = points.iter().map(|(_, weight)| weight).sum();
         let end = |axis: usize, sign: f64| {

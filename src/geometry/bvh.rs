@@ -1,7 +1,7 @@
-//! A binary tree of boxes (bounding volume hierarchy): which items may lie where.
+//! A binary tree of boxes (bounding volume hierarchy) for spatial queries.
 //!
-//! Items are halved again and again until few enough are left for a leaf, and every node has the
-//! box around its items. A query descends into the nodes whose box it accepts:
+//! Items are halved until at most the size of a leaf is left, and every node has the box around its
+//! items. A query descends into the nodes whose box it accepts:
 //!
 //! ```text
 //!            ┌───────────────┐
@@ -13,16 +13,15 @@
 //!          4 1  0 3
 //! ```
 //!
-//! How a node's items are halved is the caller's: by the middles of boxes, by other points of the
-//! items, with ties broken by index or not. The order of leaves decides in which order results are
-//! found, and so every bit of what is summed up from them. Rays have a tree of their own, see
-//! [`crate::visibility`].
+//! The caller halves the items of a node: by the middles of boxes, by other points of the items,
+//! with ties broken by index or not. The order of leaves determines the order of results, and so
+//! the rounding of sums over them. Rays have their own tree, see [`crate::visibility`].
 
 use std::ops::{ControlFlow, Range};
 
 use super::aabb::Aabb;
 
-/// A binary tree of boxes over items that are numbers.
+/// A binary tree of boxes over numbered items.
 #[derive(Debug)]
 pub(crate) struct Bvh {
     /// All items, those of a leaf side by side.
@@ -33,20 +32,19 @@ pub(crate) struct Bvh {
 
 #[derive(Debug)]
 struct Node {
-    /// Around the boxes of all items below.
+    /// Box around all items below.
     bounds: Aabb,
-    /// Where the items below are in the order.
+    /// Range of the items below in the order.
     items: Range<usize>,
     /// Both halves, unless this is a leaf.
     children: Option<[usize; 2]>,
 }
 
 impl Bvh {
-    /// A tree over `boxes`, one an item, with leaves of at most `leaf_size` items.
+    /// A tree over `boxes`, one per item, with leaves of at most `leaf_size` items.
     ///
-    /// `halve` is called with the items of a node that is no leaf, and the box around them. It
-    /// reorders the items so that those before the middle, index ⌊n/2⌋, belong together, and so do
-    /// the others.
+    /// `halve` is called with the items of an inner node and the box around them. It partitions the
+    /// items at the middle, index ⌊n/2⌋, as by a median.
     pub fn new(boxes: &[Aabb], leaf_size: usize, halve: impl Fn(&mut [u32], &Aabb)) -> Bvh {
         let mut bvh = Bvh { order: (0..boxes.len() as u32).collect(), nodes: vec![] };
         if !boxes.is_empty() {
@@ -55,7 +53,7 @@ impl Bvh {
         bvh
     }
 
-    /// Adds the node of these items and all below it; gives its number.
+    /// Adds the node of these items and all below it; returns its number.
     fn build(
         &mut self,
         items: Range<usize>,
@@ -84,7 +82,7 @@ impl Bvh {
         &self.order
     }
 
-    /// Each leaf in order: where its items are in [`Bvh::order`], and the box around them.
+    /// Each leaf in order: the range of its items in [`Bvh::order`], and the box around them.
     pub fn leaves(&self) -> impl Iterator<Item = (Range<usize>, &Aabb)> {
         let leaves = self.nodes.iter().filter(|node| node.children.is_none());
         leaves.map(|node| (node.items.clone(), &node.bounds))
@@ -169,7 +167,7 @@ mod tests {
         for k in 0..100 {
             assert!(found.contains(&k) || !boxes[k as usize].overlaps(&query), "{k}");
         }
-        // Ten overlap; a leaf at either end brings up to two more.
+        // Ten overlap; a leaf at either end adds up to two more.
         assert!(found.len() <= 14, "{}", found.len());
         let mut visited = 0;
         bvh.visit(

@@ -1,6 +1,6 @@
-//! Which faces meet at each vertex.
+//! The faces at each vertex.
 
-/// The faces at each vertex, one vertex after the other.
+/// The faces at each vertex, vertex by vertex.
 pub(crate) struct Incidence {
     /// Those of vertex v are from `first[v]` to `first[v + 1]`.
     first: Vec<u32>,
@@ -8,8 +8,8 @@ pub(crate) struct Incidence {
 }
 
 impl Incidence {
-    /// For `vertex_count` vertices and faces given, the same at every call, by their numbers and
-    /// the vertices that each has. The faces at a vertex stay in that order.
+    /// For `vertex_count` vertices and faces, each given by its number and its vertices; `faces`
+    /// must give the same at every call. The faces at a vertex stay in that order.
     pub fn new<'a, I>(vertex_count: usize, faces: impl Fn() -> I) -> Incidence
     where
         I: Iterator<Item = (usize, &'a [u32])>,
@@ -32,7 +32,7 @@ impl Incidence {
         Incidence { first, faces: at_vertices }
     }
 
-    /// How many vertices there are.
+    /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.first.len() - 1
     }

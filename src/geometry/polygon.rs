@@ -18,15 +18,14 @@
 
 use glam::DVec3;
 
-/// A corner is on a plane if its distance from the plane is at most this share of the distance
+/// Distance of a corner from a plane up to which it is on the plane, as a fraction of the distance
 /// between a point of the plane and the farthest corner. Dimensionless.
 ///
 /// Coordinates carry rounding of about 1e-16 of their magnitude, and a few operations multiply it;
-/// 1e-13 is well above that. What it ignores changes a form factor by about 1e-13.
+/// 1e-13 is well above that. The neglected part changes a form factor by about 1e-13.
 pub(crate) const PLANE_TOLERANCE: f64 = 1e-13;
 
-/// Half the sum of cross products: normal to the polygon, towards its front, as long as its area is
-/// large.
+/// Half the sum of cross products: normal to the polygon, towards its front, its length the area.
 pub(crate) fn area_vector(polygon: &[DVec3]) -> DVec3 {
     fan(polygon).map(|[a, b, c]| 0.5 * (b - a).cross(c - a)).sum()
 }
@@ -51,9 +50,9 @@ pub(crate) fn fan(polygon: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> {
 
 /// The part of a convex polygon above the plane through `origin` with unit `normal`.
 ///
-/// Corners within [`PLANE_TOLERANCE`] of the plane stay where they are. A polygon that has no
-/// corner above the plane beyond the tolerance has no such part: empty. Corners keep their order,
-/// and the first one that stays is the first.
+/// Corners within [`PLANE_TOLERANCE`] of the plane are not moved. A polygon without a corner above
+/// the plane beyond the tolerance gives an empty part. Corners keep their order, and the first one
+/// that stays is the first.
 pub(crate) fn clip(polygon: &[DVec3], origin: DVec3, normal: DVec3) -> Vec<DVec3> {
     let (Some(&first), Some(&last)) = (polygon.first(), polygon.last()) else { return Vec::new() };
     let tolerance = PLANE_TOLERANCE * max_distance(polygon, origin);
@@ -104,8 +103,8 @@ fn snapped(height: f64, tolerance: f64) -> f64 {
     if height.abs() <= tolerance { 0.0 } else { height }
 }
 
-/// Goes around `polygon`, beginning with the edge that closes it, and visits every corner with its
-/// height over a plane, and, with height 0, every point where an edge crosses the plane.
+/// Goes around `polygon`, beginning with its closing edge, and visits every corner with its height
+/// over a plane, and, with height 0, every point where an edge crosses the plane.
 fn walk(polygon: &[DVec3], height: impl Fn(DVec3) -> f64, mut visit: impl FnMut(DVec3, f64)) {
     let Some(&last) = polygon.last() else { return };
     let mut a = last;
@@ -121,11 +120,11 @@ fn walk(polygon: &[DVec3], height: impl Fn(DVec3) -> f64, mut visit: impl FnMut(
     }
 }
 
-/// What of a convex polygon lies outside the convex polygon `cover` in the same plane, in convex
-/// parts. `cover_normal` is the unit normal of the cover.
+/// The part of a convex polygon outside the convex polygon `cover` in the same plane, as convex
+/// polygons. `cover_normal` is the unit normal of the cover.
 ///
-/// Each edge of the cover in turn cuts off what is outside of it. Where the two do not overlap, the
-/// polygon itself is the one part.
+/// Each edge of the cover in turn cuts off the part outside of it. Without overlap, the polygon
+/// itself is the only part.
 pub(crate) fn polygon_difference(
     polygon: &[DVec3],
     cover: &[DVec3],

@@ -4,19 +4,20 @@
 //! |---|---|---|
 //! | Gauss–Legendre | 2, 3, 4, 6 | smooth integrands on [0, 1]; exact to degree 2n − 1 |
 //! | Gauss–Jacobi, weight u | 2, 3 | the direction from the tip of a triangle, see below |
-//! | tanh–sinh | as many as it takes | integrands that are singular at the ends of an interval |
+//! | tanh–sinh | until convergence | integrands that are singular at the ends of an interval |
 //! | Radon | 7 | a triangle, exact to degree 5, with a rule of degree 2 on the same points |
 //!
 //! A triangle abc is the square of (u, v) collapsed towards its tip a,
 //! x = a + u ((b − a) + v (c − b)), dx = 2 · area · u du dv: a product of two rules on [0, 1], the
 //! factor u being part of the integrand or of the weights.
 //!
-//! How many Gauss points an integrand needs depends on how far away it is singular. On an interval
-//! of half length 1 with the nearest singularity at imaginary distance z, n points err by about
-//! ρ^(−2n) of the integral, where ρ = z + √(z² + 1) is the sum of the half axes of the largest
-//! ellipse with foci ±1 in which the integrand is analytic (L. N. Trefethen, Approximation Theory
-//! and Approximation Practice, 2013, chapter 19). Form factors of polygons are singular where the
-//! polygons touch, so that z is the gap between two of them in radii of the one integrated over:
+//! The number of Gauss points for an integrand depends on the distance of its singularities. On an
+//! interval of half length 1 with the nearest singularity at imaginary distance z, n points err by
+//! about ρ^(−2n) of the integral, where ρ = z + √(z² + 1) is the sum of the half axes of the
+//! largest ellipse with foci ±1 in which the integrand is analytic (L. N. Trefethen, Approximation
+//! Theory and Approximation Practice, 2013, chapter 19). Form factors of polygons are singular
+//! where the polygons touch, so that z is the gap between two of them in radii of the one
+//! integrated over:
 //!
 //! | gap, radii | points a direction | ρ^(−2n) | constant |
 //! |---|---|---|---|
@@ -25,34 +26,34 @@
 //! | 8 | 3 | 16^(−6) = 6e-8 | [`THREE_POINT_MIN_GAP`] |
 //! | 40 | 2 | 80^(−4) = 2e-8 | [`TWO_POINT_MIN_GAP`] |
 //!
-//! The first two rows serve closed forms, right to rounding; the last two serve view factors, whose
-//! error is told beside them.
+//! The first two rows serve closed forms, exact up to rounding; the last two serve view factors,
+//! whose error is reported with them.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::LazyLock;
 
 use glam::DVec3;
 
-/// Gap, in radii of the polygon integrated over, from which six Gauss points a direction suffice to
-/// 4e-15 of the integral.
+/// Gap, in radii of the polygon integrated over, from which six Gauss points per direction err by
+/// at most 4e-15 of the integral.
 pub(crate) const SIX_POINT_MIN_GAP: f64 = 8.0;
 
-/// Gap, in radii of the polygon integrated over, from which four Gauss points a direction suffice
-/// to 1e-17 of the integral. Six would do as well; four are cheaper.
+/// Gap, in radii of the polygon integrated over, from which four Gauss points per direction err by
+/// at most 1e-17 of the integral. Six would do as well; four are cheaper.
 pub(crate) const FOUR_POINT_MIN_GAP: f64 = 64.0;
 
-/// Gap, in radii of the larger polygon, from which three Gauss points a direction suffice to 6e-8
-/// of the integral.
+/// Gap, in radii of the larger polygon, from which three Gauss points per direction err by at most
+/// 6e-8 of the integral.
 pub(crate) const THREE_POINT_MIN_GAP: f64 = 8.0;
 
-/// Gap, in radii of the larger polygon, from which two Gauss points a direction suffice to 2e-8 of
-/// the integral.
+/// Gap, in radii of the larger polygon, from which two Gauss points per direction err by at most
+/// 2e-8 of the integral.
 pub(crate) const TWO_POINT_MIN_GAP: f64 = 40.0;
 
 /// A point of a rule on [0, 1].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
-    /// Place in [0, 1].
+    /// Position in [0, 1].
     pub x: f64,
     /// Weight; those of a rule add up to the integral of its weight function over [0, 1].
     pub weight: f64,
@@ -124,13 +125,13 @@ const TANH_SINH_LEVELS: u32 = 7;
 /// Nodes of the tanh–sinh rule with weights below this change no sum of terms near 1.
 const TANH_SINH_MIN_WEIGHT: f64 = 1e-18;
 
-/// Two levels of the tanh–sinh rule that differ by no more than this have converged. In units of
-/// the integrand, which callers keep near 1. The error about squares with each level, so that what
-/// is left is rounding.
+/// Largest difference of two levels of the tanh–sinh rule at convergence, in units of the
+/// integrand, which callers keep near 1. The error about squares with each level, so that only
+/// rounding is left.
 const TANH_SINH_TOLERANCE: f64 = 1e-13;
 
-/// Nodes of the tanh–sinh rule on [0, 1], nearer half: `x` is the distance from either end. Level k
-/// has those that a step of 2^−(k+1) has more than twice that step.
+/// Nodes of the tanh–sinh rule in the nearer half of [0, 1]: `x` is the distance from either end.
+/// Level k has the nodes that step 2^−(k+1) adds to those of twice that step.
 static TANH_SINH: LazyLock<Vec<Vec<Node>>> = LazyLock::new(|| {
     let node_at = |s: f64| {
         let x = 1.0 / (1.0 + (PI * s.sinh()).exp());
@@ -178,8 +179,8 @@ pub(crate) struct TriangleNode {
 
 /// Weights of the centroid in Radon's rule (9/40) and in the rule of degree two within it.
 ///
-/// The weights of the rule of degree two are right to seven digits only, so that it errs by 3e-8
-/// for polynomials of degree two: enough for a difference that tells an error.
+/// The weights of the rule of degree two have seven digits only, so that it errs by 3e-8 for
+/// polynomials of degree two: accurate enough for the difference that estimates an error.
 const RADON_CENTROID: (f64, f64) = (0.225, 0.484_123_183_164);
 
 /// Orbits of three points of Radon's rule: barycentric coordinate of two of the corners,
@@ -193,7 +194,7 @@ const RADON_ORBITS: [(f64, f64, f64); 2] = [
 /// A. H. Stroud, Approximate Calculation of Multiple Integrals, 1971, T2:5-1).
 ///
 /// Four of the points with other weights are exact to degree two: the difference of the two sums
-/// tells how smooth the integrand is.
+/// estimates the smoothness of the integrand.
 pub(crate) fn radon_nodes([a, b, c]: [DVec3; 3]) -> [TriangleNode; 7] {
     let (degree_5, degree_2) = RADON_CENTROID;
     let mut nodes = [TriangleNode { point: (a + b + c) / 3.0, degree_5, degree_2 }; 7];
@@ -247,7 +248,7 @@ mod tests {
             let sum: f64 = rule.iter().map(|node| 2.0 * node.weight * f(2.0 * node.x - 1.0)).sum();
             let right = 2.0 * (1.0 / z).atan() / z;
             let rho = z + (z * z + 1.0).sqrt();
-            // Rounding is all that is left of the finest.
+            // For the finest rule only rounding is left.
             let bound = 2.0 * rho.powi(-2 * rule.len() as i32) + 1e-15;
             assert!((sum / right - 1.0).abs() < bound, "{z}: {sum} for {right}");
         }

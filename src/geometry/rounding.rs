@@ -1,7 +1,7 @@
-//! Rounding: to whole numbers whose sum is exact, and to keys that rounding errors do not change.
+//! Rounding to integers with an exact sum, and to keys that are stable under rounding errors.
 //!
 //! [`Apportion`] deals out whole units in proportion to real shares. Rounding each share would
-//! leave a remainder; instead the running sum is rounded, and every part is what the sum grew by:
+//! leave a remainder; instead the running sum is rounded, and every part is its increase:
 //!
 //! ```text
 //! shares of 5 units       0.3   0.3   0.3   0.1
@@ -33,14 +33,14 @@ impl Apportion {
     }
 }
 
-/// A sort key for positive numbers that ties where they differ by rounding alone: their upper bits,
-/// with 24 significant ones, rounded.
+/// A sort key for positive numbers in which numbers that differ only by rounding tie: their upper
+/// bits, with 24 significant ones, rounded.
 ///
 /// Computed values that are equal in exact arithmetic, as in symmetric scenes, then tie, and ties
-/// are broken by index: the order does not depend on where the scene stands or how large it is.
+/// are broken by index: the order does not depend on the position or size of the scene.
 pub(crate) fn tie_stable_key(x: f64) -> u64 {
     // The bits of positive floats are in the order of their values. Half of a step is added, since
-    // what ties is often a round number.
+    // tied values are often round numbers.
     (x.to_bits() + (1 << 28)) >> 29
 }
 

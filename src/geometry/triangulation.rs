@@ -1,28 +1,30 @@
 //! Polygons in space, convex or not, cut into triangles.
 //!
-//! A convex outline is halved again and again, so that a disc of a thousand corners has no thousand
-//! slivers in one corner, and a few triangles cover most of it. A fan from the first corner covers
-//! some outlines that are not convex. Where neither does, ears are clipped off one by one in the
-//! polygon's own plane (D. Eberly, "Triangulation by Ear Clipping", 2002; the `earcut` crate).
-//! Either way the areas of the triangles must sum to that of the outline (Newell's formula); an
-//! outline that crosses itself fails this, and what can be cut of it is another function's answer.
+//! A convex outline is halved recursively, so that a disc of a thousand corners does not become a
+//! thousand slivers at one corner, and a few triangles cover most of it. A fan from the first
+//! corner covers some outlines that are not convex. If neither does, ears are clipped off one by
+//! one in the polygon's own plane (D. Eberly, "Triangulation by Ear Clipping", 2002; the `earcut`
+//! crate). Either way the areas of the triangles must sum to that of the outline (Newell's
+//! formula); an outline that crosses itself fails this, and [`triangulate_anyhow`] cuts it as far
+//! as possible.
 
 use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
 
-/// Corners a polygon may have when no fan covers it: ear clipping takes time quadratic in them at
-/// worst. Chosen by hand.
+/// Maximum number of corners of a polygon that no fan covers: ear clipping takes time quadratic in
+/// them at worst. Plain choice.
 pub(crate) const MAX_EAR_CLIPPING_CORNERS: usize = 10_000;
 
-/// Triangles no higher than this are flat but for the rounding of their corners: a few operations
-/// on coordinates. In units of the polygon's extent or of its largest coordinate, if that is more.
+/// Height of a triangle up to which it is flat but for the rounding of its corners: a few
+/// operations on coordinates. In units of the polygon's extent or of its largest coordinate,
+/// whichever is larger.
 const FLAT_HEIGHT: f64 = 8.0 * f64::EPSILON;
 
-/// Triangles that cover the polygon with these corners, as indices into them, turning as it does.
+/// Triangles that cover the polygon with these corners, as indices into them, in its orientation.
 ///
-/// By halves where these cover it, else a fan from the first corner, else ear clipping. A polygon
-/// with fewer than three corners, or all on a line, gives one triangle without area. `None` when
-/// the areas of the triangles do not sum to that of the outline, as where it crosses itself.
+/// By halves where these cover it, else by a fan from the first corner, else by ear clipping. A
+/// polygon with fewer than three corners, or all on a line, gives one triangle without area. `None`
+/// when the areas of the triangles do not sum to that of the outline, as where it crosses itself.
 pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     let (n, &origin) = (corners.len(), corners.first()?);
     if n == 3 {
@@ -31,7 +33,7 @@ pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     // Around the first corner and in units of the largest extent, so that neither rounds away.
     let extent = corners.iter().map(|&p| (p - origin).abs().max_element()).fold(0.0, f64::max);
     let points: Vec<DVec3> = corners.iter().map(|&p| (p - origin) / extent).collect();
-    // Rounding is a step of the coordinates, wherever the polygon is.
+    // Rounding is a step of the coordinates, whatever the polygon's position.
     let reach = corners.iter().map(|p| p.abs().max_element()).fold(extent, f64::max) / extent;
     let flat_height = FLAT_HEIGHT * reach;
     if extent == 0.0 || on_a_line(&points, flat_height) {
@@ -40,7 +42,7 @@ pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     // Newell's normal: its length is twice the area of a flat polygon.
     let newell: DVec3 = (1..n).map(|i| points[i - 1].cross(points[i])).sum();
     let doubled_area = newell.length();
-    // Each of the n products is off by a few ε. What is left may have no front, or not be finite.
+    // Each of the n products is off by a few ε. The rest may have no front, or not be finite.
     let rounding = 16.0 * f64::EPSILON * reach * n as f64;
     if doubled_area.is_nan() || doubled_area <= rounding {
         return None;
@@ -56,7 +58,7 @@ pub(crate) fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     ((covered - doubled_area).abs() <= rounding).then_some(triangles)
 }
 
-/// Triangles for the polygon with these corners where [`triangulate`] has none: the ears that can
+/// Triangles for the polygon with these corners where [`triangulate`] gives none: the ears that can
 /// be clipped off an outline that crosses itself, else a fan from the first corner.
 pub(crate) fn triangulate_anyhow(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let origin = corners.first().copied().unwrap_or_default();
@@ -77,8 +79,8 @@ fn on_a_line(points: &[DVec3], flat_height: f64) -> bool {
     points.iter().all(|p| far.cross(*p).length() <= flat_height)
 }
 
-/// Triangles between the first corner, the last and the middle one of `n`, and of what is left on
-/// both sides: a corner is in at most two of each size.
+/// Triangles between the first corner, the last and the middle one of `n`, and recursively of both
+/// sides: a corner is in at most two of each size.
 fn halves(n: usize) -> Vec<[usize; 3]> {
     let mut triangles = Vec::with_capacity(n.saturating_sub(2));
     let mut left = vec![(0, n - 1)];
@@ -94,7 +96,7 @@ fn halves(n: usize) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Triangles between the first of `n` corners and each edge that it is not on.
+/// Triangles between the first of `n` corners and each edge opposite to it.
 fn fan(n: usize) -> Vec<[usize; 3]> {
     (2..n).map(|i| [0, i - 1, i]).collect()
 }
@@ -236,7 +238,7 @@ mod tests {
         };
         assert_eq!(flat(&[[0., 0.], [1., 1.], [1., 0.], [0., 1.]]), None);
         for turn in 0..100 {
-            // Two equal lobes, so that nothing but rounding tells the normal.
+            // Two equal lobes: the normal is determined by rounding alone.
             let frame = DMat3::from_axis_angle(DVec3::new(1., 2., 3.).normalize(), turn as f64);
             let bow = [[0., 0.], [1., 1.], [1., 0.], [0., 1.]].map(|[x, y]| DVec3::new(x, y, 3.0));
             assert_eq!(triangulate(&bow.map(|p| frame * p)), None);

@@ -1,7 +1,7 @@
 //! Disjoint sets of the numbers 0 to n − 1 (union–find), with path halving.
 //!
-//! Every number starts as its own set. Joining two sets hangs the tree of the one with the higher
-//! representative below the other, so that the lowest member represents its set, whatever the
+//! Every number starts as its own set. Joining two sets attaches the tree of the one with the
+//! higher representative to the other, so that the lowest member represents its set, whatever the
 //! order of joining.
 
 /// Disjoint sets, each represented by its lowest member.

@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 /// A position as the bits of its coordinates; −0 counts as 0.
 pub(crate) fn position_key(position: DVec3) -> [u64; 3] {
-    // −0 + 0 is 0; every other number stays what it is.
+    // −0 + 0 is 0; every other number is unchanged.
     (position + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct Weld {
 }
 
 impl Weld {
-    /// The number of `position`: that of an equal one before it, or else the next.
+    /// The number of `position`: that of an equal earlier one, or else the next.
     pub fn number(&mut self, position: DVec3) -> u32 {
         *self.numbers.entry(position_key(position)).or_insert_with(|| {
             self.positions.push(position);

@@ -9,14 +9,14 @@ use crate::error::Error;
 /// The points of a plane at which light is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuringGrid {
-    /// What it is called: after the group below it, if there is one.
+    /// Name: that of the group below it, if any.
     pub name: String,
-    /// What the cells fill: without the strip along the walls.
+    /// The area that the cells fill: without the strip along the walls.
     pub plane: GridPlane,
     /// Points along each edge.
     pub counts: [usize; 2],
-    /// Positions, scene unit, row by row: those along the first edge follow one another. `None`
-    /// where the surface below ends, or is nearer to its end than the strip is wide.
+    /// Positions, scene unit, row by row along the first edge. `None` where the surface below ends,
+    /// or is nearer to its end than the width of the strip.
     pub points: Vec<Option<DVec3>>,
 }
 

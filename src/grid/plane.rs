@@ -1,10 +1,11 @@
-//! Where a measuring grid lies.
+//! The plane of a measuring grid.
 
 use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 
-/// A parallelogram in space. Light arrives at it from where the cross product of its edges points.
+/// A parallelogram in space. It receives light on the side that the cross product of its edges
+/// points to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridPlane {
     /// A corner, scene unit.
@@ -29,7 +30,7 @@ impl GridPlane {
         })
     }
 
-    /// The point at these shares of both edges.
+    /// The point at these fractions of both edges.
     pub(super) fn at(&self, [x, y]: [f64; 2]) -> DVec3 {
         self.origin + self.edges[0] * x + self.edges[1] * y
     }

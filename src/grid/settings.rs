@@ -1,13 +1,13 @@
-//! How far apart points are, and how far off the walls: EN 12464-1.
+//! Spacing of points and distance from walls: EN 12464-1.
 
 use crate::error::{Error, ErrorKind};
 
-/// How a grid is laid out. Its lengths are in metres, as those of the norm.
+/// Layout of a grid. Lengths are in metres, as in the standard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSettings {
     /// Length of a metre in the scene's unit: 1000 where that is a millimetre.
     pub metre: f64,
-    /// Width of what is left out along the edges, m. EN 12464-1: 0.5 along walls, none where the
+    /// Width of the strip left out along the edges, m. EN 12464-1: 0.5 along walls, none where the
     /// task reaches to the edge.
     pub strip: f64,
     /// Largest edge of a cell, m; by EN 12464-1 if `None`.
@@ -17,14 +17,14 @@ pub struct GridSettings {
 /// The longest cell of EN 12464-1, m.
 const LONGEST_CELL: f64 = 10.0;
 
-/// From this ratio of its sides on a plane's cells follow the shorter side (EN 12464-1:2011, 4.4).
+/// Ratio of its sides from which a plane's cells follow the shorter side (EN 12464-1:2011, 4.4).
 const LONG_PLANE: f64 = 2.0;
 
-/// Points of a grid, at most. Chosen by hand.
+/// Maximum number of points of a grid. Plain choice.
 const MAX_POINTS: f64 = 1e6;
 
 impl Default for GridSettings {
-    /// Metres, the norm's spacing, and its strip along walls.
+    /// Metres, the standard's spacing, and its strip along walls.
     fn default() -> GridSettings {
         GridSettings { metre: 1.0, strip: 0.5, spacing: None }
     }
@@ -32,7 +32,7 @@ impl Default for GridSettings {
 
 impl GridSettings {
     /// Points along the two edges of a plane, given their lengths in the scene's unit: the least
-    /// odd numbers by which no cell is longer than
+    /// odd numbers for which no cell is longer than
     ///
     /// ```text
     /// p = 0.2 · 5^(log10 d) m,  at most 10 m                       (EN 12464-1:2011, 4.4)
@@ -50,7 +50,7 @@ impl GridSettings {
         let d = if long >= LONG_PLANE * short { short } else { long };
         let by_norm = (0.2 * 5f64.powf(d.log10())).min(LONGEST_CELL);
         let p = self.spacing.unwrap_or(by_norm);
-        // The next odd number; rounding of a whole number of cells does not make one more.
+        // The next odd number; 1e-9 keeps rounding of a whole number of cells from adding one.
         let counts = [a, b].map(|edge| (edge / p * (1.0 - 1e-9) / 2.0 - 0.5).ceil() * 2.0 + 1.0);
         let counts = counts.map(|n| n.max(1.0));
         if counts[0] * counts[1] <= MAX_POINTS {

@@ -1,6 +1,6 @@
-//! What the points of a grid say together.
+//! Statistics over the points of a grid.
 
-/// Mean, extremes and uniformity over the points of a grid, in the unit of what was measured.
+/// Mean, extremes and uniformity over the points of a grid, in the unit of the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GridStatistics {
@@ -8,11 +8,11 @@ pub struct GridStatistics {
     pub points: usize,
     /// Their mean.
     pub mean: f64,
-    /// Its standard error by sampling: that the points are no more than so many is not in it.
+    /// Standard error of the mean by sampling, without the error of the finite number of points.
     pub mean_error: f64,
-    /// The least value of a point.
+    /// The lowest value.
     pub minimum: f64,
-    /// The largest one.
+    /// The highest value.
     pub maximum: f64,
     /// U₀ = minimum / mean (EN 12464-1), in [0, 1]; 0 in the dark.
     pub uniformity: f64,

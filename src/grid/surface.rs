@@ -1,4 +1,4 @@
-//! What a grid is laid out above: floors, and flat groups.
+//! The surfaces below grids: floors, and flat groups.
 
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
@@ -13,25 +13,25 @@ use crate::geometry::weld::position_key;
 use crate::scene::Scene;
 use crate::visibility::ray_scene::RayScene;
 
-/// Cosine of the angle up to which a surface counts as level: 5 degrees. Chosen by hand.
+/// Cosine of the angle up to which a surface counts as level: 5 degrees. Plain choice.
 const LEVEL_COSINE: f64 = 0.996;
 
-/// Area of a floor at least, m²: more than that of tables. Chosen by hand.
+/// Least area of a floor, m²: more than that of tables. Plain choice.
 const MIN_FLOOR_AREA: f64 = 4.0;
 
-/// How far below its highest corner a group is still its highest side, m. Chosen by hand.
+/// Depth below its highest corner that still belongs to a group's highest side, m. Plain choice.
 const SAME_LEVEL: f64 = 0.01;
 
-/// Directions in which it is looked whether a surface goes on, from each point.
+/// Number of directions in which a surface is tested to go on, from each point.
 const AROUND: usize = 8;
 
-/// Triangles that face alike, and lie in one plane or nearly so.
+/// Triangles with similar normals, in about one plane.
 pub(super) struct LevelSurface {
     name: String,
     triangles: Vec<usize>,
     /// Unit length.
     normal: DVec3,
-    /// Of the highest corner along the normal, scene unit.
+    /// Height of the highest corner along the normal, scene unit.
     level: f64,
 }
 
@@ -47,8 +47,8 @@ impl LevelSurface {
         LevelSurface { name, triangles, normal, level }
     }
 
-    /// The floors of `scene`, the lowest first: what faces unit `up`, is joined by shared corners
-    /// and large. A metre has `metre` scene units.
+    /// The floors of `scene`, the lowest first: large surfaces that face unit `up`, connected by
+    /// shared corners. A metre has `metre` scene units.
     pub fn floors(scene: &Scene, up: DVec3, metre: f64) -> Vec<LevelSurface> {
         let all = 0..scene.triangles().len();
         let facing: Vec<usize> =
@@ -74,11 +74,11 @@ impl LevelSurface {
         floors
     }
 
-    /// The highest side of a group that faces unit `up` or, if none does, the side that most of it
-    /// shows.
+    /// The highest side of a group that faces unit `up` or, if none does, the side that faces along
+    /// its mean normal, weighted by area.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when there is no such group, or it shows no side more than others.
+    /// [`ErrorKind::Setting`] when there is no such group, or no side faces that way.
     pub fn of_group(
         scene: &Scene,
         group: &str,
@@ -116,7 +116,7 @@ impl LevelSurface {
     }
 
     /// The grid `height` above it, scene unit: over the smallest rectangle around it, where the
-    /// surface reaches beyond the strip in all directions. None where nothing of it is left.
+    /// surface reaches beyond the strip in all directions. None if no point is left.
     pub fn grid(
         &self,
         scene: &Scene,
@@ -149,8 +149,8 @@ impl LevelSurface {
         [along, self.normal.cross(along)]
     }
 
-    /// The smallest rectangle around it, `height` above: its longer edge is the first, and points
-    /// to where an axis of the scene does.
+    /// The smallest rectangle around it, `height` above: its longer edge is the first, in the
+    /// positive direction of an axis of the scene.
     fn plane(&self, scene: &Scene, height: f64) -> Option<GridPlane> {
         let (x, y) = self.normal.any_orthonormal_pair();
         let corners = self.triangles.iter().flat_map(|&t| scene.corners(t));
@@ -159,8 +159,7 @@ impl LevelSurface {
         let in_space = |p: DVec2| x * p.x + y * p.y;
         let mut edges = [in_space(axis * size.x), in_space(axis.perp() * size.y)];
         let mut origin = in_space(corner) + self.normal * (self.level + height);
-        // Turned by a right angle as often as it takes; from a corner to the next, the other way
-        // round the same.
+        // Turned by right angles until it fits; a turn moves the origin to the next corner.
         let is_wrong = |[u, v]: [DVec3; 2]| {
             let largest = u.to_array().into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
             u.length() < v.length() * (1.0 - 1e-9) || largest < Some(0.0)

@@ -1,4 +1,4 @@
-//! OpenEXR out: linear light, one 32-bit float a channel.
+//! OpenEXR output: linear light, one 32-bit float per channel.
 
 use std::path::Path;
 
@@ -14,8 +14,8 @@ use crate::scene::Rgb;
 /// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
 ///
 /// # Errors
-/// [`crate::ErrorKind::File`] when the file cannot be written, or does not hold a radiance: above
-/// 3.4e38. What is below 1e-38 becomes 0, or keeps few digits.
+/// [`crate::ErrorKind::File`] when the file cannot be written, or cannot represent a radiance:
+/// above 3.4e38. Values below 1e-38 become 0, or keep few digits.
 pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
     let size = [image.width, image.height];
     let channels = rgb(path.as_ref(), size, &image.pixels, ["radiance", "W/(m² sr)"])?;
@@ -23,8 +23,8 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
 }
 
 /// Writes the irradiance of a light map, W/m², as a 32-bit float OpenEXR. Its channels are R, G, B
-/// and `coverage`, 1 where a texel gathered and 0 where it is empty or has values of its
-/// neighbours. At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
+/// and `coverage`, 1 where a texel gathered and 0 where it is empty or filled from its neighbours.
+/// At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
 ///
 /// # Errors
 /// Those of [`write_exr`].
@@ -52,7 +52,7 @@ pub fn write_light_map_radiosity(path: impl AsRef<Path>, map: &LightMap) -> Resu
 /// Name and samples of a channel, row by row from the top.
 type Channel = (&'static str, Vec<f32>);
 
-/// The channels of `pixels`, a quantity in a unit, if 32-bit floats hold all of them.
+/// The channels of `pixels`, a quantity in a unit, if 32-bit floats represent all of them.
 fn rgb(
     path: &Path,
     [width, _]: [u32; 2],
@@ -77,7 +77,7 @@ fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Resu
     let size = (width as usize, height as usize);
     let image = Image::from_encoded_channels(size, Encoding::FAST_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(vec![]);
-    // One block after the other: in parallel they would come in another order on each run.
+    // One block after the other: parallel writes would change their order from run to run.
     image.write().non_parallel().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;
     write_file(path, |out| std::io::Write::write_all(out, bytes.get_ref()))
 }

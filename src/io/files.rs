@@ -1,8 +1,8 @@
-//! Where the bytes of OBJ files, their libraries and textures come from, and how many may come.
+//! Source of the bytes of OBJ files, their libraries and textures, with limits of their size.
 //!
-//! A name in a file is looked for below the folder of the OBJ file and nowhere else: as it is
-//! written, with `/` for `\`, then without its first folders one by one, down to the file name
-//! alone; each time as it is spelled and then without regard to case.
+//! A name in a file is searched below the folder of the OBJ file only: as written, with `/` for
+//! `\`, then without its first folders one by one, down to the file name alone; each time with the
+//! spelling given and then without regard to case.
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -14,26 +14,26 @@ use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use crate::error::quoted;
 
-/// Bytes that an OBJ file may have, and all its libraries together: a corner takes at least two, so
-/// the sides of all triangles can be numbered in 32 bits.
+/// Maximum number of bytes of an OBJ file, and of all its libraries together: a corner takes at
+/// least two, so that 32 bits number the sides of all triangles.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 
-/// Names that are looked for in a scene's folder; more are taken for missing, so that a file with
-/// a million names does not keep the disk busy. Chosen by hand: a look takes some 10 µs.
+/// Maximum number of names searched in a scene's folder; more count as missing, so that a file with
+/// a million names does not keep the disk busy. Plain choice: a search takes some 10 µs.
 const MAX_LOOKUPS: usize = 10_000;
 
-/// Bytes of the longest name that is looked for: that of a path on Linux.
+/// Maximum number of bytes of a name that is searched: that of a path on Linux.
 const MAX_NAME: usize = 4096;
 
-/// Folders of a name, from its end, that are looked for below the scene's folder.
+/// Maximum number of folders of a name, from its end, that are searched below the scene's folder.
 const MAX_FOLDERS: usize = 8;
 
 /// The files that an OBJ file and its libraries can name.
 pub(super) struct FileSource<'a> {
     place: Place<'a>,
-    /// Of each folder that was looked into: names in lower case, and as they are.
+    /// Per folder read: names in lower case, and as spelled.
     listings: RefCell<HashMap<PathBuf, HashMap<String, String>>>,
-    /// What was looked for already.
+    /// Results of earlier searches.
     found: RefCell<HashMap<String, Option<String>>>,
     lookups: Cell<usize>,
 }
@@ -66,7 +66,7 @@ impl<'a> FileSource<'a> {
         }
     }
 
-    /// The file that `name` stands for, as a path from the scene's folder.
+    /// The file of this `name`, as a path from the scene's folder.
     pub fn find(&self, name: &str) -> Option<String> {
         if name.len() > MAX_NAME || name.contains('\0') {
             return None;
@@ -88,7 +88,7 @@ impl<'a> FileSource<'a> {
         }
         let slashes = name.replace('\\', "/");
         let parts: Vec<&str> = slashes.split('/').filter(|p| !["", "."].contains(p)).collect();
-        // What stands before the last `..` lies elsewhere.
+        // The part up to the last `..` lies outside the folder.
         let inside = parts.iter().rposition(|&p| p == "..").map_or(0, |k| k + 1);
         let first = inside.max(parts.len().saturating_sub(MAX_FOLDERS));
         (first..parts.len()).find_map(|k| self.spelled(&parts[k..]))
@@ -100,7 +100,7 @@ impl<'a> FileSource<'a> {
         !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Normal(_) | CurDir))
     }
 
-    /// A file of this path, spelled so or with other capitals.
+    /// A file of this path, with this or other capitalisation.
     fn spelled(&self, parts: &[&str]) -> Option<String> {
         let path = parts.join("/");
         if !self.is_below(&path) {
@@ -122,7 +122,7 @@ impl<'a> FileSource<'a> {
         self.is_file(&found).then_some(found)
     }
 
-    /// The entry of `folder` that is `name` but for capitals.
+    /// The entry of `folder` that equals `name` except for capitalisation.
     fn listed(&self, folder: &Path, name: &str) -> Option<String> {
         let mut listings = self.listings.borrow_mut();
         let names = listings.entry(folder.into()).or_insert_with(|| {
@@ -152,7 +152,7 @@ impl<'a> FileSource<'a> {
         }
     }
 
-    /// The content of file `name`, which was found, of at most `most` bytes.
+    /// The content of the existing file `name`, of at most `most` bytes.
     pub fn read(&self, name: &str, most: u64) -> io::Result<Vec<u8>> {
         match self.place {
             Place::Folder(_) => read_bytes(&self.path(name), most),
@@ -163,7 +163,7 @@ impl<'a> FileSource<'a> {
         }
     }
 
-    /// Which libraries there are.
+    /// The libraries in the folder, for messages.
     pub fn libraries(&self) -> String {
         let (place, mut names): (_, Vec<String>) = match self.place {
             Place::Folder(folder) => {
@@ -198,7 +198,7 @@ fn is_inside(path: &Path, folder: &Path) -> bool {
     }
 }
 
-/// The whole of a regular file of at most `most` bytes.
+/// The content of a regular file of at most `most` bytes.
 pub(super) fn read_bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let about = fs::metadata(path)?;
     if about.is_dir() {
@@ -211,13 +211,13 @@ pub(super) fn read_bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if about.len() > most {
         return Err(too_large(most));
     }
-    // Some files are longer than they say, or grow.
+    // Some files are longer than their metadata report, or grow.
     let mut bytes = Vec::with_capacity(about.len() as usize);
     File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
 }
 
-/// A copy of `bytes`, if they are not too many.
+/// A copy of `bytes`, if there are at most `most`.
 pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes.into()) }
 }
@@ -242,8 +242,8 @@ pub(super) fn decode(bytes: Vec<u8>) -> (String, Option<&'static str>) {
     }
 }
 
-/// UTF-16 without a byte-order mark: of its first 256 pairs of bytes, three in four have a zero
-/// always at the same end, as Latin letters have.
+/// UTF-16 without a byte-order mark: at least three in four of the first 256 byte pairs have a
+/// zero, always at the same end, as Latin letters do.
 fn utf_16(bytes: &[u8]) -> Option<&'static Encoding> {
     let pairs = || bytes.chunks_exact(2).take(256);
     let most = |zero: usize| {

@@ -1,13 +1,13 @@
-//! glTF 2.0 binary out: the mesh with radiosity, for viewers, engines and modellers.
+//! glTF 2.0 binary output: the mesh with radiosity, for viewers, engines and modellers.
 //!
 //! ```text
-//!   header │ JSON chunk: what lies where     │ binary chunk
-//! │ scene ── node ── node per group │ positions   normals     colours   radiosity  indices
-//!          │   └ mesh: a primitive for each  │ p₀ p₁ p₂ …  p₀ p₁ p₂ …  …                    p₀ p₁
+//!   header │ JSON chunk: layout of the data  │ binary chunk
+//!          │ scene ── node ── node per group │ positions   normals     colours  radiosity  indices
+//!          │   └ mesh: a primitive for each  │ p₀ p₁ p₂ …  p₀ p₁ p₂ …  …                   p₀ p₁
 //!          │     material, by its name       │ (of each primitive, one after the other)
 //! ```
 //!
-//! The numbers are written as they are computed; the JSON, which comes first, needs but counts and
+//! The numbers are written as they are computed; the JSON, which comes first, needs only counts and
 //! the box of each primitive. (Khronos, "glTF 2.0 Specification", 2021.)
 
 mod container;
@@ -39,20 +39,21 @@ use primitives::{Primitive, primitives};
 /// A node for each group and a primitive for each of its materials, by their names. Vertices have
 /// `POSITION`, `NORMAL`, `COLOR_0` (linear, through `tone`, a curve of radiosity, within [0, 1])
 /// and `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
-/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` as it is, and clear panes let through
-/// the mean of their transmittance (`alphaMode` `BLEND`); their `extras` have
-/// reflectance and exitance. All numbers are 32-bit floats.
+/// (`KHR_materials_unlit`), so that viewers show `COLOR_0` unchanged, and clear panes transmit the
+/// mean of their transmittance (`alphaMode` `BLEND`); their `extras` have reflectance and exitance.
+/// All numbers are 32-bit floats.
 ///
 /// In a scene with textures, vertices whose corners have texture coordinates in the file have
-/// `TEXCOORD_0`, after `-s` and `-o`, and `_IRRADIANCE` (W/m² per channel, linear), which a
-/// program multiplies with a texture of reflectance; `_RADIOSITY` has its mean around each vertex.
-/// The file has an image for each material with `map_Ke`, else `map_Kd`, as its colour (PNG): the
-/// texture as `tone` shows it under the median light on that material. Viewers multiply it with
-/// `COLOR_0`, which is how much brighter or darker the light at a vertex shows the texture's mean.
+/// `TEXCOORD_0`, after `-s` and `-o`, and `_IRRADIANCE` (W/m² per channel, linear), to be
+/// multiplied by a texture of reflectance; `_RADIOSITY` has its mean around each vertex. The file
+/// has an image for each material with `map_Ke`, else `map_Kd`, as its colour (PNG): the texture as
+/// `tone` shows it under the median light on that material. Viewers multiply it by `COLOR_0`, the
+/// ratio of the colour of the texture's mean under the light at a vertex to that under the median
+/// light.
 ///
-/// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF means
-/// metres with +y up: nothing is turned or scaled. A scene that lies more than 16 of its sizes from
-/// the origin is moved there, and its node moves it back.
+/// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF has
+/// metres with +y up: nothing is turned or scaled. A scene more than 16 of its sizes from the
+/// origin is moved there, and its node moves it back.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
@@ -75,28 +76,29 @@ const PLACE_BYTES: u64 = 8;
 /// Bytes of an index.
 const INDEX_BYTES: u64 = 4;
 
-/// Sizes of a scene between it and the origin from which on it is moved: see [`write_glb`].
+/// Distance of a scene from the origin, in units of its size, above which it is moved: see
+/// [`write_glb`].
 const FAR_AWAY: f64 = 16.0;
 
-/// The place that positions within `bounds` are best written relative to, scene unit.
+/// Origin of the positions written for a scene with these `bounds`, scene unit.
 fn origin(bounds: Aabb) -> Vec3 {
     let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
     let far = reach > FAR_AWAY * bounds.longest_side();
     if far { bounds.centre().as_vec3() } else { Vec3::ZERO }
 }
 
-/// What is written: the surface, cut up by groups and materials.
+/// The file's content: the surface, split by groups and materials.
 struct Model<'a> {
     light: &'a GatheredMesh,
     tone: &'a ToneCurve,
     primitives: Vec<Primitive<'a>>,
     images: Images,
-    /// The place that positions are relative to, scene unit.
+    /// The point that positions are relative to, scene unit.
     origin: Vec3,
 }
 
-/// What a vertex has, in the order of the file: three floats each, but for two of texture
-/// coordinates. The last two are those of vertices that have texture coordinates.
+/// Attributes of a vertex, in the order of the file: three floats each, except two for texture
+/// coordinates. The last two are for vertices that have texture coordinates.
 #[derive(Clone, Copy, PartialEq)]
 enum Attribute {
     Position,
@@ -117,7 +119,7 @@ const ATTRIBUTES: [Attribute; 6] = [
 ];
 
 impl Attribute {
-    /// Bytes of one.
+    /// Bytes of one value.
     fn size(self) -> u64 {
         if self == Attribute::TextureCoordinates { PLACE_BYTES } else { VECTOR_BYTES }
     }
@@ -142,13 +144,13 @@ impl Model<'_> {
         ATTRIBUTES.into_iter().filter(|a| self.primitives.iter().any(|p| a.is_of(p)))
     }
 
-    /// Vertices of all primitives that have an attribute.
+    /// Number of vertices of all primitives with an attribute.
     fn vertex_count(&self, attribute: Attribute) -> u64 {
         let having = self.primitives.iter().filter(|primitive| attribute.is_of(primitive));
         having.map(|primitive| primitive.vertices.len() as u64).sum()
     }
 
-    /// Faces of all primitives.
+    /// Number of faces of all primitives.
     fn face_count(&self) -> u64 {
         self.primitives.iter().map(|primitive| primitive.faces.len() as u64).sum()
     }
@@ -185,14 +187,14 @@ impl Model<'_> {
         out.write_all(&[0; 4][..padding as usize])
     }
 
-    /// What vertex `k` of `primitive` has, as it is written.
+    /// The value of an attribute of vertex `k` of `primitive`, as written.
     fn value(&self, attribute: Attribute, primitive: &Primitive<'_>, k: usize) -> Vec3 {
         let (surface, v) = (&self.light.surface, primitive.vertices[k] as usize);
         let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3();
         let irradiance = || irradiance(self.light, primitive.vertices[k]);
         match attribute {
             Attribute::Position => (surface.positions[v] - self.origin.as_dvec3()).as_vec3(),
-            // glTF allows no other length than 1.
+            // glTF allows only length 1.
             Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
             Attribute::Colour => {
                 let image = primitive.shown.and_then(|_| self.images.get(primitive.material));

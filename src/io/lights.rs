@@ -1,13 +1,13 @@
-//! Which materials emit: `Ke`, else `Ka` above 1, and what the user says.
+//! Light sources: materials that emit by `Ke`, else by `Ka` above 1, or by the caller's settings.
 //!
-//! MTL has no statement for light. `Ke` is the radiance that a material emits by common usage; some
-//! scenes, older than that usage, give a lamp an ambient colour far above 1 instead, as Intel's
-//! Embree and what was made after its Cornell box do. Many more merely call a material "light": the
-//! warning that nothing emits names these.
+//! MTL has no statement for light. By common usage `Ke` is the radiance that a material emits; some
+//! older scenes give a lamp an ambient colour far above 1 instead, such as Intel's Embree and
+//! scenes derived from its Cornell box. Many more only name a material "light": the warning that
+//! nothing emits lists these.
 
 use crate::scene::{Material, Rgb, Sky, Warning, WarningKind};
 
-/// Words in the names that lamps are given, in lower case.
+/// Words in names of lamps, in lower case.
 const LIGHT_NAMES: [&str; 36] = [
     "light",
     "lamp",
@@ -47,23 +47,23 @@ const LIGHT_NAMES: [&str; 36] = [
     "arealight",
 ];
 
-/// Ends of words that say the same: German writes compounds as one word, as in `Deckenleuchte`.
+/// Suffixes of German compounds for lamps, such as `Deckenleuchte`.
 const LIGHT_ENDS: [&str; 2] = ["leuchte", "lampe"];
 
-/// Names of materials that look like lamps.
+/// Names of materials that suggest lamps.
 fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let is_light = |name: &&str| words(name).iter().any(|word| says_light(word));
     names.filter(is_light).collect()
 }
 
-/// Whether a word in lower case is one for a lamp, or for several.
+/// Whether a word in lower case means a lamp, or lamps.
 fn says_light(word: &str) -> bool {
     let word = word.strip_suffix('s').filter(|one| !one.is_empty()).unwrap_or(word);
     LIGHT_NAMES.contains(&word) || LIGHT_ENDS.iter().any(|end| word.ends_with(end))
 }
 
-/// The words of a name, in lower case: what other characters than letters part, and capitals that
-/// begin a word, as in `ceilingLamp` and `LEDPanel`.
+/// The words of a name, in lower case: split at characters other than letters, and before capitals,
+/// as in `ceilingLamp` and `LEDPanel`.
 fn words(name: &str) -> Vec<String> {
     let letters: Vec<char> = name.chars().collect();
     let mut words = vec![String::new()];
@@ -80,11 +80,11 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// Radiance of the sky over a scene in which nothing emits, unless said otherwise, W/(m² sr).
+/// Default radiance of the sky over a scene in which nothing emits, W/(m² sr).
 const DEFAULT_SKY: Rgb = Rgb::ONE;
 
-/// The sky over a scene of `used` materials where `wanted` is asked for; and the warning that none
-/// of them emits, if none does and no sky was asked for.
+/// The sky over a scene of `used` materials, `wanted` if given; and the warning that none of them
+/// emits, if none does and no sky was given.
 pub(super) fn sky_and_warning<'a>(
     used: impl Iterator<Item = &'a Material> + Clone,
     wanted: Option<&Sky>,
@@ -107,7 +107,7 @@ pub(super) fn sky_and_warning<'a>(
     (sky, warning)
 }
 
-/// What lights a scene without lamps, in words.
+/// The lighting of a scene without lamps, in words.
 fn under(is_black: bool) -> &'static str {
     match is_black {
         true => "left dark",

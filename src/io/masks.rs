@@ -1,21 +1,21 @@
-//! Masks that materials name (`map_d`): which texels of an image are solid, and which are holes.
+//! Masks of materials (`map_d`): solid texels and holes of an image.
 //!
-//! An alpha channel counts if it is not the same everywhere, else the luminance of the colours:
-//! either is solid from a half on. Exporters name the image of the colours as a mask where its
-//! alpha channel is meant. If it has none, dark colours are no holes, and all of it is solid.
+//! The alpha channel is used unless it is constant, else the luminance of the colours: solid from
+//! one half on. Exporters name the image of the colours as a mask if its alpha channel is meant. If
+//! it has none, dark colours are not holes, and the image is solid.
 
 use std::sync::Arc;
 
 use super::textures::{ReadMask, Textures, Unread};
 use crate::scene::texture::Texture;
 
-/// The least of 255 that is solid.
+/// Least value, of 255, that is solid.
 #[cfg(feature = "textures")]
 const HALF: u8 = 128;
 
 impl Textures<'_> {
     /// The mask in the image `name`, white where it is solid and black elsewhere, if it can be
-    /// read; none without a hole. `colours` is the image that the material has its colours from.
+    /// read; none without a hole. `colours` is the image of the material's colours.
     pub fn mask(&mut self, name: &str, colours: Option<&str>) -> ReadMask {
         let found = self.find(name)?;
         let of_colours = colours.is_some_and(|colours| self.find(colours).as_ref() == Ok(&found));

@@ -11,9 +11,10 @@
 //! | `map_Kd`, `map_Ke` | textures, multiplied by `Kd` and `Ke`: see [`super::textures`] |
 //! | `map_d` | a mask: holes where it is below a half |
 //!
-//! All others do not change diffuse light, and are skipped. tobj reads the materials, one at a time
-//! so that its large records do not pile up. It gets the statements above alone, with three finite
-//! numbers each: it gives no line for others, panics at fewer, and takes what is not finite.
+//! All other statements do not change diffuse light, and are skipped. tobj reads the materials, one
+//! at a time so that its large records do not accumulate. It gets only the statements above, with
+//! three finite numbers each: it reports no line for others, panics at fewer numbers, and accepts
+//! numbers that are not finite.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::{self, Write as _};
@@ -25,10 +26,10 @@ use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted_few, shortened};
 use crate::scene::{Rgb, Specular, Warning, WarningKind};
 
-/// Words of a `mtllib` line that are tried as one name with spaces. Chosen by hand.
+/// Maximum number of words of a `mtllib` line that are tried as one name with spaces. Plain choice.
 const MAX_WORDS: usize = 8;
 
-/// Libraries, and materials of each, that a message names. Chosen by hand.
+/// Maximum number of libraries, and of materials of each, in a message. Plain choice.
 const LIBRARIES: usize = 2;
 const CONTENTS: usize = 4;
 
@@ -43,7 +44,7 @@ pub(super) struct Library {
     redefined: BTreeSet<String>,
 }
 
-/// One `newmtl` and what follows it, as it is written.
+/// One `newmtl` and its statements, as written.
 pub(super) struct MtlMaterial {
     pub name: String,
     /// `Kd`.
@@ -56,7 +57,7 @@ pub(super) struct MtlMaterial {
     pub textures: [Option<Box<str>>; 2],
     /// `map_d`, with its options.
     pub mask: Option<Box<str>>,
-    /// `illum` and what belongs to it.
+    /// `illum` and the statements that it uses.
     pub specular: Option<Specular>,
     transparent: bool,
     /// Its `newmtl` line, and the file by index.
@@ -65,19 +66,19 @@ pub(super) struct MtlMaterial {
 }
 
 impl Library {
-    /// Index of the material that `name` stands for, with its quotes or without.
+    /// Index of the material `name`, with its quotes or without.
     pub fn find(&self, name: &str) -> Option<u32> {
         let named = |name: &str| self.by_name.get(name).copied();
         named(name).or_else(|| named(name.trim_matches('"')))
     }
 
-    /// Whether no file was found yet.
+    /// Whether no file has been loaded.
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()
     }
 
-    /// What the libraries have, for a message behind another: `; a.mtl has 'b', 'c'`. Empty where
-    /// there is none.
+    /// The materials of the libraries, for the end of a message: `; a.mtl has 'b', 'c'`. Empty if
+    /// there is no library.
     pub fn contents(&self) -> String {
         let of_file = |(file, name): (usize, &String)| {
             let names = self.materials.iter().filter(|m| m.file as usize == file);
@@ -96,8 +97,8 @@ impl Library {
         text::place(&files.path(&self.files[material.file as usize]), material.line as usize)
     }
 
-    /// Loads the files that a `mtllib` line names: one name or several, each of which may contain
-    /// spaces, with or without backslashes before them. Gives the materials by name, for tobj.
+    /// Loads the files named by a `mtllib` line: one name or several, each of which may contain
+    /// spaces, with or without backslashes before them. Returns the materials by name, for tobj.
     pub fn load(
         &mut self,
         line: &Line,
@@ -116,7 +117,7 @@ impl Library {
                 let most = MAX_WORDS.min(words.len() - at);
                 let name = |count: &usize| words[at..at + count].join(" ");
                 let known = (1..=most).rev().find(|count| files.find(&name(count)).is_some());
-                // What is missing ends where a name of a library does.
+                // A missing name ends at a word with a library's extension.
                 let ends = |word: &String| word.to_ascii_lowercase().ends_with(".mtl");
                 let to_end = words[at..].iter().position(ends).map_or(words.len() - at, |k| k + 1);
                 let count = known.unwrap_or(to_end);
@@ -131,7 +132,7 @@ impl Library {
         Ok(Ok((vec![], new.map(|(k, m)| (m.name.clone(), k)).collect())))
     }
 
-    /// Loads the library `name`, if it is there and was not loaded before.
+    /// Loads the library `name`, if it exists and was not loaded before.
     fn load_file(
         &mut self,
         line: &Line,
@@ -153,7 +154,7 @@ impl Library {
         self.take(line, &found, files, repairs)
     }
 
-    /// Takes in the file `found`, which exists, once.
+    /// Loads the existing file `found`, once.
     pub fn take(
         &mut self,
         line: &Line,
@@ -192,7 +193,7 @@ impl Library {
         Ok(())
     }
 
-    /// Has tobj read `block`, if a material begins there.
+    /// Passes `block` to tobj, if it begins with a material.
     fn push(&mut self, block: Block) {
         if block.line == 0 {
             return;
@@ -208,7 +209,7 @@ impl Library {
         }
     }
 
-    /// Warns of what `used` materials have that is not modelled, or not everywhere.
+    /// Warns of statements of `used` materials that are not modelled, or only partly.
     pub fn warn(&self, used: &HashSet<u32>, surfaces: SpecularSurfaces, repairs: &mut Repairs) {
         let names = |odd: &dyn Fn(&MtlMaterial) -> bool| {
             let all = self.materials.iter().enumerate();
@@ -246,7 +247,7 @@ fn note_missing(
     files: &FileSource,
     repairs: &mut Repairs,
 ) -> Result<(), Error> {
-    // Looks into the folder, which is not done again for each of many.
+    // Searching the folder is not repeated for each of many.
     let first = repairs.count_of(WarningKind::MissingLibrary) == 0;
     let there = if first { files.libraries() } else { String::new() };
     let done = format!("its materials are grey; {there}");
@@ -285,7 +286,7 @@ impl MtlMaterial {
         let emitted = material.unknown_param.remove("map_Ke");
         let text = |key: &str| material.unknown_param.get(key).map(String::as_str);
         let rgb = |colour: Option<[f64; 3]>| colour.map(Rgb::from_array);
-        // Files disagree about which end of `Tr` is opaque.
+        // Files differ in which end of `Tr` is opaque.
         let between = text("transparent").and_then(|t| t.parse().ok());
         let statements = SpecularStatements {
             model: material.illumination_model.unwrap_or(0),
@@ -311,15 +312,15 @@ impl MtlMaterial {
     }
 }
 
-/// The statements of one material as tobj can take them.
+/// The statements of one material in the form that tobj accepts.
 #[derive(Default)]
 struct Block {
     statements: Vec<u8>,
-    /// Of `newmtl`; 0 before the first.
+    /// Line of `newmtl`; 0 before the first.
     line: u32,
 }
 
-/// Statements that are handed on, as they are written here. Files differ in capitals.
+/// Statements passed on, spelled as here. Files differ in capitalisation.
 const STATEMENTS: [&str; 13] =
     ["newmtl", "Kd", "Ke", "Ka", "Ks", "Tf", "Ni", "d", "Tr", "illum", "map_Kd", "map_Ke", "map_d"];
 
@@ -353,7 +354,7 @@ impl Block {
                     drop(writeln!(self.statements, "transparent {transparency}"));
                 }
             }
-            // A vector takes whatever is written.
+            // Writing to a vector cannot fail.
             Some(values) => drop(writeln!(self.statements, "{known} {values}")),
             None => repairs.note(WarningKind::MaterialStatement, line, "", "passed over")?,
         }

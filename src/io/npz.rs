@@ -1,12 +1,12 @@
 //! Matrices of view factors in `.npz` files: the compressed sparse rows of SciPy.
 //!
-//! | array | numbers | |
+//! | array | numbers | content |
 //! |---|---|---|
-//! | `format`, `shape`, `indptr`, `indices`, `data` | | what `scipy.sparse.load_npz` reads |
-//! | `standard_error` | as many as `data` | of each |
-//! | `area`, `open`, `open_error`, `back`, `back_error` | one a group | |
+//! | `format`, `shape`, `indptr`, `indices`, `data` | | input of `scipy.sparse.load_npz` |
+//! | `standard_error` | as `data` | of each factor |
+//! | `area`, `open`, `open_error`, `back`, `back_error` | one per group | |
 //! | `names` | bytes | of all groups, UTF-8, a line feed between |
-//! | `absent` | 1 | what it means that a pair is not there: 0, 1 or 2 as in [`Missing`] |
+//! | `absent` | 1 | meaning of a missing pair: 0, 1 or 2 as in [`Missing`] |
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek};
@@ -20,15 +20,15 @@ use super::write_file;
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, Factor, Missing, ViewFactors};
 
-/// Bytes of the header of an array at most; that of a plain one has 128.
+/// Maximum number of bytes of the header of an array; that of a plain one has 128.
 const MAX_HEADER: usize = 512;
 
-/// Digits of a number in the header of an array at most.
+/// Maximum number of digits of a number in the header of an array.
 const MAX_DIGITS: usize = 12;
 
-/// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and beside
-/// them what it ignores: `standard_error` of each; of each group `area`, `open` and `back` with
-/// their errors; `names`, a line feed between; `absent`.
+/// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and
+/// additional arrays, which it ignores: `standard_error` of each; of each group `area`, `open` and
+/// `back` with their errors; `names`, separated by line feeds; `absent`.
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be written.
@@ -66,7 +66,7 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
     })
 }
 
-/// What the numbers of `absent` mean.
+/// Meaning of the numbers of `absent`.
 const ABSENT: [Missing; 3] = [Missing::Zero, Missing::NotSeen, Missing::Unmet];
 
 /// An `.npz` file: a zip archive of `.npy` files, none of them compressed.
@@ -76,7 +76,7 @@ impl Archive<'_> {
     /// Begins the array `name`.
     fn start(&mut self, name: &str) -> std::io::Result<()> {
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-        // Arrays of more than 4 GiB, too.
+        // Arrays may exceed 4 GiB.
         Ok(self.0.start_file(format!("{name}.npy"), options.large_file(true))?)
     }
 
@@ -105,12 +105,12 @@ impl Archive<'_> {
     }
 }
 
-/// Reads a matrix that [`write_npz`] has written, or a program that has the same arrays; without
-/// `names`, groups are called by their numbers, from 1.
+/// Reads a matrix written by [`write_npz`], or by a program with the same arrays; without `names`,
+/// groups are named by their numbers, from 1.
 ///
 /// # Errors
-/// [`ErrorKind::File`] when the file cannot be read, or an array is missing, compressed, of another
-/// type or length than it must be, or has numbers that no matrix of view factors has.
+/// [`ErrorKind::File`] when the file cannot be read, or an array is missing, compressed, of a wrong
+/// type or length, or has numbers that are not valid in a matrix of view factors.
 pub fn read_npz(path: impl AsRef<Path>) -> Result<ViewFactors, Error> {
     let path = path.as_ref();
     let file = File::open(path).map_err(|e| {
@@ -232,7 +232,7 @@ impl<R: Read + Seek> Arrays<'_, R> {
         self.numbers(name, count)
     }
 
-    /// The array `name`, of one dimension and `count` numbers if that is known.
+    /// The array `name`, of one dimension and, if given, `count` numbers.
     fn numbers<T: npyz::Deserialize>(
         &mut self,
         name: &str,
@@ -247,7 +247,7 @@ impl<R: Read + Seek> Arrays<'_, R> {
         let mut start = [0; 10];
         file.read_exact(&mut start).map_err(broken)?;
         let length = usize::from(u16::from_le_bytes([start[8], start[9]]));
-        // Version 1 has two bytes for the length; others are for headers that are long.
+        // Version 1 has two bytes for the length; later versions are for long headers.
         if !start.starts_with(b"\x93NUMPY\x01") || length > MAX_HEADER {
             return Err(wrong(name, "no plain array", "NumPy's format, version 1.0"));
         }
@@ -268,7 +268,7 @@ impl<R: Read + Seek> Arrays<'_, R> {
         let data = array.data::<T>().map_err(|e| {
             wrong(name, e.to_string(), "the type that `write_npz` writes").with_source(e)
         })?;
-        // The length may be a lie: memory grows with what is there.
+        // The length is not trusted: memory grows with the data read.
         let mut numbers = vec![];
         for number in data {
             numbers.push(number.map_err(broken)?);
@@ -277,7 +277,7 @@ impl<R: Read + Seek> Arrays<'_, R> {
     }
 }
 
-/// Whether the header of an array is that of one dimension, and has no number that is too long.
+/// Whether the header of an array is that of one dimension, without overlong numbers.
 fn is_plain(header: &[u8]) -> bool {
     let nested = header.iter().filter(|byte| b"([{".contains(byte)).count();
     let mut runs = header.split(|byte| !byte.is_ascii_digit());

@@ -1,9 +1,10 @@
 //! Scenes from Wavefront OBJ files and their MTL libraries.
 //!
 //! The `tobj` crate reads geometry, groups and materials. A pass before it ([`statements`]) numbers
-//! the lines, keeps what tobj does not tell (smoothing groups, which faces are repaired), and hands
-//! on only what tobj can take. Then faces are cut into triangles, materials completed and repaired,
-//! and the scene is made, with a warning for each kind of thing that was odd.
+//! the lines, keeps the data that tobj does not return (smoothing groups, which faces are
+//! repaired), and passes on only lines that tobj accepts. Then faces are cut into triangles,
+//! materials are completed and repaired, and the scene is built, with a warning for each kind of
+//! defect.
 
 mod faces;
 mod materials;
@@ -45,31 +46,31 @@ use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
 /// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
 /// [`crate::Material::DEFAULT_REFLECTANCE`]. `illum` 3 to 7 and 9 make mirrors and glass
-/// ([`crate::Specular`]), which pictures show; light is spread as if mirrors were their diffuse
-/// part alone, and passes glass straight on, weakened by its transmittance
+/// ([`crate::Specular`]), which pictures show; the light solution treats mirrors as their diffuse
+/// part alone, and passes glass straight on, attenuated by its transmittance
 /// ([`ObjSettings::specular`]).
 ///
-/// What is merely odd is repaired, and said in [`Scene::warnings`]: libraries under other names or
+/// Defects are repaired, and reported in [`Scene::warnings`]: libraries under other names or
 /// missing, materials that no library defines (grey), reflectances of 1 or more
 /// ([`ObjSettings::MAX_REFLECTANCE`]), polygons that cross themselves, texts in UTF-16 or Latin-1,
-/// and more; `docs/obj.md` has the whole list. [`ObjSettings`] refuses these instead, sets the
-/// ceiling, and lets materials emit.
+/// and more; `docs/obj.md` has the whole list. [`ObjSettings`] can refuse these instead, sets the
+/// largest reflectance, and makes materials emit.
 ///
 /// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below, so
-/// that a scene cannot have other files of the machine (or of its network) opened. Only regular
-/// files are read, of at most 1 GiB, as are all MTL files of a scene together. Memory stays within
-/// sixty times the size of the files.
+/// that a scene cannot open other files of the machine (or of its network). Only regular files are
+/// read, of at most 1 GiB, as are all MTL files of a scene together. Memory stays within sixty
+/// times the size of the files.
 ///
 /// # Errors
 /// [`ErrorKind::File`] for a file that cannot be read. [`ErrorKind::Scene`], with file and line,
-/// for one whose content has no meaning: coordinates that are no finite numbers, corners without a
-/// vertex, no face at all; and for a scene without a triangle that has area.
+/// for invalid content: coordinates that are not finite numbers, corners without a vertex, no face
+/// at all; and for a scene without a triangle that has area.
 pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
     ObjSettings::default().load(path)
 }
 
-/// [`load_obj`] from memory: an OBJ file of this name, for messages, and this content. `files` are
-/// the MTL files, name and content, that its `mtllib` lines may name.
+/// [`load_obj`] from memory: an OBJ file of this name, used in messages, and this content. `files`
+/// are the MTL files, name and content, that its `mtllib` lines may name.
 ///
 /// # Errors
 /// Those of [`load_obj`].
@@ -104,7 +105,7 @@ fn read_scene(
     ObjFile::read(path, text, files, repairs)?.into_scene(settings)
 }
 
-/// What the OBJ file and its libraries say.
+/// The content of the OBJ file and its libraries.
 struct ObjFile<'a> {
     path: &'a Path,
     files: &'a FileSource<'a>,
@@ -114,9 +115,9 @@ struct ObjFile<'a> {
     repairs: Repairs,
 }
 
-/// What the pass before tobj and the loader of libraries share.
+/// State shared by the pass before tobj and the loader of libraries.
 struct Reading<'a> {
-    /// The one that tobj is at.
+    /// The line that tobj reads.
     line: Line<'a>,
     statements: Statements,
     library: Library,
@@ -202,7 +203,7 @@ impl<'a> ObjFile<'a> {
         scene.with_sky(sky)
     }
 
-    /// The error that there is no face, with what there is.
+    /// The error that there is no face, with counts of the content.
     fn without_faces(&self) -> Error {
         let mut found = format!("no face, {} vertices", self.statements.vertices);
         for kind in [
@@ -224,8 +225,8 @@ impl<'a> ObjFile<'a> {
         Error::new(ErrorKind::Scene, self.path.display().to_string(), found, remedy)
     }
 
-    /// Where materials are not known and no library was found, takes one that has the name of the
-    /// OBJ file, as Blender and Assimp do.
+    /// If materials are undefined and no library was loaded, loads the one with the name of the OBJ
+    /// file, as Blender and Assimp do.
     fn find_default_library(&mut self) -> Result<(), Error> {
         let names = &self.statements.materials.list;
         if !self.library.is_empty() || names.is_empty() {
@@ -244,8 +245,8 @@ impl<'a> ObjFile<'a> {
         self.library.take(&line, &found, self.files, &mut self.repairs)
     }
 
-    /// For each name that `usemtl` lines gave, the index of its material: those of the library,
-    /// then those that no library defines, then the one of faces without a material.
+    /// For each name of `usemtl` lines, the index of its material: those of the library, then those
+    /// that no library defines, then the one of faces without a material.
     fn named_materials(&mut self) -> Result<Vec<u32>, Error> {
         let mut unknown = self.library.materials.len() as u32;
         let there = self.library.contents();

@@ -1,12 +1,12 @@
-//! Files that hold how a luminaire spreads its light: IESNA LM-63 (`.ies`), EULUMDAT (`.ldt`).
+//! Photometric files of luminaires: IESNA LM-63 (`.ies`), EULUMDAT (`.ldt`).
 //!
 //! ```text
 //! bytes ─► text ─► numbers ─► planes, unfolded by symmetry ─► IntensityDistribution
 //!                                                          └► opening, in metres
 //! ```
 //!
-//! Real files are odd. What can be understood is repaired and told ([`Photometry::warnings`]); what
-//! cannot is refused with its line.
+//! Real files have defects. Those that can be interpreted are repaired and reported
+//! ([`Photometry::warnings`]); others are refused with their line.
 
 mod eulumdat;
 mod lm_63;
@@ -22,24 +22,24 @@ use super::files;
 use crate::error::{Error, ErrorKind};
 use crate::scene::{IntensityDistribution, Luminaire, Opening};
 
-/// Bytes that a file may have: five times those of one with 361 × 181 values.
+/// Maximum number of bytes of a file: five times those of one with 361 × 181 values.
 const MAX_BYTES: u64 = 1 << 22;
 
-/// What a photometric file says of a luminaire.
+/// The luminaire of a photometric file.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Photometry {
-    /// What it is called, as the file has it; may be empty.
+    /// Name in the file; may be empty.
     pub name: String,
     /// Intensity by direction, cd.
     pub intensity: Arc<IntensityDistribution>,
-    /// What of it shines, metres.
+    /// Luminous opening, metres.
     pub opening: Opening,
-    /// Flux that the file says its lamps have, lm; none where intensities are absolute.
+    /// Flux of the lamps as given in the file, lm; none if intensities are absolute.
     pub lamp_flux: Option<f64>,
-    /// Electric power, W; 0 where the file does not say.
+    /// Electric power, W; 0 if the file does not give it.
     pub power: f64,
-    /// What was odd, and what was made of it.
+    /// Defects and their repairs.
     pub warnings: Vec<String>,
 }
 
@@ -53,15 +53,15 @@ impl Photometry {
 }
 
 /// Reads an IESNA LM-63 file of 1986 to 2019, of any photometric type, or a EULUMDAT file; the
-/// content says which of them it is.
+/// format is detected from the content.
 ///
 /// Intensities become candela: of LM-63 times the multiplier and the ballast's factors; of
-/// EULUMDAT, which has them per 1000 lm, times the flux of the first set of lamps. Light from them
-/// is in lumens and lux: then all numbers of the scene should be photometric, `Ke` in cd/m².
+/// EULUMDAT, which has them per 1000 lm, times the flux of the first set of lamps. Their light is
+/// in lumens and lux: then all numbers of the scene should be photometric, `Ke` in cd/m².
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be read or has more than 4 MiB; [`ErrorKind::Scene`]
-/// with its line for what is no such file, ends early, or has numbers without a meaning.
+/// with its line if it is of neither format, ends early, or has invalid numbers.
 pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
     let path = path.as_ref();
     let bytes = files::read_bytes(path, MAX_BYTES).map_err(|e| {
@@ -85,7 +85,7 @@ pub fn photometry_from_bytes(name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<P
     }
 }
 
-/// At most so many characters of a name are kept.
+/// Maximum number of characters of a name that are kept.
 const MAX_NAME: usize = 100;
 
 /// `text` as a name.

@@ -1,4 +1,4 @@
-//! PLY out: the mesh with radiosity, for other programs.
+//! PLY output: the mesh with radiosity, for other programs.
 
 use std::fmt;
 use std::io::Write;
@@ -14,14 +14,13 @@ use crate::vertex::VertexMesh;
 /// Writes `surface` as binary little-endian PLY.
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit), `radiosity_r radiosity_g radiosity_b`
-/// (float, W/m² per channel, linear), `irradiance_r irradiance_g irradiance_b` (the same; what a
-/// program multiplies with its own textures; 0 in channels that a material does not reflect), `red
-/// green blue` (uchar, the radiosity tone-mapped for viewers), and, where it is known, `error`
-/// (float, W/m²: how far the radiosity may be off, a length over the channels). Faces:
-/// `vertex_indices`, triangles, counter-clockwise from the front. The surface's comments are in the
-/// header.
+/// (float, W/m² per channel, linear), `irradiance_r irradiance_g irradiance_b` (the same; for
+/// multiplication by textures; 0 in channels that a material does not reflect), `red green blue`
+/// (uchar, the radiosity tone-mapped for viewers), and, if estimated, `error` (float, W/m²: the
+/// error of the radiosity, a length over the channels). Faces: `vertex_indices`, triangles,
+/// counter-clockwise from the front. The surface's comments are in the header.
 ///
-/// Where 32 bits do not do, numbers are double: `x y z` of a mesh more than 16 of its sizes from
+/// If 32 bits do not suffice, numbers are double: `x y z` of a mesh more than 16 of its sizes from
 /// the origin, and the radiosity and its error if the largest is above 3.4e38 or below 1e-30 W/m².
 ///
 /// # Errors
@@ -56,7 +55,7 @@ pub fn write_ply_with_tone(
         for name in ["red", "green", "blue"] {
             writeln!(out, "property uchar {name}")?;
         }
-        // An error a vertex, or none at all.
+        // One error per vertex, or none at all.
         if errors {
             writeln!(out, "property {light} error")?;
         }
@@ -68,7 +67,7 @@ pub fn write_ply_with_tone(
                 vector.to_array().into_iter().try_for_each(|x| width.write(out, x))?;
             }
             if irradiances {
-                // A reflectance next to none makes it larger than any float.
+                // A reflectance close to 0 makes it larger than any float.
                 let irradiance = surface.irradiance[v].min(Rgb::splat(light.most()));
                 irradiance.to_array().into_iter().try_for_each(|x| light.write(out, x))?;
             }
@@ -81,8 +80,8 @@ pub fn write_ply_with_tone(
     })
 }
 
-/// Begins a file of `surface`: its comments after that of the `units`, and the vertices' positions,
-/// of this width, and normals.
+/// Begins a file of `surface`: its comments after that of the `units`, and the properties of
+/// positions, of this width, and normals.
 pub(super) fn write_header(
     out: &mut dyn Write,
     surface: &VertexMesh,
@@ -92,7 +91,7 @@ pub(super) fn write_header(
     writeln!(out, "ply\nformat binary_little_endian 1.0")?;
     writeln!(out, "comment {units}")?;
     for comment in &surface.comments {
-        // A header is ASCII, a line an entry.
+        // A header is ASCII, one line per entry.
         let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
         writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
     }
@@ -123,14 +122,14 @@ pub(super) enum Width {
 }
 
 impl Width {
-    /// Floats, where their steps are below a millionth of the mesh's size.
+    /// Floats, if their steps are below a millionth of the mesh's size.
     pub fn of_positions(surface: &VertexMesh) -> Width {
         let bounds = Aabb::from_points(surface.positions.iter().copied());
         let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
         Width::of(largest, largest <= 16.0 * bounds.longest_side())
     }
 
-    /// Floats, where they hold the largest value and what is a hundred million times dimmer.
+    /// Floats, if they represent the largest value and one of 1e-8 times that.
     fn of_light(surface: &VertexMesh, errors: bool) -> Width {
         let brightest = surface.radiosity.iter().map(|b| b.max_element());
         let told = surface.error.iter().copied().filter(|_| errors);

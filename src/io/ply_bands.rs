@@ -1,4 +1,4 @@
-//! PLY out with a property for each band.
+//! PLY output with a property for each band.
 
 use std::io::Write;
 use std::path::Path;
@@ -13,10 +13,10 @@ use crate::io::tone::ToneCurve;
 ///
 /// Vertices: `x y z nx ny nz` (float, the scene's unit) and, for each band by its name,
 /// `radiosity_NAME`, `irradiance_NAME` and `error_NAME`, the standard error of the radiosity by
-/// noise (float, W/m² or W/(m² nm)); where all bands have wavelengths also `red green blue` (uchar,
-/// the colours that they add up to, for viewers, by `tone` of radiosity or one that fits). Faces:
-/// `vertex_indices`, triangles, counter-clockwise from the front. Where 32 bits do not do, numbers
-/// are double, as in [`write_ply`](crate::write_ply).
+/// noise (float, W/m² or W/(m² nm)); if all bands have wavelengths also `red green blue` (uchar,
+/// the colours of the spectrum, for viewers, by `tone` of radiosity or one that fits). Faces:
+/// `vertex_indices`, triangles, counter-clockwise from the front. If 32 bits do not suffice,
+/// numbers are double, as in [`write_ply`](crate::write_ply).
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -26,7 +26,7 @@ pub fn write_ply_bands(
     tone: Option<&ToneCurve>,
 ) -> Result<(), Error> {
     let BandLight { bands, surface, radiosity, irradiance, noise, .. } = light;
-    // Bands that are no spectrum have no colours.
+    // Bands without wavelengths have no colours.
     let colours = light.colours().ok().map(|colours| colours.radiosity);
     let fitted = ToneCurve::fit(colours.as_deref().unwrap_or_default());
     let tone = tone.unwrap_or(&fitted);

@@ -1,4 +1,4 @@
-//! PLY in: a mesh with radiosity, as the crate or another program wrote it.
+//! PLY input: a mesh with radiosity, written by the crate or another program.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use crate::error::{Error, ErrorKind, quoted, shortened};
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 
-/// Bytes that a PLY file may have.
+/// Maximum number of bytes of a PLY file.
 const MAX_BYTES: u64 = 1 << 32;
 
-/// Properties of a vertex: first those that it must have.
+/// Properties of a vertex, the required ones first.
 const NAMES: [&str; 13] = [
     "x",
     "y",
@@ -33,7 +33,7 @@ const NAMES: [&str; 13] = [
     "error",
 ];
 
-/// How many of them it must have.
+/// Number of required properties.
 const NEEDED: usize = 6;
 
 /// Reads a mesh as [`write_ply`](super::write_ply) writes it, in ASCII or binary of either order.
@@ -46,8 +46,8 @@ const NEEDED: usize = 6;
 ///
 /// # Errors
 /// - [`ErrorKind::File`] when the file cannot be read, or has more than 4 GiB.
-/// - [`ErrorKind::Scene`] when it is malformed, a property is missing, a number is not finite, or a
-///   face has fewer than three vertices or one that there is not.
+/// [`ErrorKind::Scene`] when it is malformed, a property is missing, a number is not finite, or a
+/// face has fewer than three vertices or one that does not exist.
 pub fn read_ply(path: impl AsRef<Path>) -> Result<VertexMesh, Error> {
     let path = path.as_ref();
     let bytes = files::read_bytes(path, MAX_BYTES).map_err(|e| {
@@ -91,11 +91,11 @@ fn parse(bytes: &[u8]) -> Result<VertexMesh, Error> {
     Ok(mesh)
 }
 
-/// Whether as many of `element` as the header claims can be in a file of `bytes`.
+/// Checks whether the number of `element` in the header fits a file of `bytes`.
 fn check(element: &ElementDef, encoding: Encoding, bytes: u64) -> Result<(), Error> {
     let ElementDef { name, count, properties } = element;
     let size = |scalar: &ScalarType| match (encoding, scalar) {
-        // A digit and what parts it from the next.
+        // A digit and a separator.
         (Encoding::Ascii, _) => 2,
         (_, ScalarType::Char | ScalarType::UChar) => 1,
         (_, ScalarType::Short | ScalarType::UShort) => 2,
@@ -163,7 +163,7 @@ fn wrong(place: String, found: String, remedy: &str) -> Error {
     Error::new(ErrorKind::Scene, place, found, remedy)
 }
 
-/// The parser says where by line, and its first line says what.
+/// The parser reports the line, and the cause in the first line of its message.
 fn malformed(e: ParseError) -> Error {
     let text = e.to_string();
     let (what, _) = text.split_once('\n').unwrap_or((&text, ""));
@@ -173,7 +173,7 @@ fn malformed(e: ParseError) -> Error {
     wrong(place, found, "give a PLY file, ASCII or binary, that is whole").with_source(e)
 }
 
-/// The numbers of a vertex, as [`NAMES`] has them.
+/// The numbers of a vertex, in the order of [`NAMES`].
 struct Vertex([f64; NAMES.len()]);
 
 impl PropertyAccess for Vertex {
@@ -228,7 +228,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// What is of no use here.
+/// Unused elements.
 struct Skipped;
 
 impl PropertyAccess for Skipped {

@@ -1,4 +1,4 @@
-//! PNG out: tone-mapped colours for viewing.
+//! PNG output: tone-mapped colours for viewing.
 
 use std::path::Path;
 

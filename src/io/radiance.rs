@@ -1,4 +1,4 @@
-//! Pictures of radiance in: OpenEXR and Radiance's RGBE, as they are taken around a place.
+//! Input of radiance images: OpenEXR and Radiance's RGBE, such as environment maps.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -7,8 +7,8 @@ use super::files::{self, MAX_BYTES};
 use crate::error::{Error, ErrorKind};
 use crate::scene::Rgb;
 
-/// Reads a picture of linear radiance, OpenEXR (`.exr`) or Radiance (`.hdr`, `.pic`): pixels in a
-/// line, and all pixels line by line from the top, as in the file. What is below 0 becomes 0. For
+/// Reads a picture of linear radiance, OpenEXR (`.exr`) or Radiance (`.hdr`, `.pic`): pixels per
+/// line, and all pixels line by line from the top, as in the file. Negative values become 0. For
 /// [`Sky::picture`](crate::Sky::picture).
 ///
 /// # Errors

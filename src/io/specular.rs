@@ -1,52 +1,50 @@
-//! Which materials of MTL files are mirrors and glass.
+//! Mirrors and glass in materials of MTL files.
 //!
 //! `illum` names a model (Wavefront, "Advanced Visualizer" 3.0, appendix B1, "Illumination
-//! models").
-//! Many programs write it without meaning it, and values that belong to it by default:
+//! models"). Many programs write it, and the values that it uses, by default:
 //!
 //! | `illum` | counts as | if |
 //! |---|---|---|
 //! | 3 | mirror of reflectance `Ks` | `Ks` is above 0 |
 //! | 5 | polished: `Ks` at normal incidence, more from the side | `Ks` is above 0 |
-//! | 4, 9 | glass that lets 1 − `d` through; without a `d` below 1, 1 − `Tf` | that is above 0 |
-//! | 6, 7 | glass that lets (1 − `d`) `Tf` through; without a `d` below 1, `Tf` | see below |
-//! | others, none | what it is without: diffuse | |
+//! | 4, 9 | glass of transmittance 1 − `d`; without a `d` below 1, 1 − `Tf` | that is above 0 |
+//! | 6, 7 | glass of transmittance (1 − `d`) `Tf`; without a `d` below 1, `Tf` | see below |
+//! | others, none | diffuse | |
 //!
-//! - Where there is no `d` below 1, a `Tr` between 0 and 1 counts as 1 − `d`. Files disagree about
-//!   which end of `Tr` is opaque, so that 0 and 1 say nothing.
-//! - 4 without `d` is what Maya writes for all that it has, with a `Tf` of 1 for what is opaque and
-//!   of 0 for what is clear.
-//! - In 6 and 7 a `Tf` of 0 or of 1 in all channels says nothing, and counts as 1. Where `d` says
-//!   nothing either, the material is glass only if there is no `d` and `Ni` is above 1.
+//! - Without a `d` below 1, a `Tr` between 0 and 1 counts as 1 − `d`. Files differ in which end of
+//!   `Tr` is opaque, so that 0 and 1 are ignored.
+//! - Maya writes 4 without `d` for all materials, with a `Tf` of 1 for opaque and of 0 for clear
+//!   ones.
+//! - In 6 and 7 a `Tf` of 0 or of 1 in all channels is ignored, and counts as 1. If `d` is ignored
+//!   too, the material is glass only if there is no `d` and `Ni` is above 1.
 //! - `Ni` is the refractive index if it is above 1 and at most 5; else that of window glass, 1.5.
-//! - Channels of `Ks` and `Tf` count as 0 below 0 and as 1 above 1. `Ns` does not count: what
-//!   is a mirror is a perfect one.
+//! - Channels of `Ks` and `Tf` are clamped to [0, 1]. `Ns` is ignored: all mirrors are perfect.
 //!
-//! The diffuse part of a mirror or glass is `Kd`, as far as it leaves room for that: in each
-//! channel both together reflect no more than they get. Without a `Kd` there is none. Glass that
-//! light passes ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` says: in files it is the
-//! colour of a preview more often than a haze.
+//! The diffuse part of a mirror or glass is `Kd`, limited in each channel so that both together
+//! reflect no more than they receive. Without a `Kd` there is none. Glass that light passes
+//! ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` is: in files it is the colour of a preview
+//! more often than a haze.
 
 use crate::scene::{Rgb, Specular};
 
-/// What the light that is spread takes mirrors and glass for.
+/// Treatment of mirrors and glass in the light solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum SpecularSurfaces {
-    /// Mirrors for their diffuse part; glass for clear panes, which light passes straight on,
-    /// weakened by the transmittance: its diffuse part does not count. Pictures show both.
+    /// Mirrors as their diffuse part; glass as clear panes, which light passes straight on,
+    /// attenuated by the transmittance: its diffuse part is ignored. Pictures show both.
     #[default]
     Clear,
-    /// For their diffuse part: glass blocks light. Pictures show it with mirrors and glass.
+    /// Both as their diffuse part: glass blocks light. Pictures show mirrors and glass.
     Diffuse,
-    /// For black. Pictures show mirrors and glass without a diffuse part.
+    /// Both as black. Pictures show mirrors and glass without a diffuse part.
     Black,
-    /// `illum` does not count: all is diffuse, also in pictures.
+    /// `illum` is ignored: all is diffuse, also in pictures.
     Ignore,
 }
 
 impl SpecularSurfaces {
-    /// What is done about mirrors and glass, for a warning.
+    /// The treatment of mirrors and glass, for a warning.
     pub fn treatment(self) -> &'static str {
         match self {
             SpecularSurfaces::Clear => {
@@ -61,7 +59,7 @@ impl SpecularSurfaces {
     }
 }
 
-/// What a material says of these, as it is written; nothing where it cannot be read.
+/// Statements of a material about mirrors and glass, as written; none if unreadable.
 pub(super) struct SpecularStatements {
     /// `illum`.
     pub model: u8,
@@ -81,7 +79,7 @@ pub(super) struct SpecularStatements {
 const WINDOW_GLASS: f64 = 1.5;
 
 impl SpecularStatements {
-    /// The mirror or glass that they describe.
+    /// The mirror or glass of these statements.
     pub fn surface(&self) -> Option<Specular> {
         let share = |colour: Rgb| colour.clamp(Rgb::ZERO, Rgb::ONE);
         let reflectance = share(self.specular.unwrap_or(Rgb::ZERO));
@@ -109,7 +107,7 @@ impl SpecularStatements {
         (transmittance != Rgb::ZERO).then_some(Specular::Glass { refractive_index, transmittance })
     }
 
-    /// How much `d` or `Tr` lets through, if either says that anything passes.
+    /// Transmittance by `d` or `Tr`, if either is transparent.
     fn clearness(&self) -> Option<Rgb> {
         let by_dissolve = self.dissolve.filter(|&d| d < 1.0).map(|d| 1.0 - d.max(0.0));
         by_dissolve.or(self.transparency).map(Rgb::splat)
@@ -157,7 +155,7 @@ mod tests {
             |n, transmittance| Some(Specular::Glass { refractive_index: n, transmittance });
         let glass = |n, t| tinted(n, Rgb::splat(t));
         for (text, want) in [
-            // Those of the format's own description.
+            // Examples of the format's own description.
             ("illum 3, Ks 0 1 0", mirror(Rgb::Y)),
             ("illum 4, Ks 0.9, d 0.1", glass(1.5, 0.9)),
             ("illum 5, Ks 0.618 0.876 0.143", polished(Rgb::new(0.618, 0.876, 0.143))),
@@ -171,11 +169,11 @@ mod tests {
             ("illum 6, d 0.5, Tf 1 0.5 0.5", tinted(1.5, Rgb::new(0.5, 0.25, 0.25))),
             ("illum 4, d 0", glass(1.5, 1.0)),
             ("illum 4, Tr 0.75", glass(1.5, 0.75)),
-            // What Maya writes: opaque, clear, half.
+            // Maya's output: opaque, clear, half.
             ("illum 4, Tf 1, Ni 1, Ks 0.5", None),
             ("illum 4, Tf 0, Ni 1.8, Ks 1", glass(1.8, 1.0)),
             ("illum 4, Tf 0.5, Ni 1", glass(1.5, 0.5)),
-            // Written without being meant.
+            // Written by default.
             ("illum 4, Ks 0", None),
             ("illum 4, d 1, Ni 1", None),
             ("illum 4, Ni 42, Tf 1", None),

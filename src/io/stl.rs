@@ -1,14 +1,14 @@
-//! STL files, ASCII and binary, as OBJ text: what reads OBJ files reads them from there on.
+//! STL files, ASCII and binary, converted to OBJ text, which the OBJ reader reads.
 //!
 //! | STL | OBJ |
 //! |---|---|
 //! | `solid NAME` | `g NAME` |
-//! | `vertex x y z` | `v x y z`, the digits as they are |
-//! | `endloop` | `f` with the vertices since the last |
+//! | `vertex x y z` | `v x y z`, with the same digits |
+//! | `endloop` | `f` with the vertices since the last one |
 //!
-//! Of an ASCII file each line becomes one, so that messages name the file's own lines. Normals are
-//! only looked at; the front is where corners run counter-clockwise, as the format has it
-//! (3D Systems, "StereoLithography Interface Specification", 1989).
+//! Each line of an ASCII file becomes one line, so that messages name the file's own lines. Normals
+//! are only checked; the front is where corners run counter-clockwise, as the format defines it (3D
+//! Systems, "StereoLithography Interface Specification", 1989).
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -21,13 +21,13 @@ use super::text::{place, words};
 use crate::error::{Error, ErrorKind};
 use crate::scene::WarningKind;
 
-/// Bytes before the triangles of a binary file: a comment of 80, and how many there are.
+/// Bytes before the triangles of a binary file: a comment of 80, and the number of triangles.
 const HEADER: usize = 84;
 
-/// Bytes of a triangle: normal and corners, 12 floats, and two of no fixed meaning.
+/// Bytes of a triangle: normal and corners, 12 floats, and two undefined bytes.
 const TRIANGLE: usize = 50;
 
-/// Bytes from which it is told what a file is.
+/// Number of bytes used for detecting the format.
 const FIRST_BYTES: usize = 1024;
 
 /// Whether `path` has the extension of STL files.
@@ -35,13 +35,13 @@ pub(super) fn is_stl(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl"))
 }
 
-/// OBJ text of the STL file `path` with this content, and its encoding where that is not UTF-8.
+/// OBJ text of the STL file `path` with this content, and its encoding if that is not UTF-8.
 pub(super) fn to_obj(
     path: &Path,
     bytes: Vec<u8>,
     repairs: &mut Repairs,
 ) -> Result<(String, Option<&'static str>), Error> {
-    // Binary ones may begin with `solid` too, but have the length that they say.
+    // Binary files may begin with `solid` too, but have the length given by their count.
     let said = bytes
         .get(HEADER - 4..HEADER)
         .map_or(0, |count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize);
@@ -67,7 +67,7 @@ fn is_ascii(bytes: &[u8]) -> bool {
     !first.contains('\0') && (begins || first.contains("facet"))
 }
 
-/// A facet of which not all is read.
+/// A facet that is being read.
 #[derive(Default)]
 struct Facet {
     normal: DVec3,
@@ -75,7 +75,7 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether its normal says that its front is at the other side.
+    /// Whether its normal points away from its front.
     fn is_opposed(&self) -> bool {
         let [a, b, c, ..] = self.corners[..] else { return false };
         (b - a).cross(c - a).dot(self.normal) < 0.0
@@ -115,7 +115,7 @@ fn of_ascii(path: &Path, text: &str, repairs: &mut Repairs) -> Result<String, Er
                 facet.corners.clear();
             }
             "outer" | "endloop" | "endfacet" | "endsolid" | "" => {}
-            // A line that OBJ has no meaning for either.
+            // A line that the OBJ reader ignores too.
             _ => emit(&mut obj, format_args!("stl {}", line.trim_end_matches('\\'))),
         }
         obj.push('\n');
@@ -128,7 +128,7 @@ fn of_ascii(path: &Path, text: &str, repairs: &mut Repairs) -> Result<String, Er
     Ok(obj)
 }
 
-/// Of the bytes after the header, which `said` how many triangles there are.
+/// Triangles of a binary file from the bytes after the header, which gives their number as `said`.
 fn of_binary(
     path: &Path,
     bytes: &[u8],
@@ -136,7 +136,7 @@ fn of_binary(
     repairs: &mut Repairs,
 ) -> Result<String, Error> {
     let there = bytes.len() / TRIANGLE;
-    // Writers that cannot go back leave the count at 0.
+    // Writers that cannot seek leave the count at 0.
     let count = if said == 0 { there } else { said.min(there) };
     if said != there || !bytes.len().is_multiple_of(TRIANGLE) {
         let done =
@@ -177,7 +177,7 @@ fn note_opposed(repairs: &mut Repairs, place: impl Fn() -> String) -> Result<(),
     repairs.note_at(WarningKind::OpposedNormal, place, "", done)
 }
 
-/// Appends text; a string takes whatever is written.
+/// Appends text; writing to a string cannot fail.
 fn emit(obj: &mut String, text: std::fmt::Arguments) {
     let _ = obj.write_fmt(text);
 }

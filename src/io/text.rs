@@ -27,7 +27,7 @@ impl Line<'_> {
         place(self.file, self.number)
     }
 
-    /// The error that `found` stands in this line where `remedy` would be right.
+    /// The error `found` at this line, with its `remedy`.
     pub fn parse_error(&self, found: impl Display, remedy: impl Into<String>) -> Error {
         self.parse_error_as(ErrorKind::Scene, found, remedy)
     }
@@ -54,15 +54,14 @@ pub(super) fn place(file: &Path, line: usize) -> String {
     format!("{}:{line}", file.display())
 }
 
-/// The lines of `text` as they stand; it ends them with LF, CRLF or CR. A byte-order mark is
-/// skipped.
+/// The physical lines of `text`, ending with LF, CRLF or CR. A byte-order mark is skipped.
 pub(super) fn physical_lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
     let end = if text.contains('\n') { '\n' } else { '\r' };
     let lines = text.strip_prefix('\u{feff}').unwrap_or(text).split(end);
     lines.zip(1..).map(move |(text, number)| Line { file, number, text: text.trim().into() })
 }
 
-/// The same, with the next line joined to one that ends with a backslash.
+/// The same, with lines joined to the next at a trailing backslash.
 pub(super) fn lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = Line<'a>> {
     let mut physical = physical_lines(file, text);
     std::iter::from_fn(move || {

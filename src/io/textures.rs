@@ -1,7 +1,7 @@
 //! Textures that materials name: `map_Kd`, `map_Ke` and `map_d` with their options, and the images.
 //!
-//! Images are PNG, JPEG, BMP or TGA, all of which hold sRGB. They are looked for as libraries are
-//! ([`super::files`]). What an image claims to be is checked before memory is taken for it.
+//! Images are PNG, JPEG, BMP or TGA, all of which hold sRGB. They are searched like libraries
+//! ([`super::files`]). The declared size of an image is checked before memory is allocated for it.
 
 use std::collections::HashMap;
 #[cfg(feature = "textures")]
@@ -17,32 +17,32 @@ use crate::error::shortened;
 use crate::scene::WarningKind;
 use crate::scene::texture::Texture;
 
-/// Texels that all images of a scene may have together: each takes up to 15 bytes while it is
-/// read, and 7 from then on. Chosen by hand.
+/// Maximum number of texels of all images of a scene together: each takes up to 15 bytes while it
+/// is read, and 7 from then on. Plain choice.
 #[cfg(feature = "textures")]
 const MAX_TEXELS: u64 = 1 << 27;
 
-/// Bytes that the file of an image may have. Chosen by hand.
+/// Maximum number of bytes of an image file. Plain choice.
 #[cfg(feature = "textures")]
 const MAX_IMAGE_BYTES: u64 = 1 << 28;
 
-/// Texels that an image may have along a side. Chosen by hand.
+/// Maximum number of texels along a side of an image. Plain choice.
 #[cfg(feature = "textures")]
 const MAX_SIDE: u32 = 1 << 15;
 
-/// Texels that a byte of a PNG file can stand for at most: deflate makes up to 1032 bytes of one
-/// (258 of two bits: RFC 1951, 3.2.5), of eight texels each.
+/// Maximum number of texels per byte of a PNG file: deflate expands a byte to at most 1032 (258
+/// from two bits: RFC 1951, 3.2.5), of eight texels each.
 #[cfg(feature = "textures")]
 const PNG_TEXELS: u64 = 8 * 1032;
 
-/// The same of the others: JPEG has at least a bit for each 8 × 8 texels (ITU-T T.81, F and G), BMP
-/// and TGA have two bytes for each run of up to 255 and 128. A file of a hundred bytes is thus not
-/// taken for one of 10 000 × 10 000 texels that breaks off.
+/// The same for the others: JPEG has at least a bit for each 8 × 8 texels (ITU-T T.81, F and G),
+/// BMP and TGA have two bytes for each run of up to 255 and 128. So a file of a hundred bytes
+/// cannot pass as a truncated one of 10 000 × 10 000 texels.
 #[cfg(feature = "textures")]
 const OTHER_TEXELS: u64 = 512;
 
-/// Bytes that colour profiles and texts of a PNG may have together when they are unpacked, which is
-/// done before its size is known. Chosen by hand: profiles have some kilobytes.
+/// Maximum total number of bytes of unpacked colour profiles and texts of a PNG, which are read
+/// before its size is known. Plain choice: profiles have some kilobytes.
 #[cfg(feature = "textures")]
 const MAX_ANCILLARY_BYTES: u64 = 1 << 24;
 
@@ -107,14 +107,15 @@ pub(super) type ReadMask = Result<Option<Arc<Texture>>, Unread>;
 pub(super) struct Textures<'a> {
     files: &'a FileSource<'a>,
     known: HashMap<String, Result<Arc<Texture>, Unread>>,
-    /// Masks by name, and whether the material has its colours from there: see [`super::masks`].
+    /// Masks by name, and whether it is also the image of the material's colours: see
+    /// [`super::masks`].
     pub(super) masks: HashMap<(String, bool), ReadMask>,
-    /// Texels that may yet be read.
+    /// Remaining number of texels.
     #[cfg(feature = "textures")]
     texels_left: u64,
 }
 
-/// Why an image is not used: what it is, and a reason for the kinds that have several.
+/// Why an image is not used: the kind, and a reason for kinds that have several.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unread {
     pub kind: WarningKind,
@@ -132,13 +133,13 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// Where the image `name` is.
+    /// Path of the image `name`.
     pub(super) fn find(&self, name: &str) -> Result<String, Unread> {
         let missing = Unread { kind: WarningKind::MissingTexture, reason: None };
         self.files.find(name).ok_or(missing)
     }
 
-    /// The image `name`, if it is there and can be read.
+    /// The image `name`, if it exists and is readable.
     pub fn get(&mut self, name: &str) -> Result<Arc<Texture>, Unread> {
         let found = self.find(name)?;
         if let Some(known) = self.known.get(&found) {
@@ -157,7 +158,7 @@ impl<'a> Textures<'a> {
         Texture::new(width, height, texels).ok_or_else(|| Unread::unreadable("no texels"))
     }
 
-    /// The image that was found there, if the limits let it in.
+    /// The image at this path, if within the limits.
     #[cfg(feature = "textures")]
     pub(super) fn decode(&mut self, found: &str) -> Result<image::DynamicImage, Unread> {
         let bytes = self.files.read(found, MAX_IMAGE_BYTES).map_err(|e| match e.kind() {
@@ -169,7 +170,7 @@ impl<'a> Textures<'a> {
         if let Ok(format) = image::ImageFormat::from_path(found) {
             reader.set_format(format);
         }
-        // Some are called .png and are none; TGA cannot be told by its content.
+        // Some files named .png have another format; TGA has no signature.
         let mut reader = reader.with_guessed_format().map_err(Unread::unreadable)?;
         let is_png = reader.format() == Some(image::ImageFormat::Png);
         let mut limits = image::Limits::default();
@@ -183,7 +184,7 @@ impl<'a> Textures<'a> {
         Ok(image)
     }
 
-    /// Whether an image may be so large, whose file has bytes enough for `most` texels.
+    /// Checks the size of an image whose file has bytes for at most `most` texels.
     #[cfg(feature = "textures")]
     fn check(&self, width: u32, height: u32, most: u64) -> Result<(), Unread> {
         let texels = u64::from(width) * u64::from(height);
@@ -211,7 +212,7 @@ impl<'a> Textures<'a> {
 }
 
 impl Unread {
-    /// Its reason, and what is `done`.
+    /// Its reason, and the treatment `done`.
     pub fn and_so(&self, done: &str) -> String {
         self.reason.as_ref().map_or(done.into(), |reason| format!("{reason}; {done}"))
     }
@@ -284,7 +285,7 @@ mod tests {
         assert_eq!(unread.kind, WarningKind::LargeTexture);
         let reason = unread.reason.clone().unwrap();
         assert!(reason.starts_with("9 × 9 texels") && reason.contains("134217728"), "{reason}");
-        // Those that still fit are read, and each counts once.
+        // Images that still fit are read, and each counts once.
         assert_eq!(size("c.tga"), Ok([3, 3]));
         assert_eq!(
             [size("b.tga"), size("a.tga"), size("c.tga")],

@@ -1,13 +1,13 @@
-//! Files of view factors: tables out, and rows that are done out and in.
+//! Files of view factors: output of tables, input and output of finished rows.
 //!
 //! | function | file | zeros | errors |
 //! |---|---|---|---|
-//! | [`write_csv_matrix`] | CSV, one row a group: for spreadsheets | `0` | no |
-//! | [`write_csv_list`] | CSV, one line a nonzero | left out | yes |
-//! | [`write_matrix_market`] | Matrix Market, one line a nonzero | left out | no |
-//! | [`write_rows`], [`read_rows`] | some of the rows, of no other use | left out | yes |
+//! | [`write_csv_matrix`] | CSV, one row per group: for spreadsheets | `0` | no |
+//! | [`write_csv_list`] | CSV, one line per nonzero | left out | yes |
+//! | [`write_matrix_market`] | Matrix Market, one line per nonzero | left out | no |
+//! | [`write_rows`], [`read_rows`] | some of the rows, for resuming only | left out | yes |
 //!
-//! In all of them the group that leaves comes first: rows leave, columns receive. Areas are in the
+//! In all of them the emitting group comes first: rows emit, columns receive. Areas are in the
 //! scene's length unit squared, factors are dimensionless.
 
 use std::io::Write;
@@ -17,10 +17,10 @@ use super::{cannot_write, write_file};
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 
-/// Writes the matrix as CSV: a header row and a first column of names, row leaves, column receives;
-/// then `open`, what leaves the scene, `back`, what meets the backs of surfaces, and the `area` of
-/// each row's group. Values have nine decimals; below 1e-5, five digits. Zero is `0`; what is
-/// merely not seen is left empty.
+/// Writes the matrix as CSV: a header row and a first column of names, rows emit, columns receive;
+/// then `open`, the fraction that leaves the scene, `back`, the fraction that hits backs of
+/// surfaces, and the `area` of each row's group. Values have nine decimals; below 1e-5, five
+/// digits. Zero is `0`; pairs not seen by any pixel or ray are left empty.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -46,9 +46,10 @@ pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<
     })
 }
 
-/// Writes every nonzero as a line of CSV, with its standard error beside it, rounding of the value
-/// as it is printed included: for matrices with many zeros, and for errors. After the groups that a
-/// group sees come `open`, what leaves the scene, and `back`, what meets the backs of surfaces.
+/// Writes every nonzero as a line of CSV with its standard error, rounding of the printed value
+/// included: for matrices with many zeros, and for errors. After the groups that a group sees come
+/// `open`, the fraction that leaves the scene, and `back`, the fraction that hits backs of
+/// surfaces.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -78,8 +79,8 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
     })
 }
 
-/// Writes rows that are done, for [`read_rows`]. Whenever this is cut short, the file is either
-/// what it was or what it was to be.
+/// Writes finished rows, for [`read_rows`]. If interrupted, the file has either its old or its new
+/// content.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
@@ -90,10 +91,10 @@ pub fn write_rows(path: impl AsRef<Path>, rows: &PartialMatrix) -> Result<(), Er
     std::fs::rename(&temporary, path).map_err(|e| cannot_write(path, e))
 }
 
-/// Reads rows that [`write_rows`] has written.
+/// Reads rows written by [`write_rows`].
 ///
 /// # Errors
-/// [`crate::ErrorKind::File`] when the file cannot be read, is something else, or is damaged.
+/// [`crate::ErrorKind::File`] when the file cannot be read, has another format, or is damaged.
 pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|e| {
@@ -104,7 +105,7 @@ pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
 }
 
 /// Writes the nonzeros in Matrix Market's coordinate format (R. F. Boisvert, R. Pozo,
-/// K. A. Remington, NISTIR 5935, 1996), rows leave and columns receive, both counted from 1; names,
+/// K. A. Remington, NISTIR 5935, 1996), rows emit and columns receive, both counted from 1; names,
 /// areas, `open` and `back` of the groups are in comments.
 ///
 /// # Errors
@@ -147,7 +148,7 @@ pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resu
     })
 }
 
-/// A value with nine decimals, or five digits where it is small.
+/// A value with nine decimals, or five digits if it is small.
 struct RoundedValue {
     text: String,
     /// Of the last digit.
@@ -177,7 +178,7 @@ impl std::fmt::Display for RoundedValue {
     }
 }
 
-/// A CSV field (RFC 4180): quoted where a comma, quote or line break is in it.
+/// A CSV field (RFC 4180): quoted if it contains a comma, quote or line break.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))

@@ -1,4 +1,4 @@
-//! Where the surfaces of a scene lie in a light map.
+//! Texture coordinates of the surfaces of a scene in a light map.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
 
-/// Which texture coordinates a light map has.
+/// Source of the texture coordinates of a light map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coordinates {
-    /// Those of the scene's file where a light map can have them, else new ones.
+    /// Those of the scene's file if they are usable for a light map, else new ones.
     #[default]
     Auto,
     /// Those of the scene's file.
@@ -36,13 +36,12 @@ pub struct Atlas {
 
 impl Atlas {
     /// Lays out all triangles of `scene`, one for each side that reflects
-    /// ([`Scene::resolve_sides`]): [`Atlas::scene`] has them, and is to be baked.
+    /// ([`Scene::resolve_sides`]): [`Atlas::scene`] has them, and is the scene to bake.
     ///
-    /// Coordinates that the file gives ([`ObjSettings::texture_coordinates`]) can be used where all
-    /// triangles have them, within [0, 1], and none overlap by more than a quarter of a texel. New
-    /// ones have a chart, or several, for each smooth surface: none goes across a crease. Charts
-    /// lie six texels apart: one that only points at their outline are shown with, and two of
-    /// dilation, on either side.
+    /// Coordinates of the file ([`ObjSettings::texture_coordinates`]) are usable if all triangles
+    /// have them, within [0, 1], and none overlap by more than a quarter of a texel. New ones have
+    /// one or several charts for each smooth surface: none crosses a crease. Charts lie six texels
+    /// apart: on either side one that points on the outline use, and two of dilation.
     ///
     /// [`ObjSettings::texture_coordinates`]: crate::ObjSettings::texture_coordinates
     ///
@@ -77,7 +76,7 @@ impl Atlas {
         Ok(Atlas { scene, size, coordinates, charts, unusable })
     }
 
-    /// The scene whose triangles have places.
+    /// The scene of the triangles laid out.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
@@ -93,13 +92,13 @@ impl Atlas {
     }
 
     /// Texture coordinates of the corners of triangle `t`: (0, 0) is the upper left corner of the
-    /// map, (1, 1) the lower right one, as glTF has it. What is too thin for 32-bit coordinates
-    /// lies on one point.
+    /// map, (1, 1) the lower right one, as in glTF. Triangles too thin for 32-bit coordinates lie
+    /// on one point.
     pub fn coordinates(&self, t: usize) -> [DVec2; 3] {
         self.coordinates[t]
     }
 
-    /// Edge of a texel on the surfaces, scene unit: the mean of all.
+    /// Edge of a texel on the surfaces, scene unit: the mean over all.
     pub fn texel_size(&self) -> f64 {
         let triangles = 0..self.coordinates.len();
         let on_surfaces: f64 = triangles.clone().map(|t| self.scene.area(t)).sum();
@@ -108,12 +107,12 @@ impl Atlas {
         (on_surfaces / texels).sqrt()
     }
 
-    /// How many connected parts were laid out; none where the coordinates are those of the file.
+    /// Number of charts laid out; none if the coordinates are those of the file.
     pub fn charts(&self) -> Option<usize> {
         self.charts
     }
 
-    /// Why the coordinates of the file are not used, where they would have been.
+    /// Why the coordinates of the file are not used, if they were to be.
     pub fn unusable(&self) -> Option<&Unusable> {
         self.unusable.as_ref()
     }
@@ -132,13 +131,12 @@ impl Atlas {
         topology.corners.iter().enumerate().map(of_triangle).collect()
     }
 
-    /// Where the corners of triangle `t` lie in units of texels, the centre of the upper left one
-    /// being (0, 0).
+    /// Corners of triangle `t` in units of texels, the centre of the upper left one being (0, 0).
     pub(super) fn corners(&self, t: usize) -> [DVec2; 3] {
         in_texels(self.coordinates[t], self.size)
     }
 
-    /// The same of the point where the second and third corner have these weights.
+    /// The same for the point with these weights of the second and third corner.
     pub(super) fn place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let [a, b, c] = self.corners(t);
         a * (1.0 - u - v) + b * u + c * v

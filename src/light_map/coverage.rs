@@ -1,30 +1,30 @@
-//! Which texels a triangle is shown with, and where on it each of them gathers.
+//! Texels that a triangle covers, and the points at which they gather.
 //!
-//! A point is shown by the four texels around it, those whose centres are less than one texel away
-//! along both axes. So a triangle covers each texel around whose centre a square of two texels
-//! reaches into it. Row by row:
+//! A point is interpolated from the four texels around it, those whose centres are less than one
+//! texel away along both axes. So a triangle covers each texel around whose centre a square of two
+//! texels reaches into it. Row by row:
 //!
 //! ```text
-//!             ╱╲            what of the triangle lies between the centres of the rows above and
+//!             ╱╲            the part of the triangle between the centres of the rows above and
 //!   ─────────╱  ╲────────   below has an extent from left to right; centres less than a texel
 //!     ·   · ╱ ·  ╲·   ·     beyond its ends are covered
 //!   ───────╱──────╲──────
 //! ```
 //!
-//! That is all texels that a triangle touches, and some around it (conservative rasterisation).
+//! These are all texels that a triangle touches, and some around it (conservative rasterisation).
 
 use glam::DVec2;
 
-/// In place of a triangle's index, for texels that none covers.
+/// Triangle index of texels that no triangle covers.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Coordinates this far apart, in texels, may be meant to be the same: that is what 32-bit numbers
-/// leave of them across 8192 texels.
+/// Largest difference of coordinates, in texels, that may be equal: the precision of 32-bit numbers
+/// across 8192 texels.
 pub(super) const ROUNDING: f64 = 1e-3;
 
-/// For each texel of a map of this `size` the one of `triangles`, by their corners in units of
-/// texels, that it gathers on: of those that cover it the one nearest to its centre, the first of
-/// several.
+/// For each texel of a map of this `size` the index of the triangle, out of `triangles` by corners
+/// in units of texels, on which it gathers: of those that cover it the one nearest to its centre,
+/// the first of several.
 pub(super) fn triangles_of_texels(
     size: [u32; 2],
     triangles: impl Iterator<Item = [DVec2; 3]>,
@@ -44,8 +44,8 @@ pub(super) fn triangles_of_texels(
     owners
 }
 
-/// Calls `visit` with each texel whose centre is less than `reach` texels away from some point of a
-/// triangle along both axes, by its number and its centre, until it says false.
+/// Calls `visit` with the number and the centre of each texel whose centre is less than `reach`
+/// texels away from some point of a triangle along both axes, until it returns false.
 pub(super) fn for_each_texel_around(
     corners: [DVec2; 3],
     reach: f64,
@@ -53,7 +53,7 @@ pub(super) fn for_each_texel_around(
     mut visit: impl FnMut(usize, DVec2) -> bool,
 ) {
     let [low, high] = [DVec2::min, DVec2::max].map(|f| f(f(corners[0], corners[1]), corners[2]));
-    // Casts saturate: what lies outside of the map is cut off.
+    // Casts saturate: texels outside the map are cut off.
     let range = |low: f64, high: f64, count: u32| {
         let end = ((high + reach).floor() + 1.0).max(0.0) as u32;
         (low - reach).ceil().max(0.0) as u32..end.min(count)
@@ -70,7 +70,7 @@ pub(super) fn for_each_texel_around(
     }
 }
 
-/// The extent from left to right of what of a triangle lies between two heights.
+/// The extent from left to right of the part of a triangle between two heights.
 fn extent_between(corners: [DVec2; 3], low: f64, high: f64) -> Option<(f64, f64)> {
     let mut extent: Option<(f64, f64)> = None;
     for k in 0..3 {
@@ -116,7 +116,7 @@ pub(super) fn nearest_point([a, b, c]: [DVec2; 3], place: DVec2) -> ([f64; 2], f
     sides.into_iter().fold(([0.0; 2], f64::INFINITY), |x, y| if y.1 < x.1 { y } else { x })
 }
 
-/// How far inside of a triangle `place` lies, the distance to its nearest side; negative outside.
+/// Distance of `place` inside a triangle from its nearest side; negative outside.
 pub(super) fn depth_inside([a, b, c]: [DVec2; 3], place: DVec2) -> f64 {
     let turn = (b - a).perp_dot(c - a).signum();
     let side =
@@ -128,8 +128,8 @@ pub(super) fn depth_inside([a, b, c]: [DVec2; 3], place: DVec2) -> f64 {
 mod tests {
     use super::*;
 
-    /// Whether a triangle has a point less than `reach` from `centre` along both axes, by looking
-    /// at many.
+    /// Whether a triangle has a point less than `reach` from `centre` along both axes, by testing
+    /// many points.
     fn reaches([a, b, c]: [DVec2; 3], centre: DVec2, reach: f64) -> bool {
         const STEPS: u32 = 400;
         let at = |i: u32, j: u32| {

@@ -1,4 +1,4 @@
-//! Values for texels that have none: those of their neighbours.
+//! Values for texels without one, from their neighbours.
 //!
 //! ```text
 //!   · · · · ·        · 2 2 2 2       ring by ring, each texel the mean of the up to eight
@@ -8,8 +8,8 @@
 
 use crate::scene::Rgb;
 
-/// Gives those of `texels` that are not `known` yet the mean of their known neighbours, and so on,
-/// for as many `rings`; ends early where none gets one.
+/// Sets those of `texels` that are not `known` to the mean of their known neighbours, ring by ring,
+/// up to `rings` times; ends early if no texel is set.
 pub(super) fn fill_from_neighbours(
     values: &mut [Rgb],
     known: &mut [bool],
@@ -64,7 +64,7 @@ mod tests {
         fill_from_neighbours(&mut values, &mut known, [7, 2], texels, usize::MAX);
         assert_eq!(row(&values), [1.0, 1.0, 1.0, 2.5, 4.0, 4.0, 4.0]);
         assert_eq!(row(&values), row(&values[7..]));
-        // Where nothing is known, nothing is made up.
+        // Without known texels, nothing is filled.
         let mut nothing = vec![Rgb::ZERO; 4];
         fill_from_neighbours(&mut nothing, &mut [false; 4], [2, 2], vec![0, 1, 2, 3], usize::MAX);
         assert_eq!(nothing, [Rgb::ZERO; 4]);

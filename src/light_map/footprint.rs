@@ -1,10 +1,10 @@
-//! The texels that a place between them is shown with.
+//! The texels from which a point is interpolated.
 
 use glam::DVec2;
 
 use crate::scene::Rgb;
 
-/// The four texels around a place, and how much each counts: bilinear interpolation.
+/// The four texels around a point, and their weights: bilinear interpolation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footprint {
     pub texels: [u32; 4],
@@ -12,7 +12,7 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Of a place in units of texels; those beyond the border count as the ones on it.
+    /// Of a point in units of texels; beyond the border the texels on it are used.
     pub fn of(place: DVec2, [width, height]: [u32; 2]) -> Footprint {
         let axis = |x: f64, count: u32| {
             let x = x.clamp(0.0, f64::from(count - 1));
@@ -33,7 +33,7 @@ impl Footprint {
         }
     }
 
-    /// The value there of a map with these `values`.
+    /// The value at the point of a map with these `values`.
     pub fn value(&self, values: &[Rgb]) -> Rgb {
         self.texels.iter().zip(self.weights).map(|(&k, weight)| values[k as usize] * weight).sum()
     }

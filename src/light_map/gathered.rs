@@ -20,38 +20,38 @@ use crate::scene::Rgb;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LightMap {
-    /// Where its surfaces lie.
+    /// Its texture coordinates.
     pub atlas: Atlas,
-    /// Irradiance of each texel, row by row from the top, W/m² per channel, linear: to be
-    /// multiplied with a surface's reflectance, texture and all, for what it reflects. On a
-    /// translucent surface it is the mean of both sides, as that of
+    /// Irradiance of each texel, row by row from the top, W/m² per channel, linear: multiplied by a
+    /// surface's reflectance, texture included, it gives the reflected radiosity. On a translucent
+    /// surface it is the mean of both sides, like
     /// [`VertexMesh::irradiance`](crate::VertexMesh::irradiance).
     pub irradiance: Vec<Rgb>,
-    /// Whether a texel gathered. Others are empty, or have values of their neighbours.
+    /// Whether a texel gathered. Others are empty, or filled from their neighbours.
     pub gathered: Vec<bool>,
-    /// The triangle of each texel's place, or none.
+    /// The triangle on which each texel gathers, or none.
     pub(super) triangles: Vec<u32>,
 }
 
 /// Rings of empty texels around charts that get values, for the filters of renderers.
 const DILATION: usize = 2;
 
-/// Texels in the first batch; later ones follow the clock. Chosen by hand: results do not depend on
-/// it.
+/// Texels in the first batch; later batches follow the clock. Plain choice: results do not depend
+/// on it.
 const FIRST_BATCH: usize = 256;
 
-/// Rays of a texel where the vertices of a bake did not gather: those of an error of 2 % or so.
+/// Rays of a texel if the vertices of a bake did not gather: for an error of about 2 %.
 const RAYS: u32 = 1024;
 
 impl LightMap {
-    /// The light of a bake, gathered at the texels of `atlas`: with as many rays as its vertices
-    /// took in the end, so that a texel is as exact as what was asked for. Where the device fails,
-    /// rays on the CPU go on.
+    /// The light of a bake, gathered at the texels of `atlas`: with the final number of rays of its
+    /// vertices, so that a texel has the requested accuracy. If the device fails, rays on the CPU
+    /// continue.
     ///
-    /// Texels inside of solids, and under what stands on their surface, get values of their
-    /// neighbours. `progress` is called with the texels done and all of them, several times a
-    /// second; where it stops the work, the result is `None`. The same bake and atlas give the same
-    /// bits, on any number of threads.
+    /// Texels inside solids, and below objects that stand on their surface, are filled from their
+    /// neighbours. `progress` is called with the number of texels done and of all texels, several
+    /// times a second; if it stops the work, the result is `None`. The same bake and atlas give the
+    /// same bits, on any number of threads.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for the bake of another scene than that of `atlas`; those of
@@ -65,7 +65,7 @@ impl LightMap {
         LightMap::gather(atlas, &baked.light, &mut *gatherer(baked, backend)?, progress)
     }
 
-    /// The same by a `gatherer` of the caller's, of the scene of `light`.
+    /// The same by the caller's `gatherer`, for the scene of `light`.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for light of another scene than that of `atlas`; those of `gatherer`.
@@ -113,8 +113,8 @@ impl LightMap {
         Ok(Some(LightMap { atlas, irradiance, gathered, triangles }))
     }
 
-    /// Radiosity of each texel, W/m² per channel: what its material emits and reflects, without
-    /// textures.
+    /// Radiosity of each texel, W/m² per channel: exitance and reflected light of its material,
+    /// without textures.
     pub fn radiosity(&self) -> Vec<Rgb> {
         let scene = self.atlas.scene();
         let of_texel = |(&t, &irradiance): (&u32, &Rgb)| {
@@ -130,14 +130,14 @@ impl LightMap {
         radiosity
     }
 
-    /// The share of all texels that triangles cover, in [0, 1].
+    /// Fraction of all texels that triangles cover, in [0, 1].
     pub fn coverage(&self) -> f64 {
         let covered = self.triangles.iter().filter(|&&t| t != NO_TRIANGLE).count();
         covered as f64 / self.triangles.len() as f64
     }
 }
 
-/// What gathers the light of `baked` as exactly as its last vertices did.
+/// A gatherer for the light of `baked` with the accuracy of its last vertices.
 pub(super) fn gatherer<'a>(
     baked: &BakeResult,
     backend: &Backend,
@@ -150,7 +150,7 @@ pub(super) fn gatherer<'a>(
     backend.gather_or_cast_rays(&baked.light.mesh, (rays, noise, dim), |_| ())
 }
 
-/// Gives empty texels next to charts the values of their neighbours.
+/// Fills empty texels next to charts from their neighbours.
 fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
     let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
     let empty = (0..known.len() as u32).filter(|&k| !known[k as usize]).collect();

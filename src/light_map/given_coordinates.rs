@@ -1,4 +1,4 @@
-//! Texture coordinates that a file gives, and whether a light map can have them.
+//! Texture coordinates of a file, and their check for use in a light map.
 
 use std::fmt;
 
@@ -9,28 +9,28 @@ use super::layout::{Layout, MAX_SIDE, Resolution, bad_size, in_texels};
 use crate::error::Error;
 use crate::scene::Scene;
 
-/// Why a light map cannot have the texture coordinates of a file.
+/// Why the texture coordinates of a file are not usable for a light map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unusable {
-    /// So many triangles have none.
+    /// This number of triangles have none.
     Missing(usize),
-    /// So many triangles reach out of [0, 1], where textures repeat.
+    /// This number of triangles reach out of [0, 1], where textures repeat.
     Outside(usize),
-    /// So many triangles lie on a point or a line.
+    /// This number of triangles are degenerate, to a point or a line.
     Collapsed(usize),
-    /// These triangles lie on one another.
+    /// These two triangles overlap.
     Overlapping([usize; 2]),
 }
 
-/// How deep inside of two triangles the centre of a texel lies where they overlap, in texels: files
-/// have few digits, and neighbours may overlap by what these leave.
+/// Depth inside two triangles of the centre of a texel, in texels, from which they overlap: files
+/// have few digits, whose rounding makes neighbours overlap.
 const OVERLAP: f64 = 0.25;
 
-/// Texture coordinates may be this far out of [0, 1]: what 32-bit numbers leave of them.
+/// Largest distance of texture coordinates outside [0, 1]: the precision of 32-bit numbers.
 const OUTSIDE: f64 = 1e-6;
 
-/// Where the triangles of `scene` lie by the coordinates of its file, unless these are unusable.
+/// Layout of the triangles of `scene` by the coordinates of its file, unless these are unusable.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`](crate::ErrorKind::Setting) for more than [`MAX_SIDE`] texels.
@@ -79,8 +79,8 @@ fn area([a, b, c]: &[DVec2; 3]) -> f64 {
     (b - a).perp_dot(c - a).abs() / 2.0
 }
 
-/// The first two triangles that the centre of one texel lies inside of. It ends with the first that
-/// has two, so that no more are found inside than there are texels, however many overlap.
+/// The first two triangles that contain the centre of one texel. It ends with the first such pair,
+/// so that its time is bounded by the number of texels, however many triangles overlap.
 fn overlapping(coordinates: &[[DVec2; 3]], size: [u32; 2]) -> Option<[usize; 2]> {
     let mut owners = vec![NO_TRIANGLE; size[0] as usize * size[1] as usize];
     let mut found = None;

@@ -1,31 +1,30 @@
-//! How large a light map is, and the places of triangles in it.
+//! Size of a light map, and coordinates of triangles in it.
 
 use glam::DVec2;
 
 use crate::error::{Error, ErrorKind};
 
-/// How large the texels of a light map are.
+/// Size of the texels of a light map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
-    /// Edge of a texel on the surface, scene unit, above 0: the mean of all where the texture
+    /// Edge of a texel on the surface, scene unit, above 0: the mean over all if the texture
     /// coordinates are those of the file.
     TexelSize(f64),
-    /// Texels along a side of the map; where surfaces are laid out anew its height may be less.
+    /// Texels along a side of the map; if surfaces are laid out anew its height may be less.
     Pixels(u32),
 }
 
-/// Places of triangles in a map, before it is known for which scene.
+/// Coordinates of triangles in a map, independent of the scene.
 pub(super) struct Layout {
     /// Texels in a row, and rows.
     pub size: [u32; 2],
-    /// Of the corners of each triangle, as [`Atlas::coordinates`](super::Atlas::coordinates) has
-    /// them.
+    /// Of the corners of each triangle, as in [`Atlas::coordinates`](super::Atlas::coordinates).
     pub coordinates: Vec<[DVec2; 3]>,
-    /// Connected parts of surfaces that were laid out, if they were.
+    /// Number of charts laid out; none if the coordinates are those of the file.
     pub charts: Option<usize>,
 }
 
-/// Texels along a side of a map at most: what any graphics device takes (WebGPU's
+/// Maximum number of texels along a side of a map: the limit of any graphics device (WebGPU's
 /// `maxTextureDimension2D`).
 pub(super) const MAX_SIDE: u32 = 8192;
 
@@ -50,7 +49,7 @@ impl Resolution {
     }
 }
 
-/// The error of a map that is too large, or too small for its surfaces: `found` says how.
+/// The error of a map that is too large, or too small for its surfaces: `found` is the finding.
 pub(super) fn bad_size(resolution: Resolution, found: String) -> Error {
     let place = match resolution {
         Resolution::TexelSize(size) => format!("texels of {size}"),

@@ -1,16 +1,16 @@
-//! How far off a map is, as it is shown.
+//! Error of a map as displayed.
 //!
-//! What a bake estimates is the error of its vertices. A map has another one, since light bends
-//! between its texels. So points of the surfaces gather as texels do, twice, the second
-//! time from a hair beside, and are compared with what the map shows there:
+//! A bake estimates the error of its vertices. The error of a map differs, since light is not
+//! linear between its texels. So points of the surfaces gather as texels do, twice, the second time
+//! slightly beside, and are compared with the map's value:
 //!
 //! ```text
 //!   e² = (shown − first) · (shown − second) / max(|mean of both|, floor)²
 //! ```
 //!
-//! Noise of the two is independent, so that it adds nothing to the mean of e². What gathers cannot
-//! know of the light that they gather is taken from the bake's estimate: bounces that are left out,
-//! light that is not shot, and what paths have found beyond.
+//! The noise of the two is independent, so that it adds nothing to the mean of e². Errors of the
+//! gathered light itself are taken from the bake's estimate: bounces left out, unshot light, and
+//! light that only paths measured.
 
 use std::ops::{ControlFlow, RangeInclusive};
 
@@ -34,31 +34,31 @@ use crate::sampling::surface::AreaSampler;
 use crate::scene::Rgb;
 use crate::verify::Estimate;
 
-/// Texels for each point, and points at least and at most. Chosen by hand: a sixteenth of what the
-/// texels took.
+/// Number of texels per point; minimum and maximum number of points. Plain choice: with two gathers
+/// per point, a sixteenth of the work of the texels.
 const TEXELS_PER_POINT: usize = 32;
 const POINTS: RangeInclusive<usize> = 2048..=16384;
 
-/// Points in the first batch; later ones follow the clock.
+/// Points in the first batch; later batches follow the clock.
 const FIRST_BATCH: usize = 64;
 
-/// A point, and what the map shows there.
+/// A point, and the map's value there.
 struct ShownPoint {
     points: [TwoSidedPoint; 2],
     albedo: Rgb,
     /// Reflected radiosity, W/m².
     shown: Rgb,
-    /// What the point stands for, up to a common factor.
+    /// Area that the point represents, up to a common factor.
     area: f64,
 }
 
 impl LightMap {
-    /// How far what the map shows is off, between texels too, and the standard error of that: the
-    /// root mean square over the surfaces that reflect of relative errors, with the measure of
-    /// [`ErrorEstimate`](crate::ErrorEstimate). `baked` is what the map was gathered from.
+    /// Error of the map's values, between texels too, and its standard error: the root mean square
+    /// over the reflecting surfaces of relative errors, with the measure of
+    /// [`ErrorEstimate`](crate::ErrorEstimate). `baked` is the bake that the map was gathered from.
     ///
-    /// `progress` is called with the points done and all of them, several times a second; where it
-    /// stops the work, the result is `None`, as it is where nothing reflects.
+    /// `progress` is called with the number of points done and of all points, several times a
+    /// second; if it stops the work, the result is `None`, as it is if nothing reflects.
     ///
     /// # Errors
     /// Those of [`LightMap::of_bake`].
@@ -102,9 +102,9 @@ impl LightMap {
         Ok(root_mean_square(&found, baked.estimate.of_light()))
     }
 
-    /// Half of them evenly over what reflects, half in the cells between four texels, by how far
-    /// these differ as a share of the darkest. Each stands for the area over the density of both
-    /// halves (Veach and Guibas 1995, the balance heuristic).
+    /// Half of the points lie evenly over the reflecting surfaces, half in the cells between four
+    /// texels, in proportion to the cells' contrast. Each represents the area over the density of
+    /// both halves (Veach and Guibas 1995, the balance heuristic).
     fn shown_points(&self) -> Vec<ShownPoint> {
         let scene = self.atlas.scene();
         let areas = (0..scene.triangles().len()).map(|t| match scene.material(t).scatters() {
@@ -133,7 +133,7 @@ impl LightMap {
             let density = 1.0 / surface.total_area() + share / (texel * texel);
             let [a, b, c] = scene.corners(t);
             let position = a * (1.0 - u - v) + b * u + c * v;
-            // Next to a side, another surface may be nearer than what a point of this size sees.
+            // Next to a side, another surface may be nearer than the near distance for this size.
             let inset = 3.0 * u.min(v).min(1.0 - u - v) * scene.area(t).sqrt();
             let size = texel.min(inset);
             let point = offset.gather_point(position, scene.normal(t), size);
@@ -163,18 +163,18 @@ impl LightMap {
         even.into_iter().chain((0..count).filter_map(in_cell)).collect()
     }
 
-    /// The upper left texel of the cell around a `place` in units of texels.
+    /// The upper left texel of the cell around a point `place` in units of texels.
     fn cell(&self, place: DVec2) -> usize {
         Footprint::of(place, self.atlas.size).texels[0] as usize
     }
 
-    /// The triangles on which the texels around a `place` gather, or none; some more than once.
+    /// The triangles on which the texels around a point `place` gather, or none; some repeated.
     fn triangles_of_cell(&self, place: DVec2) -> [u32; 4] {
         Footprint::of(place, self.atlas.size).texels.map(|texel| self.triangles[texel as usize])
     }
 
-    /// How far the four texels of each cell differ, as a share of the darkest, cells by their upper
-    /// left texels; 0 where one of them is no surface's.
+    /// Contrast of each cell: the difference of its four texels as a fraction of the darkest, by
+    /// the upper left texel; 0 if one of them belongs to no surface.
     fn contrasts(&self) -> Vec<f64> {
         let radiosity: Vec<f64> = self.irradiance.iter().map(|e| e.length()).collect();
         let gathered = radiosity.iter().zip(&self.gathered).filter(|(_, gathered)| **gathered);
@@ -201,12 +201,12 @@ impl LightMap {
     }
 }
 
-/// What was gathered at a point.
+/// The values at a point.
 struct Found {
-    /// Reflected radiosity, W/m²: that of the map, and what was gathered twice.
+    /// Reflected radiosity, W/m²: of the map, and gathered twice.
     shown: Rgb,
     gathered: [Rgb; 2],
-    /// What it stands for, up to a common factor.
+    /// Area that it represents, up to a common factor.
     area: f64,
 }
 
@@ -223,12 +223,12 @@ impl Found {
     }
 }
 
-/// The root mean square of the relative errors that were `found`, and of that of the `light`.
+/// The root mean square of the relative errors of `found`, combined with the error of the `light`.
 fn root_mean_square(found: &[Found], light: f64) -> Option<Estimate> {
     let sum = |of: &dyn Fn(&Found) -> f64| found.iter().map(of).sum::<f64>();
     let area = sum(&|point| point.area);
     let brightness = sum(&|point| point.area * point.mean().length()) / area;
-    // Where nothing arrives, nothing is wrong.
+    // Without light there is no error.
     let floor = (RADIOSITY_FLOOR_SHARE * brightness).max(f64::MIN_POSITIVE);
     let mean = sum(&|point| point.area * point.square(floor)) / area;
     let off = |point: &Found| (point.area * (point.square(floor) - mean)).powi(2);

@@ -1,4 +1,4 @@
-//! What renderers make of a light map: values between the centres of texels.
+//! Sampling of a light map as in renderers: values between the centres of texels.
 
 use super::footprint::Footprint;
 use super::gathered::LightMap;
@@ -14,12 +14,12 @@ impl LightMap {
         Footprint::of(self.atlas.place(t, weights), self.atlas.size).value(&self.irradiance)
     }
 
-    /// The scene as it looks by the map, with elements about as large as texels that each have
-    /// vertices of their own: nothing is shared, so that seams of the map show. Radiosity is that
-    /// of materials without their textures.
+    /// The scene lit by the map, with elements about as large as texels that each have their own
+    /// vertices: nothing is shared, so that seams of the map show. Radiosity is that of materials
+    /// without their textures.
     ///
     /// # Errors
-    /// Those of [`Mesh::new`] where there would be too many.
+    /// Those of [`Mesh::new`] for too many elements.
     pub fn surface(&self) -> Result<VertexMesh, Error> {
         let mesh = Mesh::new(self.atlas.scene().clone(), self.atlas.texel_size())?;
         let mut surface = VertexMesh { sky: mesh.scene().sky().clone(), ..Default::default() };

@@ -1,14 +1,14 @@
-//! Seams welded: where a smooth surface is cut, both charts show the same light.
+//! Welding of seams: where a smooth surface is cut, both charts show the same light.
 //!
 //! ```text
-//!   chart a │ cut │ chart b      points along the cut, each shown by four texels of either chart:
+//!   chart a │ cut │ chart b      points along the cut, each from four texels of either chart:
 //!     · · ·─┼─ ─ ─┼─· · ·        a(x) = Σ w x over its texels,  b(x) likewise
 //!     · · ·─┼─ ─ ─┼─· · ·
 //! ```
 //!
 //! The texels near cuts are changed as little as makes both sides agree: the least sum of squares
-//! of what they change by and of what is left between the sides (Iwanicki 2013, "Lighting
-//! technology of The Last of Us"), by conjugate gradients (Hestenes and Stiefel 1952) on
+//! of their changes and of the remaining differences (Iwanicki 2013, "Lighting technology of The
+//! Last of Us"), by conjugate gradients (Hestenes and Stiefel 1952) on
 //!
 //! ```text
 //!   (I + w DᵀD) d = −w DᵀD x      x irradiance, d its change, D differences between the sides
@@ -23,17 +23,18 @@ use crate::mesh::SurfaceTopology;
 use crate::scene::Rgb;
 
 /// Weight w of a difference between the sides over that of a texel's change. There are about two
-/// points for each texel along a cut, so that some 1/(1 + 2w) of a difference is left. Chosen by
-/// hand.
+/// points for each texel along a cut, so that some 1/(1 + 2w) of a difference remains. Plain
+/// choice.
 const WEIGHT: f64 = 10.0;
 
-/// Steps at most; the condition of the system is about w, and each takes 1/√w of the error or so.
+/// Maximum number of steps. The condition number is about w; a step removes about 1/√w of the
+/// error.
 const MAX_STEPS: usize = 100;
 
-/// The residual that is left may be this share of the first.
+/// Ratio of the final to the initial residual.
 const TOLERANCE: f64 = 1e-6;
 
-/// A point on a cut: how the two charts show it.
+/// A point on a cut, in the two charts.
 type SeamPoint = [Footprint; 2];
 
 /// Makes both sides of all cuts through smooth surfaces agree in `irradiance`.
@@ -42,7 +43,7 @@ pub(super) fn weld(atlas: &Atlas, irradiance: &mut [Rgb]) {
     if points.is_empty() {
         return;
     }
-    // Numbers of the texels at cuts among themselves.
+    // The texels at cuts, numbered consecutively.
     let mut texels: Vec<u32> = points.iter().flatten().flat_map(|side| side.texels).collect();
     texels.sort_unstable();
     texels.dedup();
@@ -66,7 +67,7 @@ fn seam_points(atlas: &Atlas) -> Vec<SeamPoint> {
     let mut points = vec![];
     for [(s, k), (t, l)] in topology.shared_edges() {
         let (one, other) = (atlas.corners(s), atlas.corners(t));
-        // Opposite windings: where one side starts, the other ends.
+        // Opposite windings: the start of one side is the end of the other.
         let [from, to] = [[one[k], other[(l + 1) % 3]], [one[(k + 1) % 3], other[l]]];
         let same = |[a, b]: [DVec2; 2]| a.distance(b) < ROUNDING;
         if same(from) && same(to) || !has_place(s) || !has_place(t) {
@@ -82,7 +83,7 @@ fn seam_points(atlas: &Atlas) -> Vec<SeamPoint> {
     points
 }
 
-/// What the texels change by that have these `values`.
+/// The changes of the texels with these `values`.
 fn changes(points: &[SeamPoint], values: &[Rgb]) -> Vec<Rgb> {
     // w DᵀD x.
     let pull = |x: &[Rgb]| {
@@ -147,7 +148,7 @@ mod tests {
         for row in 2..7 {
             let change = |column: usize| changed[10 * row + column];
             for column in [2, 3] {
-                // The ends have three points for two texels: what that changes dies out inwards.
+                // The ends have three points for two texels; this effect decays inwards.
                 assert!((change(column).x - wanted).abs() < 0.01, "{}", change(column));
                 assert!((change(column) + change(9 - column)).abs().max_element() < 1e-9);
             }

@@ -15,8 +15,8 @@ pub(super) struct TexelPoints<'a> {
     offset: SurfaceOffset,
 }
 
-/// How far gather points keep from the sides of triangles, in texels: on the sides themselves it is
-/// undefined what is seen, as for vertices. Chosen by hand.
+/// Distance of gather points from the sides of triangles, in texels: on the sides themselves
+/// visibility is undefined, as for vertices. Plain choice.
 const SIDE_INSET: f64 = 0.02;
 
 impl<'a> TexelPoints<'a> {
@@ -25,8 +25,8 @@ impl<'a> TexelPoints<'a> {
         TexelPoints { atlas, normals: atlas.corner_normals(), offset }
     }
 
-    /// Where texel `texel` gathers on triangle `t`: at the point of it that lies nearest to the
-    /// texel's centre, a little inside.
+    /// The gather point of texel `texel` on triangle `t`: the point of it nearest to the texel's
+    /// centre, moved slightly inside.
     pub fn point(&self, texel: u32, t: usize) -> TwoSidedPoint {
         let (scene, width) = (self.atlas.scene(), self.atlas.width());
         let places = self.atlas.corners(t);
@@ -35,8 +35,8 @@ impl<'a> TexelPoints<'a> {
         let corners = scene.corners(t);
         let at = |u: f64, v: f64| corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
         let size = self.texel_size(t);
-        // Towards the centroid, which all sides lie around: a share of the way that keeps the
-        // weights of all corners above it.
+        // Moved towards the centroid, by the fraction of the way that keeps the weights of all
+        // corners above a third of it.
         let to_centroid = (corners.iter().sum::<DVec3>() / 3.0).distance(at(u, v));
         let share = (SIDE_INSET * size / to_centroid).clamp(0.0, 1.0);
         let is_near = 3.0 * u.min(v).min(1.0 - u - v) < share;
@@ -48,7 +48,7 @@ impl<'a> TexelPoints<'a> {
         TwoSidedPoint::new(point, scene.material(t))
     }
 
-    /// Edge of a texel on triangle `t`, scene unit: the triangle's own size where it is less.
+    /// Edge of a texel on triangle `t`, scene unit: the triangle's own size if that is less.
     pub fn texel_size(&self, t: usize) -> f64 {
         let [a, b, c] = self.atlas.corners(t);
         let texels = (b - a).perp_dot(c - a).abs() / 2.0;

@@ -1,4 +1,4 @@
-//! New texture coordinates: every smooth surface in charts, and all charts in one texture.
+//! New texture coordinates: charts for every smooth surface, all in one texture.
 //!
 //! Charts, their parameterisation (Lévy, Petitjean, Ray, Maillot 2002: least squares conformal
 //! maps) and their packing are those of the crate `uvunwrap`.
@@ -14,14 +14,14 @@ use crate::error::Error;
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
 
-/// Empty texels around a chart: one that points on its outline are shown with, and two of dilation.
+/// Empty texels around a chart: one that points on its outline use, and two of dilation.
 const PADDING: u32 = 3;
 
-/// Smooth surfaces up to which charts are packed by their shapes, which leaves less empty, and
-/// takes seconds for a few thousand. Chosen by hand.
+/// Maximum number of smooth surfaces for packing charts by their shapes, which leaves less empty
+/// space, and takes seconds for a few thousand. Plain choice.
 const MAX_BY_SHAPE: usize = 1000;
 
-/// A smooth surface as the unwrapper takes it: 32-bit numbers.
+/// A smooth surface as input of the unwrapper: 32-bit numbers.
 #[derive(Default)]
 struct Surface {
     triangles: Vec<usize>,
@@ -30,11 +30,11 @@ struct Surface {
     indices: Vec<u32>,
 }
 
-/// Places of the triangles of `scene` in a texture, by surfaces.
+/// Coordinates of the triangles of `scene` in a texture, by surfaces.
 ///
 /// # Errors
-/// [`ErrorKind::Setting`](crate::ErrorKind::Setting) where they do not fit into [`MAX_SIDE`]
-/// texels, or not into as few as were asked for.
+/// [`ErrorKind::Setting`](crate::ErrorKind::Setting) if they do not fit into [`MAX_SIDE`] texels,
+/// or not into the requested number.
 pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Error> {
     let unit = scene.bounds().longest_side();
     let density = match resolution {
@@ -79,7 +79,7 @@ pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Er
 }
 
 /// The smooth surfaces of `scene`, in units of its longest side from its centre, so that 32 bits
-/// are enough for coordinates of any size.
+/// suffice for coordinates of any size.
 fn surfaces(scene: &Scene) -> Vec<Surface> {
     let (bounds, topology) = (scene.bounds(), SurfaceTopology::of_scene(scene));
     let (centre, unit) = (bounds.centre(), bounds.longest_side());

@@ -1,8 +1,8 @@
-//! Which axis-aligned boxes overlap, in time that stays linear where thousands lie in one place.
+//! Overlapping pairs of axis-aligned boxes, in linear time even if thousands coincide.
 //!
-//! Each box asks a tree of boxes for its partners, and stops asking once it has more than
-//! [`MAX_OVERLAPS`]: it is *crowded* then. Boxes that are not crowded know all of their partners,
-//! and tell those that are. Among crowded boxes only the highest-ranked are paired:
+//! Each box queries a tree of boxes for its partners, and stops once it has more than
+//! [`MAX_OVERLAPS`]: it is *crowded* then. Boxes that are not crowded have all of their partners,
+//! and are added to those of crowded ones. Among crowded boxes only the highest-ranked are paired:
 //!
 //! ```text
 //!                      partner not crowded   partner crowded
@@ -18,11 +18,11 @@ use rayon::prelude::*;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::bvh::Bvh;
 
-/// A box that overlaps more others than this is crowded: thousands of faces in one place. Chosen by
-/// hand, well above what meets in one place of an ordinary mesh; no measurement was kept.
+/// Number of overlapping boxes above which a box is crowded: thousands of faces at one point. Plain
+/// choice, well above the number at a point of an ordinary mesh; no measurement was kept.
 const MAX_OVERLAPS: usize = 256;
 
-/// Boxes in a leaf of the tree, at most. Chosen by hand; no measurement was kept.
+/// Maximum number of boxes in a leaf of the tree. Plain choice; no measurement was kept.
 const LEAF_SIZE: usize = 4;
 
 /// For each box, the others that it overlaps, in no particular order. Pairs are complete unless
@@ -55,7 +55,7 @@ pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> 
     partners
 }
 
-/// Boxes halved along the axis on which their centres reach furthest.
+/// Boxes halved along the axis of the largest extent of their centres.
 fn tree(boxes: &[Aabb]) -> Bvh {
     let centre = |&k: &u32| boxes[k as usize].centre();
     Bvh::new(boxes, LEAF_SIZE, |part, _| {
@@ -65,7 +65,7 @@ fn tree(boxes: &[Aabb]) -> Bvh {
     })
 }
 
-/// Boxes that box `k` overlaps, up to one more than [`MAX_OVERLAPS`].
+/// Boxes that box `k` overlaps, up to [`MAX_OVERLAPS`] + 1 of them.
 fn first_partners(tree: &Bvh, boxes: &[Aabb], k: usize) -> Vec<u32> {
     let mut partners = vec![];
     let visit = |other: u32| {
@@ -82,7 +82,7 @@ fn first_partners(tree: &Bvh, boxes: &[Aabb], k: usize) -> Vec<u32> {
     partners
 }
 
-/// Adds box `k`, which is not crowded and knows all of its partners, to those that are crowded.
+/// Adds box `k`, which is not crowded and has all of its partners, to its crowded partners.
 fn tell_crowded(k: usize, crowded: &[bool], partners: &mut [Vec<u32>]) {
     let to_tell: Vec<u32> =
         partners[k].iter().copied().filter(|&other| crowded[other as usize]).collect();

@@ -1,12 +1,12 @@
-//! Levels above the triangle: clusters of neighbours that face much the same way.
+//! Levels above the triangle: clusters of neighbours with similar normals.
 //!
-//! Two clusters become one across a shared side, cheapest pair first, until no pair is left that
-//! may: greedy merging along the edges of the dual graph (Garland, Willmott and Heckbert 2001),
-//! which is how the face clusters of Willmott, Heckbert and Garland (1999) are made. Only a surface
-//! of one group and one material is merged, and no normal in a cluster is further than
-//! [`MAX_NORMAL_DEVIATION_DEGREES`] from its axis: what a cluster sends out is much like what one
-//! flat patch does. Smoothing groups are ignored: they are about the shading of a surface, not
-//! about what it sends.
+//! Two clusters are merged across a shared side, cheapest pair first, until no pair is allowed:
+//! greedy merging along the edges of the dual graph (Garland, Willmott and Heckbert 2001), as for
+//! the face clusters of Willmott, Heckbert and Garland (1999). Only a surface of one group and one
+//! material is merged, and no normal in a cluster deviates by more than
+//! [`MAX_NORMAL_DEVIATION_DEGREES`] from its axis: the light leaving a cluster is close to that of
+//! one flat patch. Smoothing groups are ignored: they affect the shading of a surface, not the
+//! light that leaves it.
 //!
 //! ```text
 //! roots              7              6
@@ -27,7 +27,7 @@ use super::SurfaceTopology;
 use crate::geometry::rounding::tie_stable_key;
 use crate::scene::Scene;
 
-/// No triangle's normal is further than this from its cluster's axis, degrees. Chosen by hand; no
+/// Largest angle between a triangle's normal and its cluster's axis, degrees. Plain choice; no
 /// measurement was kept.
 pub(crate) const MAX_NORMAL_DEVIATION_DEGREES: f64 = 35.0;
 
@@ -38,11 +38,11 @@ pub(crate) struct Clusters {
     clusters: Vec<Cluster>,
     /// The two parts of each cluster that is not a triangle.
     parts: Vec<[u32; 2]>,
-    /// Clusters that are part of no other, ascending.
+    /// Clusters without a parent, ascending.
     roots: Vec<u32>,
 }
 
-/// What merging needs to know of a set of triangles.
+/// Properties of a set of triangles that merging uses.
 #[derive(Clone, Copy, Debug)]
 struct Cluster {
     area: f64,
@@ -60,8 +60,9 @@ struct Cluster {
 impl Clusters {
     /// The clusters of `scene`, in time that is linear in its triangles but for the sorting.
     ///
-    /// All that may merge is of one smooth surface. So each is merged by itself, many at once, and
-    /// then the cheapest of what is next on each gets the next number, as if all were one.
+    /// Mergeable triangles belong to one smooth surface. So each surface is merged by itself, many
+    /// in parallel, and then the cheapest of the next merges of all gets the next number, as in one
+    /// sequence.
     pub fn new(scene: &Scene) -> Clusters {
         let count = scene.triangles().len();
         let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
@@ -94,7 +95,7 @@ impl Clusters {
         &self.roots
     }
 
-    /// How many there are, triangles alone counted.
+    /// Number of clusters, single triangles included.
     pub fn count(&self) -> usize {
         self.clusters.len()
     }
@@ -131,30 +132,30 @@ impl Clusters {
 
 /// Two clusters become one.
 struct Merge {
-    /// What it costs, see [`candidate`].
+    /// Cost, see [`candidate`].
     key: u64,
-    /// Both, as the surface numbers them: its triangles first, and then what merged.
+    /// Both parts, in the surface's numbering: its triangles first, then merged clusters.
     parts: [u32; 2],
     cluster: Cluster,
 }
 
-/// A smooth surface, all that may merge on which has merged.
+/// A smooth surface with all of its merges.
 struct MergedSurface {
-    /// The clusters that it has yet, by their numbers in the scene.
+    /// Numbers in the scene of its clusters so far.
     numbers: Vec<u32>,
-    /// How it gets the others.
+    /// The remaining merges.
     merges: Peekable<std::vec::IntoIter<Merge>>,
 }
 
 impl MergedSurface {
-    /// That of these `triangles`, ascending, of all in `clusters`; what is `beside` each.
+    /// For these `triangles`, ascending, with all `clusters` and the neighbours `beside` each.
     fn new(clusters: &[Cluster], triangles: &[u32], beside: &[BTreeSet<u32>]) -> MergedSurface {
         let local = |t: &u32| triangles.partition_point(|other| other < t) as u32;
         let mut clusters: Vec<Cluster> = triangles.iter().map(|&t| clusters[t as usize]).collect();
         let mut beside: Vec<BTreeSet<u32>> =
             triangles.iter().map(|&t| beside[t as usize].iter().map(local).collect()).collect();
         let mut merges = vec![];
-        // Clusters that are not yet part of another.
+        // Clusters without a parent so far.
         let mut active = vec![true; triangles.len()];
         let mut queue = BinaryHeap::new();
         for (a, others) in (0u32..).zip(&beside) {
@@ -189,7 +190,7 @@ impl MergedSurface {
         MergedSurface { numbers: triangles.to_vec(), merges: merges.into_iter().peekable() }
     }
 
-    /// What is next on this surface, the `k`th: its cost, and the numbers of its parts.
+    /// The next merge on this surface, the `k`th: its cost, and the numbers of its parts.
     fn next(&mut self, k: usize) -> Option<Reverse<(u64, [u32; 2], usize)>> {
         let Merge { key, parts, .. } = self.merges.peek()?;
         Some(Reverse((*key, parts.map(|part| self.numbers[part as usize]), k)))
@@ -201,7 +202,7 @@ impl Cluster {
         let [a, b, c] = scene.corners(t);
         let (area, axis) = (scene.area(t), scene.normal(t));
         let centroid = a + ((b - a) + (c - a)) / 3.0;
-        // The three corners and the centroid, as a rule for integrals of degree two.
+        // Quadrature of degree two over the three corners and the centroid.
         let square: f64 = [a, b, c].iter().map(|p| p.distance_squared(centroid)).sum();
         let second_moment = area * square / 12.0;
         let area_vector = axis * area;
@@ -213,7 +214,7 @@ impl Cluster {
         let area = self.area + other.area;
         let share = other.area / area;
         let centroid = self.centroid + (other.centroid - self.centroid) * share;
-        // The parallel axis theorem, for two.
+        // The parallel axis theorem for two parts.
         let distance_squared = self.centroid.distance_squared(other.centroid);
         let second_moment =
             self.second_moment + other.second_moment + self.area * share * distance_squared;
@@ -227,7 +228,7 @@ impl Cluster {
 }
 
 /// A pair of clusters that may merge, with its cost as the key of the queue: small and compact
-/// clusters come first, and flat before bent. `None` if the normals would deviate too far.
+/// clusters come first, and flat before bent. `None` if normals would deviate too much.
 ///
 /// The cost is the second moment ∫|x − c|² dA plus A² (1 − |n̄|²), both length unit⁴, where n̄ is
 /// the mean of the unit normals: 1 − |n̄|² is their variance.
@@ -242,7 +243,7 @@ fn candidate(clusters: &[Cluster], a: u32, b: u32) -> Option<Reverse<(u64, u32, 
     Some(Reverse((tie_stable_key(cost), a, b)))
 }
 
-/// For each triangle its neighbours across sides that are no crease.
+/// For each triangle its neighbours across sides that are not creases.
 fn neighbours(topology: &SurfaceTopology) -> Vec<BTreeSet<u32>> {
     let mut beside = vec![BTreeSet::new(); topology.sides.len()];
     for [(s, _), (t, _)] in topology.shared_edges() {
@@ -295,7 +296,7 @@ mod tests {
 
     fn sphere() -> Scene {
         let at = |u: f64, v: f64| {
-            // The same bits all round at the poles.
+            // Bit-identical positions at the poles.
             let (sin, cos) = (std::f64::consts::PI * v).sin_cos();
             let r = if v == 0.0 || v == 1.0 { 0.0 } else { sin };
             DVec3::new(r * turned(u).1, r * turned(u).0, -cos)
@@ -366,7 +367,7 @@ mod tests {
                     root_of[t as usize] = root;
                 }
             }
-            // Merging goes on until no two neighbours may merge any more.
+            // Merging continues until no two neighbours may merge.
             let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
             for (a, others) in neighbours(&topology).iter().enumerate() {
                 for &b in others {
@@ -377,10 +378,10 @@ mod tests {
             clusters.roots().len()
         };
         assert_eq!(roots(&disc()), 1);
-        // How many that leaves depends on the order of merging; bounds of it. Bands of 70° at most:
-        // six are needed around a cylinder, and greedy bands that are half as wide as they could be
-        // make twice that. Their height is free, but compact clusters that met first may stand in
-        // one another's way: as much again.
+        // The number of roots depends on the order of merging; these are bounds. Bands of 70° at
+        // most: six are needed around a cylinder, and greedy bands half as wide as possible give
+        // twice that. Their height is free, but compact clusters formed first may block one
+        // another: another factor of two.
         let (around, ball) = (roots(&cylinder()), roots(&sphere()));
         println!("cylinder {around}, sphere {ball}");
         assert!((6..=24).contains(&around), "{around}");
@@ -393,7 +394,7 @@ mod tests {
     fn cluster_has_one_group_and_material() {
         let scene = striped();
         let clusters = Clusters::new(&scene);
-        // Four stripes, each with its own pair.
+        // Four stripes, each with its own group and material.
         assert_eq!(clusters.roots().len(), 4);
         for &c in clusters.roots() {
             let kind = |t: u32| {

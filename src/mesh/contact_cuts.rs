@@ -10,11 +10,11 @@
 //!   └─────────────┘        └─────────────┘     each side. Around its end it does.
 //! ```
 //!
-//! Light falls from full to none at such a line, and a point in the dark that is given some of the
-//! light beside it is off by many times its own: where things are stuck into one another, a strip
-//! of next to no area makes most of the error, and no element is small enough. So nearly every line
-//! is cut along that has light on both its sides, or a slit on one: see [`openness`]. What is
-//! nearer than [`SNAP_DISTANCE`] is one point: see [`snapping`].
+//! Irradiance drops from full to none at such a line, and a dark point that is interpolated with
+//! the light beside it is off by many times its own value: where objects penetrate one another, a
+//! strip of nearly no area makes most of the error, and no element is small enough. So cuts are
+//! made along nearly every line with light on both its sides, or a slit on one: see [`openness`].
+//! Points nearer than [`SNAP_DISTANCE`] are merged: see [`snapping`].
 
 mod openness;
 mod snapping;
@@ -35,24 +35,24 @@ use snapping::{Cuts, STEPS, Snapping};
 use triangulation::CutTriangle;
 
 /// Length of the shortest cuts, in units of the finest edge. A bake for 10 % of a room full of
-/// things that are stuck into one another was off by 84 ± 6 % with cuts down to 4 finest edges, and
-/// by 21 ± 5 % with these.
+/// penetrating objects had an error of 84 ± 6 % with cuts down to 4 finest edges, and of 21 ± 5 %
+/// with these.
 const SHORTEST_CUT: f64 = 0.02;
 
-/// What comes nearer to a triangle's plane than this touches it, in units of the shortest cut: a
-/// slit as narrow lets next to no light through. Chosen by hand.
+/// Distance from a triangle's plane below which another triangle touches it, in units of the
+/// shortest cut: a slit as narrow transmits almost no light. Plain choice.
 const CONTACT_DISTANCE: f64 = 0.05;
 
-/// Points nearer than this are one, in units of the shortest cut: no piece need be thinner. Chosen
-/// by hand.
+/// Distance below which points are merged, in units of the shortest cut: pieces need not be
+/// thinner. Plain choice.
 const SNAP_DISTANCE: f64 = 0.02;
 
-/// Contact segments there are at most, over all triangles: more are not cut at all, since each
-/// makes some pieces, and a mesh that fine resolves little of them.
+/// Maximum number of contact segments over all triangles: a scene with more is not cut at all,
+/// since each makes some pieces, and a mesh that fine resolves few of them.
 const MAX_SEGMENTS: usize = 1 << 17;
 
 /// `scene` with its reflecting triangles cut where others touch them, for elements with edges down
-/// to `finest` (scene unit); as it is where none are.
+/// to `finest` (scene unit); unchanged if none are touched.
 pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
     let topology = SurfaceTopology::of_scene(scene);
     let mut cuts = find_cuts(scene, &topology, finest);
@@ -69,8 +69,8 @@ pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
 }
 
 impl Mesh {
-    /// The same mesh with elements that are longer than `finest` (scene unit) split further,
-    /// `levels` times, where they have a corner at which the scene was cut: shadows begin there.
+    /// The same mesh with elements longer than `finest` (scene unit) split further, `levels` times,
+    /// if they have a corner on a cut: shadows begin there.
     pub(crate) fn split_beside_cuts(&self, levels: u32, finest: f64) -> Mesh {
         let scene = self.scene();
         let touches = |t: usize, cell: Cell| {
@@ -90,7 +90,7 @@ impl Mesh {
     }
 }
 
-/// The contact segments on each triangle that is to be cut.
+/// The contact segments on each triangle to be cut.
 fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts> {
     let shortest = SHORTEST_CUT * finest;
     let count = scene.triangles().len();
@@ -104,7 +104,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
     let cuts = |t: usize| {
         let corners = scene.corners(t);
         let material = scene.material(t);
-        // Glass that is cut here and not there would enclose no body.
+        // Glass cut only partly would enclose no body.
         let is_glass = material.specular.is_some_and(|specular| specular.is_glass());
         if longest_edge(corners) <= shortest || !material.scatters() || is_glass {
             return Cuts::default();
@@ -116,13 +116,13 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
         others.sort_unstable();
         let mut segments = vec![];
         for s in others {
-            // No shadow begins there.
+            // No shadow begins at clear panes.
             if scene.is_clear(s) {
                 continue;
             }
             let mut sides = outer[s];
             if is_near(s) {
-                // Of what lies on the triangle, its outline.
+                // Of coplanar triangles, only the outline.
                 for (k, side) in sides.iter_mut().enumerate() {
                     *side &= !neighbours[s][k].is_some_and(|n| is_near(n as usize));
                 }
@@ -194,7 +194,7 @@ mod tests {
     const FLOOR: [[f64; 3]; 4] =
         [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 8.0, 0.0], [0.0, 8.0, 0.0]];
 
-    /// Pieces of the floor, and how many smooth surfaces they are.
+    /// Pieces of the floor, and the number of their smooth surfaces.
     fn floor_of(scene: &Scene) -> (Vec<[DVec3; 3]>, usize) {
         let topology = SurfaceTopology::new(scene);
         let surfaces = topology.surfaces();
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn walls_are_cut_across_the_sides_of_triangles() {
-        // Next to the floor's corner all but a bit of the foot is on one of its two triangles.
+        // Near the floor's corner almost the whole foot is on one of its two triangles.
         for x in [1e-3, 10.0 - 1e-3] {
             let wall = [[x, 0.0, 0.0], [x, 8.0, 0.0], [x, 8.0, 3.0], [x, 0.0, 3.0]];
             let (pieces, surfaces) = floor_of(&cut_at_contacts(&quads(&[FLOOR, wall]), 0.1));
@@ -246,7 +246,7 @@ mod tests {
         let cut = cut_at_contacts(&quads(&[FLOOR, wall]), 0.1);
         let (pieces, surfaces) = floor_of(&cut);
         assert!(pieces.len() > 2 && surfaces == 1);
-        // Along the wall there are two vertices in each place.
+        // Along the wall there are two vertices at each position.
         let topology = SurfaceTopology::new(&cut);
         let mesh = Mesh::new(cut.clone(), f64::INFINITY).unwrap();
         let split = mesh.split_beside_cuts(2, 0.1);
@@ -312,7 +312,8 @@ mod tests {
         let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
         assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
-        // Through a hole in its lid, of which floor beside a wall sees a thirtieth, people do.
+        // The floor is visible through a hole in the lid, which fills 1/30 of the view from floor
+        // beside a wall.
         let lid = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {
             [[x0, y0, 2.0], [x1, y0, 2.0], [x1, y1, 2.0], [x0, y1, 2.0]]
         };

@@ -1,4 +1,4 @@
-//! Where surfaces touch: elements there are split further, since the light on them jumps.
+//! Contacts of surfaces: elements there are split further, since the light on them jumps.
 //!
 //! ```text
 //!          │ wall                 An element that straddles the wall's foot is lit on one
@@ -9,8 +9,8 @@
 //!  └───┴─┴─┴─┴─┴───┘
 //! ```
 //!
-//! 1. Boxes of triangles, expanded by the contact distance, give the pairs to look at.
-//! 2. For each pair, the segments on the one triangle that the other makes are found, in
+//! 1. Boxes of triangles, expanded by the contact distance, give the candidate pairs.
+//! 2. For each pair, the segments that one triangle makes on the other are computed, in
 //!    barycentric coordinates.
 //! 3. The quadtree of each triangle is descended along its segments.
 
@@ -23,19 +23,19 @@ use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// What comes nearer to a cell's plane than this touches it, in units of the cell's size (the
-/// square root of its area). Chosen by hand; no measurement was kept.
+/// Distance from a cell's plane below which another triangle touches the cell, in units of the
+/// cell's size (the square root of its area). Plain choice; no measurement was kept.
 const CONTACT_DISTANCE: f64 = 0.15;
 
-/// A segment has to come this far into an element to separate it, as a barycentric weight: one
-/// along the element's edge does not. Chosen by hand; no measurement was kept.
+/// Least depth of a segment in an element for separating it, as a barycentric weight: a segment
+/// along the element's edge does not. Plain choice; no measurement was kept.
 const MIN_PENETRATION: f64 = 0.02;
 
-/// A segment that separates some element in a cell comes at least this far into the cell, as a
-/// barycentric weight, since elements are at most [`Mesh::MAX_DEPTH`] levels smaller.
+/// Least depth in a cell of a segment that separates some element in it, as a barycentric weight,
+/// since elements are at most [`Mesh::MAX_DEPTH`] levels smaller.
 const MIN_CELL_PENETRATION: f64 = MIN_PENETRATION / (1u32 << Mesh::MAX_DEPTH) as f64;
 
-/// Triangles lie in one plane if the cosine between their normals is above this: 1e-5 radians.
+/// Cosine of the angle between the normals above which triangles are coplanar: 1e-5 radians.
 const COPLANAR_COSINE: f64 = 1.0 - 5e-11;
 
 /// A line on a triangle along which another triangle touches or crosses it.
@@ -48,16 +48,16 @@ pub(super) struct ContactSegment {
 }
 
 impl Mesh {
-    /// The same mesh with elements split further, `levels` times, that edges or faces of other
-    /// triangles touch within: an element that straddles a wall's foot is light on one side and
-    /// hidden on the other (the discontinuities of order zero of Heckbert, "Discontinuity meshing
-    /// for radiosity", 1992).
+    /// The same mesh with elements split further, `levels` times, if edges or faces of other
+    /// triangles touch their interior: an element that straddles a wall's foot is light on one side
+    /// and hidden on the other (the discontinuities of order zero of Heckbert, "Discontinuity
+    /// meshing for radiosity", 1992).
     ///
-    /// What comes nearer than 15 % of the square root of an element's area touches it; levels that
-    /// would go beyond [`Mesh::MAX_DEPTH`] are left out.
+    /// The contact distance is 15 % of the square root of an element's area; levels beyond
+    /// [`Mesh::MAX_DEPTH`] are left out.
     ///
-    /// Where more than 256 triangles have more than 256 others about them each, only the largest
-    /// 256 touch the rest of these: thousands of faces in one place are not worth the time.
+    /// Among triangles that each have more than 256 others near them, only the largest 256 touch
+    /// the rest: this bounds the time for thousands of faces at one point.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
         let count = self.depths.len();
         let tolerances: Vec<f64> =
@@ -136,8 +136,8 @@ impl Mesh {
 }
 
 impl ContactSegment {
-    /// Whether the segment comes into `cell` by more than `margin`, a barycentric weight of the
-    /// cell: whether it meets the triangle in which all three weights are at least that.
+    /// Whether the segment enters `cell` by more than `margin`, a barycentric weight of the cell:
+    /// whether it intersects the triangle in which all three weights are at least that.
     fn separates(&self, cell: Cell, margin: f64) -> bool {
         let [start, end] = self.ends.map(|p| {
             let [u, v] = cell.local(p.x, p.y);
@@ -147,8 +147,9 @@ impl ContactSegment {
     }
 }
 
-/// From and to which share of its length a segment has no weight below zero, given the three at
-/// both ends; none if nowhere. Clipped against the three sides one by one (Liang and Barsky 1984).
+/// The range of a segment, as fractions of its length, in which no weight is below zero, given the
+/// three weights at both ends; none if empty. Clipped against the three sides one by one (Liang and
+/// Barsky 1984).
 pub(super) fn part_inside([start, end]: [[f64; 3]; 2]) -> Option<[f64; 2]> {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for (start, end) in start.into_iter().zip(end) {
@@ -165,8 +166,8 @@ pub(super) fn part_inside([start, end]: [[f64; 3]; 2]) -> Option<[f64; 2]> {
     (from < to).then_some([from, to])
 }
 
-/// Per triangle, which of its sides end its plane: the diagonals of a flat polygon do not, and
-/// separate nothing.
+/// Per triangle, the sides at which its plane ends: the diagonals of a flat polygon are not among
+/// them, and separate nothing.
 pub(super) fn outer_edges(scene: &Scene, topology: &SurfaceTopology) -> Vec<[bool; 3]> {
     let mut outer = vec![[true; 3]; topology.sides.len()];
     for [(s, l), (t, k)] in topology.shared_edges() {
@@ -208,8 +209,8 @@ impl TrianglePlane {
 
     /// Adds the segments along which the triangle with these `corners` touches or crosses this one,
     /// whose expanded box is `within`: the parts of its `outer` sides that lie within the tolerance
-    /// of the plane, and its cut with the plane. What lies in the plane does not cut it, whatever
-    /// rounding makes of it.
+    /// of the plane, and its cut with the plane. A coplanar triangle does not cut it, whatever the
+    /// rounding.
     pub fn add_contacts(
         &self,
         corners: &[DVec3; 3],
@@ -237,7 +238,7 @@ impl TrianglePlane {
             let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
             let crosses = !is_coplanar && low < 0.0 && high > 0.0;
             if outer[k] && low <= tolerance && high >= -tolerance {
-                // The end at corner k of what lies within the tolerance.
+                // The end at corner k of the part within the tolerance.
                 let end = |k: usize, l: usize| {
                     if height[k].abs() <= tolerance {
                         corners[k]

@@ -1,10 +1,10 @@
-//! Triangles that are far larger than the place where the light is, in pieces: a quadtree has
+//! Pieces of triangles that are far larger than the lit region: a quadtree has
 //! [`super::Mesh::MAX_DEPTH`] levels, and twelve halvings of a ground plane of a kilometre leave
-//! elements of a quarter of a metre, which resolve nothing of the room that stands on it.
+//! elements of a quarter of a metre, which do not resolve the room that stands on it.
 //!
-//! Pieces grow with their distance from the light as elements do, so that there are as many at
-//! each octave of the distance. They are made by halving longest edges; where the two triangles at
-//! an edge do not agree that it is their longest, the one that does not is halved first (Rivara,
+//! Pieces grow with their distance from the light as elements do, so that each octave of the
+//! distance has the same number. They are made by halving longest edges; if an edge is not the
+//! longest of both triangles at it, the triangle with a longer one is halved first (Rivara,
 //! "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques",
 //! 1984), so that no corner of a piece lies on the side of another:
 //!
@@ -27,21 +27,22 @@ use super::sizing::size_growth;
 use crate::geometry::aabb::Aabb;
 use crate::scene::{Piece, Scene, longest_edge};
 
-/// Pieces there are at most; a scene that would have more stays as it is, and so do its elements.
+/// Maximum number of pieces; a scene with more is left unchanged, and so are its elements.
 const MAX_PIECES: usize = 1 << 18;
 
-/// Pieces are no smaller than one over this of the scene: what is smaller is lost in the rounding
-/// of coordinates.
+/// Largest ratio of the sizes of the scene and of a piece: smaller ones are lost in the rounding of
+/// coordinates.
 const MAX_CONCENTRATION: f64 = 1e9;
 
 /// `scene` with its reflecting triangles cut until none has a longer edge than the diagonal of
-/// `region`, where the light is, or the distance from it; as it is where none is so large. Below a
-/// piece there are [`super::Mesh::MAX_DEPTH`] levels of elements, down to 1/4096 of the region.
+/// `region`, which has the light, times the growth with the distance from it; unchanged if none is
+/// so large. Below a piece there are [`super::Mesh::MAX_DEPTH`] levels of elements, down to 1/4096
+/// of the region.
 pub(crate) fn cut_large_triangles(scene: &Arc<Scene>, region: &Aabb) -> Arc<Scene> {
     let least = region.diagonal().max(scene.reflecting_bounds().diagonal() / MAX_CONCENTRATION);
     let is_large = |t: usize, corners: &[DVec3; 3]| {
         let material = scene.material(t);
-        // Glass that is cut here and not there would enclose no body.
+        // Glass cut only partly would enclose no body.
         material.scatters()
             && !material.specular.is_some_and(|specular| specular.is_glass())
             && longest_edge(*corners) > least * size_growth(Some(region), corners)
@@ -63,10 +64,10 @@ type Edge = (u32, u32);
 #[derive(Clone, Copy)]
 struct Part {
     triangle: usize,
-    /// What its corners are on the smooth surface.
+    /// Identities of its corners on the smooth surface.
     ids: [u32; 3],
     corners: [DVec3; 3],
-    /// Weights of the triangle's second and third corner at each.
+    /// Weights of the triangle's second and third corner at each corner.
     weights: [[f64; 2]; 3],
 }
 
@@ -75,7 +76,7 @@ struct Bisection {
     parts: Vec<Part>,
     /// The parts at each edge.
     at_edge: FxHashMap<Edge, Vec<usize>>,
-    /// The corner in the middle of each edge that was halved.
+    /// The midpoint of each edge that was halved.
     middles: FxHashMap<Edge, u32>,
     next_id: u32,
 }
@@ -86,8 +87,8 @@ impl Part {
         (a.min(b), a.max(b))
     }
 
-    /// The side that is halved first: the longest and, of those as long but for rounding, the one
-    /// that all triangles agree on.
+    /// The side to halve first: the longest and, of sides equal up to rounding, one chosen equally
+    /// for all triangles.
     fn longest(&self) -> usize {
         let rounded = |k: usize| {
             let length = self.corners[k].distance(self.corners[(k + 1) % 3]);
@@ -100,7 +101,7 @@ impl Part {
         (0..3).max_by(order).expect("three sides")
     }
 
-    /// Its two halves, `middle` being the corner in the middle of side `k`.
+    /// Its two halves, `middle` being the midpoint of side `k`.
     fn halves(&self, k: usize, middle: u32) -> [Part; 2] {
         let (a, b) = (k, (k + 1) % 3);
         let corner = (self.corners[a] + self.corners[b]) / 2.0;
@@ -135,8 +136,8 @@ impl Bisection {
         bisection
     }
 
-    /// Halves what `is_large` by its triangle and its corners, and what that takes; the pieces of
-    /// each triangle, unless there are too many.
+    /// Halves parts that are `is_large` by their triangle and corners, and those needed for a
+    /// conforming result; returns the pieces of each triangle, unless there are too many.
     fn run(mut self, is_large: impl Fn(usize, &[DVec3; 3]) -> bool) -> Option<Vec<Vec<Piece>>> {
         let triangles = self.parts.len();
         let most = MAX_PIECES.max(2 * triangles);
@@ -158,15 +159,15 @@ impl Bisection {
         Some(pieces)
     }
 
-    /// Goes from part `p` over longest edges to one that all parts at it agree on, and halves these
-    /// parts; new ones are added to `pending`.
+    /// Goes from part `p` over longest edges to one that is the longest of all parts at it, and
+    /// halves these parts; new ones are added to `pending`.
     fn halve_next(&mut self, mut p: usize, pending: &mut Vec<usize>) {
         let mut passed = FxHashSet::default();
         loop {
             let edge = self.parts[p].edge(self.parts[p].longest());
             let longer = |&&q: &&usize| self.parts[q].edge(self.parts[q].longest()) != edge;
-            // Edges grow from part to part, but for what rounding makes of lengths that two
-            // triangles have differently: never twice the same.
+            // Edges grow from part to part, except where rounding makes a length differ between two
+            // triangles: no edge is passed twice.
             let other = self.at_edge[&edge].iter().find(longer).copied();
             match other {
                 Some(q) if passed.insert(edge) => p = q,
@@ -195,7 +196,7 @@ impl Bisection {
         }
     }
 
-    /// Notes part `p` at its edges.
+    /// Registers part `p` at its edges.
     fn enter(&mut self, p: usize) {
         for k in 0..3 {
             self.at_edge.entry(self.parts[p].edge(k)).or_default().push(p);
@@ -250,7 +251,7 @@ mod tests {
             }
             // The black quad is not cut. Between squares of half a side r and 2 r around the light
             // there is an area of 12 r², and a piece has r²/8 at least: halves of a square whose
-            // diagonal is over r / √2. So there are 96 of them an octave at most.
+            // diagonal is over r / √2. So there are at most 96 of them per octave.
             assert_eq!(pieces.iter().filter(|&&t| cut.triangles()[t].material == 1).count(), 2);
             let most = last + (100f64.log2() * 96.0) as usize;
             assert!(pieces.len() > last && pieces.len() < most, "{half}: {}", pieces.len());

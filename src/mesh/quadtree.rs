@@ -1,4 +1,4 @@
-//! One cell of a triangle's quadtree: where it is, its corners, children and parent.
+//! One cell of a triangle's quadtree: its position, corners, children and parent.
 
 /// A cell of the midpoint subdivision of a triangle.
 ///
@@ -65,7 +65,7 @@ impl Cell {
         if self.flipped { [-u, -v] } else { [u, v] }
     }
 
-    /// The inverse of [`Cell::local`]: where in the triangle (u, v) in this cell is.
+    /// The inverse of [`Cell::local`]: the position in the triangle of (u, v) in this cell.
     pub fn in_triangle(self, [u, v]: [f64; 2]) -> [f64; 2] {
         let side = f64::from(1u32 << self.level);
         let [[i, j], ..] = self.lattice_corners();

@@ -1,14 +1,14 @@
-//! How large elements may be, place by place.
+//! Size of elements as a function of position.
 //!
-//! Elements are for light, and light may fill a small part of a scene: a lit room that stands on a
-//! ground plane of a kilometre. Within the region where the light is, elements have one size; away
-//! from it they grow with the distance, so that they look equally large from there:
+//! Light may fill a small part of a scene, such as a lit room on a ground plane of a kilometre.
+//! Within the lit region elements have one size; outside they grow with the distance, so that they
+//! look equally large from there:
 //!
 //! ```text
 //!  size · (1 + d/D)    d: distance from the region; D: the region's diagonal
 //! ```
 //!
-//! A plane of any size then adds a number of elements that grows as the logarithm of its size.
+//! A plane then adds a number of elements that grows with the logarithm of its size.
 
 use std::sync::Arc;
 
@@ -19,12 +19,12 @@ use crate::error::{Error, ErrorKind};
 use crate::geometry::aabb::Aabb;
 use crate::scene::{Scene, Triangle, longest_edge};
 
-/// How large elements may be, place by place.
+/// Size of elements as a function of position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ElementSizing {
     /// Longest edge of an element within the region, scene unit.
     pub size: f64,
-    /// Where most of the light is; none for the whole scene.
+    /// The region with most of the light; none for the whole scene.
     pub region: Option<Aabb>,
     /// Materials, by their index, whose triangles are not split: they neither receive nor shoot.
     pub unsplit_materials: Vec<u32>,
@@ -46,12 +46,12 @@ impl ElementSizing {
     }
 }
 
-/// Elements grow by this factor until there are few enough: half as many a step.
+/// Growth factor of elements per step until there are few enough: it halves their number.
 const COARSENING: f64 = std::f64::consts::SQRT_2;
 
 impl ElementSizing {
-    /// The same, with elements as much larger as it takes for `scene` to have at most `most` of
-    /// them at up to `max_depth` levels; its triangles are not merged.
+    /// The same sizing scaled up until `scene` has at most `most` elements at up to `max_depth`
+    /// levels; its triangles are not merged.
     pub fn within(&self, scene: &Scene, max_depth: u32, most: usize) -> ElementSizing {
         let mut sizing = self.clone();
         let triangles = scene.triangles().len();
@@ -63,7 +63,7 @@ impl ElementSizing {
         sizing
     }
 
-    /// Elements of `scene`; beyond `bound` not all of them.
+    /// Number of elements of `scene`; counting stops beyond `bound`.
     fn count(&self, scene: &Scene, max_depth: u32, bound: usize) -> usize {
         let mut count = 0;
         for t in 0..scene.triangles().len() {
@@ -94,9 +94,9 @@ impl ElementSizing {
 }
 
 impl Mesh {
-    /// Splits every triangle of `scene` until no element is larger than `sizing` allows in its
-    /// place, down to `max_depth` levels. The same elements as [`Mesh::new`] has where the sizes
-    /// are the same everywhere.
+    /// Splits every triangle of `scene` until no element is larger than `sizing` allows at its
+    /// position, down to `max_depth` levels. For a uniform size the elements are those of
+    /// [`Mesh::new`].
     ///
     /// # Errors
     /// Those of [`Mesh::new`].
@@ -123,8 +123,8 @@ impl Mesh {
     }
 }
 
-/// Leaves of the quadtree of a triangle whose inner cells `is_inner` tells; not all of those beyond
-/// `bound`.
+/// Number of leaves of the quadtree of a triangle with inner cells by `is_inner`; counting stops
+/// beyond `bound`.
 fn leaves(is_inner: &impl Fn(Cell) -> bool, bound: usize) -> usize {
     let mut pending = vec![Cell::ROOT];
     let mut count = 0;
@@ -137,7 +137,7 @@ fn leaves(is_inner: &impl Fn(Cell) -> bool, bound: usize) -> usize {
     count
 }
 
-/// By how much larger than in `region` an element with these `corners` may be.
+/// Ratio of the sizes allowed for an element with these `corners` and for one in `region`.
 pub(crate) fn size_growth(region: Option<&Aabb>, corners: &[DVec3; 3]) -> f64 {
     region.map_or(1.0, |region| {
         let bounds = Aabb::from_points(*corners);
@@ -176,7 +176,7 @@ mod tests {
             assert!(found <= most && 4 * found > most, "{found} of {most}");
         }
         assert_eq!(fine.within(&scene, Mesh::MAX_DEPTH, usize::MAX), fine);
-        // The triangles stay, however few elements there may be.
+        // The triangles remain, whatever the maximum number of elements.
         assert_eq!(count(&fine.within(&scene, Mesh::MAX_DEPTH, 1)), 2);
     }
 

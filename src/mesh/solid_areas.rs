@@ -1,6 +1,6 @@
-//! The area of elements and patches that light counts: without holes.
+//! The solid area of elements and patches: without holes.
 //!
-//! What is solid of a patch is what is solid of its elements, so that no light is lost or made
+//! The solid area of a patch is the sum over its elements, so that no light is lost or added
 //! between patches and the elements that they shoot for.
 
 use glam::DVec3;
@@ -8,15 +8,15 @@ use glam::DVec3;
 use super::{Mesh, NodeId};
 use crate::sampling::low_discrepancy::{fold_to_triangle, r2_point};
 
-/// Share of its area that a hole weighs in means over elements around a vertex: vertices that lie
-/// in holes alone have normals, too, and others know nothing of it.
+/// Weight of a hole, as a fraction of its area, in means over elements around a vertex: gives
+/// normals to vertices in holes, and does not affect others.
 const HOLE_WEIGHT: f64 = 1e-12;
 
-/// Places on a patch at which a point is looked for that is no hole. Chosen by hand.
+/// Number of points on a patch that are tested for one outside of holes. Plain choice.
 const PLACES: usize = 64;
 
 impl Mesh {
-    /// Area of `node` without its holes, length unit squared: what light counts.
+    /// Area of `node` without its holes, length unit squared: the area used for light.
     pub fn solid_area(&self, node: NodeId) -> f64 {
         match self.solid_shares() {
             [] => self.area(node),
@@ -24,18 +24,18 @@ impl Mesh {
         }
     }
 
-    /// The share of `node` that is solid, in [0, 1].
+    /// The fraction of `node` that is solid, in [0, 1].
     pub(crate) fn solid_share(&self, node: NodeId) -> f64 {
         self.solid_shares().get(node.0 as usize).copied().unwrap_or(1.0)
     }
 
-    /// Whether any of the light that arrives at `node` leaves again: it is no hole, nor black.
+    /// Whether light that arrives at `node` is scattered: it is neither a hole nor black.
     pub(crate) fn scatters(&self, node: NodeId) -> bool {
         self.material(node).scatters() && self.solid_share(node) > 0.0
     }
 
-    /// What `node` weighs in means over elements around a vertex: its solid area, and next to
-    /// nothing of a hole.
+    /// Weight of `node` in means over elements around a vertex: its solid area, and nearly 0 for a
+    /// hole.
     pub(crate) fn weight(&self, node: NodeId) -> f64 {
         self.solid_area(node).max(HOLE_WEIGHT * self.area(node))
     }
@@ -46,8 +46,8 @@ impl Mesh {
         !scene.has_cut_outs() || scene.is_solid(t, scene.barycentric(t, position))
     }
 
-    /// A point of `node` that is no hole: its centroid, or of the places that are looked at the
-    /// nearest to it. The centroid where all of these are holes.
+    /// A point of `node` outside of holes: its centroid, or the nearest to it of the test points.
+    /// The centroid if all of these are in holes.
     pub(crate) fn viewpoint(&self, node: NodeId) -> DVec3 {
         let centroid = self.centroid(node);
         if self.is_solid(node, centroid) {
@@ -63,7 +63,7 @@ impl Mesh {
         solid.min_by(|p, q| distance(p).total_cmp(&distance(q))).unwrap_or(centroid)
     }
 
-    /// Of every node, the share that is solid; of none in a scene without holes.
+    /// The solid fraction of every node; empty in a scene without holes.
     fn solid_shares(&self) -> &[f64] {
         self.solid_shares.get_or_init(|| {
             if !self.scene().has_cut_outs() {

@@ -1,16 +1,16 @@
-//! What elements reflect and emit: of a texture, the mean of their own piece.
+//! Reflectance and exitance of elements: of a texture, the mean over the element.
 
 use super::Mesh;
 use crate::scene::Rgb;
 
-/// Least share of the material's reflectance that an element has whose piece of the texture is
-/// black. It reflects nothing that matters, and still what it receives can be told from what it
-/// reflects: a thousand million is far from the 2⁵³ of rounding.
+/// Least reflectance of an element as a fraction of its material's, if its piece of the texture is
+/// black: negligible, and irradiance can still be computed from the reflected radiosity, since 1e9
+/// is far below the 2⁵³ of rounding.
 const MIN_REFLECTANCE_SHARE: f64 = 1e-9;
 
 impl Mesh {
     /// Reflectance of element `e` per channel: that of its material or, of a textured one, the mean
-    /// of the texture over the element, and no less than 1e-9 of the material's.
+    /// of the texture over the element, at least 1e-9 of the material's.
     pub fn reflectance(&self, e: usize) -> Rgb {
         let of_material = || self.material(self.element(e)).reflectance;
         self.textured_reflectances().get(e).copied().unwrap_or_else(of_material)
@@ -22,22 +22,22 @@ impl Mesh {
         self.scene().exitance(self.triangle(self.element(e)))
     }
 
-    /// Reflectance of element `e` over that of its material, per channel: 1 without a texture, and
-    /// where nothing is reflected.
+    /// Ratio of the reflectances of element `e` and of its material, per channel: 1 without a
+    /// texture, and if nothing is reflected.
     pub(crate) fn relative_reflectance(&self, e: usize) -> Rgb {
         let Some(&reflectance) = self.textured_reflectances().get(e) else { return Rgb::ONE };
         let of_material = self.material(self.element(e)).reflectance;
         Rgb::select(of_material.cmpgt(Rgb::ZERO), reflectance / of_material, Rgb::ONE)
     }
 
-    /// The share of what element `e` receives that leaves again diffusely, on either side: ρ + τ
+    /// Fraction of the light received by element `e` that leaves diffusely, on either side: ρ + τ
     /// per channel. The transmittance τ of a textured material follows its reflectance.
     pub(crate) fn albedo(&self, e: usize) -> Rgb {
         self.reflectance(e) + self.transmittance(e)
     }
 
-    /// The share of what element `e` receives that leaves diffusely from the other side, if it has
-    /// one.
+    /// Fraction of the light received by element `e` that leaves diffusely from the other side, if
+    /// there is one.
     pub(crate) fn transmittance(&self, e: usize) -> Rgb {
         let of_material = self.material(self.element(e)).transmittance;
         if of_material == Rgb::ZERO {
@@ -47,7 +47,7 @@ impl Mesh {
         }
     }
 
-    /// Reflectance of every element; of none where no material has a texture of it.
+    /// Reflectance of every element; empty if no material has a texture of it.
     fn textured_reflectances(&self) -> &[Rgb] {
         self.textured_reflectances.get_or_init(|| {
             if !self.scene().has_textured_reflectance() {

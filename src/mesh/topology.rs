@@ -1,4 +1,4 @@
-//! Which corners and sides of scene triangles belong to one smooth surface.
+//! Corners and sides of scene triangles that belong to one smooth surface.
 //!
 //! Corners at one position are welded; two triangles that share a side between the same two
 //! positions continue one another across it, unless the side is a crease:
@@ -13,9 +13,9 @@
 //!        a                    and at b.
 //! ```
 //!
-//! Of two triangles t runs along the side from a to b then, and s from b to a. Where more meet,
-//! each is next to at most one, by the order of their angles around the side: of a plate that a
-//! file has once for each side, the triangles of either side continue one another.
+//! Of two triangles t runs along the side from a to b then, and s from b to a. If more share the
+//! side, each is adjacent to at most one, by the order of their angles around the side: of a plate
+//! with triangles for both sides, the triangles of either side continue one another.
 //!
 //! ```text
 //!                     the front of
@@ -25,8 +25,8 @@
 //!          front      │ likewise v and u: the next after v, all around
 //! ```
 //!
-//! A corner's identity is shared by all triangles that are connected across such sides around it,
-//! so that one position has a vertex for each smooth surface that meets there.
+//! A corner's identity is shared by all triangles connected across such sides around it, so that
+//! one position has a vertex for each smooth surface there.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -59,22 +59,22 @@ pub(crate) struct Side {
     pub reversed: bool,
 }
 
-/// Triangles at one side lie in one place up to this angle, radians: what six digits of their
-/// corners leave of it, as for covered backs.
+/// Largest angle between triangles at one side that coincide, radians: the precision of six digits
+/// of their corners, as for covered backs.
 const SAME_ANGLE: f64 = 1e-4;
 
 /// A triangle, and the number of one of its sides.
 type TriangleSide = (usize, usize);
 
 impl SurfaceTopology {
-    /// Those of [`SurfaceTopology::new`], made once for a scene.
+    /// The topology of [`SurfaceTopology::new`], computed once for a scene.
     pub fn of_scene(scene: &Scene) -> Arc<SurfaceTopology> {
         scene.derived(SurfaceTopology::new)
     }
 
     /// Surfaces that continue by the scene's smoothing groups and by angles: up to
-    /// [`Mesh::CREASE_DEGREES`] within one smoothing group, up to [`Scene::crease_degrees`] where
-    /// none is known, else up to [`Mesh::COPLANAR_DEGREES`].
+    /// [`Mesh::CREASE_DEGREES`] within one smoothing group, up to [`Scene::crease_degrees`] if none
+    /// is known, else up to [`Mesh::COPLANAR_DEGREES`].
     pub fn new(scene: &Scene) -> SurfaceTopology {
         SurfaceTopology::with_crease_angle(scene, |a, b| match (a.smoothing, b.smoothing) {
             (None, None) => scene.crease_degrees().unwrap_or(Mesh::CREASE_DEGREES),
@@ -134,12 +134,12 @@ impl SurfaceTopology {
             .flat_map_iter(continued)
             .collect();
         let mut corners = UnionFind::new(3 * count);
-        // No two of these have a side in common.
+        // No two of these share a side.
         for [(t, k), (s, l)] in pairs {
             let id = sides[t][k].id.min(sides[s][l].id);
             sides[t][k].id = id;
             sides[s][l].id = id;
-            // Opposite windings: where one side starts, the other ends.
+            // Opposite windings: the start of one side is the end of the other.
             corners.join(3 * t + k, 3 * s + (l + 1) % 3);
             corners.join(3 * t + (k + 1) % 3, 3 * s + l);
         }
@@ -149,7 +149,7 @@ impl SurfaceTopology {
     }
 
     /// The sides across which the surface continues smoothly to another triangle: each once, as the
-    /// two triangles that share it and which of their sides it is.
+    /// two triangles that share it and the index of the side in each.
     pub fn shared_edges(&self) -> impl Iterator<Item = [TriangleSide; 2]> {
         let all = (0..self.sides.len()).flat_map(|t| [(t, 0), (t, 1), (t, 2)]);
         let with_first = all.map(|(t, k)| {
@@ -159,7 +159,7 @@ impl SurfaceTopology {
         with_first.filter(|[(s, _), (t, _)]| s != t)
     }
 
-    /// Per triangle, the smooth surface that it is a part of: the number of its first triangle.
+    /// Per triangle, its smooth surface: the number of that surface's first triangle.
     pub fn surfaces(&self) -> Vec<u32> {
         let mut surfaces = UnionFind::new(self.sides.len());
         for [(s, _), (t, _)] in self.shared_edges() {
@@ -179,11 +179,11 @@ fn facing_pairs(
 ) -> Vec<[TriangleSide; 2]> {
     let looks_back = |(t, k): TriangleSide| sides[t][k].reversed;
     if let &[t, s] = sharing {
-        // Two are next to each other in whichever order.
+        // For two the order is irrelevant.
         return if looks_back(t) == looks_back(s) { vec![] } else { vec![[t, s]] };
     }
     let mut around = by_angle(scene, sides, sharing);
-    // Of those in one place, what looks to smaller angles lies before what looks to larger ones.
+    // Of coincident ones, those that face smaller angles come before those that face larger ones.
     let mut start = 0;
     for end in 1..=around.len() {
         if end == around.len() || around[end].0 - around[end - 1].0 > SAME_ANGLE {
@@ -196,14 +196,14 @@ fn facing_pairs(
     pairs.filter(|&[t, s]| !looks_back(t) && looks_back(s)).collect()
 }
 
-/// Triangles with sides between the same two positions in the order of their angles around the
-/// side, radians, from the first.
+/// Triangles with sides between the same two positions, sorted by their angles around the side,
+/// radians, from the first.
 fn by_angle(
     scene: &Scene,
     sides: &[[Side; 3]],
     sharing: &[TriangleSide],
 ) -> Vec<(f64, TriangleSide)> {
-    // Within the triangle and at right angles to the side, which all run along alike.
+    // Within the triangle and at right angles to the side, along the same direction for all.
     let across = |(t, k): TriangleSide| {
         let corners = scene.corners(t);
         let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
@@ -216,7 +216,7 @@ fn by_angle(
     let quarter = axis.cross(zero);
     let angle = |side: TriangleSide| {
         let (_, out) = across(side);
-        // What lies with the first is at its angle on both sides of it.
+        // Triangles that coincide with the first have about its angle, on both sides of 0.
         let angle = out.dot(quarter).atan2(out.dot(zero));
         if angle < -SAME_ANGLE { angle + TAU } else { angle }
     };
@@ -264,13 +264,13 @@ mod tests {
         let mut triangles = vec![];
         for (k, &(degrees, forward)) in sheets.iter().enumerate() {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
-            // At another height each: of one place, but with other corners.
+            // At another height each: coincident, but with other corners.
             points.push(DVec3::new(cos, sin, 0.1 + 0.2 * k as f64));
             let corner = k as u32 + 2;
             let corners = if forward { [0, 1, corner] } else { [1, 0, corner] };
             triangles.push(Triangle { corners, ..Default::default() });
         }
-        // Another that has only the origin: sides then run from it to +z, whoever is first.
+        // Another one that has only the origin: sides then run from it to +z, whichever is first.
         let count = points.len() as u32;
         points.extend([DVec3::new(7.0, 0.0, -1.0), DVec3::new(0.0, 7.0, -1.0)]);
         triangles.insert(0, Triangle { corners: [0, count, count + 1], ..Default::default() });
@@ -281,11 +281,11 @@ mod tests {
 
     #[test]
     fn each_side_of_a_plate_continues_by_itself() {
-        // Every order of the four, of both sides of a plate that is bent by 10°: what looks into
-        // the wedge of 170° is joined, and what looks into that of 190°.
+        // Every order of the four, of both sides of a plate that is bent by 10°: the two that face
+        // the wedge of 170° are joined, and so are those that face the one of 190°.
         let [t, s, u, v] = [(0.0, true), (170.0, false), (0.0, false), (170.0, true)];
         let sheets = [t, s, u, v];
-        // One of a pair in one place is off by what six digits leave, to either side.
+        // One of a coincident pair is off by the precision of six digits, to either side.
         for (turn, off) in [(0.0, 1e-4), (45.0, -1e-4), (100.0, 1e-4), (-90.0, -1e-4)] {
             for order in 0..24 {
                 let mut left = vec![0, 1, 2, 3];

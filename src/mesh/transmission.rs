@@ -1,12 +1,12 @@
-//! Where the light leaves that translucent elements let through.
+//! Transport of light through translucent elements.
 //!
-//! The two sides of a translucent surface are triangles of their own, in one place and back to back
-//! ([`Scene::other_side`](crate::Scene)). Each is cut into elements by itself, so that what arrives
-//! at one element leaves from all that lie behind it, by the area that they share:
+//! The two sides of a translucent surface are separate triangles, coincident and back to back
+//! ([`Scene::other_side`](crate::Scene)). Each is cut into elements by itself, so that light
+//! arriving at one element leaves from all elements behind it, in proportion to the shared area:
 //!
 //! ```text
-//!      ●──────── e ────────●        of what e receives f sends on  τ · |e ∩ f| / |e|
-//!      ┊     │             ┊        and of what f receives e       τ · |e ∩ f| / |f|
+//!      ●──────── e ────────●        of the light received by e, f emits     τ · |e ∩ f| / |e|
+//!      ┊     │             ┊        of the light received by f, e emits     τ · |e ∩ f| / |f|
 //!      ●─ f ─●────── g ────●
 //! ```
 
@@ -16,17 +16,17 @@ use super::{Mesh, NodeId};
 use crate::geometry::polygon::{clip, polygon_area};
 use crate::scene::{Material, Rgb};
 
-/// Elements that share less than this part of the smaller one's area are neighbours: what rounding
-/// leaves where they meet.
+/// Shared area, as a fraction of the smaller element's, below which elements are only neighbours:
+/// rounding where they meet.
 const SLIVER: f64 = 1e-9;
 
-/// What elements pass on to those on the other side of them; of none where nothing is translucent.
+/// Light passed on between elements and those behind them; empty if nothing is translucent.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Transmission {
     /// Those of element e are from `first[e]` to `first[e + 1]`.
     first: Vec<u32>,
     passages: Vec<Passage>,
-    /// Per element, the share of what it receives that it passes on to all of them.
+    /// Per element, the fraction of its received light that it passes on to all of them.
     passed: Vec<Rgb>,
 }
 
@@ -35,14 +35,14 @@ pub(crate) struct Transmission {
 pub(crate) struct Passage {
     /// The one behind it.
     pub behind: u32,
-    /// Share per channel of what the element receives that leaves from the one behind.
+    /// Fraction per channel of the light received by the element that leaves from the one behind.
     pub passed: Rgb,
-    /// Share per channel of what the one behind receives that leaves from the element.
+    /// Fraction per channel of the light received by the one behind that leaves from the element.
     pub returned: Rgb,
 }
 
 impl Transmission {
-    /// That of the elements of `mesh`.
+    /// For the elements of `mesh`.
     pub fn new(mesh: &Mesh) -> Transmission {
         let scene = mesh.scene();
         if !scene.materials().iter().any(Material::is_translucent) {
@@ -83,20 +83,20 @@ impl Transmission {
         &self.passages[self.first[e] as usize..self.first[e + 1] as usize]
     }
 
-    /// Share per channel of what element `e` receives that leaves from those behind it.
+    /// Fraction per channel of the light received by element `e` that leaves from those behind it.
     pub fn passed(&self, e: usize) -> Rgb {
         self.passed.get(e).copied().unwrap_or(Rgb::ZERO)
     }
 
-    /// What leaves element `e` of what those behind it receive, of the flux that is `incident` on
-    /// each element.
+    /// Light leaving element `e` that those behind it receive, given the flux `incident` on each
+    /// element.
     pub fn transmitted(&self, e: usize, incident: &[Rgb]) -> Rgb {
         let part = |p: &Passage| p.returned * incident[p.behind as usize];
         self.behind(e).iter().map(part).sum()
     }
 }
 
-/// Elements below `other` that share area with `node`, in one plane, and how much, holes left out.
+/// Elements below `other` that share area with `node`, in one plane, and that area without holes.
 fn overlaps(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<(usize, f64)> {
     let (mut open, mut found) = (vec![other], vec![]);
     while let Some(other) = open.pop() {
@@ -117,7 +117,7 @@ fn overlaps(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<(usize, f64)> {
     found
 }
 
-/// What two nodes in one plane share.
+/// The intersection of two nodes in one plane.
 fn shared_polygon(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<DVec3> {
     let (corners, normal) = (mesh.corners(node), mesh.normal(node));
     let mut shared: Vec<DVec3> = mesh.corners(other).to_vec();
@@ -128,7 +128,7 @@ fn shared_polygon(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<DVec3> {
     shared
 }
 
-/// The share of a convex polygon on `node` that is in no hole.
+/// The fraction of a convex polygon on `node` outside of holes.
 fn solid_share(mesh: &Mesh, node: NodeId, polygon: &[DVec3]) -> f64 {
     let (scene, t) = (mesh.scene(), mesh.triangle(node));
     let [first, rest @ ..] = polygon else { return 1.0 };
@@ -152,8 +152,8 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, Sides, Triangle};
 
-    /// A square of translucent triangles that has been given its second side, each split so many
-    /// times.
+    /// A square of translucent triangles with its second side added, each split the number of times
+    /// in `levels`.
     fn sheet(levels: [u32; 4]) -> Mesh {
         let positions = [[0.1, 0.0], [2.3, 0.2], [2.0, 1.9], [0.0, 1.4]]
             .map(|[x, y]| x * DVec3::new(0.6, 0.0, 0.8) + y * DVec3::Y);
@@ -192,7 +192,7 @@ mod tests {
                     assert!(normal.dot(mesh.normal(mesh.element(p.behind as usize))) < -0.999);
                 }
             }
-            // Pushed on and pulled from behind are the same.
+            // Pushing to and pulling from behind give the same.
             let incident: Vec<Rgb> = (0..count).map(|e| Rgb::splat(1.0 + e as f64)).collect();
             let mut pushed = vec![Rgb::ZERO; count];
             for (e, &arrives) in incident.iter().enumerate() {

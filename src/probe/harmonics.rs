@@ -1,5 +1,4 @@
-//! Real spherical harmonics to order 2, and the directions by which irradiance is projected onto
-//! them.
+//! Real spherical harmonics to order 2, and the directions for projecting irradiance onto them.
 //!
 //! | index | l, m | Y_lm (Ramamoorthi and Hanrahan 2001, equation 3) |
 //! |---|---|---|
@@ -17,17 +16,17 @@ use glam::DVec3;
 
 use crate::scene::Rgb;
 
-/// Nine coefficients a channel.
+/// Number of coefficients per channel.
 pub const COUNT: usize = 9;
 
-/// What irradiance keeps of the radiance of order l: Â_l = π, 2π/3, π/4 (Ramamoorthi and Hanrahan
+/// Factor from radiance to irradiance of order l: Â_l = π, 2π/3, π/4 (Ramamoorthi and Hanrahan
 /// 2001, equation 8).
 const COSINE_LOBE: [f64; 3] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
 
 /// Order l of each coefficient.
 const ORDER: [usize; COUNT] = [0, 1, 1, 1, 2, 2, 2, 2, 2];
 
-/// A function of the direction by its harmonics to order 2, three channels.
+/// A function of direction by its harmonics to order 2, three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Harmonics {
     /// Coefficients c_lm with f(n) = Σ c_lm Y_lm(n): (l, m) = (0, 0), (1, −1), (1, 0), (1, 1),
@@ -53,8 +52,8 @@ impl Harmonics {
     /// The projection of a function given in the [`DIRECTIONS`], in their order:
     /// c_lm = 4π Σ w_k f(n_k) Y_lm(n_k).
     ///
-    /// It is exact for functions of order 5 at most, as the rule is to degree 7. Irradiance has no
-    /// odd orders above the first, and of order 6 but 1/64 of what it keeps of order 0.
+    /// Exact for functions of order 5 at most, as the rule is exact to degree 7. Irradiance has no
+    /// odd orders above the first, and its factor of order 6 is 1/64 of that of order 0.
     pub(super) fn of_values(values: impl Iterator<Item = Rgb>) -> Harmonics {
         let mut harmonics = Harmonics::default();
         for (direction, value) in DIRECTIONS.iter().zip(values) {
@@ -89,7 +88,7 @@ fn basis(n: DVec3) -> [f64; COUNT] {
 pub(super) struct Direction {
     /// Each −1, 0 or 1.
     towards: [f64; 3],
-    /// Share of the sphere.
+    /// Fraction of the sphere.
     pub weight: f64,
 }
 

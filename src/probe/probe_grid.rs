@@ -16,11 +16,11 @@ pub struct ProbeGrid {
     pub counts: [usize; 3],
 }
 
-/// Probes of a grid, at most. Chosen by hand: 1 GiB of them.
+/// Maximum number of probes of a grid. Plain choice: 1 GiB of them.
 const MAX_PROBES: f64 = 4e6;
 
 impl ProbeGrid {
-    /// So many cells along x, y and z of `bounds`.
+    /// A grid with `counts` cells along x, y and z of `bounds`.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for no cells, or more than four million, or a box that is not finite.
@@ -59,7 +59,7 @@ impl ProbeGrid {
                 remedy,
             ));
         }
-        // Too many for a number are too many.
+        // A count too large for an integer saturates, and is refused as too large.
         let count = |size: f64| (size / spacing).round().max(1.0) as usize;
         ProbeGrid::with_counts(bounds, bounds.size().to_array().map(count))
     }
@@ -75,8 +75,8 @@ impl ProbeGrid {
         (0..columns * rows * layers).map(at).collect()
     }
 
-    /// Length across what a probe stands for: the shortest edge of a cell that is not flat, scene
-    /// unit.
+    /// Width of the region that a probe represents: the shortest edge of a cell that is not flat,
+    /// scene unit.
     pub fn size(&self) -> f64 {
         let edges = self.spacing.to_array().into_iter().filter(|edge| *edge > 0.0);
         edges.reduce(f64::min).unwrap_or(1.0)

@@ -32,7 +32,7 @@ pub(crate) fn low_bias32(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// The number in [0, 1) that the upper 53 bits stand for: all that an f64 holds.
+/// The number in [0, 1) of the upper 53 bits: the precision of an f64.
 pub(crate) fn unit_interval(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }

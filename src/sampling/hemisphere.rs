@@ -1,7 +1,7 @@
 //! Cosine-weighted directions over a hemisphere.
 //!
 //! Malley's method: points spread evenly over a unit disc are projected up onto the hemisphere.
-//! Each direction then stands for the same form factor, so that a form factor is a count of rays.
+//! Each direction then has the same form factor, so that a form factor is a count of rays.
 //!
 //! ```text
 //! unit square   →   unit disc                   →   hemisphere
@@ -18,16 +18,15 @@ use glam::DVec3;
 use crate::error::{Error, ErrorKind};
 use crate::sampling::low_discrepancy::{radical_inverse, sobol_02_point};
 
-/// Directions spread over a hemisphere in proportion to the cosine, so that each stands for the
-/// same form factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on low-discrepancy
-/// points.
+/// Directions spread over a hemisphere in proportion to the cosine, so that each has the same form
+/// factor: Malley's method (Pharr, Jakob, Humphreys 2016, 13.6.3) on low-discrepancy points.
 #[derive(Debug)]
 pub(crate) struct HemisphereSamples {
     /// Unit vectors, by components along two tangents and the normal.
     directions: Vec<[f64; 3]>,
 }
 
-/// Rays that a set can have at most: some 24 MiB of directions.
+/// Maximum number of rays of a set: some 24 MiB of directions.
 pub(crate) const MAX_RAYS: u32 = 1 << 20;
 
 impl HemisphereSamples {
@@ -54,8 +53,8 @@ impl HemisphereSamples {
     }
 
     /// The same with the first `block` directions (a power of two) in the middle of their rings
-    /// instead of at the inner rims. Those of each further block, to twice as many, are there
-    /// already; so no power of two of them has a bias to the normal of one over twice its number.
+    /// instead of at the inner rims. Each further block, up to twice the number, already fills the
+    /// middles; so no power of two of them has the bias 1/(2n) of n directions towards the normal.
     pub fn centred(count: u32, block: u32) -> HemisphereSamples {
         HemisphereSamples::from_points(count.clamp(1, MAX_RAYS), |k| {
             let [x, y] = sobol_02_point(k);
@@ -104,9 +103,9 @@ mod tests {
 
     #[test]
     fn centred_directions_have_no_bias_to_the_normal() {
-        // The mean of the cosine is 2/3. At the rims of rings it is 1/(2 n) too much; in their
-        // middles what is left is that of the ring at the horizon, where √(1 − x) is steep: less
-        // than a tenth of (1/n)^1.5.
+        // The mean of the cosine is 2/3. With directions at the rims of rings it is 1/(2 n) too
+        // large; in their middles only the error of the ring at the horizon is left, where √(1 − x)
+        // is steep: less than a tenth of (1/n)^1.5.
         for count in [64, 128, 256, 512] {
             let mean = |samples: HemisphereSamples| {
                 let all = samples.directions_in(0..count, DVec3::Z, 0.0);

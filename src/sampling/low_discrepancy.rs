@@ -20,9 +20,9 @@ pub(crate) fn radical_inverse(k: u32) -> f64 {
     f64::from(k.reverse_bits()) / 2f64.powi(32)
 }
 
-/// Point `k` of Sobol's (0,2)-sequence in base 2 (I. M. Sobol 1967), in (0, 1)²: any 2ᵐ
-/// consecutive points from a multiple of 2ᵐ on are spread as evenly as Hammersley's. Each point
-/// stands in the middle of its cell of 2⁻³².
+/// Point `k` of Sobol's (0,2)-sequence in base 2 (I. M. Sobol 1967), in (0, 1)²: any 2ᵐ consecutive
+/// points from a multiple of 2ᵐ on are spread as evenly as Hammersley's. Each point is in the
+/// middle of its cell of 2⁻³².
 pub(crate) fn sobol_02_point(k: u32) -> [f64; 2] {
     // The second coordinate's generator matrix is Pascal's triangle modulo 2: its next column is
     // the one before it, added to itself shifted.

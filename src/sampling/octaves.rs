@@ -1,12 +1,12 @@
-//! Parts of triangles for points that are spread over octaves of the distance.
+//! Parts of triangles for points that are distributed over octaves of the distance.
 //!
-//! Where a scene is far larger than the place that most of it is in, as a ground of a kilometre
-//! with a room on it, the light of the ground changes next to the room, where points spread evenly
-//! over area have none:
+//! If a scene is far larger than the region with most of its triangles, such as a ground of a
+//! kilometre with a room on it, the light on the ground changes next to the room, where points
+//! spread evenly over area are missing:
 //!
 //! ```text
-//!   │       │   │ │room│ │   │       │    as many points in each strip as in the next, and each
-//!   └───────┴───┴─┴────┴─┴───┴───────┘    stands for its part of the area
+//!   │       │   │ │room│ │   │       │    equal numbers of points in each strip, each
+//!   └───────┴───┴─┴────┴─┴───┴───────┘    standing for its part of the area
 //! ```
 
 use glam::DVec3;
@@ -14,36 +14,35 @@ use glam::DVec3;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::longest_edge;
 
-/// Share of the triangles that may lie outside of the place that most are in, at either end of each
-/// axis.
+/// Fraction of the triangles that may lie outside the dense region, at either end of each axis.
 const TRIMMED_SHARE: f64 = 0.1;
 
-/// That place has to be this many times smaller than all of the scene,
+/// Least ratio of the diagonals of the scene and of the dense region for a split into octaves.
 const MIN_CONCENTRATION: f64 = 4.0;
 
-/// but no more than so many: parts that are smaller are lost in the rounding of coordinates.
+/// Largest such ratio: smaller parts are lost in the rounding of coordinates.
 const MAX_CONCENTRATION: f64 = 1e9;
 
-/// A triangle from corner to corner, by weights of its second and third.
+/// The whole triangle, by weights of its second and third corner.
 const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
-/// Where the distances are counted from.
+/// The dense region from which distances are measured.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Octaves {
-    /// None where nothing is far away: all is one octave.
+    /// None if nothing is far away: all is one octave.
     centre: Option<Aabb>,
 }
 
 /// A part of a triangle.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
-    /// Weights of the triangle's second and third corner at the part's own; none where it is all of
-    /// the triangle.
+    /// Weights of the triangle's second and third corner at the part's corners; none if it is the
+    /// whole triangle.
     pub corners: Option<Box<[[f64; 2]; 3]>>,
     /// Length unit squared.
     pub area: f64,
-    /// The area over the square of the distance: by this each octave gets as many points as the
-    /// next.
+    /// Area over the square of the distance: weighted by it, all octaves get equal numbers of
+    /// points.
     pub angular: f64,
 }
 
@@ -57,8 +56,8 @@ impl Octaves {
         Octaves { centre: Aabb::around_most(&middles, TRIMMED_SHARE).filter(is_concentrated) }
     }
 
-    /// Has `take` the parts of a triangle with this `area`: none is longer than it is far away. One
-    /// with holes stays in one part, since it is not known part by part where they are.
+    /// Calls `take` with the parts of a triangle with this `area`: none is longer than its
+    /// distance. A triangle with holes stays whole, since its holes are not known part by part.
     pub fn for_each_part(
         &self,
         triangle: [DVec3; 3],
@@ -69,8 +68,7 @@ impl Octaves {
         self.split(&triangle, WHOLE, (area, is_split), take);
     }
 
-    /// How far off the part is, and at least as far as the place in the middle is wide; 1 where all
-    /// is one octave.
+    /// Distance of the part plus the diagonal of the dense region; 1 if all is one octave.
     fn reach(&self, corners: [DVec3; 3]) -> f64 {
         let Some(centre) = &self.centre else { return 1.0 };
         let bounds = Aabb::from_points(corners);
@@ -103,7 +101,7 @@ impl Octaves {
 }
 
 impl Part {
-    /// Weights of the triangle's second and third corner at a place given by those of the part's.
+    /// Weights of the triangle's second and third corner at the point given by those of the part.
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let Some(corners) = &self.corners else { return [x, y] };
         let [p, q, r] = **corners;
@@ -168,7 +166,7 @@ mod tests {
     fn nothing_is_split_where_all_is_near() {
         for octaves in [
             Octaves::new(middles(), 3.0),
-            // Of no size: no place at all.
+            // Without extent there is no dense region.
             Octaves::new([DVec3::ONE; 30], 2000.0),
         ] {
             let parts = parts_of(&octaves, false);

@@ -1,9 +1,9 @@
-//! Random numbers from words.
+//! Random number generators seeded by words.
 
 use fastrand::Rng;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// Random numbers of their own for everything that `words` tell apart.
+/// A random number generator seeded by the hash of `words`.
 pub(crate) fn random_numbers(words: &[u64]) -> Rng {
     let hash = |seed, word: &u64| xxh3_64_with_seed(&word.to_le_bytes(), seed);
     Rng::with_seed(words.iter().fold(0, hash))

@@ -1,4 +1,4 @@
-//! How far sets of directions are rotated about the normal, from point to point.
+//! Rotations of sets of directions about the normal, from point to point.
 //!
 //! The same set at every point would repeat its errors as a pattern across a surface. A
 //! Cranley–Patterson rotation (R. Cranley and T. N. L. Patterson 1976) shifts the azimuth of all
@@ -27,16 +27,16 @@ pub(crate) struct CellRotation {
     size: f64,
 }
 
-/// Phase of the cell sizes, which double: a power of two. Chosen by hand so that near distances
-/// that are round shares of the scene's size do not lie where the cell size changes.
+/// Phase of the cell sizes, which double: a power of two. Plain choice: the cell size does not
+/// change at near distances that are round fractions of the scene's size.
 const DOUBLING_PHASE: f64 = 0.377;
 
-/// Smallest cell, as a power of two of the scene's size. Cell numbers stay below 2⁴⁰ then, which
-/// 64-bit floats tell apart.
+/// Smallest cell, as a power of two of the scene's size: keeps cell numbers below 2⁴⁰, which 64-bit
+/// floats represent exactly.
 const SMALLEST_CELL_LOG2: f64 = -40.0;
 
 impl CellRotation {
-    /// Edge of a cell at most, in units of a point's near distance: 2^(3 + [`DOUBLING_PHASE`]).
+    /// Largest edge of a cell, in units of a point's near distance: 2^(3 + [`DOUBLING_PHASE`]).
     pub const LARGEST_CELL: f64 = 10.39;
 
     /// For points within `bounds`.
@@ -61,8 +61,8 @@ impl CellRotation {
     }
 }
 
-/// A second rotation, in turns, for the other coordinate: the rest of the first behind its 16
-/// leading bits.
+/// A second rotation, in turns, for the other coordinate: the bits of the first after its 16
+/// leading ones.
 pub(crate) fn second_rotation(rotation: f64) -> f64 {
     (rotation * f64::from(1u32 << 16)).fract()
 }

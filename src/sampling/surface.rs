@@ -11,7 +11,7 @@
 
 use crate::sampling::low_discrepancy::{fold_to_triangle, r2_point};
 
-/// Places that are tried in the stead of one. Chosen by hand.
+/// Number of shifted points that are tried instead of one. Plain choice.
 const MAX_SHIFTS: usize = 64;
 
 /// Chooses triangles in proportion to their areas.
@@ -68,7 +68,7 @@ impl AreaSampler {
     }
 }
 
-/// A place on a triangle, by the weights of its second and third corner, and others in its stead,
+/// A point of a triangle, by the weights of its second and third corner, then alternatives to it,
 /// spread evenly over the triangle.
 pub(crate) fn shifted([u, v]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     let shift = move |k: usize| {

@@ -1,11 +1,11 @@
-//! Backs that nobody can see, because fronts lie in the same place.
+//! Backs that are hidden by coincident fronts.
 //!
-//! Where a file has a surface once for each side, two fronts lie in one plane and face opposite
-//! ways. Each is the other's back: what comes from a side meets that side's front.
+//! If a file has a surface once for each side, two fronts lie in one plane and face opposite ways.
+//! Each covers the other's back: a ray from a side hits that side's front.
 //!
 //! ```text
-//!     \   ray               front of t     ┐ the same place: of both
-//!   ───▼──────────── t ─── back of s       ┘ the ray meets t
+//!     \   ray               front of t     ┐ coincident: the ray
+//!   ───▼──────────── t ─── back of s       ┘ hits t, not s
 //!   ──────────────── s ─── back of t
 //!                           front of s
 //! ```
@@ -19,19 +19,20 @@ use super::{Scene, longest_edge};
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 
-/// Fronts lie in the same place as a triangle up to this distance, in units of the longer of their
-/// longest edges: well above what a file's six digits leave of a flat polygon.
+/// Largest distance of fronts that coincide with a triangle, in units of the longer of their
+/// longest edges: well above the rounding of a flat polygon in a file of six digits.
 const SAME_PLACE: f64 = 1e-4;
 
-/// Share of a triangle's area that may stay open where it counts as covered: what rounding leaves
-/// of slivers between outlines.
+/// Fraction of a triangle's area that may stay open if it counts as covered: slivers between
+/// outlines due to rounding.
 const OPEN_SHARE: f64 = 1e-6;
 
-/// Corners at which more triangles meet are passed over, and so many are looked at for one
-/// triangle: thousands that meet in a point would each look at all of them. Chosen by hand.
+/// Number of triangles at a corner above which the corner is skipped, and maximum number of
+/// candidates for one triangle: otherwise thousands that meet in a point would each test all of
+/// them. Plain choice.
 const MAX_TRIANGLES: usize = 256;
 
-/// Which backs of `scene` are covered.
+/// The covered backs of `scene`.
 pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let count = scene.triangles().len();
     let (corners, positions) = scene.welded_corners();
@@ -58,8 +59,8 @@ impl Surfaces<'_> {
         if meeting.len() > MAX_TRIANGLES { &[] } else { meeting }
     }
 
-    /// Takes the fronts in the plane of triangle `t` off it, from its corners on outwards: which
-    /// they are, if nothing is left.
+    /// Subtracts the fronts in the plane of triangle `t` from it, from its corners outwards;
+    /// returns these fronts if nothing is left.
     fn covers(&self, t: usize) -> Option<Vec<u32>> {
         // Light passes it from either side.
         if self.scene.is_clear(t) {
@@ -78,7 +79,7 @@ impl Surfaces<'_> {
                 let Some(cover) = cover.filter(|_| known.insert(s)) else { continue };
                 let taken_off = |part: &Vec<DVec3>| polygon_difference(part, &cover, -normal);
                 let left: Vec<Vec<DVec3>> = open.iter().flat_map(taken_off).collect();
-                // Only what covers some of it leads on.
+                // Only fronts that cover some of it lead further.
                 if left != open {
                     let further = self.corners[s as usize];
                     queue.extend(further.iter().filter(|v| !self.corners[t].contains(v)));
@@ -95,7 +96,7 @@ impl Surfaces<'_> {
     }
 
     /// Triangle `s` in the plane of triangle `t`, which has these `corners` and this unit `normal`,
-    /// if it lies there, faces the other way and has no holes but those of `t`.
+    /// if it coincides, faces the other way and has no holes except those of `t`.
     fn cover(
         &self,
         t: usize,
@@ -122,7 +123,7 @@ mod tests {
     use super::*;
     use crate::scene::{Material, Piece, Triangle};
 
-    /// Which backs of these triangles are covered.
+    /// Whether each of these triangles has a covered back.
     fn covered(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<bool> {
         let triangles: Vec<Triangle> =
             triangles.iter().map(|&corners| Triangle { corners, ..Default::default() }).collect();
@@ -133,7 +134,7 @@ mod tests {
         (0..count).map(|t| scene.is_back_covered(t)).collect()
     }
 
-    /// Corners of a regular polygon in a skew plane, as a file with six digits has them.
+    /// Corners of a regular polygon in a skew plane, with six digits as in a file.
     fn polygon(corners: u32) -> Vec<DVec3> {
         let [x, y] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
         let corner = |k: u32| {
@@ -161,7 +162,7 @@ mod tests {
                 let found = covered(&polygon(corners), &both);
                 assert!(found.iter().all(|&c| c), "{corners} from {first}: {found:?}");
                 assert!(!covered(&polygon(corners), &front).contains(&true));
-                // Twice the same way round: no front behind any of them.
+                // Twice with the same winding: no front behind any of them.
                 let twice = [&front[..], &front[..]].concat();
                 assert!(!covered(&polygon(corners), &twice).contains(&true));
             }
@@ -208,8 +209,8 @@ mod tests {
 
     #[test]
     fn crowds_of_triangles_at_a_corner_take_no_quadratic_time() {
-        // A disc of a hundred thousand triangles around its middle, for each side: each looks at
-        // the few that meet at the rim. All pairs would be ten thousand million.
+        // A disc of a hundred thousand triangles around its middle, for each side: each tests the
+        // few that meet at the rim. All pairs would be ten thousand million.
         let corners = 100_000;
         let mut positions = polygon(corners);
         positions.push(DVec3::splat(7.0));

@@ -1,8 +1,8 @@
-//! Which backs of triangles are covered by the fronts of others, and by which.
+//! Covered backs of triangles, and the triangles whose fronts cover them.
 
 use rustc_hash::FxHashMap;
 
-/// Of each triangle whose back is covered, all of it, the others whose fronts do: they share
+/// Of each triangle whose whole back is covered, the triangles whose fronts cover it: they share
 /// corners with it, or with others that do.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Covers(pub FxHashMap<u32, Vec<u32>>);
@@ -13,13 +13,13 @@ impl Covers {
         self.0.contains_key(&(t as u32))
     }
 
-    /// Triangles whose fronts cover it; none where it is open.
+    /// Triangles whose fronts cover it; none if it is open.
     pub fn of(&self, t: usize) -> &[u32] {
         self.0.get(&(t as u32)).map_or(&[], Vec::as_slice)
     }
 
-    /// The same where triangle t is cut into the pieces from `firsts[t]` to `firsts[t + 1]`. These
-    /// are covered as it is: what covers it may be cut elsewhere.
+    /// The same for triangles t cut into the pieces from `firsts[t]` to `firsts[t + 1]`. All pieces
+    /// of a triangle keep all pieces of its covers, which may be cut differently.
     pub fn cut(&self, firsts: &[u32]) -> Covers {
         let pieces = |t: u32| firsts[t as usize]..firsts[t as usize + 1];
         let of_pieces = |(&t, covers): (&u32, &Vec<u32>)| {

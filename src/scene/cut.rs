@@ -8,16 +8,16 @@ use super::{Scene, Triangle};
 
 /// A piece of a triangle of a scene.
 pub(crate) struct Piece {
-    /// Where its corners are, scene unit.
+    /// Positions of its corners, scene unit.
     pub corners: [DVec3; 3],
-    /// Weights of the second and third corner of the triangle at each.
+    /// Weights of the triangle's second and third corner at each corner.
     pub weights: [[f64; 2]; 3],
     /// Sides, from corner k to k + 1, across which the surface does not continue.
     pub cut: [bool; 3],
 }
 
 impl Piece {
-    /// All of a triangle with these `corners`.
+    /// The whole of a triangle with these `corners`.
     pub fn whole(corners: [DVec3; 3]) -> Piece {
         Piece { corners, weights: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], cut: [false; 3] }
     }

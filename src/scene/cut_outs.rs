@@ -1,14 +1,14 @@
-//! Cut-outs: holes in triangles, where the mask of their material has them.
+//! Cut-outs: holes in triangles, given by the mask of their material.
 //!
 //! ```text
 //!   ■■□□■    ■ solid: it blocks, reflects, emits and receives
-//!   ■□□■■    □ a hole: nothing is there
+//!   ■□□■■    □ a hole: empty
 //! ```
 //!
-//! A mask is a texture of white, which is solid, and black texels, and these are squares: there is
-//! nothing between. So the solid share of a piece of a triangle is the mean of the mask over it,
-//! and the area that light counts is this share of the geometric one. Triangles that lack texture
-//! coordinates at a corner are solid.
+//! A mask is a texture of white (solid) and black texels, which are squares without interpolation.
+//! So the solid fraction of a piece of a triangle is the mean of the mask over it, and the area
+//! used for light is this fraction of the geometric one. Triangles that lack texture coordinates at
+//! a corner are solid.
 
 use glam::DVec2;
 
@@ -18,26 +18,26 @@ use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
 use super::textured::Piece;
 
-/// Shares of a piece nearer to none and to all of it than this are rounding.
+/// Distance of a piece's solid fraction from 0 or 1 below which it is rounded to it.
 const ROUNDING: f64 = 1e-9;
 
-/// Texture coordinates this near, over one more than their length, are the same: what a file's six
-/// digits leave.
+/// Distance of texture coordinates, relative to one plus their length, below which they are equal:
+/// the rounding of a file's six digits.
 const SAME_PLACE: f64 = 1e-4;
 
-/// Points along each side that a piece is looked at by where its mean has no closed form.
+/// Number of points along each side of a piece whose mean has no closed form.
 const MAX_POINTS: f64 = 48.0;
 const MIN_POINTS: f64 = 8.0;
 
 impl Scene {
-    /// Area of triangle `t` without its holes, length unit squared: what light counts.
+    /// Area of triangle `t` without its holes, length unit squared: the area used for light.
     pub fn solid_area(&self, t: usize) -> f64 {
         let area = self.area(t);
         self.textures.solid_shares.get(t).map_or(area, |share| share * area)
     }
 
-    /// Whether triangle `t` is no hole at a point, where its second and third corner have these
-    /// weights.
+    /// Whether triangle `t` is solid at the point with these weights of its second and third
+    /// corner.
     pub fn is_solid(&self, t: usize, barycentric: [f64; 2]) -> bool {
         self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_place(t, barycentric)))
     }
@@ -68,7 +68,7 @@ impl Scene {
         places.into_iter().find(|&place| self.is_solid(t, place))
     }
 
-    /// The share of each of `pieces` that is solid, in [0, 1].
+    /// The solid fraction of each of `pieces`, in [0, 1].
     pub(crate) fn solid_shares(&self, pieces: &[Piece]) -> Vec<f64> {
         let share = |mask: &TextureMap, _: Option<&TextureMap>, place: [DVec2; 3], cells: f64| {
             mask.solid_share(place, cells)
@@ -77,21 +77,21 @@ impl Scene {
         shares.into_iter().map(|share| share.unwrap_or(1.0)).collect()
     }
 
-    /// The same of one piece.
+    /// The same for one piece.
     pub(crate) fn solid_share(&self, (t, corners): Piece) -> f64 {
         let place = || corners.map(|corner| self.texture_place(t, corner));
         self.mask(t).map_or(1.0, |mask| mask.solid_share(place(), MAX_OUTLINE_CELLS))
     }
 
-    /// Finds the solid shares of all triangles, by the textures that lie on them.
+    /// Computes the solid fractions of all triangles from their textures.
     pub(super) fn find_solid_shares(&mut self) {
         let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
         let solid_shares = self.solid_shares(&pieces);
         self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
     }
 
-    /// Whether triangle `s` of `other` is solid wherever triangle `t` is, where the corners of `s`
-    /// have these weights in `t`: it has no holes, or those of `t`.
+    /// Whether triangle `s` of `other`, whose corners have these weights in triangle `t`, is solid
+    /// wherever `t` is: it has no holes, or those of `t`.
     pub(crate) fn has_no_other_holes(
         &self,
         t: usize,
@@ -107,12 +107,12 @@ impl Scene {
 }
 
 impl TextureMap {
-    /// A mask: what is white in `texture` is solid, all else is a hole.
+    /// Of a mask: whether the texel at `uv` is solid; points without coordinates are.
     pub(crate) fn is_solid(&self, uv: DVec2) -> bool {
         !uv.is_finite() || self.texel(uv) != Rgb::ZERO
     }
 
-    /// Where texture coordinates, as the file has them, lie in texels, rows from the top.
+    /// The position of texture coordinates, as in the file, in texels, rows from the top.
     pub(crate) fn in_texels(&self, uv: DVec2) -> DVec2 {
         let [width, height] = self.texture.size().map(f64::from);
         let place = uv * self.scale + self.offset;
@@ -126,8 +126,8 @@ impl TextureMap {
         texels.map(|at| self.value(self.texture.texel(at)) != Rgb::ZERO)
     }
 
-    /// The share of a mask that is solid over a triangle with these texture coordinates, in [0, 1];
-    /// with so many cells of the image along the triangle's outline.
+    /// The solid fraction of a mask over a triangle with these texture coordinates, in [0, 1], with
+    /// at most `cells` cells of the image along the triangle's outline.
     fn solid_share(&self, corners: [DVec2; 3], cells: f64) -> f64 {
         if !corners.iter().all(|corner| corner.is_finite()) {
             return 1.0;
@@ -178,7 +178,7 @@ impl TextureMap {
     }
 }
 
-/// Points spread evenly over a triangle that gets so many cells along its outline: a square of them
+/// Points spread evenly over a triangle with a limit of `cells` along its outline: a square of them
 /// folded onto it.
 fn spread_over([a, b, c]: [DVec2; 3], cells: f64) -> impl Iterator<Item = DVec2> {
     let n = (MAX_POINTS * cells / MAX_OUTLINE_CELLS).clamp(MIN_POINTS, MAX_POINTS) as u32;

@@ -1,10 +1,10 @@
-//! What is made of a scene once, and kept as long as the scene.
+//! Values computed from a scene once, and kept as long as the scene.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Values that are made of a scene when they are first needed, one of a type. A clone has none,
-/// since it may become another scene.
+/// Values computed from a scene on first use, one per type. A clone has none, since it may become
+/// another scene.
 #[derive(Debug, Default)]
 pub(super) struct Derived(Mutex<Vec<Arc<dyn Any + Send + Sync>>>);
 
@@ -15,8 +15,9 @@ impl Clone for Derived {
 }
 
 impl Derived {
-    /// The value, by `make` if there is none yet. Nothing is locked meanwhile: a thread that waits
-    /// for a part of it may be given other work that asks for the same, and then both make it.
+    /// The value, computed by `make` if there is none yet. No lock is held meanwhile: a thread that
+    /// waits for a part of the work may take other work that needs the same value, and then both
+    /// compute it.
     pub fn get<T: Any + Send + Sync>(&self, make: impl FnOnce() -> T) -> Arc<T> {
         let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let kept = |all: &[Arc<dyn Any + Send + Sync>]| {

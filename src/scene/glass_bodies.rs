@@ -1,16 +1,16 @@
-//! Which triangles of glass enclose a body, and which are panes.
+//! Glass triangles that enclose bodies, and those that are panes.
 //!
 //! ```text
 //!     ┌──────────┐  body: each side of its triangles     ─────────  pane: a sheet with an end;
 //!     │  glass   │  is shared by one other of them                  light goes straight on
 //!     │  ┌────┐  │
-//!     │  │ air│  │  cavity: a body in a body, wound the other way round
+//!     │  │ air│  │  cavity: a body in a body, with opposite winding
 //!     │  └────┘  │
-//!     └──────────┘  Another body in it, wound alike, is of its own glass.
+//!     └──────────┘  Another body in it, with equal winding, has its own glass.
 //! ```
 //!
-//! What is outside follows from the shape, not from how triangles are wound: files have bodies
-//! inside out. How a body is wound counts only beside that of one around it.
+//! The outside follows from the shape, not from the winding of triangles: files have bodies inside
+//! out. The winding of a body matters only relative to that of one around it.
 
 use std::f64::consts::TAU;
 
@@ -23,18 +23,18 @@ use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
 
-/// What encloses less than this share of its area to the power of 3/2 is flat: a sheet that a file
-/// has twice. A ball has 0.094, what is 10⁻⁶ as thick as it is wide some 10⁻⁷.
+/// Ratio of the volume to the area to the power of 3/2 below which a shell is flat: a duplicated
+/// sheet. A ball has 0.094, a plate with a thickness of 10⁻⁶ of its width some 10⁻⁷.
 const FLAT: f64 = 1e-9;
 
-/// What a triangle of glass is.
+/// Role of a triangle of glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GlassFace {
     /// A part of a sheet.
     Pane,
     /// A part of the boundary of a body.
     Boundary {
-        /// Which one.
+        /// Index of the body.
         body: u32,
         /// Whether its front looks out of the glass.
         front_is_outside: bool,
@@ -50,12 +50,12 @@ pub(crate) struct Medium {
 
 /// The glass of a scene.
 pub(crate) struct GlassBodies {
-    /// Per triangle of the scene; none for what is not glass.
+    /// Per triangle of the scene; none if it is not glass.
     pub faces: Vec<Option<GlassFace>>,
-    /// Per triangle, whether another before it has its corners and material.
+    /// Per triangle, whether an earlier one has its corners and material.
     is_copy: Vec<bool>,
-    /// Per triangle, whether it is in a closed surface that encloses nothing: a sheet that is there
-    /// twice, over other diagonals.
+    /// Per triangle, whether it is in a closed surface of no volume: a duplicated sheet with other
+    /// diagonals.
     is_layer: Vec<bool>,
     shells: Vec<Shell>,
 }
@@ -68,7 +68,7 @@ struct Shell {
     bounds: Aabb,
     /// Scene unit cubed, above 0.
     volume: f64,
-    /// Area of the triangles whose fronts look out of it, less that of the others.
+    /// Area of the triangles that face out of it, less that of the others.
     outward_area: f64,
     /// The body that it bounds.
     body: u32,
@@ -76,7 +76,7 @@ struct Shell {
     is_cavity: bool,
 }
 
-/// A triangle of glass by its corners' numbers, the first of those with the same corners.
+/// A triangle of glass by its corners' numbers; the first of duplicates.
 #[derive(Clone, Copy)]
 struct Face {
     triangle: usize,
@@ -135,8 +135,8 @@ impl GlassBodies {
         bodies
     }
 
-    /// How much of the way through a pane or a body light goes where it crosses triangle `t`: all
-    /// through a pane, half at the surface of a body, nothing at a copy of another triangle.
+    /// Fraction of the way through a pane or a body per crossing of triangle `t`: 1 for a pane, 1/2
+    /// at the surface of a body, 0 for a copy of another triangle.
     pub fn crossing(&self, t: usize) -> f64 {
         match self.faces[t] {
             _ if self.is_copy[t] => 0.0,
@@ -164,7 +164,7 @@ impl GlassBodies {
         media
     }
 
-    /// Finds the cavities, and gives bodies their numbers: those of the shells around them.
+    /// Determines the cavities, and numbers bodies by the shells around them.
     fn nest(&mut self) {
         let shells = &self.shells;
         let place = |s: &Shell| s.triangles[0][0];
@@ -197,8 +197,8 @@ impl GlassBodies {
 }
 
 impl Shell {
-    /// That of these faces, of which some are wound one way and the others, which are not
-    /// `alike`, the other. Also whether those that are alike look into it. None if it is flat.
+    /// The shell of these faces, of which those not `alike` have the opposite winding. Also whether
+    /// those alike face into it. None if it is flat.
     fn new(
         scene: &Scene,
         faces: &[Face],
@@ -235,7 +235,7 @@ impl Shell {
         Some((shell, flipped))
     }
 
-    /// Whether `point` is inside: by the solid angle that it is enclosed in.
+    /// Whether `point` is inside, by the solid angle of the shell from it.
     fn encloses(&self, point: DVec3) -> bool {
         let Aabb { low, high } = self.bounds;
         let is_near = point.cmpge(low).all() && point.cmple(high).all();
@@ -243,7 +243,7 @@ impl Shell {
     }
 }
 
-/// The closed surfaces of `faces`: which belong to each, and which of these are wound alike.
+/// The closed surfaces of `faces`: the members of each, and which of them have equal winding.
 fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
     let edges = |k: usize| {
         let ([a, b, c], material) =
@@ -256,7 +256,7 @@ fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
     }
     let mut sets = UnionFind::new(faces.len());
     for pair in sharing.values() {
-        // Where more meet, those of one body are joined elsewhere.
+        // If more share an edge, those of one body are joined across other edges.
         if let [a, b] = pair[..] {
             sets.join(a, b);
         }
@@ -276,12 +276,12 @@ fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
         while let Some(k) = queue.pop() {
             for (edge, forward) in edges(k) {
                 let Some(other) = neighbour(k, edge) else { continue 'sets };
-                // Wound alike, they run along their side in opposite directions.
+                // With equal winding, they run along their side in opposite directions.
                 let runs_forward = edges(other).contains(&(edge, true));
                 let wanted = alike[k].map(|alike| alike == (forward != runs_forward));
                 match alike[other] {
                     None => queue.push(other),
-                    // A band with one side encloses nothing.
+                    // A one-sided band encloses nothing.
                     known if known != wanted => continue 'sets,
                     _ => {}
                 }
@@ -294,13 +294,13 @@ fn shells(scene: &Scene, faces: &[Face]) -> Vec<(Vec<usize>, Vec<bool>)> {
     closed
 }
 
-/// Whether the same three corners are in the same order, wherever it begins.
+/// Whether the same three corners are in the same cyclic order.
 fn same_way_round(a: [u32; 3], b: [u32; 3]) -> bool {
     (0..3).any(|k| [0, 1, 2].map(|i| a[(i + k) % 3]) == b)
 }
 
-/// Solid angle that a triangle takes up from `point`, above 0 where its back is seen (van Oosterom
-/// and Strackee 1983, equation 8).
+/// Solid angle of a triangle from `point`, above 0 if its back is seen (van Oosterom and Strackee
+/// 1983, equation 8).
 fn solid_angle(corners: [DVec3; 3], point: DVec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner - point);
     let [x, y, z] = [a.length(), b.length(), c.length()];
@@ -308,7 +308,7 @@ fn solid_angle(corners: [DVec3; 3], point: DVec3) -> f64 {
     2.0 * a.dot(b.cross(c)).atan2(below)
 }
 
-/// What passes the clear panes and bodies of `scene`; none if it has none.
+/// The clear panes and bodies of `scene`; none if it has none.
 pub(super) fn clear_panes(scene: &Scene) -> Option<ClearPanes> {
     let of_material: Vec<Option<Rgb>> =
         scene.materials().iter().map(Material::clear_transmittance).collect();

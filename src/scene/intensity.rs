@@ -1,4 +1,4 @@
-//! Intensity by direction, as goniometers measure it: bilinear between the angles measured.
+//! Intensity by direction, as measured by goniometers: bilinear between the measured angles.
 //!
 //! ```text
 //!                 ╲  azimuth: C-planes, 0° to 360° around the pole
@@ -16,15 +16,15 @@ use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 
-/// Intensity by direction, W/sr; candela where a scene's numbers are photometric. Bilinear in the
-/// two angles; none beyond the angles that are given.
+/// Intensity by direction, W/sr; candela if a scene's numbers are photometric. Bilinear in the two
+/// angles; 0 outside the given angles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IntensityDistribution {
-    /// Radians, ascending; one alone means that all azimuths are alike.
+    /// Radians, ascending; a single one means rotational symmetry.
     azimuths: Vec<f64>,
     /// Radians from the pole, ascending, in [0, π].
     polar: Vec<f64>,
-    /// Of each azimuth, those of all polar angles.
+    /// For each azimuth, the values at all polar angles.
     values: Vec<f64>,
     pole: Pole,
 }
@@ -32,7 +32,7 @@ pub struct IntensityDistribution {
 /// The axis of a luminaire that the angles of an [`IntensityDistribution`] turn around.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pole {
-    /// Where it aims; azimuths from C = 0° towards C = 90°. Type C of the IES, and EULUMDAT.
+    /// The aim; azimuths from C = 0° towards C = 90°. Type C of the IES, and EULUMDAT.
     #[default]
     Aim,
     /// Towards C = 0°; azimuths from the aim towards C = 90°. Type B.
@@ -41,17 +41,18 @@ pub enum Pole {
     C90,
 }
 
-/// Azimuths that span a whole turn but for this are closed, degrees: above the rounding of files.
+/// Largest difference of a span of azimuths from a full turn if it is closed, degrees: above the
+/// rounding of files.
 const TURN_TOLERANCE: f64 = 1e-6;
 
 impl IntensityDistribution {
     /// For `azimuths` and `polar` angles, both in degrees and ascending, and for each azimuth the
-    /// values at all polar angles, W/sr. One azimuth alone stands for all.
+    /// values at all polar angles, W/sr. A single azimuth means rotational symmetry.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for no azimuth or fewer than two polar angles, angles that do not
-    /// ascend, azimuths of more than a turn, polar angles outside [0, 180], another number of
-    /// values than angles make, or one that is negative or not finite.
+    /// ascend, azimuths of more than a turn, polar angles outside [0, 180], a number of values
+    /// other than azimuths × polar angles, or one that is negative or not finite.
     pub fn new(
         azimuths: &[f64],
         polar: &[f64],
@@ -65,7 +66,7 @@ impl IntensityDistribution {
             return bad(found, "give one azimuth and two polar angles at least");
         }
         for angles in [azimuths, polar] {
-            // Nothing ascends to or from NaN.
+            // Comparisons with NaN are not ascending.
             let ascends =
                 |k: usize| angles[k].partial_cmp(&angles[k - 1]) == Some(Ordering::Greater);
             if let Some(k) = (1..angles.len()).find(|&k| !ascends(k)) {
@@ -107,7 +108,7 @@ impl IntensityDistribution {
     }
 
     /// Intensity along a direction of unit length in the frame of the luminaire, x towards C = 0°,
-    /// y towards C = 90° and z where it aims; W/sr.
+    /// y towards C = 90° and z along the aim; W/sr.
     pub fn along(&self, direction: DVec3) -> f64 {
         let DVec3 { x, y, z } = direction;
         let [x, y, z] = match self.pole {
@@ -132,9 +133,9 @@ impl IntensityDistribution {
         before + across * (after - before)
     }
 
-    /// All of the flux, W; lumens where intensities are candela. Exact: in each cell the integral
-    /// of what [`IntensityDistribution::along`] gives. Between polar angles m ∓ h, with I₀ and I₁
-    /// there,
+    /// Total flux, W; lumens if intensities are candela. Exact: the integral of
+    /// [`IntensityDistribution::along`] over each cell. Between polar angles m ∓ h, with
+    /// intensities I₀ and I₁ there,
     ///
     /// ```text
     /// ∫ I sin γ dγ = (I₀ + I₁) sin m sin h + (I₁ − I₀) cos m (sin h / h − cos h)
@@ -161,13 +162,13 @@ impl IntensityDistribution {
         self.values.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Whether azimuths are all around.
+    /// Whether azimuths cover a full turn.
     fn is_closed(&self) -> bool {
         let span = self.azimuths[self.azimuths.len() - 1] - self.azimuths[0];
         span >= TAU - TURN_TOLERANCE.to_radians()
     }
 
-    /// Numbers that two distributions share if they are the same.
+    /// Numbers that are equal for equal distributions.
     pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
         let pole = match self.pole {
             Pole::Aim => 0.0,
@@ -179,7 +180,7 @@ impl IntensityDistribution {
     }
 }
 
-/// sin h / h − cos h, by its series where h is small and the two are nearly equal.
+/// sin h / h − cos h, by its series for small h, where the two are nearly equal.
 fn bend(h: f64) -> f64 {
     let square = h * h;
     match h < 0.1 {
@@ -191,8 +192,8 @@ fn bend(h: f64) -> f64 {
     }
 }
 
-/// The step of ascending `angles` that `angle` lies in, and how far along it, in [0, 1]; none
-/// outside of them. What lies outside by the rounding of a turn counts as inside.
+/// The step of ascending `angles` that contains `angle`, and its fraction of the step, in [0, 1];
+/// none outside of them. An angle outside by the rounding of a turn counts as inside.
 fn cell(angles: &[f64], angle: f64) -> Option<(usize, f64)> {
     const ROUNDING: f64 = TAU * f64::EPSILON;
     let (first, last) = (angles[0], angles[angles.len() - 1]);

@@ -1,4 +1,4 @@
-//! Luminaires: lamps that are known by the intensity which they send in each direction.
+//! Luminaires: lamps given by their intensity in each direction.
 //!
 //! ```text
 //!               ┌──── opening ────┐
@@ -7,9 +7,9 @@
 //!                        ▼ aim, γ = 0°
 //! ```
 //!
-//! They are no surfaces: nothing meets them, and pictures do not show them. With an opening all of
-//! its points send the same distribution, each its share of it: what was measured from afar is all
-//! that is known (IES Lighting Handbook, 10th edition 2011, 9.7: the far field).
+//! They are not surfaces: rays do not hit them, and pictures do not show them. All points of an
+//! opening have the same distribution, scaled by their fraction of the opening: only the far field
+//! is known (IES Lighting Handbook, 10th edition 2011, 9.7: the far field).
 
 use std::sync::Arc;
 
@@ -25,18 +25,18 @@ pub struct Luminaire {
     pub intensity: Arc<IntensityDistribution>,
     /// Middle of the opening, scene unit.
     pub position: DVec3,
-    /// Where it aims: towards γ = 0°, straight down for what hangs from a ceiling. Of any length.
+    /// Direction of aim, γ = 0°: straight down for ceiling lamps. Of any length.
     pub aim: DVec3,
-    /// Towards C = 0°: what of it is at right angles to `aim`. Seen from behind, as from above
-    /// where it aims down, C runs counter-clockwise.
+    /// Direction of C = 0°; only its component at right angles to `aim` counts. Seen from behind,
+    /// that is from above if it aims down, C runs counter-clockwise.
     pub c0: DVec3,
-    /// What of it shines.
+    /// Luminous opening.
     pub opening: Opening,
-    /// What intensities are multiplied with, per channel.
+    /// Factor of intensities, per channel.
     pub scale: Rgb,
 }
 
-/// The part of a luminaire that shines: a box or an upright cylinder, flat or of no size at all.
+/// The luminous part of a luminaire: a box or an upright cylinder, flat or of no size at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Opening {
     /// Extent along C = 0°, along C = 90° and along the aim; scene unit, metres in files.
@@ -46,8 +46,8 @@ pub struct Opening {
 }
 
 impl Luminaire {
-    /// A point that sends `intensity` from `position`, aims at `aim` (of any length) and has C = 0°
-    /// towards +x, or +y if it aims along x.
+    /// A point that emits `intensity` from `position`, aims along `aim` (of any length) and has C =
+    /// 0° towards +x, or +y if it aims along x.
     pub fn new(
         intensity: impl Into<Arc<IntensityDistribution>>,
         position: DVec3,
@@ -59,20 +59,20 @@ impl Luminaire {
         Luminaire { intensity: intensity.into(), position, aim, c0, opening, scale }
     }
 
-    /// The same, given in metres, for a scene whose unit is so many `metres`: the opening and the
-    /// inverse square of distances are those of that unit, so that irradiance stays per m².
+    /// The same, given in metres, for a scene whose unit is `metres` long: converts the opening and
+    /// the inverse square of distances to that unit, so that irradiance stays per m².
     pub fn in_unit_of(mut self, metres: f64) -> Luminaire {
         self.opening.size /= metres;
         self.scale /= metres * metres;
         self
     }
 
-    /// Flux per channel, W; lumens where intensities are candela.
+    /// Flux per channel, W; lumens if intensities are candela.
     pub fn flux(&self) -> Rgb {
         self.intensity.flux() * self.scale
     }
 
-    /// The same with axes of unit length at right angles.
+    /// The same with orthonormal axes.
     fn checked(mut self, number: usize) -> Result<Luminaire, Error> {
         let bad = |found: String, remedy: &str| {
             Error::new(ErrorKind::Scene, format!("luminaire {number}"), found, remedy)
@@ -102,7 +102,7 @@ impl Luminaire {
         self.c0.cross(self.aim)
     }
 
-    /// The longest way across the opening, scene unit.
+    /// The diagonal of the opening, scene unit.
     pub(crate) fn extent(&self) -> f64 {
         self.opening.size.length()
     }
@@ -114,7 +114,8 @@ impl Luminaire {
         beyond.max(DVec3::ZERO).length()
     }
 
-    /// A point of the opening: points of the unit cube are spread over it evenly.
+    /// A point of the opening: a uniform distribution over the unit cube becomes one over the
+    /// opening.
     pub(crate) fn point(&self, [x, y, z]: [f64; 3]) -> DVec3 {
         let [x, y] = match self.opening.is_round {
             false => [x - 0.5, y - 0.5],
@@ -127,12 +128,12 @@ impl Luminaire {
         self.position + local.x * self.c0 + local.y * self.c90() + local.z * self.aim
     }
 
-    /// Irradiance at `at` with this unit `normal` where all of it shines from `point` and nothing
-    /// hides that; in units of the scale, 0 behind the surface and at `point` itself.
+    /// Irradiance at `at` with this unit `normal` if all light comes from `point`, unoccluded; in
+    /// units of the scale, 0 behind the surface and at `point` itself.
     pub(crate) fn irradiance(&self, point: DVec3, at: DVec3, normal: DVec3) -> f64 {
         let (direction, distance) = (at - point).normalize_and_length();
         let cosine = -normal.dot(direction);
-        // NaN is of no distance.
+        // NaN at distance 0.
         if cosine.is_nan() || cosine <= 0.0 {
             return 0.0;
         }
@@ -142,7 +143,7 @@ impl Luminaire {
         if irradiance.is_finite() { irradiance } else { 0.0 }
     }
 
-    /// Numbers that two luminaires share if they are the same.
+    /// Numbers that are equal for equal luminaires.
     pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
         let Luminaire { position, aim, c0, opening, scale, .. } = self;
         let vectors = [*position, *aim, *c0, opening.size, *scale];
@@ -152,17 +153,17 @@ impl Luminaire {
 }
 
 impl Scene {
-    /// The luminaires; none unset. Their axes have unit length and are at right angles.
+    /// The luminaires; none by default. Their axes are orthonormal.
     pub fn luminaires(&self) -> &[Luminaire] {
         &self.luminaires
     }
 
-    /// The same scene with these luminaires in the place of its own. What was said of a scene
-    /// without light is said no more.
+    /// The same scene with its luminaires replaced by these. Removes the warning about a scene
+    /// without light.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for a position, an opening or a scale that is not finite, an opening or
-    /// scale below 0, or axes that are no directions or the same.
+    /// scale below 0, or axes that are zero or parallel.
     pub fn with_luminaires(mut self, luminaires: Vec<Luminaire>) -> Result<Scene, Error> {
         let numbered = (1..).zip(luminaires);
         self.luminaires =

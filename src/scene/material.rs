@@ -1,37 +1,36 @@
-//! What the surfaces of a scene are made of.
+//! Materials of surfaces.
 
 use super::rgb::Rgb;
 use super::sides::Sides;
 use super::specular::Specular;
 use crate::error::{Error, ErrorKind, quoted};
 
-/// How faces reflect and emit.
+/// Reflection and emission of faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name, for messages and look-up.
     pub name: String,
     /// Diffuse hemispherical reflectance ρ per channel, in [0, 1). Of a texture the mean over all
-    /// triangles of the material;
-    /// [`Scene::reflectance_at`](super::Scene::reflectance_at) has it in detail.
+    /// triangles of the material; [`Scene::reflectance_at`](super::Scene::reflectance_at) has the
+    /// values.
     pub reflectance: Rgb,
     /// Exitance E per channel, W/m²: π times the emitted radiance. Of a texture the mean over all
-    /// triangles of the material;
-    /// [`Scene::exitance_at`](super::Scene::exitance_at) has it in detail.
+    /// triangles of the material; [`Scene::exitance_at`](super::Scene::exitance_at) has the values.
     pub exitance: Rgb,
-    /// Diffuse transmittance τ per channel: of the light that arrives on either side, the share
-    /// that leaves diffusely from the other. ρ + τ < 1. What is translucent reflects on both sides,
-    /// whatever `sides` says. With a texture, τ follows it as ρ does, and this is its mean.
+    /// Diffuse transmittance τ per channel: the fraction of the light arriving on either side that
+    /// leaves diffusely from the other. ρ + τ < 1. Translucent surfaces reflect on both sides,
+    /// whatever `sides` is. With a texture, τ is proportional to it like ρ, and this is its mean.
     pub transmittance: Rgb,
-    /// Which sides do: fronts, unless set. Backs of others only block light.
+    /// Sides that reflect and emit: fronts by default. Other backs only block light.
     pub sides: Sides,
-    /// A mirror or glass, beside that: pictures show it. The light that is spread passes glass that
-    /// reflects nothing diffusely and does not emit, weakened by its transmittance; for it all else
-    /// is as if it were not there.
+    /// Additional mirror or glass: pictures show it. The light solution passes glass that reflects
+    /// nothing diffusely and does not emit, attenuated by its transmittance, and ignores all
+    /// others.
     pub specular: Option<Specular>,
 }
 
 impl Material {
-    /// Reflectance ρ, in every channel, of faces that name no material.
+    /// Reflectance ρ, in every channel, of faces without a material.
     pub const DEFAULT_REFLECTANCE: f64 = 0.5;
 
     /// A surface that reflects `reflectance` in every channel and emits nothing.
@@ -42,23 +41,23 @@ impl Material {
         Material { name, reflectance, transmittance, exitance, sides, specular: None }
     }
 
-    /// Whether any light that arrives leaves again diffusely, on either side, in any channel.
+    /// Whether any arriving light is scattered diffusely, on either side, in any channel.
     pub(crate) fn scatters(&self) -> bool {
         self.albedo() != Rgb::ZERO
     }
 
-    /// Whether any light that arrives leaves diffusely from the other side.
+    /// Whether any arriving light leaves diffusely from the other side.
     pub(crate) fn is_translucent(&self) -> bool {
         self.transmittance != Rgb::ZERO
     }
 
-    /// The share of the light that arrives which leaves again diffusely, on either side: ρ + τ per
+    /// The fraction of the arriving light that is scattered diffusely, on either side: ρ + τ per
     /// channel.
     pub(crate) fn albedo(&self) -> Rgb {
         self.reflectance + self.transmittance
     }
 
-    /// The share of light per channel that passes a pane or body of it straight on; none where it
+    /// The fraction of light per channel that passes a pane or body of it straight on; none if it
     /// blocks light. Glass with a diffuse part blocks light and reflects that part.
     pub(crate) fn clear_transmittance(&self) -> Option<Rgb> {
         match self.specular {
@@ -71,8 +70,8 @@ impl Material {
         }
     }
 
-    /// Reflectance and transmittance in [0, 1) together, exitance finite and not negative, no more
-    /// light than there is.
+    /// Checks the ranges: reflectance and transmittance in [0, 1) together, exitance finite and not
+    /// negative, energy conserved.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let place = || format!("material {}", quoted(&[&self.name]));
         for (channel, rho) in ["r", "g", "b"].iter().zip(self.reflectance.to_array()) {

@@ -7,17 +7,17 @@ use glam::DVec2;
 use super::rgb::Rgb;
 use super::texture::MaterialTextures;
 
-/// Textures of materials, and where they lie on triangles.
+/// Textures of materials, and texture coordinates of triangles.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SceneTextures {
-    /// Of the corners of each triangle; empty where no material has textures and nobody asked for
-    /// them.
+    /// Of the corners of each triangle; empty if no material has textures and they were not
+    /// requested.
     pub coordinates: Vec<[DVec2; 3]>,
-    /// Of the materials that have some, by their indices.
+    /// Of the materials with textures, by their indices.
     pub of_materials: BTreeMap<u32, MaterialTextures>,
-    /// Exitance of each triangle over that of its material; empty where no texture emits.
+    /// Ratio of the exitance of each triangle to that of its material; empty if no texture emits.
     pub relative_exitance: Vec<Rgb>,
-    /// The share of each triangle that is solid; empty where no material has a mask.
+    /// The solid fraction of each triangle; empty if no material has a mask.
     pub solid_shares: Vec<f64>,
 }
 

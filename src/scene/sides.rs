@@ -1,15 +1,15 @@
 //! Surfaces with two sides: a triangle for each side that reflects.
 //!
 //! ```text
-//!   as it was wound       turned                  doubled
+//!   as in the file        turned                  doubled
 //!
 //!   ──────── front        ──────── back           ──────── front of t
 //!   ──────── back         ──────── front          ──────── front of its twin: the same corners
-//!                                                          the other way round
+//!                                                          with opposite winding
 //! ```
 //!
-//! Each of the two covers the other's back ([`Scene::is_back_covered`]), so that whatever makes
-//! rows, gathers or casts rays treats them as it treats any other triangles.
+//! Each of the two covers the other's back ([`Scene::is_back_covered`]), so that rows, gathers and
+//! rays treat them like any other triangles.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -17,22 +17,22 @@ use std::sync::{Arc, OnceLock};
 use super::texture::MaterialTextures;
 use super::{Material, Rgb, Scene};
 
-/// What the surfaces of a material do on their two sides. It is carried out when a scene is baked
-/// or verified, or by [`Scene::resolve_sides`].
+/// Treatment of the two sides of a material's surfaces. Applied when a scene is baked or verified,
+/// or by [`Scene::resolve_sides`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Sides {
     /// Fronts reflect and emit, backs block.
     #[default]
     Front,
-    /// Both sides reflect alike, each with a radiosity of its own; fronts emit.
+    /// Both sides reflect with the same reflectance, each with its own radiosity; fronts emit.
     Both,
-    /// Each triangle reflects on the sides that light can reach, however it is wound. It emits on
-    /// its front, or on its back if light from there gets much further.
+    /// Each triangle reflects on the sides that light can reach, whatever its winding. It emits on
+    /// its front, or on its back if the mean free path there is much longer.
     Auto,
 }
 
-/// What becomes of a triangle.
+/// Treatment of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Treatment {
     /// Left out.
@@ -45,8 +45,8 @@ pub(crate) struct Treatment {
 
 impl Scene {
     /// The same scene with each of its triangles treated, and materials that have one side. Twins
-    /// come after all others, in their order. They emit nothing: where the triangle's material
-    /// does, they have another, of the same name, after all others.
+    /// follow all others, in their order. They emit nothing: if the triangle's material does, they
+    /// have another, of the same name, after all others.
     pub(crate) fn treated(&self, treatments: &[Treatment]) -> Scene {
         let mut scene = self.clone();
         scene.materials.iter_mut().for_each(|material| material.sides = Sides::Front);

@@ -1,11 +1,11 @@
-//! Light from outside: a sky, seen in every direction in which there is no surface, and a sun.
+//! Light from outside: a sky, visible in every direction without a surface, and a sun.
 //!
 //! ```text
 //!          up        sun: a disc of half a degree
 //!           │      ☼      L(direction): uniform, a distribution of the CIE or of Perez, or a
 //!     ╭─────┼─────╮                     picture around the scene
 //!   ╭─╯     │     ╰─╮
-//!  ─┴───────┴───────┴─ horizon: skies by distributions send nothing from below it
+//!  ─┴───────┴───────┴─ horizon: skies by distributions are black below it
 //! ```
 
 use std::f64::consts::{PI, TAU};
@@ -18,20 +18,20 @@ use super::sky_map::SkyMap;
 use super::{Rgb, Scene};
 use crate::error::{Error, ErrorKind};
 
-/// The light from outside of a scene: radiance by direction, and perhaps a sun. Black, unless made
-/// otherwise.
+/// The light from outside of a scene: radiance by direction, and optionally a sun. Black by
+/// default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sky {
-    /// Radiance that all directions have, W/(m² sr) per channel; 0 where there is a map.
+    /// Radiance in all directions, W/(m² sr) per channel; 0 if there is a map.
     uniform: Rgb,
     map: Option<Arc<SkyMap>>,
     sun: Option<Sun>,
 }
 
-/// The sun: a disc that is far away, half a degree wide, and as bright in its middle as at its rim.
+/// The sun: a distant disc, half a degree wide, of uniform brightness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Towards its middle; of any length.
+    /// Direction of its centre; of any length.
     pub direction: DVec3,
     /// Irradiance of a surface that faces it, W/m² per channel.
     pub irradiance: Rgb,
@@ -46,14 +46,15 @@ impl Sun {
         Sun::SINE / (1.0 - Sun::SINE * Sun::SINE).sqrt()
     }
 
-    /// Irradiance of a surface to which it is at this cosine, if nothing hides it, W/m²; none where
-    /// the horizon cuts the disc. Exact: what a sphere sends follows the cosine as long as all of
-    /// it is seen.
+    /// Irradiance of a surface with this cosine of the angle to the sun, if unoccluded, W/m²; none
+    /// if the horizon cuts the disc. Exact: the irradiance of a sphere follows the cosine as long
+    /// as the whole sphere is visible.
     pub(crate) fn unoccluded(&self, cosine: f64) -> Option<Rgb> {
         (cosine >= Sun::SINE).then_some(self.irradiance * cosine)
     }
 
-    /// A direction to its disc, unit length: points of the unit square are spread over it evenly.
+    /// A direction to its disc, unit length: a uniform distribution over the unit square becomes
+    /// one over the disc.
     pub(crate) fn towards(&self, [x, y]: [f64; 2]) -> DVec3 {
         let (right, up) = self.direction.any_orthonormal_pair();
         let (sine, cosine) = (TAU * y).sin_cos();
@@ -69,21 +70,21 @@ impl From<Rgb> for Sky {
 }
 
 impl Sky {
-    /// The same `radiance` in every direction, W/(m² sr) per channel: what sees nothing else
-    /// receives the irradiance π times that.
+    /// The same `radiance` in every direction, W/(m² sr) per channel: unoccluded surfaces receive
+    /// the irradiance π times that.
     pub fn uniform(radiance: Rgb) -> Sky {
         Sky { uniform: radiance, ..Sky::default() }
     }
 
-    /// A sky of this `distribution`, `zenith` its radiance straight up, W/(m² sr) per channel.
-    /// `up` and `towards_sun` may have any length; an overcast sky does not look at the latter. The
-    /// sun itself is not in it: see [`Sky::with_sun`]. Below the horizon it is black.
+    /// A sky of this `distribution`, `zenith` its radiance straight up, W/(m² sr) per channel. `up`
+    /// and `towards_sun` may have any length; an overcast sky ignores the latter. The sun itself is
+    /// not included: see [`Sky::with_sun`]. Below the horizon it is black.
     ///
-    /// It is held in pieces of 0.3° or less.
+    /// It is stored in pieces of 0.3° or less.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite, or a direction of no
-    /// length.
+    /// [`ErrorKind::Scene`] for a radiance that is negative or not finite, or a direction of length
+    /// 0.
     pub fn new(
         distribution: SkyDistribution,
         zenith: Rgb,
@@ -100,10 +101,10 @@ impl Sky {
         Ok(Sky { map: Some(Arc::new(map)), ..Sky::default() })
     }
 
-    /// A picture around the scene: `pixels` of radiance, W/(m² sr) per channel, in lines of `width`
-    /// from straight up to straight down, each once around. With `up` +y the middle of a line is
-    /// towards −z and what is right of it towards +x; with +z it is towards +y, and other axes have
-    /// it as the shortest turn from +y leaves it.
+    /// An environment map: `pixels` of radiance, W/(m² sr) per channel, in lines of `width` from
+    /// straight up to straight down, each a full turn. With `up` +y the middle of a line is towards
+    /// −z and its right towards +x; with +z the middle is towards +y. For other axes it is the +y
+    /// case turned by the shortest rotation.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] for no pixels, lines of another length, a pixel that is negative or not
@@ -122,11 +123,11 @@ impl Sky {
         Ok(Sky { map: Some(Arc::new(map)), ..Sky::default() })
     }
 
-    /// The same sky with this sun before it.
+    /// The same sky with this sun in front of it.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for an irradiance that is negative or not finite, or a direction of no
-    /// length.
+    /// [`ErrorKind::Scene`] for an irradiance that is negative or not finite, or a direction of
+    /// length 0.
     pub fn with_sun(self, sun: Sun) -> Result<Sky, Error> {
         check_light("irradiance of the sun", sun.irradiance)?;
         let sun = Sun { direction: unit("towards the sun", sun.direction)?, ..sun };
@@ -147,12 +148,12 @@ impl Sky {
         }
     }
 
-    /// Whether no light comes from it.
+    /// Whether it has neither radiance nor a sun.
     pub fn is_black(&self) -> bool {
         self.brightest() == 0.0 && self.sun.is_none()
     }
 
-    /// The radiance that all directions have; none where they differ.
+    /// The radiance in all directions; none if they differ.
     pub fn uniform_radiance(&self) -> Option<Rgb> {
         self.map.is_none().then_some(self.uniform)
     }
@@ -163,12 +164,12 @@ impl Sky {
         map.max(self.uniform.max_element())
     }
 
-    /// The pieces; none where all are alike.
+    /// The pieces; none if the sky is uniform.
     pub(crate) fn map(&self) -> Option<&SkyMap> {
         self.map.as_deref()
     }
 
-    /// Numbers that two skies share if they are the same; none of a black one.
+    /// Numbers that are equal for equal skies; none for a black one.
     pub(crate) fn key(&self) -> Vec<f64> {
         if self.is_black() {
             return vec![];
@@ -219,8 +220,8 @@ fn unit(what: &str, direction: DVec3) -> Result<DVec3, Error> {
     direction.try_normalize().ok_or_else(found)
 }
 
-/// The turn from the axes of the scene to those of a map, whose zenith is +z and whose pictures
-/// have their middle towards +y: (x, −z, y) where `up` is +y.
+/// The rotation from the axes of the scene to those of a map, whose zenith is +z and whose pictures
+/// have their middle towards +y: (x, −z, y) if `up` is +y.
 fn axes(up: DVec3) -> DQuat {
     let upright = DQuat::from_rotation_arc(DVec3::Y, up).inverse();
     DQuat::from_rotation_arc(DVec3::Y, DVec3::Z) * upright

@@ -1,4 +1,4 @@
-//! How radiance is spread over skies, relative to the zenith.
+//! Distributions of sky radiance, relative to the zenith.
 //!
 //! ```text
 //!   L(Z, χ) / L_zenith = f(χ) φ(Z) / (f(Z_sun) φ(0))         Z: angle from the zenith
@@ -8,7 +8,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-/// How the radiance of a sky is spread, relative to that of its zenith.
+/// Distribution of the radiance of a sky, relative to that of its zenith.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyDistribution(Kind);
 
@@ -39,7 +39,7 @@ const STANDARD: [[f64; 5]; 15] = [
     [-1.0, -0.15, 24.0, -2.8, 0.15],
 ];
 
-/// Clearnesses at which the next line of [`PEREZ`] begins (Perez et al. 1990, table 1).
+/// Clearness values at which the next row of [`PEREZ`] begins (Perez et al. 1990, table 1).
 const CLEARNESS: [f64; 7] = [1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2];
 
 /// Four coefficients each of a, b, c, d and e (Perez, Seals and Michalsky 1993, table 1, with the
@@ -103,17 +103,17 @@ const PEREZ: [[[f64; 4]; 5]; 8] = [
     ],
 ];
 
-/// Nearer to the horizon than by this cosine the gradation is that there: b above 0 diverges.
+/// Least cosine of the zenith angle in the gradation, which diverges at the horizon for b above 0.
 const MIN_COSINE: f64 = 0.01;
 
 impl SkyDistribution {
     /// The overcast sky, 1 + 2 sin of the elevation (Moon and Spencer 1942): a third of the zenith
-    /// at the horizon. Open ground receives 7π/9 times the zenith's radiance.
+    /// at the horizon. The irradiance of open ground is 7π/9 times the zenith's radiance.
     pub const OVERCAST: SkyDistribution = SkyDistribution(Kind::Traditional);
 
     /// One of the standard skies of the CIE (S 011/E:2003), by its number: 1 overcast, steep, 5
     /// uniform, 7 partly cloudy with the sun behind, 12 clear, 13 clear and polluted, and so on to
-    /// 15. None of other numbers.
+    /// 15. None for other numbers.
     pub fn cie(number: u32) -> Option<SkyDistribution> {
         let index = usize::try_from(number).ok()?.checked_sub(1)?;
         STANDARD.get(index).map(|&all| SkyDistribution(Kind::Graded(all)))
@@ -123,14 +123,14 @@ impl SkyDistribution {
     /// overcast, to 12 or so; `brightness` Δ from 0.01 to 0.6 or so; `sun_zenith` is the angle from
     /// the zenith to the sun, radians.
     ///
-    /// None for a clearness below 1, another number that is negative, or one that is not finite.
+    /// None for a clearness below 1, or another number that is negative or not finite.
     pub fn perez(clearness: f64, brightness: f64, sun_zenith: f64) -> Option<SkyDistribution> {
         let all = [clearness - 1.0, brightness, sun_zenith];
         if !all.iter().all(|x| x.is_finite() && *x >= 0.0) {
             return None;
         }
         let line = CLEARNESS.partition_point(|&least| least <= clearness);
-        // Within the range that the model was fitted to.
+        // The range of the model's fit.
         let brightness = if line > 0 && line < 5 { brightness.max(0.2) } else { brightness };
         let linear =
             |[p, q, r, s]: [f64; 4]| p + q * sun_zenith + brightness * (r + s * sun_zenith);
@@ -140,14 +140,14 @@ impl SkyDistribution {
             c = ((brightness * (c1 + c2 * sun_zenith)).powf(c3)).exp() - c4;
             d = -(brightness * (d1 + d2 * sun_zenith)).exp() + d3 + brightness * d4;
         }
-        // Theirs has 1 + c exp(d χ) + e cos² χ: the same over a factor.
+        // The paper has 1 + c exp(d χ) + e cos² χ: the same up to a factor.
         let factor = 1.0 + c * (d * FRAC_PI_2).exp();
         let graded = [a, b, c / factor, d, e / factor];
         graded.iter().all(|x| x.is_finite()).then_some(SkyDistribution(Kind::Graded(graded)))
     }
 
-    /// Radiance relative to the zenith, 0 or more, by the cosines from it, above 0, and from the
-    /// sun, which is at the cosine `sun` from the zenith.
+    /// Radiance relative to the zenith, 0 or more, as a function of the cosines of the angles from
+    /// the zenith, above 0, and from the sun. `sun` is the cosine of the sun's zenith angle.
     pub(super) fn relative_to_zenith(self, sun: f64) -> impl Fn(f64, f64) -> f64 {
         let absolute = move |up: f64, from_sun: f64| match self.0 {
             Kind::Traditional => 1.0 + 2.0 * up,

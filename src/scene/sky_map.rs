@@ -1,4 +1,4 @@
-//! A sky in pieces: the radiance of small parts of the sphere, two squares of them.
+//! A piecewise constant sky: the radiance of small parts of the sphere, in two squares.
 //!
 //! ```text
 //!        y                   u = (x + y) / (|x| + |y| + |z|)     A hemisphere fills a square, its
@@ -8,7 +8,7 @@
 //!    ╲   │   ╱               z < 0: the second                   Hoppe, 2003, by halves)
 //! ```
 //!
-//! Shaders look directions up in the same way: `shaders/sky.wgsl`.
+//! Shaders use the same mapping: `shaders/sky.wgsl`.
 
 use glam::{DQuat, DVec3};
 
@@ -17,7 +17,7 @@ use super::Rgb;
 /// The radiance of a sky, piece by piece.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SkyMap {
-    /// From the scene's axes to the map's, whose zenith is +z.
+    /// Rotation from the scene's axes to the map's, whose zenith is +z.
     turn: DQuat,
     /// Pieces along the edge of a square.
     side: usize,
@@ -26,16 +26,17 @@ pub(crate) struct SkyMap {
     brightest: f64,
 }
 
-/// Pieces along the edge of a square for a sky by a formula, each with the radiance in its middle:
-/// over one, 0.3° at most, what is smooth over 20° is even but for 1e-4 about that.
+/// Pieces along the edge of a square for a sky by a formula, each with the radiance at its centre:
+/// a function smooth over 20° varies by about 1e-4 within a piece of at most 0.3°.
 const SIDE: usize = 512;
 
-/// Pieces along the edge of a square for a picture, at most: of 0.1° or so, 24 MB of them.
+/// Maximum number of pieces along the edge of a square for a picture: about 0.1° each, 24 MB in
+/// all.
 const MAX_SIDE: usize = 1024;
 
 impl SkyMap {
     /// Of `radiance` by directions (unit length, in the scene's axes) above the horizon; black
-    /// below. `turn` is from the scene's axes to the map's.
+    /// below. `turn` is the rotation from the scene's axes to the map's.
     pub fn of_upper_hemisphere(turn: DQuat, radiance: impl Fn(DVec3) -> Rgb) -> SkyMap {
         let back = turn.inverse();
         let middle = |cell: usize| 2.0 * (cell as f64 + 0.5) / SIDE as f64 - 1.0;
@@ -45,15 +46,15 @@ impl SkyMap {
         SkyMap::new(turn, SIDE, &pieces)
     }
 
-    /// Of a picture in lines of `width`, from the zenith down, each once around with its middle
-    /// towards +y of the map's axes. `turn` is from the scene's axes to those.
+    /// Of a picture in lines of `width`, from the zenith down, each a full turn with its middle
+    /// towards +y of the map's axes. `turn` is the rotation from the scene's axes to those.
     pub fn of_picture(turn: DQuat, width: usize, pixels: &[Rgb]) -> SkyMap {
         use std::f64::consts::{PI, TAU};
         let height = pixels.len() / width;
         let side = (width / 4).max(height / 2).next_power_of_two().clamp(64, MAX_SIDE);
         let (mut sums, mut weights) =
             (vec![Rgb::ZERO; 2 * side * side], vec![0.0; 2 * side * side]);
-        // So many parts of a pixel that none of the pieces is left out: a piece is no narrower than
+        // Parts of a pixel, enough for each piece to contain one: a piece is no narrower than
         // 1.2/side radians.
         let parts = |angle: f64| (angle * side as f64 * 2.0).ceil().max(2.0) as usize;
         let across = parts(TAU / width as f64);
@@ -90,7 +91,7 @@ impl SkyMap {
         self.brightest
     }
 
-    /// From the scene's axes to the map's.
+    /// Rotation from the scene's axes to the map's.
     pub fn turn(&self) -> DQuat {
         self.turn
     }
@@ -105,20 +106,20 @@ impl SkyMap {
         &self.pieces
     }
 
-    /// Numbers that two maps share if they are the same.
+    /// Numbers that are equal for equal maps.
     pub fn key(&self) -> impl Iterator<Item = f64> {
         let pieces = self.pieces.iter().flatten().map(|&x| f64::from(x));
         self.turn.to_array().into_iter().chain(pieces)
     }
 }
 
-/// The direction to a place of the first square, unit length.
+/// The direction of a point of the first square, unit length.
 fn direction(u: f64, v: f64) -> DVec3 {
     let (x, y) = ((u + v) / 2.0, (u - v) / 2.0);
     DVec3::new(x, y, 1.0 - x.abs() - y.abs()).normalize()
 }
 
-/// The piece that `direction` is to, in the map's axes.
+/// The index of the piece that contains `direction`, in the map's axes.
 fn index(direction: DVec3, side: usize) -> usize {
     let DVec3 { x, y, z } = direction / direction.abs().element_sum();
     let cell = |t: f64| (((t + 1.0) / 2.0 * side as f64) as usize).min(side - 1);

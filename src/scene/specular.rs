@@ -1,17 +1,17 @@
-//! Surfaces that reflect as a mirror does, or let light through: what a picture shows of them.
+//! Specular surfaces, mirrors and glass, as shown in pictures.
 //!
-//! Radiosity is diffuse. A solver takes such a surface for its diffuse part alone
+//! Radiosity is diffuse. A solver uses only the diffuse part of such a surface
 //! ([`Material::reflectance`](super::Material::reflectance)), and lets light pass straight through
 //! glass that has none; a picture shows both.
 
 use super::rgb::Rgb;
 
-/// What a smooth surface does to light beside reflecting it diffusely. Pictures that know the scene
-/// ([`Camera::interpolated_image`](crate::Camera::interpolated_image) and
-/// [`Camera::gathered_image`](crate::Camera::gathered_image)) show it: the diffuse part of its
-/// radiance, B/π, times a share, plus the radiance that comes along other directions, times others:
+/// Specular reflection and transmission of a smooth surface beside its diffuse reflection. Pictures
+/// that know the scene ([`Camera::interpolated_image`](crate::Camera::interpolated_image) and
+/// [`Camera::gathered_image`](crate::Camera::gathered_image)) show it: the sum of its diffuse
+/// radiance, B/π, and the reflected and transmitted radiance, with these factors:
 ///
-/// | | B/π counts | reflected | transmitted |
+/// | | B/π | reflected | transmitted |
 /// |---|---|---|---|
 /// | `Mirror` | 1 | r | – |
 /// | `Polished` | 1 − (1 − cos θ)⁵ | r + (1 − r) (1 − cos θ)⁵ | – |
@@ -28,19 +28,19 @@ pub enum Specular {
         /// Reflectance r per channel at every angle, in [0, 1].
         reflectance: Rgb,
     },
-    /// A polished surface, which reflects more the more it is seen from the side (Schlick 1994,
+    /// A polished surface, whose reflectance increases towards grazing angles (Schlick 1994,
     /// equation 15). Its front reflects.
     Polished {
         /// Reflectance r per channel at normal incidence, in [0, 1].
         reflectance: Rgb,
     },
-    /// Clear glass, or another dielectric: it reflects and refracts. Triangles of one material
-    /// that enclose a space are the surface of a body; others are panes, through which light
-    /// goes straight on. Both sides count.
+    /// Clear glass, or another dielectric: it reflects and refracts. Triangles of one material that
+    /// enclose a space are the surface of a body; others are panes, through which light goes
+    /// straight on. Both sides are active.
     Glass {
         /// Refractive index n, in [1, [`Specular::MAX_REFRACTIVE_INDEX`]].
         refractive_index: f64,
-        /// Share τ per channel that passes the inside of a body or a pane once, in [0, 1].
+        /// Fraction τ per channel that passes the inside of a body or a pane once, in [0, 1].
         transmittance: Rgb,
     },
 }
@@ -54,7 +54,7 @@ impl Specular {
         matches!(self, Specular::Glass { .. })
     }
 
-    /// The share per channel that is not left for diffuse reflection.
+    /// The fraction per channel that is not available for diffuse reflection.
     pub(crate) fn share(&self) -> Rgb {
         match *self {
             Specular::Mirror { reflectance } | Specular::Polished { reflectance } => reflectance,
@@ -62,7 +62,7 @@ impl Specular {
         }
     }
 
-    /// What is wrong with it beside this diffuse reflectance, and what would be right.
+    /// The error beside this diffuse reflectance, if any, and the remedy.
     pub(super) fn fault(&self, diffuse: Rgb) -> Option<(String, &'static str)> {
         if let Specular::Glass { refractive_index: index, .. } = self
             && !(1.0..=Specular::MAX_REFRACTIVE_INDEX).contains(index)
@@ -76,7 +76,7 @@ impl Specular {
                 let found = format!("{name} {share} in channel {channel}");
                 return Some((found, "must be from 0 to 1"));
             }
-            // Shares that leave nothing add up to one but for rounding.
+            // Complementary fractions add up to one up to rounding.
             if share + diffuse > 1.0 + 4.0 * f64::EPSILON {
                 let found =
                     format!("{name} {share} and reflectance {diffuse} in channel {channel}");

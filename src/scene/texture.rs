@@ -7,10 +7,11 @@
 //!   └──────► u
 //! ```
 //!
-//! A mean takes texels as squares of one colour. It goes down the levels: what lies within the
-//! triangle counts with its mean, what its sides cut is cut to a polygon and counts with its area.
-//! So a mean is exact for every triangle, whatever its corners, and costs its outline in texels,
-//! not its area. A look-up goes linearly between the centres of texels, for pictures.
+//! A mean takes texels as squares of one colour. It descends the levels: a cell within the triangle
+//! counts with its mean, a cell cut by its sides is clipped to a polygon and counts with its area.
+//! So a mean is exact for every triangle, whatever its corners, and its cost is proportional to the
+//! outline in texels, not to the area. A look-up interpolates linearly between the centres of
+//! texels, for pictures.
 
 use std::sync::{Arc, OnceLock};
 
@@ -18,7 +19,7 @@ use glam::DVec2;
 
 use super::rgb::Rgb;
 
-/// An image, in 8 bits a channel as sRGB has them.
+/// An image, 8 bits per channel, sRGB.
 pub struct Texture {
     width: u32,
     height: u32,
@@ -32,22 +33,22 @@ struct Level {
     means: Vec<[f32; 3]>,
 }
 
-/// Cells along the outline of a triangle, at most: what the outline cuts of one that small counts
-/// with its mean. Half a cell lies beyond it each: where the texture has its edges there too, the
-/// mean of a triangle about as wide as high is off by 5e-3 of their contrast at most, and by 1e-4
-/// where cells are not alike.
+/// Maximum number of cells along the outline of a triangle: cells cut by the outline at that size
+/// count with their mean. Each extends half a cell beyond it: if the texture has its edges there
+/// too, the mean of a triangle about as wide as high is off by at most 5e-3 of their contrast, and
+/// by 1e-4 if cells differ.
 pub(super) const MAX_OUTLINE_CELLS: f64 = 1500.0;
 
-/// Repetitions of a texture across a triangle beyond which all of the triangle has the mean of the
-/// whole. Chosen by hand.
+/// Number of repetitions of a texture across a triangle above which the mean of the whole texture
+/// is used. Plain choice.
 const MAX_TILES: f64 = 4096.0;
 
-/// Points along each side that a clamped texture is looked up at beyond its border.
+/// Points along each side at which a clamped texture is sampled beyond its border.
 const CLAMPED_POINTS: u32 = 48;
 
 impl Texture {
-    /// An image of `width` × `height` texels, at least one, rows from the top: sRGB, 8 bits a
-    /// channel (IEC 61966-2-1). `None` when their number is another.
+    /// An image of `width` × `height` texels, at least one, rows from the top: sRGB, 8 bits per
+    /// channel (IEC 61966-2-1). `None` when the number of texels differs.
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 3]>) -> Option<Texture> {
         if texels.is_empty() || texels.len() as u64 != u64::from(width) * u64::from(height) {
             return None;
@@ -70,13 +71,13 @@ impl Texture {
         self.cell(self.levels.len(), 0, 0)
     }
 
-    /// Linear colour at `uv`, between the centres of the four texels around it. Beyond 0 and 1 the
-    /// image repeats, or, `clamped`, goes on as its border.
+    /// Linear colour at `uv`, interpolated between the centres of the four texels around it. Beyond
+    /// 0 and 1 the image repeats, or, `clamped`, continues with its border.
     pub fn at(&self, uv: DVec2, clamped: bool) -> Rgb {
         self.filtered(uv, 0.0, clamped)
     }
 
-    /// Linear colour of the texel at `uv`, as far as it reaches.
+    /// Linear colour of the texel that contains `uv`.
     pub(super) fn texel_at(&self, uv: DVec2, clamped: bool) -> Rgb {
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
         let [x, y] = [(uv.x, self.width), (1.0 - uv.y, self.height)]
@@ -99,8 +100,8 @@ impl Texture {
         self.texels.as_flattened()
     }
 
-    /// The same, between the means of so many texels that one covers `area` of the image at most;
-    /// 1 is all of it. (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983)
+    /// The same from a level whose texels cover at most `area` of the image; 1 is all of it. (L.
+    /// Williams, "Pyramidal parametrics", SIGGRAPH 1983)
     fn filtered(&self, uv: DVec2, area: f64, clamped: bool) -> Rgb {
         if !uv.is_finite() {
             return self.whole_mean();
@@ -125,13 +126,14 @@ impl Texture {
         top.lerp(texel(0.0, 1.0).lerp(texel(1.0, 1.0), part.x), part.y)
     }
 
-    /// Linear mean over the triangle with these corners in texture space. Where that has no area,
-    /// the colour at its middle.
+    /// Linear mean over the triangle with these corners in texture space. If it has no area, the
+    /// colour at its middle.
     pub fn mean(&self, corners: [DVec2; 3], clamped: bool) -> Rgb {
         self.mean_by_cells(corners, clamped, MAX_OUTLINE_CELLS)
     }
 
-    /// The same, with so many cells along the triangle's outline, and as many repetitions.
+    /// The same, with a limit of `cells` for cells along the triangle's outline and for
+    /// repetitions.
     pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], clamped: bool, cells: f64) -> Rgb {
         let size = DVec2::new(self.width.into(), self.height.into());
         let [a, b, c] = corners;
@@ -144,7 +146,7 @@ impl Texture {
         if clamped && (low.min_element() < 0.0 || high.max_element() > 1.0) {
             return self.sampled_mean(corners);
         }
-        // Tiles from the one of the lowest corner, so that no digits are lost far out.
+        // Relative to the tile of the lowest corner, so that no digits are lost far out.
         let origin = low.floor();
         let tiles = (high - origin).ceil().max(DVec2::ONE);
         if tiles.x * tiles.y > MAX_TILES.min(cells) {
@@ -162,8 +164,8 @@ impl Texture {
         if covered > 0.0 { sum / covered } else { self.at((a + b + c) / 3.0, clamped) }
     }
 
-    /// Adds what `polygon`, in texels, covers of a cell: colour times area, and area. Cells of no
-    /// more than `smallest` texels are not taken apart.
+    /// Adds the intersection of `polygon`, in texels, with a cell: colour times area, and area.
+    /// Cells of at most `smallest` texels are not subdivided.
     fn add(
         &self,
         level: usize,
@@ -226,7 +228,7 @@ impl Texture {
         [self.width, self.height].map(|n| n.div_ceil(1 << level.min(31)))
     }
 
-    /// The level after the last: means of up to 2 × 2 cells by how many texels they have.
+    /// The level after the last: means of up to 2 × 2 cells, weighted by their numbers of texels.
     fn coarser(&self) -> Level {
         let from = self.levels.len();
         let [width, height] = self.level_size(from + 1);
@@ -274,49 +276,49 @@ fn linear() -> &'static [f64; 256] {
     })
 }
 
-/// A texture as a material uses it.
+/// A texture in use by a material.
 #[derive(Clone, Debug)]
 pub struct TextureMap {
     /// The image.
     pub texture: Arc<Texture>,
-    /// What its colours are multiplied with, per channel.
+    /// Factor of its colours, per channel.
     pub factor: Rgb,
-    /// Most that a point may have where the material's mean is changed: the ceiling of a
-    /// reflectance, infinite for light.
+    /// Upper limit of a point if the material's mean is changed: the largest reflectance, infinite
+    /// for light.
     pub ceiling: f64,
     /// Mean over the triangles of the material, per channel.
     pub mean: Rgb,
-    /// Texture coordinates of a corner are multiplied with this,
+    /// Texture coordinates of a corner are multiplied by this,
     pub scale: DVec2,
     /// and then this is added.
     pub offset: DVec2,
-    /// Whether the image goes on as its border beyond 0 and 1, and does not repeat.
+    /// Whether the image continues with its border beyond 0 and 1 instead of repeating.
     pub clamped: bool,
 }
 
 impl TextureMap {
-    /// The value at texture coordinates as the file has them.
+    /// The value at texture coordinates as in the file.
     pub fn at(&self, uv: DVec2) -> Rgb {
         self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
     }
 
-    /// The value of the texel that texture coordinates, as the file has them, lie in.
+    /// The value of the texel that contains texture coordinates as in the file.
     pub(crate) fn texel(&self, uv: DVec2) -> Rgb {
         self.value(self.texture.texel_at(uv * self.scale + self.offset, self.clamped))
     }
 
-    /// The value at texture coordinates as the file has them, of which `area` is to be filtered.
+    /// The value at texture coordinates as in the file, filtered over `area` of them.
     pub(crate) fn filtered(&self, uv: DVec2, area: f64) -> Rgb {
         let area = area * (self.scale.x * self.scale.y).abs();
         self.value(self.texture.filtered(uv * self.scale + self.offset, area, self.clamped))
     }
 
-    /// The mean over a triangle with these texture coordinates, as the file has them.
+    /// The mean over a triangle with these texture coordinates, as in the file.
     pub fn mean(&self, corners: [DVec2; 3]) -> Rgb {
         self.mean_by_cells(corners, MAX_OUTLINE_CELLS)
     }
 
-    /// The same, with so many cells of the image along the triangle's outline.
+    /// The same, with at most `cells` cells of the image along the triangle's outline.
     pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], cells: f64) -> Rgb {
         let corners = corners.map(|uv| uv * self.scale + self.offset);
         self.value(self.texture.mean_by_cells(corners, self.clamped, cells))
@@ -331,8 +333,8 @@ impl TextureMap {
         self.factor * colour
     }
 
-    /// What has `value` in this map, if `mean` is to be the mean over the triangles of the
-    /// material. Where all of it is 0 it is even.
+    /// The map's `value` rescaled for `mean` as the mean over the triangles of the material. A map
+    /// that is 0 everywhere becomes constant.
     pub(crate) fn scaled(&self, value: Rgb, mean: Rgb) -> Rgb {
         let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), value / self.mean, Rgb::ONE);
         (mean * relative).min(Rgb::splat(self.ceiling))
@@ -346,7 +348,7 @@ pub struct MaterialTextures {
     pub reflectance: Option<TextureMap>,
     /// Of its exitance, W/m².
     pub exitance: Option<TextureMap>,
-    /// Where it is solid: white. What is black is a hole.
+    /// Solid parts, white; black is a hole.
     pub mask: Option<TextureMap>,
 }
 
@@ -371,7 +373,7 @@ impl Polygon {
         }
     }
 
-    /// What of it lies between `low` and `high` (I. Sutherland, G. Hodgman, 1974).
+    /// The part between `low` and `high` (I. Sutherland, G. Hodgman, 1974).
     fn cut(&self, low: DVec2, high: DVec2) -> Polygon {
         let inside = |p: &DVec2| p.cmpge(low).all() && p.cmple(high).all();
         if self.corners[..self.count].iter().all(inside) {

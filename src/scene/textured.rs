@@ -1,4 +1,4 @@
-//! Textures on the triangles of a scene: what a point reflects and emits, and what a piece does.
+//! Textures on the triangles of a scene: reflectance and exitance of points and of pieces.
 //!
 //! ```text
 //!   texture ── mean over all triangles of the material ──► Material::reflectance, ρ̄
@@ -6,8 +6,8 @@
 //!      └────── look-up at a point ÷ mean of all, × ρ̄ ──────────────► ρ of a point
 //! ```
 //!
-//! A texture says how reflectance is spread, the material how much there is: a material that is
-//! changed scales its texture. Emission is the mean over each triangle, in the same way.
+//! A texture gives the distribution of reflectance, the material its mean: a changed material
+//! scales its texture. Emission is the mean over each triangle, in the same way.
 
 use std::collections::BTreeMap;
 
@@ -24,44 +24,44 @@ use crate::geometry::barycentric::barycentric;
 /// at the three corners of the piece.
 pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
-/// Cells of images along the outlines of all pieces that are looked at together: some 10 s on two
-/// cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`], so
-/// that the time is bounded for any number that each show all of a large image.
+/// Maximum number of cells of images along the outlines of all pieces computed together: some 10 s
+/// on two cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`],
+/// so that the time is bounded for any number that each show all of a large image.
 const SCENE_OUTLINE_CELLS: f64 = 2e7;
 
-/// And this is the fewest that a piece gets: its mean is off by some 1e-2 of the contrast within.
+/// Minimum number of cells of a piece: its mean is off by some 1e-2 of the contrast within.
 const MIN_OUTLINE_CELLS: f64 = 64.0;
 
 impl Scene {
-    /// All of a triangle, as a [`Piece`] has it.
+    /// The whole triangle, as in a [`Piece`].
     pub(crate) const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
-    /// Texture coordinates (u, v) of the corners of triangle `t`, as the file has them; `None`
-    /// where the scene has no textures, unless they were
-    /// [kept](crate::ObjSettings::texture_coordinates). Not finite for a corner that has none.
+    /// Texture coordinates (u, v) of the corners of triangle `t`, as in the file; `None` if the
+    /// scene has no textures, unless they were [kept](crate::ObjSettings::texture_coordinates). Not
+    /// finite for a corner without them.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
         self.textures.coordinates.get(t).copied()
     }
 
-    /// Textures of triangle `t`; `None` where its material has none.
+    /// Textures of triangle `t`; `None` if its material has none.
     pub fn textures(&self, t: usize) -> Option<&MaterialTextures> {
         self.textures.of_materials.get(&self.triangles[t].material)
     }
 
-    /// Reflectance per channel of a point of triangle `t`, where its second and third corner have
-    /// these weights: what the texture has there, if there is one.
+    /// Reflectance per channel at the point of triangle `t` with these weights of its second and
+    /// third corner: from the texture, if there is one.
     pub fn reflectance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
         self.reflectance_around(t, barycentric, 0.0)
     }
 
-    /// The same, filtered over a share of the triangle's area.
+    /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn reflectance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
         self.filtered(t, map, self.material(t).reflectance, (barycentric, share))
     }
 
-    /// The share of the light that arrives around a point which leaves again diffusely, on either
-    /// side, per channel: that of a textured material follows its reflectance.
+    /// The fraction of the light arriving around a point that is scattered diffusely, on either
+    /// side, per channel: for a textured material it is proportional to the reflectance.
     pub(crate) fn albedo_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let (material, reflectance) =
             (self.material(t), self.reflectance_around(t, barycentric, share));
@@ -73,20 +73,20 @@ impl Scene {
         reflectance + material.transmittance * relative
     }
 
-    /// Exitance per channel, W/m², of a point of triangle `t`, where its second and third corner
-    /// have these weights: what the texture has there, if there is one.
+    /// Exitance per channel, W/m², at the point of triangle `t` with these weights of its second
+    /// and third corner: from the texture, if there is one.
     pub fn exitance_at(&self, t: usize, barycentric: [f64; 2]) -> Rgb {
         self.exitance_around(t, barycentric, 0.0)
     }
 
-    /// The same, filtered over a share of the triangle's area.
+    /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn exitance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
         self.filtered(t, map, self.material(t).exitance, (barycentric, share))
     }
 
-    /// What `map` has at a place of triangle `t`, filtered over a share of its area, where the
-    /// material has this `mean`; the mean if there is no map.
+    /// The value of `map` at a point of triangle `t`, filtered over a fraction of its area, for
+    /// this `mean` of the material; the mean if there is no map.
     fn filtered(
         &self,
         t: usize,
@@ -100,7 +100,7 @@ impl Scene {
         map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
     }
 
-    /// Exitance per channel, W/m², that triangle `t` lights others with: that of its material, or
+    /// Exitance per channel, W/m², with which triangle `t` lights others: that of its material, or
     /// the mean of the texture over the triangle.
     pub fn exitance(&self, t: usize) -> Rgb {
         let mean = self.material(t).exitance;
@@ -128,7 +128,7 @@ impl Scene {
         pieces.iter().zip(means).map(scaled).collect()
     }
 
-    /// Lays textures of materials, by their indices, onto the triangles, which have coordinates.
+    /// Assigns textures to materials, by their indices; the triangles have texture coordinates.
     pub(super) fn lay_textures(&mut self, of_materials: BTreeMap<u32, MaterialTextures>) {
         let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
         self.textures = SceneTextures { of_materials, ..(*self.textures).clone() }.into();
@@ -168,7 +168,7 @@ impl Scene {
         self.textures = textures.into();
     }
 
-    /// Mean over all triangles of each material of what is given for each triangle.
+    /// Mean over all triangles of each material of a value per triangle.
     fn means_of_materials(&self, of_triangles: &[Option<Rgb>]) -> BTreeMap<u32, Rgb> {
         let mut sums: BTreeMap<u32, (Rgb, f64)> = BTreeMap::new();
         for (t, mean) in of_triangles.iter().enumerate() {
@@ -197,9 +197,9 @@ impl Scene {
         self.of_pieces(pieces, map_of, mean).into_iter().map(Option::flatten).collect()
     }
 
-    /// What `find` finds of a texture over each of `pieces`, of it, the mask beside it, the place
-    /// of the piece on it, and the cells of its image along the piece's outline; none for those
-    /// without one. Many triangles of a scene may show the same piece, which is looked at once.
+    /// Result of `find` for each of `pieces` with a texture, called with the texture, its mask, the
+    /// texture coordinates of the piece, and the number of cells along the piece's outline; none
+    /// for the others. Equal pieces, which many triangles may share, are computed once.
     pub(super) fn of_pieces<T: Copy + Send>(
         &self,
         pieces: &[Piece],
@@ -232,7 +232,7 @@ impl Scene {
         barycentric(self.corners(t), self.normal(t), position)
     }
 
-    /// Texture coordinates of a point of triangle `t`; not finite where it has none.
+    /// Texture coordinates of a point of triangle `t`; not finite if it has none.
     pub(crate) fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let place = |[a, b, c]: [DVec2; 3]| a * (1.0 - u - v) + b * u + c * v;
         self.texture_coordinates(t).map_or(DVec2::NAN, place)

@@ -1,34 +1,34 @@
-//! What was accepted but deserves a look: what it is, how often and where first, what was done.
+//! Warnings about accepted defects: kind, number, first occurrence and treatment.
 
 use std::fmt;
 
 use crate::error::quoted;
 
-/// Something odd in a scene that was repaired, replaced or passed over.
+/// A defect in a scene that was repaired, replaced or skipped.
 ///
-/// Shown with `{}`, it is one line: how many, what, where first, what was done, which.
+/// Shown with `{}`, it is one line: number, kind, first occurrence, treatment, names.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Warning {
-    /// What was found.
+    /// Kind of the defect.
     pub kind: WarningKind,
-    /// How often.
+    /// Number of occurrences.
     pub count: usize,
-    /// Where first, as `file:line`; `None` where no line is to blame.
+    /// First occurrence, as `file:line`; `None` if it has no line.
     pub place: Option<String>,
-    /// What was done about it.
+    /// Treatment.
     pub done: String,
     /// The groups, materials or files concerned, up to [`Warning::MAX_NAMES`] of them, each once.
     pub names: Vec<String>,
 }
 
-/// What a [`Warning`] is about.
+/// Kind of a [`Warning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum WarningKind {
     /// A library of materials that cannot be read.
     MissingLibrary,
-    /// A library under another path, in other letters, or one that no `mtllib` names.
+    /// A library under another path, with other capitalisation, or one that no `mtllib` names.
     LibraryElsewhere,
     /// `usemtl` with a name that no library defines, or with none.
     UnknownMaterial,
@@ -44,19 +44,19 @@ pub enum WarningKind {
     NegativeColour,
     /// A statement of a material that cannot be read.
     MaterialStatement,
-    /// A texture that is not there.
+    /// A missing texture.
     MissingTexture,
-    /// A texture that is no image, or breaks off.
+    /// A texture that is not an image, or is truncated.
     UnreadableTexture,
-    /// A texture that is too large, alone or with those before it.
+    /// A texture that exceeds the limits, alone or with those before it.
     LargeTexture,
     /// Options of a texture that are not used.
     TextureOptions,
     /// Transparency, which is not modelled.
     Transparency,
-    /// A mirror or glass, which pictures show and light does not meet as such.
+    /// A mirror or glass, which pictures show and the light solution simplifies.
     Specular,
-    /// `Ka` above 1, taken for radiance.
+    /// `Ka` above 1, used as radiance.
     AmbientAsRadiance,
     /// No face emits light.
     NoLight,
@@ -68,25 +68,25 @@ pub enum WarningKind {
     FewCorners,
     /// A vertex with more numbers than a position, a weight or a colour has.
     VertexNumbers,
-    /// A smoothing group that is no whole number.
+    /// A smoothing group that is not an integer.
     SmoothingGroup,
     /// `s` with neither a group nor `off`.
     SmoothingWithoutGroup,
     /// Points and lines.
     PointsAndLines,
-    /// Curves and surfaces of free form.
+    /// Free-form curves and surfaces.
     FreeForm,
     /// A line that is not OBJ.
     UnknownStatement,
     /// A facet of an STL file whose normal points to the back of its corners.
     OpposedNormal,
-    /// An STL file that ends early, or is not as long as it says.
+    /// An STL file that is truncated, or has another length than it declares.
     BrokenOff,
     /// A text that is not UTF-8.
     Encoding,
     /// A triangle without area.
     Degenerate,
-    /// A triangle that is there twice.
+    /// A duplicated triangle.
     RepeatedTriangle,
     /// A triangle that light reaches from behind only.
     Winding,
@@ -95,7 +95,7 @@ pub enum WarningKind {
 }
 
 impl Warning {
-    /// Most names that a warning keeps.
+    /// Maximum number of names that a warning keeps.
     pub const MAX_NAMES: usize = 9;
 
     /// A warning of `kind` without place or names.
@@ -126,7 +126,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (one, many) = self.kind.nouns();
         match (self.kind, self.count) {
-            // Of a scene as a whole, which is no matter of how many.
+            // It concerns the scene as a whole: no count.
             (WarningKind::NoLight, 1) => f.write_str(one)?,
             (_, 1) => write!(f, "1 {one}")?,
             (_, count) => write!(f, "{count} {many}")?,
@@ -137,7 +137,7 @@ impl fmt::Display for Warning {
             (None, _) => {}
         }
         write!(f, ": {}", self.done)?;
-        // Where as many were kept as are, nobody knows how many there were.
+        // If the list of names is full, the total number is unknown.
         let shown = &self.names[..self.names.len().min(Warning::MAX_NAMES - 1)];
         let others = if shown.len() < self.names.len() { " and others" } else { "" };
         if !shown.is_empty() {
@@ -148,7 +148,7 @@ impl fmt::Display for Warning {
 }
 
 impl WarningKind {
-    /// What it is about, for one and for many.
+    /// Its noun, singular and plural.
     pub(crate) fn nouns(self) -> (&'static str, &'static str) {
         use WarningKind::*;
         match self {
@@ -212,8 +212,8 @@ impl WarningKind {
         }
     }
 
-    /// What would be right, where a strict reader refuses it; `None` for what it only warns of:
-    /// nothing was changed, or what was passed over has no place in a scene of surfaces.
+    /// The remedy, if a strict reader refuses it; `None` if it only warns: nothing was changed, or
+    /// the skipped content does not belong in a scene of surfaces.
     pub(crate) fn remedy(self) -> Option<&'static str> {
         use WarningKind::*;
         Some(match self {

@@ -15,7 +15,7 @@ const VERSION: u32 = 2;
 const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BINARY_CHUNK: u32 = 0x004E_4942;
 
-/// Writes `document` and then so many bytes of numbers, a multiple of four, by `write_binary`.
+/// Writes `document` and then `binary` bytes of numbers, a multiple of four, by `write_binary`.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.

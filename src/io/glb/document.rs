@@ -1,4 +1,4 @@
-//! The JSON of a glTF file: nodes, meshes and materials by name, and where their numbers lie.
+//! The JSON of a glTF file: nodes, meshes and materials by name, and the offsets of their data.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ impl Attribute {
             Attribute::Position => Semantic::Positions,
             Attribute::Normal => Semantic::Normals,
             Attribute::Colour => Semantic::Colors(0),
-            // Written with an underscore before it, as names must be that glTF does not know.
+            // Written with a leading underscore, which glTF requires for custom names.
             Attribute::Radiosity => Semantic::Extras("RADIOSITY".into()),
             Attribute::Irradiance => Semantic::Extras("IRRADIANCE".into()),
             Attribute::TextureCoordinates => Semantic::TexCoords(0),
@@ -72,7 +72,7 @@ impl Model<'_> {
         }
     }
 
-    /// An image for each texture that is shown, in the views after those of the indices.
+    /// An image for each texture shown, in the views after those of the indices.
     fn add_images(&self, root: &mut Root) {
         let first = self.attributes().count() + 1;
         for (k, _) in self.images.iter().enumerate() {
@@ -103,7 +103,7 @@ impl Model<'_> {
         nodes
     }
 
-    /// A primitive that comes after what was `written`.
+    /// A primitive that follows those already `written`.
     fn primitive(
         &self,
         root: &mut Root,
@@ -130,10 +130,10 @@ impl Model<'_> {
         parts::triangles(root, attributes, indices, material)
     }
 
-    /// Unlit: all colour is in the vertices, and in the image if there is one.
+    /// Unlit: the colour is in the vertices, and in the image if there is one.
     fn material(&self, root: &mut Root, primitive: &Primitive<'_>) -> Material {
         let material = &self.light.mesh.scene().materials()[primitive.material as usize];
-        // Viewers see through clear panes.
+        // Clear panes are transparent in viewers.
         let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
         let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
         let alpha_mode = match (passed, has_mask) {
@@ -171,7 +171,7 @@ impl Model<'_> {
     }
 }
 
-/// What the primitives before one have.
+/// Counts over the primitives before one.
 #[derive(Default)]
 struct Written {
     vertices: u64,

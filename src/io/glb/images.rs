@@ -1,9 +1,10 @@
-//! The images of a glTF file: how each textured material looks under the light on it, as PNG.
+//! The images of a glTF file: the look of each textured material under its light, as PNG.
 //!
-//! A viewer multiplies the image with `COLOR_0`, but highlights are rolled off by luminance, after
-//! texture and light have been multiplied. So the image is the texture as the tone curve shows it
-//! under one light, that of the material's median vertex, and `COLOR_0` says how much brighter or
-//! darker the light at a vertex makes the texture's mean: exact at either, close between them.
+//! A viewer multiplies the image by `COLOR_0`, but the tone curve rolls off highlights by the
+//! luminance of texture times light. So the image is the texture as the tone curve shows it under
+//! one light, that of the material's median vertex, and `COLOR_0` is the ratio of the colours of
+//! the texture's mean under the light at a vertex and under that light: exact for the mean and for
+//! the median light, close between them.
 
 use std::collections::BTreeMap;
 
@@ -26,9 +27,9 @@ pub(super) struct Images {
 /// A textured material as it looks under one light.
 pub(super) struct Image {
     pub png: Vec<u8>,
-    /// What the image is multiplied with to look so: its brightest channel is 1.
+    /// Factor of the image, whose brightest channel is 1, for that look.
     peak: f64,
-    /// The colour that the material's mean has in that light, linear.
+    /// The colour of the material's mean in that light, linear.
     mean: Rgb,
 }
 
@@ -66,12 +67,12 @@ impl Images {
         self.of_materials.get(&material)
     }
 
-    /// The place of a material's image among all.
+    /// Index of a material's image among all.
     pub fn number(&self, material: u32) -> Option<usize> {
         self.of_materials.keys().position(|&known| known == material)
     }
 
-    /// Bytes of all.
+    /// Total number of bytes.
     pub fn length(&self) -> u64 {
         self.iter().map(|image| image.png.len() as u64).sum()
     }
@@ -93,7 +94,7 @@ impl Image {
             })
         };
         let texels = Texels::new(shown);
-        // Twice, since all colours of a large image would take gigabytes.
+        // Computed twice: storing all colours of a large image would take gigabytes.
         let colours = || texels.all().map(|texel| colour(texels.colour(texel)));
         let peak = colours().map(Rgb::max_element).reduce(|| 0.0, f64::max);
         let byte = |c: Rgb| (c / if peak > 0.0 { peak } else { 1.0 }).to_array().map(srgb);
@@ -113,16 +114,16 @@ impl Image {
         Ok(Image { png, peak, mean: tone.linear(mean_radiosity(material, irradiance)) })
     }
 
-    /// `COLOR_0` where light gives the material's mean this `colour`: within [0, 1], as glTF has
-    /// it.
+    /// `COLOR_0` for light under which the material's mean has this `colour`: within [0, 1], as
+    /// glTF requires.
     pub fn vertex_colour(&self, colour: Rgb) -> Rgb {
         let relative = Rgb::select(self.mean.cmpgt(Rgb::ZERO), colour / self.mean, Rgb::ONE);
         (self.peak * relative).min(Rgb::ONE)
     }
 }
 
-/// The texels of an image that shows one texture, or both in one place: as many along a side as the
-/// one that has more.
+/// The texels of an image that shows one texture, or colours and mask together: along each side the
+/// larger number of texels of the two.
 struct Texels<'a> {
     shown: Shown<'a>,
     size: [u32; 2],
@@ -136,7 +137,7 @@ impl Texels<'_> {
         Texels { shown, size }
     }
 
-    /// The middles of all, in texture coordinates as the file has them, rows from the top.
+    /// Centres of all texels, in texture coordinates as in the file, rows from the top.
     fn all(&self) -> impl IndexedParallelIterator<Item = DVec2> {
         let ([width, height], frame) = (self.size, self.shown.frame());
         let count = width as usize * height as usize;
@@ -156,18 +157,18 @@ impl Texels<'_> {
     }
 }
 
-/// Irradiance of a vertex; 0 where it is not known.
+/// Irradiance of a vertex; 0 if unknown.
 pub(super) fn irradiance(light: &GatheredMesh, vertex: u32) -> Rgb {
     light.surface.irradiance.get(vertex as usize).copied().unwrap_or(Rgb::ZERO)
 }
 
-/// Radiosity of a surface that has the means of its material's textures everywhere, W/m².
+/// Radiosity of a surface with the means of its material's textures everywhere, W/m².
 pub(super) fn mean_radiosity(material: &Material, irradiance: Rgb) -> Rgb {
     material.exitance + material.reflectance * irradiance
 }
 
-/// The irradiance whose mean radiosity is shown with the median brightness, of those that are lit;
-/// where none is, one that the curve shows well.
+/// The irradiance whose mean radiosity is shown with the median brightness, among lit vertices; if
+/// none is lit, one that the curve shows well.
 fn median(mut irradiances: Vec<Rgb>, material: &Material, tone: &ToneCurve) -> Rgb {
     let brightness = |e: &Rgb| tone.linear(mean_radiosity(material, *e)).element_sum();
     irradiances.retain(|e| brightness(e) > 0.0);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! binary chunk │ vertices, one after the other               │ indices │ PNG
-//!              │ position normal place in map place of file  │         │
+//!              │ position normal  uv in map  uv in file      │         │
 //! ```
 
 use std::collections::BTreeMap;
@@ -32,14 +32,15 @@ use crate::light_map::LightMap;
 use crate::mesh::SurfaceTopology;
 
 /// Writes the scene of a light map as glTF 2.0 binary, `.glb`: its own triangles with `POSITION`,
-/// `NORMAL` (of smooth surfaces), `TEXCOORD_1`, their places in the light map, and `TEXCOORD_0`,
-/// those of the scene's file on materials all of whose faces have some, else the same again.
+/// `NORMAL` (of smooth surfaces), `TEXCOORD_1`, the coordinates in the light map, and `TEXCOORD_0`,
+/// those of the scene's file on materials all of whose faces have some, else the same as
+/// `TEXCOORD_1`.
 ///
 /// A node for each group and a primitive for each of its materials, by their names; their `extras`
 /// have reflectance and exitance. The file has the map's radiosity, without textures, as an image
-/// (PNG): as `tone` shows it, a curve of radiosity. Materials are unlit and have it as their
-/// colour, so that viewers show the light as it is. A program that has textures of its own takes
-/// the irradiance of [`write_light_map_exr`](crate::io::write_light_map_exr) instead.
+/// (PNG) through `tone`, a curve of radiosity. Materials are unlit and have it as their colour, so
+/// that viewers show the light unchanged. A program with its own textures takes the irradiance of
+/// [`write_light_map_exr`](crate::io::write_light_map_exr) instead.
 ///
 /// Lengths and axes are those of the scene's file, as with [`write_glb`](crate::write_glb).
 ///
@@ -58,7 +59,7 @@ pub fn write_light_map_glb(
     })
 }
 
-/// The radiosity of a map as it is shown.
+/// The radiosity of a map through `tone`, as PNG.
 fn png(map: &LightMap, tone: &ToneCurve) -> image::ImageResult<Vec<u8>> {
     let bytes: Vec<u8> = map.radiosity().into_iter().flat_map(|c| tone.display(c)).collect();
     let (mut png, [width, height]) = (vec![], [map.atlas.width(), map.atlas.height()]);
@@ -67,11 +68,11 @@ fn png(map: &LightMap, tone: &ToneCurve) -> image::ImageResult<Vec<u8>> {
     Ok(png)
 }
 
-/// What is written.
+/// The file's content.
 struct Model<'a> {
     map: &'a LightMap,
     primitives: Vec<Primitive>,
-    /// The place that positions are relative to, scene unit.
+    /// The point that positions are relative to, scene unit.
     origin: Vec3,
     png: Vec<u8>,
 }
@@ -85,8 +86,8 @@ struct Primitive {
     faces: Vec<[u32; 3]>,
 }
 
-/// As it is written, but for the place in the file's texture where not all vertices of a primitive
-/// have one.
+/// As written, except for the file's texture coordinates if not all vertices of a primitive have
+/// them.
 struct Vertex {
     position: Vec3,
     normal: Vec3,
@@ -108,7 +109,7 @@ impl Model<'_> {
         let (topology, normals) = (SurfaceTopology::of_scene(scene), scene_normals(map));
         let origin = origin(scene.bounds());
         let mut primitives: BTreeMap<(u32, u32), Primitive> = BTreeMap::new();
-        // Corners of one smooth surface are one vertex where they have the same places.
+        // Corners of one smooth surface are one vertex if their coordinates are equal.
         let mut numbers: FxHashMap<(u32, [u32; 4]), u32> = FxHashMap::default();
         for (t, triangle) in scene.triangles().iter().enumerate() {
             let primitive =
@@ -124,7 +125,7 @@ impl Model<'_> {
             let face = [0, 1, 2].map(|k| {
                 let (place, given) = (places[k].as_vec2(), given[k].as_vec2());
                 let bits = [place.x, place.y, given.x, given.y].map(f32::to_bits);
-                // No smooth surface goes on in another group or material.
+                // A smooth surface has one group and one material.
                 *numbers.entry((topology.corners[t][k], bits)).or_insert_with(|| {
                     let position = (corners[k] - origin.as_dvec3()).as_vec3();
                     let normal = normals[t][k];
@@ -154,7 +155,7 @@ impl Model<'_> {
             let has_given = primitive.has_given_places();
             for vertex in &primitive.vertices {
                 let Vertex { position, normal, place, given } = vertex;
-                // Numbers that nobody reads are none of those that glTF forbids.
+                // Unused numbers must not be NaN, which glTF forbids.
                 let given = if has_given { *given } else { Vec2::ZERO };
                 let vectors = [position.to_array(), normal.to_array()];
                 let places = [place.to_array(), given.to_array()];
@@ -195,7 +196,7 @@ impl Model<'_> {
         parts::add_view(root, offset, self.png.len() as u64, None, None);
     }
 
-    /// A node and a mesh for each group that has triangles.
+    /// A node and a mesh for each group with triangles.
     fn add_groups(&self, root: &mut Root, texture: Index<Texture>) -> Vec<Index<Node>> {
         let mut materials = BTreeMap::new();
         let (mut vertices, mut faces, mut nodes) = (0, 0, vec![]);
@@ -232,7 +233,7 @@ fn add_texture(root: &mut Root) -> Index<Texture> {
     let source = parts::add_image(root, IMAGE, Some("light map"));
     let sampler = Sampler {
         mag_filter: Some(Valid(MagFilter::Linear)),
-        // Without smaller images, in which charts would run together.
+        // Without mipmaps, in which charts would run together.
         min_filter: Some(Valid(MinFilter::Linear)),
         wrap_s: Valid(WrappingMode::ClampToEdge),
         wrap_t: Valid(WrappingMode::ClampToEdge),
@@ -242,7 +243,7 @@ fn add_texture(root: &mut Root) -> Index<Texture> {
 }
 
 impl Primitive {
-    /// Whether all vertices have a place in the file's textures.
+    /// Whether all vertices have texture coordinates in the file.
     fn has_given_places(&self) -> bool {
         self.vertices.iter().all(|vertex| vertex.given.is_finite())
     }
@@ -261,7 +262,8 @@ impl Primitive {
             (Semantic::Normals, at(VECTOR_BYTES, Type::Vec3)),
             (Semantic::TexCoords(1), at(2 * VECTOR_BYTES, Type::Vec2)),
         ];
-        // glTF numbers sets of coordinates from 0 on: without the file's, the map's are both.
+        // glTF numbers sets of coordinates from 0 on: without the file's, the map's are used for
+        // both.
         let given = if self.has_given_places() { PLACE_BYTES } else { 0 };
         let first = at(2 * VECTOR_BYTES + given, Type::Vec2);
         attributes.push((Semantic::TexCoords(0), first));
@@ -269,14 +271,14 @@ impl Primitive {
     }
 }
 
-/// Unit normals at the corners of each triangle, as glTF has them.
+/// Unit normals at the corners of each triangle, as glTF requires.
 fn scene_normals(map: &LightMap) -> Vec<[Vec3; 3]> {
     let unit = |corners: [glam::DVec3; 3]| corners.map(|n| n.as_vec3().normalize_or(Vec3::Y));
     map.atlas.corner_normals().into_iter().map(unit).collect()
 }
 
-/// Places of the corners of triangle `t` in the textures of its file, v downwards; not finite where
-/// it has none.
+/// Texture coordinates of the corners of triangle `t` in its file, v downwards; not finite if it
+/// has none.
 fn given_places(map: &LightMap, t: usize) -> [DVec2; 3] {
     let scene = map.atlas.scene();
     let frame = scene.textures(t).and_then(Shown::of).and_then(|shown| shown.frame());

@@ -1,4 +1,4 @@
-//! Parts of a glTF document that all files of this crate have alike.
+//! Parts of a glTF document that all files of this crate share.
 
 use std::collections::BTreeMap;
 
@@ -17,13 +17,13 @@ use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Sce
 use super::INDEX_BYTES;
 use crate::scene::{self, Rgb};
 
-/// The extension that shows a colour as it is.
+/// The extension for colours without lighting.
 const UNLIT: &str = "KHR_materials_unlit";
 
-/// Where the numbers of each attribute of a primitive are.
+/// Accessors of the attributes of a primitive.
 pub(super) type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
 
-/// A document with one buffer, of so many bytes, and with these notes on it.
+/// A document with one buffer of `binary_length` bytes, and with these notes.
 pub(super) fn document(binary_length: u64, notes: &BTreeMap<&str, Value>) -> Root {
     let asset = Asset {
         generator: Some(concat!("radiosity ", env!("CARGO_PKG_VERSION")).into()),
@@ -42,7 +42,7 @@ pub(super) fn document(binary_length: u64, notes: &BTreeMap<&str, Value>) -> Roo
     root
 }
 
-/// Adds a view of the buffer: so many bytes from `offset` on, which then is after them.
+/// Adds a view of the buffer, `length` bytes from `offset` on, and moves `offset` to its end.
 pub(super) fn add_view(
     root: &mut Root,
     offset: &mut u64,
@@ -85,7 +85,7 @@ pub(super) fn add_texture(
     root.push(Texture { sampler, source, name: None, extensions: None, extras: None })
 }
 
-/// Triangles whose corners are so many of the numbers in a view, after so many `faces_before`.
+/// Triangles given by `faces` index triples in a view, after the first `faces_before`.
 pub(super) fn triangles(
     root: &mut Root,
     attributes: Attributes,
@@ -131,7 +131,7 @@ pub(super) fn add_scene(root: &mut Root, groups: Vec<Index<Node>>, origin: Vec3)
     root.scene = Some(root.push(scene));
 }
 
-/// A material of the scene with its light as its `colour`, as it is.
+/// A material of the scene with its light as its unlit `colour`.
 pub(super) fn unlit(material: &scene::Material, colour: PbrMetallicRoughness) -> Material {
     let channels = |c: Rgb| Value::from(c.to_array().to_vec());
     let notes = BTreeMap::from([
@@ -151,7 +151,7 @@ pub(super) fn unlit(material: &scene::Material, colour: PbrMetallicRoughness) ->
     }
 }
 
-/// Vectors of floats in a view, from an offset in bytes on.
+/// Float vectors in a view, from an offset in bytes on.
 pub(super) fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
     Accessor {
         buffer_view: Some(Index::new(view as u32)),
@@ -169,7 +169,7 @@ pub(super) fn accessor(view: usize, offset: u64, count: usize) -> Accessor {
     }
 }
 
-/// The same with the least and the largest of the `positions` that it has.
+/// The same with the minimum and the maximum of its `positions`.
 pub(super) fn with_bounds(
     accessor: Accessor,
     positions: impl Iterator<Item = Vec3> + Clone,

@@ -1,7 +1,7 @@
-//! The faces of a solution, cut up by groups and materials, with texture coordinates.
+//! The faces of a solution, split by groups and materials, with texture coordinates.
 //!
-//! Vertices are shared within a primitive, but where texture coordinates jump: at a seam there is
-//! one for each side.
+//! Vertices are shared within a primitive except where texture coordinates jump: a seam has one
+//! vertex for each side.
 
 use std::collections::BTreeMap;
 
@@ -19,9 +19,9 @@ pub(super) struct Primitive<'a> {
     pub vertices: Vec<u32>,
     /// Texture coordinates of each, v downwards; empty where a corner has none.
     pub places: Vec<Vec2>,
-    /// The texture that it is shown with, where it has texture coordinates.
+    /// The texture that it is shown with, if it has texture coordinates.
     pub shown: Option<Shown<'a>>,
-    /// Faces, by the places of their corners in `vertices`.
+    /// Faces, by indices of their corners in `vertices`.
     pub faces: Vec<[u32; 3]>,
 }
 
@@ -29,13 +29,13 @@ pub(super) struct Primitive<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Shown<'a> {
     pub colours: Option<&'a TextureMap>,
-    /// Whether they are those of the light that is emitted, and not of what is reflected.
+    /// Whether they are textures of the emitted, not of the reflected light.
     pub emits: bool,
     pub mask: Option<&'a TextureMap>,
 }
 
 impl<'a> Shown<'a> {
-    /// The texture of what is emitted, else of what is reflected, and the mask.
+    /// The texture of the exitance, else of the reflectance, and the mask.
     pub fn of(textures: &'a MaterialTextures) -> Option<Shown<'a>> {
         let MaterialTextures { reflectance, exitance, mask } = textures;
         let (colours, emits) = (exitance.as_ref().or(reflectance.as_ref()), exitance.is_some());
@@ -43,7 +43,7 @@ impl<'a> Shown<'a> {
         shown.frame().is_some().then_some(shown)
     }
 
-    /// The one that texture coordinates are scaled and shifted for.
+    /// The texture whose scale and offset apply to the coordinates.
     pub fn frame(&self) -> Option<&'a TextureMap> {
         self.colours.or(self.mask)
     }
@@ -52,8 +52,9 @@ impl<'a> Shown<'a> {
 /// A face of the surface, and its triangle of the scene.
 type Face = ([u32; 3], usize);
 
-/// Texture coordinates closer than this are those of one vertex: a hundredth of a texel of a large
-/// image, and far more than rounding makes of two triangles' coordinates along their common side.
+/// Distance of texture coordinates below which they belong to one vertex: a hundredth of a texel of
+/// a large image, and far more than the rounding difference of two triangles' coordinates along
+/// their common side.
 const SEAM: f64 = 1.0 / (1 << 20) as f64;
 
 /// The faces of `light` by group, then material, in the order of the scene's.
@@ -80,7 +81,7 @@ pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     primitives
 }
 
-/// Per vertex of the surface, the primitive that had it last, and its place there.
+/// Per vertex of the surface, the last primitive that has it, and its index there.
 struct Places(Vec<(usize, u32)>);
 
 impl Places {
@@ -88,8 +89,7 @@ impl Places {
         Places(vec![(usize::MAX, 0); vertices])
     }
 
-    /// The places of the corners of a face in the `vertices` of primitive `k`, to which those are
-    /// added that it does not have yet.
+    /// Indices of the corners of a face in the `vertices` of primitive `k`; missing ones are added.
     fn of_face(&mut self, k: usize, face: &[u32; 3], vertices: &mut Vec<u32>) -> [u32; 3] {
         face.map(|v| {
             let place = &mut self.0[v as usize];

@@ -1,8 +1,8 @@
 //! The faces of an OBJ file as triangles of a scene.
 //!
-//! tobj gives the faces by models, one for each stretch of lines with one material, and numbers the
-//! vertices of each anew; the colour of a vertex holds its number in the file. Here the faces get
-//! that numbering back, what [`super::statements`] noted of each, and are cut into triangles.
+//! tobj returns the faces by models, one for each run of lines with one material, and renumbers the
+//! vertices of each; the colour of a vertex holds its number in the file. Here the faces get back
+//! that numbering and the notes of [`super::statements`], and are cut into triangles.
 
 use glam::{DVec2, DVec3};
 
@@ -18,13 +18,14 @@ use crate::scene::{Material, Triangle, Warning, WarningKind};
 pub(super) struct Geometry {
     pub positions: Vec<DVec3>,
     pub triangles: Vec<Triangle>,
-    /// Of the triangles' corners, where they are asked for or some material has a texture.
+    /// Texture coordinates of the triangles' corners, if requested or if some material has a
+    /// texture.
     pub texture_coordinates: Vec<[DVec2; 3]>,
 }
 
 impl ObjFile<'_> {
     /// The vertices that faces use, in the order of the file, and the faces as triangles; with
-    /// texture coordinates where these are asked for or some material has a texture.
+    /// texture coordinates if requested or if some material has a texture.
     pub(super) fn geometry(
         &mut self,
         models: Vec<tobj::Model>,
@@ -40,7 +41,7 @@ impl ObjFile<'_> {
             with_coordinates || self.library.materials.iter().any(MtlMaterial::has_images);
         let (mut face, mut bare) = (0, 0);
         for tobj::Model { mesh, name } in models {
-            // A model that has no face has no number either.
+            // A model without a face has no number.
             let number = name.parse().ok();
             let Some(&used) = number.and_then(|k: usize| self.statements.models.get(k)) else {
                 continue;
@@ -79,8 +80,8 @@ impl ObjFile<'_> {
         Ok(geometry)
     }
 
-    /// Appends the triangles of a face with these corners, and `places` in texture space if these
-    /// matter, each otherwise `like` that one.
+    /// Appends the triangles of a face with these corners, and texture coordinates `places` if
+    /// used; all else is copied from `like`.
     fn cut(
         &mut self,
         face: usize,
@@ -112,7 +113,7 @@ impl ObjFile<'_> {
 }
 
 impl Geometry {
-    /// Drops the vertices that no face uses, which are those without a position.
+    /// Drops the vertices that no face uses, which have no position.
     fn drop_unused(&mut self) {
         let mut used = 0;
         let numbers: Vec<u32> = self
@@ -130,7 +131,7 @@ impl Geometry {
     }
 }
 
-/// Of `count` corners of `mesh` from `start` on; not finite where they have none.
+/// Texture coordinates of `count` corners of `mesh` from `start` on; not finite if they have none.
 fn texture_coordinates(mesh: &tobj::Mesh, start: usize, count: usize) -> Vec<DVec2> {
     let index = |k: usize| mesh.texcoord_indices.get(k).map(|&i| 2 * i as usize);
     let place = |k| index(k).and_then(|at| mesh.texcoords.get(at..at + 2));

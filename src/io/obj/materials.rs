@@ -1,5 +1,5 @@
-//! The materials of a scene from those of its libraries: repaired, with their textures, and with
-//! the light that the caller gives them.
+//! The materials of a scene from those of its libraries: repaired, with textures, and with the
+//! light given by the caller.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::f64::consts::PI;
@@ -14,13 +14,13 @@ use crate::error::{Error, ErrorKind, nearest, quoted};
 use crate::scene::texture::{MaterialTextures, TextureMap};
 use crate::scene::{Material, Rgb, Specular, Triangle, WarningKind};
 
-/// Of what a texture would reflect, the largest part that its material lets through instead: the
-/// rest tells where.
+/// Maximum transmittance of a textured material, as a fraction of the texture's reflectance plus
+/// transmittance: the remaining reflectance gives the distribution over the texture.
 const MAX_TRANSMITTED: f64 = 0.99;
 
 impl ObjFile<'_> {
     /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
-    /// if no used one has any that can be read.
+    /// if no used material has a readable texture.
     pub(super) fn textures(
         &mut self,
         used: &HashSet<u32>,
@@ -67,7 +67,7 @@ impl ObjFile<'_> {
                 };
                 let mut factor = factor;
                 if k == 0 && material.is_translucent() {
-                    // A part of what the texture would reflect.
+                    // The transmittance is a fraction of the texture's total.
                     let all = factor * texture.whole_mean();
                     let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
                     let share = share.min(Rgb::splat(MAX_TRANSMITTED));
@@ -89,8 +89,8 @@ impl ObjFile<'_> {
         Ok(all)
     }
 
-    /// All materials, by the indices of [`ObjFile::named_materials`]. What is odd about one is
-    /// repaired, and said if it is `used`.
+    /// All materials, by the indices of [`ObjFile::named_materials`]. Defects are repaired, and
+    /// reported if the material is `used`.
     pub(super) fn materials(
         &mut self,
         used: &HashSet<u32>,
@@ -110,7 +110,7 @@ impl ObjFile<'_> {
                 false => Ok(()),
             };
             let complete = material.complete(settings, ambient_counts, &mut note)?;
-            // There may be many, with long names.
+            // Moved, not cloned: there may be many, with long names.
             let name = std::mem::take(&mut library.materials[index].name);
             materials.push(Material { name, ..complete });
         }
@@ -138,7 +138,7 @@ impl ObjFile<'_> {
         Ok(materials)
     }
 
-    /// Does something to the material of this `name`.
+    /// Calls a function with the material of this `name`.
     fn named(
         &self,
         materials: &mut [Material],
@@ -168,7 +168,7 @@ impl ObjFile<'_> {
         Err(Error::new(ErrorKind::Scene, place, found, remedy))
     }
 
-    /// Where `name` is a group and no material: what it is, and what would be right.
+    /// If `name` is a group and not a material: the finding, and the correction.
     fn group_named(
         &self,
         name: &str,
@@ -200,7 +200,7 @@ impl ObjFile<'_> {
     }
 }
 
-/// The mask of a material at this `place`; none if it has none, or one without a hole.
+/// The mask of a material at this `place`; none without a mask or without a hole.
 fn mask(
     mtl: &MtlMaterial,
     images: &mut Textures,
@@ -237,12 +237,12 @@ fn mask(
 }
 
 impl MtlMaterial {
-    /// The mirror or glass that it is, if that counts.
+    /// The mirror or glass of this material, if the settings use it.
     fn specular(&self, settings: &ObjSettings) -> Option<Specular> {
         self.specular.filter(|_| settings.specular != SpecularSurfaces::Ignore)
     }
 
-    /// Whether light is spread as if it reflected nothing: it is black, or clear.
+    /// Whether it reflects nothing in the light solution: it is black, or clear.
     fn is_black(&self, settings: &ObjSettings) -> bool {
         match settings.specular {
             SpecularSurfaces::Black => self.specular.is_some(),
@@ -251,12 +251,12 @@ impl MtlMaterial {
         }
     }
 
-    /// What a mirror or glass leaves of one for diffuse reflectance, in every channel.
+    /// Maximum diffuse reflectance beside a mirror or glass, equal in all channels.
     fn diffuse_room(&self, settings: &ObjSettings) -> f64 {
         self.specular(settings).map_or(1.0, |specular| 1.0 - specular.share().max_element())
     }
 
-    /// As a material of a scene, as yet without its name; `note` is told of every repair.
+    /// As a material of a scene, without its name; `note` is called with every repair.
     fn complete(
         &self,
         settings: &ObjSettings,
@@ -266,7 +266,7 @@ impl MtlMaterial {
         let ceiling = settings.max_reflectance;
         let mut radiance = self.radiance.unwrap_or(Rgb::ZERO);
         let above_one = |colour: Option<Rgb>| colour.is_some_and(|c| c.max_element() > 1.0);
-        // Where `Kd` is above 1 too, colours may be in other units.
+        // If `Kd` is above 1 too, colours may be in other units.
         if ambient_counts && above_one(self.ambient) && !above_one(self.reflectance) {
             radiance = self.ambient.unwrap_or(Rgb::ZERO);
             note(WarningKind::AmbientAsRadiance, "taken for the radiance that they emit".into())?;

@@ -1,4 +1,4 @@
-//! What was repaired or passed over so far: one warning a kind, or, when strict, an error.
+//! Repairs and skipped statements so far: one warning per kind, or, when strict, an error.
 
 use super::super::text::Line;
 use crate::error::{Error, ErrorKind, quoted};
@@ -14,7 +14,7 @@ impl Repairs {
         Repairs { strict, warnings: vec![] }
     }
 
-    /// Counts what was found in `line`, about `name` if that is not empty.
+    /// Counts a finding in `line`, about `name` if that is not empty.
     pub fn note(
         &mut self,
         kind: WarningKind,
@@ -27,7 +27,7 @@ impl Repairs {
         Ok(())
     }
 
-    /// The same of what stands at `place`, a file and line.
+    /// The same for a finding at `place`, a file and line.
     pub fn note_at(
         &mut self,
         kind: WarningKind,
@@ -70,12 +70,12 @@ impl Repairs {
         }
     }
 
-    /// Adds a warning that is complete.
+    /// Adds a complete warning.
     pub fn push(&mut self, warning: Warning) {
         self.warnings.push(warning);
     }
 
-    /// How many of `kind` so far.
+    /// Number of findings of `kind` so far.
     pub fn count_of(&self, kind: WarningKind) -> usize {
         self.warnings.iter().filter(|w| w.kind == kind).map(|w| w.count).sum()
     }

@@ -1,4 +1,4 @@
-//! How an OBJ file is to be read.
+//! Settings for reading an OBJ file.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::super::specular::SpecularSurfaces;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Rgb, Scene, Sides, Sky};
 
-/// How odd things in an OBJ file and its libraries are treated, and which materials emit.
+/// Treatment of defects in an OBJ file and its libraries, and the materials that emit.
 ///
 /// ```no_run
 /// use radiosity::Rgb;
@@ -23,43 +23,43 @@ use crate::scene::{Rgb, Scene, Sides, Sky};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ObjSettings {
-    /// Refuses what would be repaired otherwise, with its line.
+    /// Refuses content that would be repaired otherwise, with its line.
     pub strict: bool,
-    /// What a reflectance of 1 or more in a channel becomes, in [0, 1).
+    /// Replacement of a reflectance of 1 or more in a channel, in [0, 1).
     pub max_reflectance: f64,
     /// Materials by name, and the radiance that they emit per channel, whatever the file says.
     pub emit: Vec<(String, Rgb)>,
-    /// Materials by name that let light through diffusely, and the share of the light that arrives
-    /// on either side which leaves from the other, per channel: their transmittance. It is taken
-    /// from what they reflect, with texture and all, as far as that goes; a texture keeps a
-    /// hundredth at least, which tells where light goes through.
+    /// Materials by name that transmit light diffusely, and their transmittance per channel: the
+    /// fraction of the light arriving on either side that leaves from the other. It is taken from
+    /// the reflectance, texture included, as far as that suffices; a texture keeps at least a
+    /// hundredth, which gives the distribution of the transmitted light.
     pub transmit: Vec<(String, Rgb)>,
     /// The light from outside ([`Scene::with_sky`]). `None`: a uniform sky of radiance
     /// 1 W/(m² sr) if nothing in the scene emits, else a black one.
     pub sky: Option<Sky>,
-    /// What surfaces do on their two sides.
+    /// Treatment of the two sides of surfaces.
     pub sides: Sides,
-    /// What the light that is spread takes mirrors and glass for; it passes glass unless set.
+    /// Treatment of mirrors and glass in the light solution; light passes glass by default.
     pub specular: SpecularSurfaces,
-    /// Each face is a group of its own, in the order of the file, named `group/n` for the n-th face
-    /// of a group: for view factors between facets.
+    /// Makes each face a group of its own, in the order of the file, named `group/n` for the n-th
+    /// face of a group: for view factors between facets.
     pub facets: bool,
-    /// Texture coordinates are kept where no material has a texture too: light maps can have them.
+    /// Keeps texture coordinates even if no material has a texture: light maps can use them.
     pub texture_coordinates: bool,
 }
 
 impl ObjSettings {
-    /// [`ObjSettings::max_reflectance`] unless set: light meets such a surface some fifty times.
-    /// Chosen by hand, between fresh snow or barium sulphate and what still settles quickly.
+    /// Default of [`ObjSettings::max_reflectance`]: light is reflected by such a surface some fifty
+    /// times. Plain choice, between fresh snow or barium sulphate and fast convergence.
     pub const MAX_REFLECTANCE: f64 = 0.98;
 
     /// Loads a Wavefront OBJ file and the MTL files that it names: see [`crate::load_obj`].
     ///
     /// # Errors
-    /// Those of [`crate::load_obj`]; [`ErrorKind::Setting`] for a ceiling outside [0, 1), a
-    /// radiance that is negative or not finite or a transmittance outside [0, 1);
-    /// [`ErrorKind::Scene`] for a material to emit or to let light through that the scene does not
-    /// have, and with [`ObjSettings::strict`] for what would be repaired.
+    /// Those of [`crate::load_obj`]; [`ErrorKind::Setting`] for a largest reflectance outside [0,
+    /// 1), a radiance that is negative or not finite or a transmittance outside [0, 1);
+    /// [`ErrorKind::Scene`] for an emitting or transmitting material that the scene does not have,
+    /// and with [`ObjSettings::strict`] for content that would be repaired.
     pub fn load(&self, path: impl AsRef<Path>) -> Result<Scene, Error> {
         let path = path.as_ref();
         self.check()?;

@@ -1,20 +1,20 @@
-//! The pass over an OBJ file that goes before tobj: what tobj does not tell or cannot take.
+//! The pass over an OBJ file before tobj: data that tobj does not return or accept.
 //!
 //! ```text
-//!   lines of the file ──► Statements ──► lines that tobj can take ──► tobj ──► models
+//!   lines of the file ──► Statements ──► lines for tobj ──► tobj ──► models
 //!                             │ line numbers, smoothing groups, group names,
-//!                             ▼ what was passed over
+//!                             ▼ skipped statements
 //!                           notes by face and by model
 //! ```
 //!
-//! tobj reads the lines one by one through [`LineFeed`]; nothing of the text is kept. What is done
-//! to them, and why:
+//! tobj reads the lines one by one through [`LineFeed`]; the text is not kept. The changes to the
+//! lines and their reasons:
 //!
-//! | statement | tobj gets | because tobj |
+//! | statement | input of tobj | reason: tobj |
 //! |---|---|---|
 //! | `v` | the number of the vertex as its colour | numbers vertices anew in each model |
-//! | `f` | corners counted from 1, `v` or `v/vt` | takes bad indices without a line |
-//! | `vt` | the same; first of all one that is no number | gives corners without one another's |
+//! | `f` | corners counted from 1, `v` or `v/vt` | accepts bad indices, reports no line |
+//! | `vt` | the same; before the first, a `vt` of NaN | gives corners without one that of another |
 //! | `o`, `g` | the number of a model, from here | makes a model for each, and copies its name |
 //! | `l`, `p` | nothing | makes faces of lines |
 //! | `usemtl`, `mtllib` | the same, after one space | splits at a space only |
@@ -27,21 +27,21 @@ use super::repairs::Repairs;
 use crate::error::{Error, quoted};
 use crate::scene::WarningKind;
 
-/// Group of the faces that come before any `o` or `g` line.
+/// Group of the faces before any `o` or `g` line.
 const DEFAULT_GROUP: &str = "default";
 
-/// Corners after which tobj is told to begin another model: it keeps 24 bytes or more for each
-/// until then. Chosen by hand.
+/// Number of corners after which a new model begins: tobj keeps 24 bytes or more for each until
+/// then. Plain choice.
 const MODEL_CORNERS: usize = 1 << 14;
 
-/// Bytes of a group's name that its facets carry too, at most; a longer one would be there as often
-/// as it has faces, which is more memory than the file explains. Chosen by hand.
+/// Maximum number of bytes of a group's name that its facets repeat; a longer one would be stored
+/// once per face, which is more memory than the file's size explains. Plain choice.
 const MAX_FACET_GROUP_NAME: usize = 64;
 
-/// What becomes of faces whose material is not known.
+/// Treatment of faces whose material is unknown.
 pub(super) const UNKNOWN_MATERIAL: &str = "they are grey, reflectance 0.5";
 
-/// What is known of a face beside its corners.
+/// Attributes of a face beside its corners.
 pub(super) struct FaceNote {
     pub line: u32,
     /// As in [`crate::Triangle::smoothing`].
@@ -69,16 +69,16 @@ impl Names {
     }
 }
 
-/// What the lines so far say.
+/// The state after the lines so far.
 #[derive(Default)]
 pub(super) struct Statements {
     pub faces: Vec<FaceNote>,
-    /// Of each model of tobj, by its name: what its faces use, as an index into `materials`.
+    /// Of each model of tobj, by its name: the material of its faces, as an index into `materials`.
     pub models: Vec<Option<u32>>,
     pub groups: Names,
     /// Names of materials that faces use.
     pub materials: Names,
-    /// Where each of them is used first.
+    /// Line of the first use of each of them.
     pub first_use: Vec<u32>,
     pub vertices: u32,
     pub texture_coordinates: u32,
@@ -88,14 +88,14 @@ pub(super) struct Statements {
     material: Option<u32>,
     material_line: u32,
     smoothing: Option<u32>,
-    /// Corners that tobj has of the current model.
+    /// Corners passed to tobj for the current model.
     model_corners: usize,
     /// Vertex and texture coordinate of each corner of a face, counted from 1; 0 for none.
     corners: Vec<[u32; 2]>,
 }
 
 impl Statements {
-    /// Takes in `line`, and appends what tobj is to read for it to `out`.
+    /// Processes `line`, and appends its replacement for tobj to `out`.
     pub fn line(
         &mut self,
         line: &Line,
@@ -132,7 +132,7 @@ impl Statements {
         Ok(())
     }
 
-    /// `v x y z`, with a fourth number to divide by, or with a colour, which is left out.
+    /// `v x y z`, with a fourth number as divisor, or with a colour, which is left out.
     fn vertex(
         &mut self,
         line: &Line,
@@ -171,7 +171,7 @@ impl Statements {
         Ok(())
     }
 
-    /// `vt u v`; numbers that are none make corners that have no texture coordinate.
+    /// `vt u v`; invalid numbers make corners without texture coordinates.
     fn texture_coordinate(&mut self, rest: &str, out: &mut Vec<u8>) {
         if self.texture_coordinates == 0 {
             emit(out, format_args!("vt nan nan\n"));
@@ -244,7 +244,7 @@ impl Statements {
         }
     }
 
-    /// Index of the group that faces belong to now.
+    /// Index of the current group of faces.
     fn current_group(&mut self) -> u32 {
         *self.group.get_or_insert_with(|| {
             let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
@@ -252,7 +252,7 @@ impl Statements {
         })
     }
 
-    /// Begins another model where the material is another, or when the last one is large.
+    /// Begins a new model if the material changes, or if the last one is large.
     fn begin_model(&mut self, out: &mut Vec<u8>) {
         if self.material.is_none() && !self.material_name.is_empty() {
             let material = self.materials.index(&self.material_name);
@@ -306,7 +306,7 @@ impl Statements {
         Ok([vertex, texture_coordinate.unwrap_or(0)])
     }
 
-    /// `s` with a group, or with `off`; without either it says nothing.
+    /// `s` with a group, or with `off`; without either it has no effect.
     fn smooth(&mut self, line: &Line, rest: &str, repairs: &mut Repairs) -> Result<(), Error> {
         let mut words = words(rest);
         let word = words.next().unwrap_or("").to_ascii_lowercase();
@@ -323,12 +323,12 @@ impl Statements {
     }
 }
 
-/// Appends text; a vector takes whatever is written.
+/// Appends text; writing to a vector cannot fail.
 fn emit(out: &mut Vec<u8>, text: std::fmt::Arguments) {
     let _ = out.write_fmt(text);
 }
 
-/// Text that is made when it is read: `fill` appends the next piece of it, or nothing at its end.
+/// Text produced on demand: `fill` appends the next piece of it, or nothing at its end.
 pub(super) struct LineFeed<F> {
     fill: F,
     buffer: Vec<u8>,

@@ -1,10 +1,10 @@
 //! EULUMDAT files (A. Stockmar, "EULUMDAT – ein Leuchtendatenformat für den europäischen
-//! Beleuchtungsplaner", Licht '90): a line for each thing that is told, then the numbers.
+//! Beleuchtungsplaner", Licht '90): a line for each item, then the numbers.
 //!
 //! | line | |
 //! |---|---|
 //! | 1 | company |
-//! | 3 to 7 | symmetry, C-planes and their step, angles γ and theirs |
+//! | 3 to 7 | symmetry, C-planes and their step, angles γ and their step |
 //! | 9 | name |
 //! | 16 to 21 | opening: length or diameter, width or 0, heights at C = 0°, 90°, 180°, 270°, mm |
 //! | 24 | factor for the intensities |
@@ -30,7 +30,7 @@ const HEADER: usize = 26;
 /// Lines of a set of lamps.
 const LAMP_LINES: usize = 6;
 
-/// Sets of lamps, at most: the format's own limit.
+/// Maximum number of sets of lamps: the format's own limit.
 const MAX_SETS: f64 = 20.0;
 
 /// Ratios before the angles.
@@ -108,7 +108,7 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     })
 }
 
-/// The C-angles of the planes that a file of this `symmetry` gives, in their order, of all.
+/// The C-angles, out of `azimuths`, of the planes that a file of this `symmetry` stores, in order.
 fn measured(symmetry: u8, azimuths: &[f64]) -> Vec<f64> {
     let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + SAME);
     match symmetry {
@@ -123,7 +123,7 @@ fn measured(symmetry: u8, azimuths: &[f64]) -> Vec<f64> {
     }
 }
 
-/// Makes planes of this `symmetry` go all around; what is wrong where they cannot.
+/// Completes planes of this `symmetry` to a full turn; an error message if that is impossible.
 fn unfold(symmetry: u8, planes: &mut Planes) -> Result<(), String> {
     let Some([first, last]) = planes.span().filter(|_| planes.planes.len() > 1) else {
         return Ok(());
@@ -144,7 +144,7 @@ fn unfold(symmetry: u8, planes: &mut Planes) -> Result<(), String> {
     Ok(())
 }
 
-/// The opening from the numbers of its lines, metres. Without a width it is round.
+/// The opening from the numbers of its lines, metres. It is round if the width is 0.
 fn opening([length, width, heights @ ..]: [f64; 6]) -> Opening {
     let is_round = width == 0.0 && length > 0.0;
     let across = if is_round { length } else { width };
@@ -152,7 +152,7 @@ fn opening([length, width, heights @ ..]: [f64; 6]) -> Opening {
     Opening { size: DVec3::new(across, length, height).max(DVec3::ZERO), is_round }
 }
 
-/// A line of the header, or none where the file ends before it.
+/// A line of the header, or none if the file ends before it.
 struct Field<'a> {
     file: &'a Path,
     number: usize,
@@ -164,12 +164,12 @@ impl Field<'_> {
         self.line.map_or("", |line| &line.text)
     }
 
-    /// What it says, with a comma or a point before fractions; none where it says no number.
+    /// Its value, with a comma or a point before fractions; none if it is not a number.
     fn value(&self) -> Option<f64> {
         finite(self.text().split_whitespace().next()?.replace(',', ".").as_str())
     }
 
-    /// For what light does not depend on.
+    /// The value or 0, for numbers that light does not depend on.
     fn number_or_zero(&self) -> f64 {
         self.value().unwrap_or(0.0)
     }

@@ -25,14 +25,14 @@ use crate::scene::{IntensityDistribution, Opening, Pole};
 /// Metres of a foot.
 const FOOT: f64 = 0.3048;
 
-/// Whether `text` is such a file: it says so, or has a line for the tilt.
+/// Whether `text` is an LM-63 file: by its first line, or by a line for the tilt.
 pub fn is_lm_63(text: &str) -> bool {
     let start = text.trim_start_matches('\u{feff}').trim_start();
     let says = |name: &str| start.get(..name.len()).is_some_and(|s| s.eq_ignore_ascii_case(name));
     says("IES") || physical_lines(Path::new(""), text).any(|line| tilt(&line).is_some())
 }
 
-/// What a line says of the tilt.
+/// The tilt of a line, if it has one.
 fn tilt<'a>(line: &'a Line) -> Option<&'a str> {
     let (keyword, value) = line.text.split_once('=')?;
     keyword.trim().eq_ignore_ascii_case("TILT").then_some(value.trim())
@@ -46,7 +46,7 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     if oddities(&separated) == 0 || !text.contains(',') {
         return separated;
     }
-    // Where that leaves less that is odd, commas are those of decimals.
+    // If that gives fewer defects, commas are decimal commas.
     let mut decimal = read_with(file, text, Comma::IsDecimal);
     if oddities(&decimal) >= oddities(&separated) {
         return separated;
@@ -117,14 +117,14 @@ fn read_with(file: &Path, text: &str, comma: Comma) -> Result<Photometry, Error>
     })
 }
 
-/// Whether a line is the first one of numbers, for files without one for the tilt.
+/// Whether a line is the first one of numbers, for files without a tilt line.
 fn is_header(line: &Line, comma: Comma) -> bool {
     let text = line.text.replace(',', if comma == Comma::Separates { " " } else { "." });
     let words: Vec<&str> = text.split_whitespace().collect();
     words.len() >= 10 && words.iter().all(|word| word.parse::<f64>().is_ok())
 }
 
-/// Reads past the numbers of TILT=INCLUDE.
+/// Skips the numbers of TILT=INCLUDE.
 fn skip_tilt(numbers: &mut Numbers, warnings: &mut Vec<String>) -> Result<(), Error> {
     numbers.next("the lamp's geometry of the tilt")?;
     let pairs = numbers.count("the number of tilt angles")?;
@@ -139,7 +139,7 @@ fn skip_tilt(numbers: &mut Numbers, warnings: &mut Vec<String>) -> Result<(), Er
 /// The numbers before the angles.
 struct Header {
     lamp_flux: Option<f64>,
-    /// What candela values are multiplied with.
+    /// Factor of the candela values.
     factor: f64,
     vertical: usize,
     horizontal: usize,
@@ -233,7 +233,7 @@ impl Header {
     }
 }
 
-/// Planes of type C, all around.
+/// Planes of type C, completed to a full turn.
 fn unfold_c(planes: &mut Planes, warnings: &mut Vec<String>) -> Result<(), Error> {
     let Some([first, last]) = planes.span() else { return Ok(()) };
     let is = |a: f64, b: f64| (a - b).abs() < SAME;
@@ -265,7 +265,7 @@ fn unfold_c(planes: &mut Planes, warnings: &mut Vec<String>) -> Result<(), Error
     Ok(())
 }
 
-/// Planes from 0° on, as they are and mirrored at 0°; others as they are.
+/// Planes from 0° on, with their mirror images at 0°; others unchanged.
 fn unfolded_at_zero(mut planes: Planes) -> Planes {
     if planes.span().is_some_and(|[first, _]| first.abs() < SAME) {
         planes.planes.iter_mut().for_each(|plane| plane.0 = -plane.0);
@@ -275,7 +275,8 @@ fn unfolded_at_zero(mut planes: Planes) -> Planes {
     planes
 }
 
-/// The opening by its signs: below 0 are diameters. A file of 1995 has one alone for a circle.
+/// The opening from its signed lengths: negative ones are diameters. A file of 1995 has a single
+/// one for a circle.
 fn opening(width: f64, length: f64, height: f64) -> Opening {
     let is_round = width < 0.0 && (length < 0.0 || length == 0.0 && height >= 0.0);
     let length = if is_round && length == 0.0 { width } else { length };

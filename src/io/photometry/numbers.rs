@@ -1,23 +1,23 @@
-//! The numbers of a photometric file, one after the other, however they are broken into lines.
+//! The numbers of a photometric file, in order, independent of line breaks.
 
 use std::path::Path;
 
 use super::super::text::{Line, finite};
 use crate::error::{Error, ErrorKind};
 
-/// What a comma in a number is.
+/// Meaning of a comma in a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comma {
     Separates,
     IsDecimal,
 }
 
-/// The numbers of some lines. Nothing is stored: what a count promises takes memory only as far as
-/// it is there.
+/// The numbers of some lines, read on demand: memory follows the numbers present, not their
+/// declared count.
 pub struct Numbers<'a> {
     file: &'a Path,
     words: Box<dyn Iterator<Item = (usize, String)> + 'a>,
-    /// The last line that was read from.
+    /// The last line read.
     line: usize,
 }
 
@@ -34,7 +34,7 @@ impl<'a> Numbers<'a> {
         Numbers { file, words: Box::new(words), line: 0 }
     }
 
-    /// The next number, which is `what`.
+    /// The next number; `what` names it in errors.
     pub fn next(&mut self, what: &str) -> Result<f64, Error> {
         let Some((line, word)) = self.words.next() else {
             let found = format!("the file ends where {what} should stand");
@@ -61,17 +61,17 @@ impl<'a> Numbers<'a> {
         (0..count).map(|_| self.next(what)).collect()
     }
 
-    /// The numbers from here up to a word that is none.
+    /// The numbers from here up to a word that is not a number.
     pub fn rest(&mut self) -> Vec<f64> {
         self.words.by_ref().map_while(|(_, word)| finite(&word)).collect()
     }
 
-    /// How many words are left.
+    /// Number of remaining words.
     pub fn left(self) -> usize {
         self.words.count()
     }
 
-    /// The error that `found` stands in the last line that was read from.
+    /// The error `found`, at the last line read.
     pub fn error(&self, found: String, remedy: &str) -> Error {
         let place = super::super::text::place(self.file, self.line);
         Error::new(ErrorKind::Scene, place, found, remedy)

@@ -6,17 +6,17 @@ use crate::scene::{IntensityDistribution, Pole};
 /// Intensities by angle in half-planes, degrees and cd.
 #[derive(Debug, Default)]
 pub struct Planes {
-    /// The angles within a plane, of all planes.
+    /// The angles within each plane, common to all planes.
     pub angles: Vec<f64>,
     /// The angle of each plane, and its intensities.
     pub planes: Vec<(f64, Vec<f64>)>,
 }
 
-/// Angles of files are the same up to this, degrees.
+/// Largest difference of equal angles in files, degrees.
 pub const SAME: f64 = 1e-3;
 
 impl Planes {
-    /// Intensities times `factor`; what is below 0, as noise of an instrument is, becomes 0.
+    /// Scales intensities by `factor`; negative ones, such as an instrument's noise, become 0.
     pub fn scale(&mut self, factor: f64, warnings: &mut Vec<String>) {
         let mut negative = 0;
         for value in self.planes.iter_mut().flat_map(|(_, values)| values) {
@@ -28,7 +28,7 @@ impl Planes {
         }
     }
 
-    /// Sorts planes and the angles in them, and leaves out those that are there already.
+    /// Sorts planes and the angles in them, and removes duplicates.
     pub fn sort(&mut self, warnings: &mut Vec<String>) {
         let ascend = |angles: &[f64]| angles.windows(2).all(|a| a[0] < a[1]);
         let planes: Vec<f64> = self.planes.iter().map(|plane| plane.0).collect();
@@ -59,7 +59,7 @@ impl Planes {
         self.planes.extend(images);
     }
 
-    /// Whether all of a turn but a step is there.
+    /// Whether the planes cover a full turn except for one step.
     pub fn can_close(&self) -> bool {
         let widest = self.planes.windows(2).map(|p| p[1].0 - p[0].0).fold(0.0, f64::max);
         let open = self.span().map(|[first, last]| first + 360.0 - last);
@@ -73,7 +73,7 @@ impl Planes {
         }
     }
 
-    /// The same by the other angle: what was along planes is across them.
+    /// The same with both angles exchanged: along planes becomes across them.
     pub fn transposed(&self) -> Planes {
         let column = |(k, &angle): (usize, &f64)| {
             (angle, self.planes.iter().map(|(_, values)| values[k]).collect())

@@ -1,11 +1,10 @@
-//! Where a cut is worth it: where light may fall on both sides of a contact segment, or into a
-//! slit.
+//! Selection of cuts: contact segments with light on both sides, or with a slit on one.
 //!
-//! What is inside a closed solid that stands on a surface is dark, and nobody sees it; values at
+//! The inside of a closed solid that stands on a surface is dark and not visible; values at
 //! vertices there are extrapolated from outside. Only behind a wall, a plate or the rim of a floor,
-//! or where a solid is open, is there other light, or next to none, that is seen. But where two
-//! solids leave a slit between them, narrower than elements are, an element would reach from one
-//! side past both to the other, and the slit would be as bright as what is beside the solids.
+//! or where a solid is open, is there visible light that differs, or visible darkness. But across a
+//! slit between two solids, narrower than elements, an element would extend past both, and the slit
+//! would be as bright as the surface beside the solids.
 
 use std::sync::Arc;
 
@@ -18,26 +17,27 @@ use crate::scene::Scene;
 use crate::visibility::buried;
 use crate::visibility::ray_scene::RayScene;
 
-/// Rays by which it is found out whether a place is inside a solid.
+/// Number of rays that test whether a point is inside a solid.
 const OPENNESS_RAYS: u32 = 128;
 
-/// So many of them at a time, a divisor of that.
+/// Rays per batch, a divisor of [`OPENNESS_RAYS`].
 const RAYS_AT_ONCE: u32 = 4;
 
-/// Shares of a segment's length at which both its sides are looked at.
+/// Fractions of a segment's length at which both its sides are tested.
 const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
 
-/// Distance from a side, share of the triangle's height over it, that is none: about the rounding
-/// of coordinates in single precision.
+/// Distance from a side, as a fraction of the triangle's height over it, that counts as 0: about
+/// the rounding of coordinates in single precision.
 const ON_SIDE: f64 = 1e-7;
 
-/// Looks on which side of a contact segment light may fall.
+/// Tests on which sides of a contact segment light may fall.
 pub(super) struct Openness {
     rays: Arc<RayScene>,
     directions: HemisphereSamples,
-    /// How far beside a segment, which is no shorter, scene unit: within and beyond thin walls.
+    /// Distances of test points beside a segment, which is no shorter, scene unit: within and
+    /// beyond thin walls.
     beside: [f64; 2],
-    /// How far above the surface, in units of that.
+    /// Height of test points above the surface, in units of these distances.
     above: f64,
 }
 
@@ -47,9 +47,9 @@ impl Openness {
         Openness { rays: RayScene::of_scene(scene), directions, beside, above }
     }
 
-    /// Whether neither side is inside a solid that stands there, somewhere along the `segment` of
-    /// the triangle with these `corners`, or the side that is not is a slit. What is too short to
-    /// be looked beside counts as the line that it is the end of.
+    /// Whether, somewhere along the `segment` of the triangle with these `corners`, neither side is
+    /// inside a solid that stands there, or the side that is not is a slit. A segment too short for
+    /// a test beside it is tested as the whole line that it ends.
     pub fn is_worth_a_cut(&self, segment: &ContactSegment, [a, b, c]: [DVec3; 3]) -> bool {
         let Some(ends) = clipped(segment.ends).filter(|ends| !is_on_side(ends)) else {
             return false;
@@ -75,14 +75,15 @@ impl Openness {
         })
     }
 
-    /// Whether another wall is nearer than elements are long, looking `away` from the one beside.
+    /// Whether another wall is nearer than the finest element edge, seen `away` from the wall
+    /// beside.
     fn is_slit(&self, (place, away): (DVec3, DVec3)) -> bool {
         let [_, finest] = self.beside;
         self.rays.occluded(place, away, 0.0..finest, |_| true)
     }
 
     fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
-        // Most places are in the open, as the first few rays say already.
+        // Most points are in the open, which the first few rays show.
         let most = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);
         while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
@@ -96,15 +97,15 @@ impl Openness {
     }
 }
 
-/// Whether a part of a triangle, by its ends in the triangle's own coordinates, is one of its
-/// sides: there is nothing to cut where a neighbour begins.
+/// Whether a part of a triangle, by its ends in barycentric coordinates, is one of its sides: there
+/// is no cut where a neighbour begins.
 fn is_on_side(ends: &[DVec2; 2]) -> bool {
     let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < ON_SIDE);
     from_side(|p| p.x) || from_side(|p| p.y) || from_side(|p| 1.0 - p.x - p.y)
 }
 
-/// The `part` of a `line`, with as much around it as makes it `length` long, if the line is. Of a
-/// line across the side of two triangles the part on one of them may be as short as can be: cut on
+/// The `part` of a `line`, extended on both sides to `length` if the line is that long. Of a line
+/// across the side of two triangles the part on one of them may be arbitrarily short: with a cut on
 /// the other alone, the surface would continue around its end.
 fn part_of_length(length: f64, part: [DVec3; 2], line: [DVec3; 2]) -> [DVec3; 2] {
     let (along, whole) = ((line[1] - line[0]).normalize_or_zero(), line[0].distance(line[1]));

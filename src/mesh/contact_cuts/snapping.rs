@@ -1,7 +1,7 @@
-//! Contact segments as lines between points of a lattice, those near one another made one.
+//! Contact segments as lines between lattice points, with near points merged.
 //!
-//! The lattice is one of barycentric weights: what is on a side is exactly on it, and the two
-//! triangles that share the side agree on it.
+//! The lattice is one of barycentric weights: points on a side are exactly on it, and equal for the
+//! two triangles that share the side.
 
 use glam::{DVec2, DVec3};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -14,7 +14,7 @@ pub(super) const STEPS: u32 = 1 << 24;
 /// A point of a triangle on the lattice: the weights of its second and third corner, in steps.
 pub(super) type LatticePoint = [u32; 2];
 
-/// Where a triangle is to be cut.
+/// The cuts of a triangle.
 #[derive(Debug, Default)]
 pub(super) struct Cuts {
     pub segments: Vec<[LatticePoint; 2]>,
@@ -22,13 +22,13 @@ pub(super) struct Cuts {
     pub on_sides: [Vec<u32>; 3],
 }
 
-/// Points of a triangle, those near one another made one.
+/// Points of a triangle, with near ones merged.
 pub(super) struct Snapping {
     corners: [DVec3; 3],
     /// Height of each corner above the side opposite, scene unit.
     heights: [f64; 3],
     distance: f64,
-    /// Points so far, by the cell of a grid that they are in.
+    /// Points so far, by their cell of a grid.
     known: FxHashMap<[i64; 3], Vec<(DVec3, LatticePoint)>>,
 }
 
@@ -61,8 +61,8 @@ impl Snapping {
         cuts
     }
 
-    /// The point of the lattice for one with these weights of the second and third corner: a
-    /// corner, a point on a side or another point, where these are near.
+    /// The lattice point for these weights of the second and third corner: a corner, a point on a
+    /// side or another point, if these are near.
     fn snapped(&mut self, point: DVec2) -> LatticePoint {
         let weights = [1.0 - point.x - point.y, point.x, point.y].map(|w| w.clamp(0.0, 1.0));
         let place = |w: [f64; 3]| (0..3).map(|k| w[k] * self.corners[k]).sum::<DVec3>();
@@ -94,7 +94,7 @@ impl Snapping {
             for dy in -1..=1 {
                 for dz in -1..=1 {
                     let [x, y, z] = cell;
-                    // Where elements of no size are asked for, cells are at the end of their range.
+                    // At an element size of 0 cells are at the end of their range.
                     let beside =
                         [(x, dx), (y, dy), (z, dz)].map(|(k, d): (i64, i64)| k.saturating_add(d));
                     let same_sides = |other: LatticePoint| {
@@ -123,12 +123,12 @@ pub(super) fn clipped(ends: [DVec2; 2]) -> Option<[DVec2; 2]> {
     Some(shares.map(|share| ends[0].lerp(ends[1], share)))
 }
 
-/// Which sides a point is on, counted by the corner that they start at.
+/// The sides that a point is on, indexed by their first corner.
 fn sides_of([u, v]: LatticePoint) -> [bool; 3] {
     [v == 0, u + v == STEPS, u == 0]
 }
 
-/// Steps from the start of each side that a point is within.
+/// Steps from the start of each side whose interior contains the point.
 pub(super) fn side_steps([u, v]: LatticePoint) -> [Option<u32>; 3] {
     let within = |step: u32| (0 < step && step < STEPS).then_some(step);
     let [first, second, third] = sides_of([u, v]);

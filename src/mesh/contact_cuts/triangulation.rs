@@ -12,25 +12,25 @@ use super::snapping::{Cuts, LatticePoint, STEPS};
 use crate::mesh::Side;
 use crate::scene::Piece;
 
-/// Pieces with less than this share of their triangle's area are left out: the rounding of where
-/// segments cross. Their neighbours do not continue one another.
+/// Fraction of their triangle's area below which pieces are left out: the rounding of where
+/// segments cross. Their neighbours are not connected.
 const MIN_AREA_SHARE: f64 = 1e-10;
 
 /// Weights are rounded to multiples of one over this: finer than the lattice, so that its points
-/// stay what they are, and those where segments meet and cross twice become one.
+/// are unchanged, and near-equal intersections of segments merge.
 const ROUNDING: f64 = 4.0 * STEPS as f64;
 
-/// Angles that are sharper than this are mended by further points, degrees: below 20.7 that ends
+/// Angle below which pieces are refined by further points, degrees: below 20.7 this terminates
 /// (Ruppert 1995).
 const LEAST_ANGLE: f64 = 20.0;
 
-/// But no piece is made smaller than this for its angles, in units of the finest edge squared.
+/// Least area of pieces refined for their angles, in units of the finest edge squared.
 const LEAST_AREA: f64 = 0.1;
 
-/// Points that are added to a triangle at most.
+/// Maximum number of points added to a triangle.
 const MAX_POINTS: usize = 1000;
 
-/// A triangle that is to be cut.
+/// A triangle to be cut.
 pub(super) struct CutTriangle {
     pub corners: [DVec3; 3],
     /// Its sides on the smooth surface.
@@ -40,7 +40,7 @@ pub(super) struct CutTriangle {
 }
 
 impl CutTriangle {
-    /// The pieces that `cuts` make: all of it, if there are none.
+    /// The pieces made by `cuts`: the whole triangle if there are none.
     pub fn pieces(&self, cuts: &Cuts) -> Vec<Piece> {
         let is_whole = cuts.segments.is_empty() && cuts.on_sides.iter().all(Vec::is_empty);
         let pieces = if is_whole { None } else { self.triangulated(cuts) };
@@ -49,7 +49,7 @@ impl CutTriangle {
 
     fn triangulated(&self, cuts: &Cuts) -> Option<Vec<Piece>> {
         let [a, b, c] = self.corners;
-        // A power of two, so that points on a side stay exactly on it, and angles are about right.
+        // A power of two keeps points on a side exactly on it, and angles about right.
         let stretch = (b.distance(a) / c.distance(a)).log2().round().exp2();
         let place = |[u, v]: LatticePoint| {
             let [u, v] = [u, v].map(|k| f64::from(k) / f64::from(STEPS));
@@ -72,7 +72,7 @@ impl CutTriangle {
             let to = triangulation.insert(place(to)).ok()?;
             triangulation.add_constraint_and_split(from, to, |point| point);
         }
-        // The whole triangle has an area of half the stretch here.
+        // In these coordinates the whole triangle has half the stretch as area.
         let area = 0.5 * (b - a).cross(c - a).length();
         let least_area = LEAST_AREA * self.finest.powi(2) / area * stretch / 2.0;
         triangulation.refine(
@@ -107,8 +107,8 @@ impl CutTriangle {
         Some(pieces.collect())
     }
 
-    /// Where the second and third corner have these weights: on a side bit for bit what the other
-    /// triangle there has.
+    /// The position with these weights of the second and third corner: on a side bit for bit the
+    /// same as for the other triangle.
     fn position(&self, [u, v]: [f64; 2]) -> DVec3 {
         let on_side = |k: usize, share: f64| {
             let (from, to) = (self.corners[k], self.corners[(k + 1) % 3]);
@@ -182,8 +182,8 @@ mod tests {
             let sum: DVec3 = areas.clone().sum();
             assert!(sum.distance(whole) < 1e-9 * whole.length(), "{round}: {cuts:?}");
             assert!(areas.clone().all(|a| a.dot(whole) > 0.0), "{round}: {cuts:?}");
-            // Every side but the triangle's own has two pieces, so that the surface continues:
-            // where segments overlap, what they cut may differ by rounding.
+            // Every side within the triangle has two pieces, so that the surface continues: where
+            // segments overlap, their cuts may differ by rounding.
             let mut sides = std::collections::HashMap::new();
             for Piece { weights, cut, .. } in &pieces {
                 for k in 0..3 {
