@@ -1,4 +1,4 @@
-//! Seconds that passes take on the device.
+//! Time of passes on the device.
 
 use super::device::Gpu;
 use super::memory::Memory;
@@ -17,7 +17,7 @@ pub struct Clock {
 const TICK_BYTES: u64 = 24;
 
 impl Clock {
-    /// The clock of a device that has one.
+    /// The clock of a device that supports timestamps.
     pub fn new(memory: &Memory) -> Result<Option<Clock>, Error> {
         use wgpu::BufferUsages as Usage;
         let device = &memory.device;
@@ -42,7 +42,7 @@ impl Clock {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, TICK_BYTES);
     }
 
-    /// Seconds of drawing, and from there to the end of the reduction, in what was submitted last.
+    /// Seconds of drawing, and from there to the end of the reduction, in the last submission.
     pub fn seconds(&self, gpu: &Gpu) -> Result<(f64, f64), Error> {
         let submission = gpu.queue.submit([]);
         let seconds = gpu.read_mapped(self.staging.slice(..), submission, |bytes| {

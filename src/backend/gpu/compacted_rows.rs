@@ -1,4 +1,4 @@
-//! Dense rows on the device, made into entries there and read back as such.
+//! Dense rows, compacted to entries on the device and read back as such.
 //!
 //! ```text
 //! counts, dense: row × slot ─► compact_rows ─► entries, row by row ─► staging ─► read
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A row over a mesh of 100 000 elements takes 400 kB, its entries some 10 kB: the bus to the
-//! device is what limits rows that are read back dense.
+//! device limits the rate of rows that are read back dense.
 
 use super::device::Gpu;
 use super::layout::{ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings};
@@ -15,28 +15,28 @@ use super::memory::Memory;
 use super::pipeline::bind_group;
 use crate::error::Error;
 
-/// Room for the entries of a batch of rows.
+/// Buffers for the entries of a batch of rows.
 #[derive(Debug)]
 pub struct CompactedRows {
-    /// [`RowSettings`], for the passes that count too.
+    /// [`RowSettings`], also for the passes that count.
     pub settings: wgpu::Buffer,
-    /// Entries that there is room for.
+    /// Capacity in entries.
     pub entries: u32,
     pub(super) found: wgpu::Buffer,
     staging: wgpu::Buffer,
-    /// Entries of a batch to be copied from the device without asking how many there are.
+    /// Number of entries of a batch to be copied before their actual number is known.
     expected: u64,
 }
 
-/// Bytes of entries that a batch has room for; rows that have more are made again in two batches.
+/// Bytes of the entries of a batch; rows with more are made again in two batches.
 const ENTRY_BYTES: u64 = 32 << 20;
 
-/// Entries that the first batch is expected to have: 2 MiB of them.
+/// Expected number of entries of the first batch: 2 MiB of them.
 const FIRST_ENTRIES: u64 = 65_536;
 
 impl CompactedRows {
-    /// Room for batches of up to `rows` rows, of up to `row_entries` entries each; for one row at
-    /// least.
+    /// Buffers for batches of up to `rows` rows, of up to `row_entries` entries each; for at least
+    /// one row.
     pub fn new(memory: &Memory, rows: u32, row_entries: u32) -> Result<CompactedRows, Error> {
         use wgpu::BufferUsages as Usage;
         let of_row = u64::from(row_entries);
@@ -52,8 +52,8 @@ impl CompactedRows {
         })
     }
 
-    /// Records how the first `rows` rows in `counts` are compacted, and these set to 0. Each has
-    /// `settings.slots` words, or four times as many `through_panes`.
+    /// Records the compaction of the first `rows` rows in `counts`, which are reset to 0. Each has
+    /// `settings.slots` words, or four times that `through_panes`.
     pub fn compact(
         &self,
         gpu: &Gpu,
@@ -81,8 +81,8 @@ impl CompactedRows {
         pass.dispatch_workgroups(rows, 1, 1);
     }
 
-    /// Runs what `encoder` recorded, and gives what `read` makes of all entries, `many` at most:
-    /// row by row in any order, slots ascending. None where `settings` leave no room for them.
+    /// Submits `encoder`, and returns the result of `read` for all entries, at most `many`: row by
+    /// row in any order, slots ascending. `None` if they exceed the capacity in `settings`.
     pub fn finish<T>(
         &mut self,
         gpu: &Gpu,
@@ -92,7 +92,8 @@ impl CompactedRows {
         read: impl Fn(&[RowEntry]) -> T,
     ) -> Result<Option<T>, Error> {
         let Self { found, staging, .. } = self;
-        // Those of the batch before and some more; if that is too few, the rest is copied then.
+        // The number of the previous batch plus a margin; if that is too few, the rest is copied
+        // afterwards.
         let guess = self.expected.min(many).min(settings.entries.into()).max(1);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
         encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(guess));
@@ -122,7 +123,7 @@ impl CompactedRows {
     }
 }
 
-/// The entries of each of `rows` rows, or what is wrong with them.
+/// The entries of each of `rows` rows, or a description of an error in them.
 pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, String> {
     let mut of_rows = vec![&entries[..0]; rows];
     for row in entries.chunk_by(|a, b| a.patch_ == b.patch_) {
@@ -132,7 +133,7 @@ pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, Str
     Ok(of_rows)
 }
 
-/// Bytes of so many entries with their header.
+/// Bytes of this number of entries with their header.
 fn bytes(entries: u64) -> u64 {
     ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64
 }

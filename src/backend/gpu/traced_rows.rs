@@ -29,7 +29,7 @@ use crate::scene::Rgb;
 use crate::visibility::offset;
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid on a graphics
-/// device: the rows of [`RayRows`](crate::RayRows), but for rays that rounding moves.
+/// device: the rows of [`RayRows`](crate::RayRows), except for rays that rounding deflects.
 ///
 /// Every ray carries the same share of the light, so a form factor is a count: for n rays the
 /// standard error of an entry F is at most √(F(1−F)/n).
@@ -38,7 +38,7 @@ pub struct TracedRows {
     gpu: Gpu,
     scene: Arc<TracedScene>,
     count: u32,
-    /// Directions by number of rays: all, and the fewer ones asked for so far.
+    /// Directions by number of rays: all, and the smaller numbers requested so far.
     directions: Vec<(u32, wgpu::TextureView)>,
     buffers: Buffers,
     has_panes: bool,
@@ -52,19 +52,19 @@ struct Buffers {
     patches: wgpu::Buffer,
     counts: wgpu::Buffer,
     compacted: CompactedRows,
-    /// Patches of a batch.
+    /// Number of patches of a batch.
     patches_at_once: u32,
     memory: Memory,
 }
 
-/// Rows made at once, at most: what a solver asks for. It decides the order of shots.
+/// Maximum number of rows of a batch: the request of a solver. It determines the order of shots.
 const MAX_BATCH: u32 = 256;
 
-/// Counts of a batch take at most this many bytes: what any WebGPU device binds.
+/// Maximum size of the counts of a batch, bytes: the limit of a binding on any WebGPU device.
 const COUNT_BYTES: u64 = 128 << 20;
 
 impl TracedRows {
-    /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
+    /// `count` rays per row over the triangles of `mesh`, and fewer for patches that shoot little.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰, [`ErrorKind::Memory`] when a row does
@@ -129,7 +129,7 @@ impl TracedRows {
         }
     }
 
-    /// The rows of a batch by so many `rays` in the directions of number `at`.
+    /// The rows of a batch by `rays` rays each in the directions of number `at`.
     fn batch(
         &mut self,
         mesh: &Mesh,
@@ -150,7 +150,7 @@ impl TracedRows {
             self.entries(&traced, settings, at, |entries| rows_of(entries, count, rays, has_panes))
         })?;
         let Some(rows) = rows else {
-            // There was no room for all entries.
+            // The capacity was too small for all entries.
             let (first, second) = patches.split_at(patches.len() / 2);
             let mut rows = self.batch(mesh, first, (rays, at))?;
             rows.extend(self.batch(mesh, second, (rays, at))?);
@@ -159,8 +159,8 @@ impl TracedRows {
         rows.map_err(|found| gpu.invalid_result(found))
     }
 
-    /// What `read` makes of the entries of all rows, row by row in any order, slots ascending; none
-    /// where there is no room for them.
+    /// The result of `read` for the entries of all rows, row by row in any order, slots ascending;
+    /// `None` if they exceed the capacity.
     fn entries<T>(
         &mut self,
         patches: &[TracedPatch],
@@ -199,7 +199,7 @@ impl TracedRows {
     }
 }
 
-/// The rows of entries, by so many `rays` each, or what is wrong with these.
+/// The rows from entries, by `rays` rays each, or a description of an error in these.
 fn rows_of(
     entries: &[RowEntry],
     patches: usize,
@@ -216,9 +216,9 @@ fn rows_of(
     by_row(entries, patches)?.par_iter().map(row).collect()
 }
 
-/// The row of entries in the order of their slots.
+/// The row from entries in the order of their slots.
 fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
-    // Elements come first in a row, then what is lost.
+    // Elements come first in a row, then the losses.
     let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
     let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
     let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
@@ -227,7 +227,7 @@ fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
         let sum = Rgb::from_array(e.passed.map(f64::from));
         (sum / (unit * f64::from(e.count))).min(Rgb::ONE)
     };
-    // A ray that nothing dims adds the whole unit.
+    // An unattenuated ray adds the whole unit.
     let is_clear = |e: &RowEntry| e.passed == [e.count * unit as u32; 3];
     if !has_panes || entries.iter().all(is_clear) {
         return row;
@@ -242,12 +242,12 @@ fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
     Row { passed, ..row }
 }
 
-/// What a ray counts in sums of what panes let through: all rays together stay within 32 bits.
+/// The value of a ray in sums of transmittances: the sum over all rays fits in 32 bits.
 fn passed_unit(rays: u32) -> f64 {
     f64::from((u32::MAX / rays).min(1 << 16))
 }
 
-/// What `row_of_counts` calls a slot.
+/// The item in `row_of_counts` of a slot.
 fn item(slot: u32) -> u32 {
     match slot {
         OPEN => cpu::OPEN,
@@ -273,7 +273,7 @@ impl Buffers {
                 patches * size_of::<TracedPatch>() as u64,
                 storage,
             )?,
-            // Zero at first, and after each batch.
+            // Zero initially and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
             compacted: CompactedRows::new(&memory, patches_at_once, row_entries)?,
             patches_at_once,
