@@ -3,7 +3,7 @@
 //! ```text
 //! row source        RayRows, HemicubeRows, your own: a patch seen from its centroid
 //!   └ ProximityCorrection   near receivers: closed forms of the whole patch
-//!       └ AdaptiveViewpoints   occluders that split a patch: the mean of what its parts see
+//!       └ AdaptiveViewpoints   occluders that split a patch: the mean over its parts
 //!           └ Solver, view factors: checked rows
 //! ```
 //!

@@ -5,23 +5,22 @@
 //! by the predicted time of the first:
 //!
 //! ```text
-//! ViewFactors::exact     exact but for an error far below what is asked for; time ~ polygons²,
-//!                        and more where many stand between
+//! ViewFactors::exact     error far below the requested one; time ~ polygons², and more with many
+//!                        blockers between
 //!   coplanar triangles ─→ convex polygons ─→ each pair once
-//!     in full view   closed form (contour integral), or Gauss cubature where far
-//!     occluded       adaptive cubature over one of the two: at each point the other, less the
-//!                    shadows of all blockers, by Lambert's formula; blockers found by a shaft
-//!                    around the pair; cells cut along visual events
+//!     unoccluded     closed form (contour integral), or Gauss cubature where far
+//!     occluded       adaptive cubature over one of the two: at each point Lambert's formula over
+//!                    the other, less the shadows of all blockers; blockers from a shaft around
+//!                    the pair; cells cut along visual events
 //!
-//! ViewFactors::sparse    with the error that is asked for; time ~ polygons, and pairs that see
-//!                        one another
+//! ViewFactors::sparse    with the requested error; time ~ polygons, and pairs that see one
+//!                        another
 //!   rays from each polygon ─→ pairs that matter
 //!     small          the count of rays
-//!     others         shadow rays, closed forms, or points that see the other past all blockers,
-//!                    whichever is cheapest
+//!     others         the cheapest of shadow rays, closed forms, or visible parts from points
 //!
 //! ViewFactors::sampled   means over the rows of a mesh's elements, hemicubes or rays; time ~
-//!                        elements; the error is estimated, not asked for
+//!                        elements; the error is estimated, not requested
 //! ```
 //!
 //! [`ViewFactors::checks`] measures closure, reciprocity and bounds of any matrix, and

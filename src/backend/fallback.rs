@@ -1,9 +1,9 @@
 //! Uses one row maker or gatherer until its device fails, then another.
 //!
 //! ```text
-//! ask ─► first ─ ok, or an error that is no device's ─► answer
-//!          │
-//!          └ device error e ─► next(e) ─► second, which answers this and all later questions
+//! request ─► first ─ ok, or an error other than of the device ─► result
+//!              │
+//!              └ device error e ─► next(e) ─► second: this and all later requests
 //! ```
 //!
 //! Rows and light made by the first stay in use: the solution up to the failure is kept.

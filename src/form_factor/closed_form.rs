@@ -15,8 +15,8 @@
 //!                      farther            Gauss cubature of cos θ cos θ′ / (π r²)
 //!
 //! polygon → polygon    gap < 8 radii of   double contour integral of ln r, a sum over
-//!                      the smaller        pairs of edges; of very unlike polygons the
-//!                                         larger is halved first
+//!                      the smaller        pairs of edges; of polygons of dissimilar
+//!                                         size the larger is halved first
 //!                      farther            Gauss cubature over the smaller of point → polygon
 //! ```
 

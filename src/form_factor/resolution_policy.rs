@@ -7,7 +7,7 @@
 //! N² is minimal where s² N⁻⁵ is the same for all patches:
 //!
 //! ```text
-//! N ∝ s^0.4,  so half of N is enough for 2^2.5 times less light
+//! N ∝ s^0.4,  so half of N suffices for light less by a factor of 2^2.5
 //! ```
 //!
 //! The error of N² stratified rays falls alike. The share s is the row's weight.

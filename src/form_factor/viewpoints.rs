@@ -4,9 +4,9 @@
 //! device gets large batches:
 //!
 //! ```text
-//!   patch          1. see the patch and three of its children from their centroids; the middle
+//!   patch          1. view the patch and three of its children from their centroids; the middle
 //!  ╱ │ │ ╲            child has the patch's centroid, and so its view
-//! ○  ○ ○  ◉        2. where the mean of the children disagrees with the patch, go on with step 1
+//! ○  ○ ○  ◉        2. where the mean of the children disagrees with the patch, repeat step 1
 //! ╱│╲╲                for each child
 //! ○○○◉             3. the row of a view is the mean of its children's rows, where it has any
 //! ```

@@ -4,7 +4,7 @@
 //! 7 bytes "radiosi", 1 byte version      MAGIC
 //! fingerprint of the mesh, text of the method, fingerprint of the row source   Identity   postcard
 //! the session                            SavedSession                                     postcard
-//! 8 bytes XXH3-64 of all before          little-endian
+//! 8 bytes XXH3-64 of all the above       little-endian
 //! ```
 //!
 //! A file is resumed only with a mesh, a method and a row source of the same identity. The file

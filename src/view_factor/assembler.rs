@@ -1,12 +1,12 @@
 //! Assembles an exact matrix: all pairs of convex polygons, each computed once, summed over groups.
 //!
 //! ```text
-//! scene ─→ fronts: polygons that give and receive, in the order of groups
-//!      ├─→ backs: what of the backs of polygons can be met
+//! scene ─→ fronts: polygons that emit and receive, in the order of groups
+//!      ├─→ backs: visible parts of the backs of polygons
 //!      └─→ blockers: polygons of any group, in a tree
 //!
 //! for each front s:   for each group of later fronts, and for all backs:
-//!                         sum of pairs in full view + adaptive cubature of occluded pairs
+//!                         sum of unoccluded pairs + adaptive cubature of occluded pairs
 //! ```
 //!
 //! Later fronts only: A_i F_ij = A_j F_ji gives the other half. The tolerance of a group's error is

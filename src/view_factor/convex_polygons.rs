@@ -3,10 +3,10 @@
 //! Fewer and larger polygons mean fewer pairs, and no shadow edges along the diagonals of quads.
 //!
 //! ```text
-//! weld corners ─→ find sides shared by two triangles that run along them in opposite directions
-//!              ─→ flood coplanar regions; one that is convex as a whole becomes one polygon
-//!              ─→ of others, join neighbours across the longest sides while the union is convex
-//!              ─→ drop corners at which the outline goes straight on
+//! weld corners ─→ find sides shared by two consistently wound triangles
+//!              ─→ flood coplanar regions; each that is convex as a whole becomes one polygon
+//!              ─→ in others, join neighbours across the longest sides while the union is convex
+//!              ─→ drop corners at which the outline is straight
 //! ```
 
 use std::collections::{BTreeMap, HashMap};

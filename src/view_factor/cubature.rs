@@ -4,8 +4,8 @@
 //! ```text
 //!        target            A₁F₁₂ = ∫ over the domain of F(point → visible part of the target)
 //!      ───────────
-//!          ▬▬  blockers    F at a point is exact (see `point_visibility`); it is smooth but where
-//!      ╱╲  ╱╲  ╱╲  ╱╲      the point crosses a visual event (see `visual_events`)
+//!          ▬▬  blockers    F at a point is exact (see `point_visibility`); it is smooth except
+//!      ╱╲  ╱╲  ╱╲  ╱╲      where the point crosses a visual event (see `visual_events`)
 //!        domain: cells
 //! ```
 //!

@@ -5,11 +5,11 @@
 //!
 //! ```text
 //! √(U / D) ≤ τ                     the count of rays over D
-//! few rays do, (U / 2τ)²           shadow rays
-//! nothing is in the shaft          U
-//! little is in it                  points of one polygon: what each sees of the other, exactly
-//! much, but rays have met little   the same past what they have met, less what they found behind
-//! much was met                     sets of rays, until they agree
+//! (U / 2τ)² is small               shadow rays
+//! no blocker in the shaft          U
+//! few blockers in it               points of one polygon: the visible part of the other, exactly
+//! many, but rays have hit few      the same past these, less the hits hidden by other blockers
+//! rays have hit many               sets of rays, until they agree
 //! ```
 //!
 //! The choice depends on U, not on the count, so that it is not random. The result of the other

@@ -1,12 +1,12 @@
 //! Mutual visibility of two convex polygons: none, full, or partial behind blockers.
 //!
 //! ```text
-//! one behind the other                       → nothing
+//! one behind the other                       → hidden
 //! clip each by the plane of the other
-//! lay a shaft around both, clip blockers     → no blocker left: all, in closed form
-//! one blocker between every two points       → nothing
+//! build a shaft around both, clip blockers   → no blocker left: unoccluded, in closed form
+//! one blocker between every two points       → hidden
 //! else choose the domain to integrate over,
-//! cut it where whole edges align, into cells → occluded, for adaptive cubature
+//! cut it by blockers that stand on it        → occluded, for adaptive cubature
 //! ```
 
 use glam::DVec3;

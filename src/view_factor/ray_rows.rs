@@ -5,8 +5,8 @@
 //! factor is a count.
 //!
 //! ```text
-//!     ╲  │  ╱      first half: which blockers stand around
-//!   ▭──╲─│─╱──▭    second half: what is behind blockers that the first half has not met
+//!     ╲  │  ╱      first half: blockers around the polygon
+//!   ▭──╲─│─╱──▭    second half: fronts behind blockers that the first half missed
 //!  ───────────────
 //! ```
 //!

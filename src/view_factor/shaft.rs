@@ -5,7 +5,7 @@
 //!     ───────             to the other. Its faces are the two polygons and, along each of their
 //!    ╱       ╲            edges, a supporting plane that leans on a corner of the other.
 //!   ╱  ▬▬     ╲
-//!  ╱           ╲          A blocker matters as far as it is strictly within: clipped by all
+//!  ╱           ╲          Of a blocker only the part strictly within matters: clipped by all
 //!  ─────────────          planes, and dropped if nothing but contact is left.
 //!        a
 //! ```

@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! each front:   first half of its rays ─→ blockers known around it
-//!               second half            ─→ row: counts of the fronts met
-//! each pair that a ray from either end has met:  see `pair_estimate`
+//!               second half            ─→ row: counts of the fronts hit
+//! each pair that a ray from either end has hit:  see `pair_estimate`
 //! ```
 //!
 //! Time grows with the number of polygons and of pairs that see one another, memory with the

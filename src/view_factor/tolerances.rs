@@ -5,7 +5,7 @@
 //! tolerance must be above the rounding of the quantity compared with it, and above every tolerance
 //! that this results from:
 //!
-//! | what | value | of | above |
+//! | constant | value | of | above |
 //! |---|---|---|---|
 //! | [`COPLANARITY`] | 4e-15 | unit | rounding of coordinates |
 //! | [`PLANE_TOLERANCE`] | 1e-13 | share of the extent | rounding of a few operations |

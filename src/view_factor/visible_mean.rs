@@ -4,8 +4,8 @@
 //!     target            from each point: the visible part of the target, exactly
 //!    ────────           (see `point_visibility`)
 //!      ▬▬   blockers
-//!   •  •  •  •          points: a low-discrepancy set; how far the means of its eight parts
-//!    domain             differ is the error
+//!   •  •  •  •          points: a low-discrepancy set; the error is the deviation between
+//!    domain             the means of its eight parts
 //! ```
 //!
 //! The mean is of the visible share, and the whole is known in closed form: the variation due to

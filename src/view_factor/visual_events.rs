@@ -10,7 +10,7 @@
 //!     ── ╲ blocker edge  event plane.
 //!  ───────╳───── domain
 //!
-//!         │ blocker      A blocker that stands on the domain: what is seen jumps at its foot. The
+//!         │ blocker      A blocker that stands on the domain: visibility jumps at its foot. The
 //!  ───────┴───── domain  domain is cut along the blocker's own plane before anything else.
 //! ```
 //!

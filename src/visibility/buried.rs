@@ -5,14 +5,14 @@
 //! its surface, sees backs. The share is of the point's hemisphere, weighted by form factor. The
 //! required certainty depends on the consequence:
 //!
-//! | constant | share | asked of | consequence |
+//! | constant | share | tested point | consequence |
 //! |---|---|---|---|
 //! | [`VIEWPOINT`] | 0.5 | viewpoint of a shooting patch | another viewpoint is tried |
 //! | [`NEAR_BACKS`] | 0.4 | sample of the error estimate | left out, if they are very near too |
 //! | [`HIDDEN`] | 0.95 | sample of the error estimate | left out |
-//! | [`OPEN`] | 0.99, of nothing | sample of the error estimate | left out |
+//! | [`OPEN`] | 0.99, empty | sample of the error estimate | left out |
 //! | [`BURIED`] | 0.9 | gather point | replaced, if surfaces are near too |
-//! | [`INSIDE`] | 0.995 | gather point | replaced, however far surfaces are |
+//! | [`INSIDE`] | 0.995 | gather point | replaced, at any distance of surfaces |
 //! | [`INSIDE`] | 0.995 | side of a contact | no cut along it |
 //!
 //! Reasons for the differences: another viewpoint is cheap, and a left-out sample must meet a

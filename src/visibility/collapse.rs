@@ -1,9 +1,9 @@
 //! Collapse of a binary tree: selects the nodes that become the children of wide ones.
 //!
 //! ```text
-//!        ●                        ●            A ray pays for each wide node that it meets, in
-//!      ╱   ╲                  ╱ ╱ │ ╲          proportion to its area. With C(n, i) for what the
-//!     ●     ●       ──►     a  b  c  ●         tree below n costs as i roots at most:
+//!        ●                        ●            The expected cost of a wide node for a ray is
+//!      ╱   ╲                  ╱ ╱ │ ╲          in proportion to its area. With C(n, i) for the
+//!     ●     ●       ──►     a  b  c  ●         cost of the tree below n with at most i roots:
 //!    ╱ ╲   ╱ ╲                      ╱ ╲
 //!   a   b c   ●                    d   e       C(n, i) = least of C(left, k) + C(right, i − k),
 //!            ╱ ╲                                         C(n, i − 1)

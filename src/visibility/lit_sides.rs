@@ -4,13 +4,13 @@
 //! hit, on either side, and ends at light: at a lamp that it sees or hits, or in the sky.
 //!
 //! ```text
-//!        lamp                    The walk from the upper side of t bounces about the room and
+//!        lamp                    The walk from the upper side of t scatters in the room and
 //!   ┌─────▀▀─────┐               sees the lamp. That from its lower side stays within the body:
-//!   │   ↗ ↖      │               no walk from there ever does. The wall's outer side sees nothing
-//!   │  ╱   ╲     │               but the night.
+//!   │   ↗ ↖      │               no walk from there leaves it. The wall's outer side sees the
+//!   │  ╱   ╲     │               dark sky only.
 //!   │ ╱ ┌──t──┐  │
-//!   │   │ ↓↗↘ │  │  → nothing    A ray that slips through a seam is an exception. A side is lit
-//!   └───┴─────┴──┘               if the walks from its sheet say so, and its own do not object.
+//!   │   │ ↓↗↘ │  │  → nothing    Single rays pass through seams: a side is lit if the walks from
+//!   └───┴─────┴──┘               its sheet reach light, and its own do not contradict.
 //! ```
 //!
 //! A **sheet** is a set of connected sides of triangles, across edges shared by exactly two

@@ -1,9 +1,9 @@
 //! Rays in the hierarchy's own unit and in 32 bits, and their intersection with boxes.
 //!
 //! ```text
-//!            near  far                      A box is met between the last near
-//!              │    │                       side that is passed and the first
-//!  far  ───────┼────●──         ╱           far one, if they come in that order
+//!            near  far                      A ray is in a box from the last near
+//!              │    │                       plane that it crosses to the first
+//!  far  ───────┼────●──         ╱           far one, if these are in that order
 //!              │  ╱ │                       (Kay, Kajiya 1986).
 //!  near ───────●────┼──
 //! ```

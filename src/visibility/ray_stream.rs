@@ -1,7 +1,7 @@
 //! Many rays from one point, traced through the hierarchy together.
 //!
 //! ```text
-//! node ── its boxes as seen from the point: once for all
+//! node ── its boxes relative to the point, for all rays
 //!   │       ray 0 ─► boxes 1 4 ─┐       children, the nearest      rays
 //!   │       ray 1 ─► boxes 4    ├──►    4                          0 1 3
 //!   │       ray 3 ─► boxes 2 4 ─┘       2                          3

@@ -1,9 +1,9 @@
 //! A binary tree of boxes by the surface area heuristic, with a depth limit for any input.
 //!
 //! ```text
-//! boxes ──► parted where rays are expected to meet the fewest ──► leaves of at most four
+//! boxes ──► splits with the least expected number of hits ──► leaves of at most four
 //!           at most 31 levels; halves where the heuristic
-//!           tells nothing apart or levels run out
+//!           does not discriminate or levels run out
 //! ```
 //!
 //! Bottom-up merging takes quadratic time, and yields a chain deeper than the stack where thousands

@@ -1,12 +1,12 @@
 //! Packs of four triangles, tested against a ray in 32 bits before the exact test.
 //!
 //! ```text
-//!            c             The ray meets the plane at o + t d. With the edges a and b, and s from
-//!           ╱ ╲            the corner to o, Cramer's rule says where (Möller, Trumbore 1997):
+//!            c             The ray hits the plane at o + t d. With the edges a and b, and s from
+//!           ╱ ╲            the corner to o, by Cramer's rule (Möller, Trumbore 1997):
 //!        b ╱ · ╲
 //!         ╱     ╲            D = d·(b×a)    u D = d·(b×s)    v D = d·(s×a)    t D = b·(s×a)
 //!        ●───────
-//!      corner  a             met where u ≥ 0, v ≥ 0, u + v ≤ 1, start ≤ t ≤ end
+//!      corner  a             hit where u ≥ 0, v ≥ 0, u + v ≤ 1, start ≤ t ≤ end
 //! ```
 //!
 //! Here these hold within a margin above all rounding, and nothing is divided by D, which may be 0.

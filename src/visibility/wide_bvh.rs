@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! triangles ──► binary tree of boxes ──► nodes of eight boxes ──► leaves of four triangles
-//!               (sah_tree)               met at once (ray32)      met at once (triangle_pack)
+//!               (sah_tree)               tested at once (ray32)   tested at once (triangle_pack)
 //! ```
 //!
 //! A step down costs the latency of the one before and an unpredictable branch, far more than its

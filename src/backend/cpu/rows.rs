@@ -1,8 +1,8 @@
 //! Form-factor rows from rays on the CPU: an independent check, and the backend without a GPU.
 //!
 //! ```text
-//! patch ─► n cosine-weighted rays from its centroid, turned by a hash of its id
-//!       ─► what each meets: an element, a back, nothing ─► sorted, counted ─► row of shares
+//! patch ─► n cosine-weighted rays from its centroid, rotated by a hash of its id
+//!       ─► item hit by each: element, back, nothing ─► sorted, counted ─► row of shares
 //! ```
 
 use std::sync::Arc;

@@ -28,7 +28,7 @@ pub struct CompactedRows {
     expected: u64,
 }
 
-/// Bytes of the entries of a batch; rows with more are made again in two batches.
+/// Bytes of the entries of a batch; larger ones are split into two batches.
 const ENTRY_BYTES: u64 = 32 << 20;
 
 /// Expected number of entries of the first batch: 2 MiB of them.

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! with_error_scopes(work)      push scopes → work() → pop scopes → an error, or work's result
-//! retry_with_smaller_batches   make(batch), make(batch/2), … until there is memory for it
-//! wait                         poll until all submitted work is done; DEVICE_TIMEOUT at most
+//! retry_with_smaller_batches   make(batch), make(batch/2), … until it fits in memory
+//! wait                         poll until all submitted work is done; at most DEVICE_TIMEOUT
 //! ```
 //!
 //! A lost device stays lost: the reason is recorded once, and every later use returns it.

@@ -1,7 +1,7 @@
 //! The draw pass of rows: the scene's triangles over every face of a batch of hemicubes.
 //!
 //! ```text
-//! corners, triangles ──► vertex ──► rasterizer ──► fragment ──► one layer a hemicube, R32Uint
+//! corners, triangles ──► vertex ──► rasterizer ──► fragment ──► one layer per hemicube, R32Uint
 //! views (5 a hemicube) ──┘          depth test     item of      N wide:  top face    N lines
 //!                                                  the pixel             side +t     N/2
 //!                                                                        side −t     N/2

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! layers of R32Uint ──copy──► items (lines padded to `stride` words)
-//! items, weights, slot of each item ──► reduce ──► rows: slots words a hemicube
+//! items, weights, slot of each item ──► reduce ──► rows: slots words per hemicube
 //!                                                        [open, back, element 0, element 1, …]
 //! ```
 //!

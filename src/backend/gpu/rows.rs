@@ -1,7 +1,7 @@
 //! Form-factor rows from hemicubes: batches drawn, reduced, compacted and read back.
 //!
 //! ```text
-//! patches ─► views (frame, turned by a hash of the patch; 5 faces) ─► item buffer ─► reduce
+//! patches ─► views (frame, rotated by a hash of patch id; 5 faces) ─► item buffer ─► reduce
 //!                                                                                      │
 //! rows ◄─ mean over rotations ◄─ sum checked ◄─ readback of entries ◄─ compact ◄───────┘
 //! ```

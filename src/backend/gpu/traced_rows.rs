@@ -2,9 +2,9 @@
 //! compacted there.
 //!
 //! ```text
-//! patches ─► a ray a lane ─► counts, dense: patch × slot ─► entries, row by row ─► readback
-//!                                                 ▲  zeros  │
-//!                                                 └─────────┘
+//! patches ─► a ray per lane ─► counts, dense: patch × slot ─► entries, row by row ─► readback
+//!                                                   ▲  zeros  │
+//!                                                   └─────────┘
 //! ```
 
 use std::sync::Arc;

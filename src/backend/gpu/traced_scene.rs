@@ -1,10 +1,10 @@
 //! A scene for rays on the device: hierarchy, triangles, lights, sky, panes and masks.
 //!
 //! ```text
-//! nodes      [hierarchy of what blocks light][hierarchy of clear panes]
-//! triangles  [those in the first's order][those in the second's][lamps that nothing meets]
-//! lights     [lights of the scene][a row for each pane: what it lets through]
-//! lamps      triangles of each light, and the share of its area up to their ends
+//! nodes      [hierarchy of blockers of light][hierarchy of clear panes]
+//! triangles  [in the order of the first][of the second][lamps that no ray hits]
+//! lights     [lights of the scene][a row for each pane: its transmittance]
+//! lamps      triangles of each light, and cumulative shares of its area
 //! ```
 
 use std::f64::consts::PI;

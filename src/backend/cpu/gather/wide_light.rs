@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!    ════════════ light ════════════      share of it that is visible
-//!      │  ╲    ╱ ▄▄▄▄                       = rays that meet it / rays towards it
-//!      │    ╲╱   ████  what hides it        = 3/4
+//!      │  ╲    ╱ ▄▄▄▄                       = rays that hit it / rays towards it
+//!      │    ╲╱   ████  blocker              = 3/4
 //!      ╲  ╱ ╲ │
 //!        ● point                          irradiance = closed form × that share
 //! ```
