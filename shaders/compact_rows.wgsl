@@ -1,5 +1,5 @@
-// The slots of rows that any ray has met, those of a row one after the other, and zeros in their
-// place: a workgroup a row, a lane a run of its slots.
+// Lists the slots of rows that any ray has hit, in order within a row, and resets them to zero: a
+// workgroup per row, a lane per range of its slots.
 
 const COMPACT_LANES: u32 = 256u;
 
@@ -8,12 +8,12 @@ struct RowEntry {
     slot: u32,
     count: u32,           // rays
     padding: u32,
-    passed: vec3u,        // of them, in units of 1/RowSettings::unit; 0 where there are no panes
+    passed: vec3u,        // sum of transmittances, in units of 1/RowSettings::unit; 0 without panes
     padding_2: u32,
 }
 
 struct RowEntries {
-    count: atomic<u32>,   // of entries; more than there is room for are counted, not written
+    count: atomic<u32>,   // of entries; those beyond the capacity are counted, not written
     padding: array<u32, 3>,
     entries: array<RowEntry>,
 }
@@ -21,7 +21,7 @@ struct RowEntries {
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(1) @binding(4) var<storage, read_write> found: RowEntries;
 
-var<workgroup> ends: array<u32, COMPACT_LANES>;   // of what lanes have, up to each
+var<workgroup> ends: array<u32, COMPACT_LANES>;   // cumulative counts of lanes
 var<workgroup> first: u32;
 
 @compute @workgroup_size(256)
@@ -32,7 +32,7 @@ fn compact_rows(
     compact(group.x, group.x * settings.slots, lane, false);
 }
 
-// The same of rows through panes.
+// The same for rows through panes.
 @compute @workgroup_size(256)
 fn compact_rows_through_panes(
     @builtin(workgroup_id) group: vec3u,
@@ -41,7 +41,7 @@ fn compact_rows_through_panes(
     compact(group.x, 4u * group.x * settings.slots, lane, true);
 }
 
-// The row of a patch, whose counts begin at `row`.
+// Compacts the row of a patch, whose counts begin at `row`.
 fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
     let run = (settings.slots + COMPACT_LANES - 1u) / COMPACT_LANES;
     let start = min(lane * run, settings.slots);
@@ -50,7 +50,7 @@ fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
     for (var slot = start; slot < end; slot++) {
         met += u32(counts[row + slot] != 0u);
     }
-    // Sums over all lanes before (Hillis and Steele 1986).
+    // Prefix sums over the lanes (Hillis and Steele 1986).
     ends[lane] = met;
     for (var step = 1u; step < COMPACT_LANES; step *= 2u) {
         workgroupBarrier();

@@ -1,5 +1,5 @@
-// Cosine-distributed rays from each point, and the sums of what they find: a workgroup a point, a
-// ray a lane. Needs shared/trace.wgsl, shared/lights.wgsl, shared/gather_state.wgsl,
+// Cosine-distributed rays from each point, and the sums of their results: a workgroup per point, a
+// lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/gather_state.wgsl,
 // shared/lattice.wgsl and shared/field.wgsl before it.
 
 @group(0) @binding(7) var sky_pieces: texture_2d<f32>;
@@ -17,7 +17,7 @@ fn hemisphere_rays(
     cast_rays(group.x, lane);
 }
 
-// Those whose rays are doubled.
+// Points whose rays are doubled.
 @compute @workgroup_size(64)
 fn more_hemisphere_rays(
     @builtin(workgroup_id) group: vec3u,
@@ -26,7 +26,7 @@ fn more_hemisphere_rays(
     cast_rays(work.points[group.x], lane);
 }
 
-// Light that the sky sends along a direction, as the radiosity of a surface.
+// Light from the sky along a direction, as the radiosity of a surface.
 fn from_sky(direction: vec3f) -> vec3f {
     if scene.sky_side == 0u {
         return scene.sky;
@@ -49,7 +49,7 @@ fn cast_rays(p: u32, lane: u32) {
     let point = points[p];
     let total = states[p].ray_count;
     let light_count = states[p].light_count;
-    // The first time all rays, in two halves; then as many again, which are the second half.
+    // In the first pass all rays, in two halves; then the same number again, as the second half.
     let is_first = states[p].pending == 3u;
     let start = select(total, 0u, is_first);
     let middle = select(total, total / 2u, is_first);
@@ -93,7 +93,7 @@ fn cast_rays(p: u32, lane: u32) {
     }
 }
 
-// Adds what one ray finds.
+// Adds the result of one ray.
 fn cast_ray(
     p: u32,
     point: TracedPoint,
@@ -143,7 +143,7 @@ fn cast_ray(
     }
 }
 
-// Whether a light lies along the ray, behind whatever hides it.
+// Whether a light, occluded or not, lies along the ray.
 fn is_towards(ray: Ray, light: TracedLight) -> bool {
     for (var k = light.first; k < light.first + light.count; k++) {
         let hit = meet(lamps[k].triangle, ray, FAR, 1.0);

@@ -1,11 +1,11 @@
-// Draws the scene's own triangles over one face of a hemicube. Every pixel gets the item seen
-// there: 0 (the clear value) for nothing, BACK, or a cell of the triangle's lattice, found from the
+// Draws the scene's own triangles over one face of a hemicube. Every pixel gets the visible item: 0
+// (the clear value) for nothing, BACK, or a cell of the triangle's lattice, computed from the
 // barycentric position. Needs shared/corner.wgsl and shared/lattice.wgsl before it.
 
 const BACK: u32 = 1u;
 
 struct FaceView {
-    eye: vec3f,           // patch centre, from the middle of the scene, in units of its size
+    eye: vec3f,           // patch centre, relative to the middle of the scene, in units of its size
     near: f32,            // near plane, same unit
     right: vec3f,         // unit vectors of the view, right x up = -forward
     bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
@@ -13,7 +13,7 @@ struct FaceView {
     own_triangle: u32,    // position of the patch's own triangle in the drawing order: never drawn
     forward: vec3f,
     padding: u32,
-    eye_low: vec3f,       // what rounding took off the eye
+    eye_low: vec3f,       // rounding remainder of `eye`
     padding_2: u32,
 }
 

@@ -1,4 +1,4 @@
-// Rays from each point to places on its lights and on the sun: a workgroup a point. Needs
+// Rays from each point to points on its lights and on the sun: a workgroup per point. Needs
 // shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
 
 // All points.
@@ -10,7 +10,7 @@ fn light_rays(
     cast_rays(group.x, lane);
 }
 
-// Those whose rays to lights are doubled.
+// Points whose rays to lights are doubled.
 @compute @workgroup_size(64)
 fn more_light_rays(
     @builtin(workgroup_id) group: vec3u,
@@ -71,7 +71,7 @@ fn cast_rays(p: u32, lane: u32) {
     }
 }
 
-// Adds what all lanes have seen of a light.
+// Adds the visible part of a light over all lanes.
 fn add(p: u32, light: u32, lane: u32, visible: array<vec4f, 2>) {
     var of_half = visible;
     for (var half = 0u; half < 2u; half++) {

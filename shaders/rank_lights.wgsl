@@ -1,9 +1,9 @@
-// Which lights are worth rays of their own from each point, by closed form: a workgroup a point.
-// Needs shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
+// Selects the lights that are sampled separately from each point, by closed form: a workgroup per
+// point. Needs shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
 
-// Lights below this share of the unoccluded irradiance of all are not sampled apart.
+// Lights below this share of the total unoccluded irradiance are not sampled separately.
 const MIN_IRRADIANCE_SHARE: f32 = 1e-3;
-// Points by which it is found how even a light looks; rays that it takes to see a light, at least.
+// Number of points for the evenness of a light; minimum expected number of rays that hit a light.
 const EVENNESS_POINTS: u32 = 32u;
 const LEAST_RAYS: f32 = 8.0;
 
@@ -13,7 +13,7 @@ var<workgroup> ranked_irradiance: array<f32, MAX_EXPLICIT_LIGHTS>;
 var<workgroup> count: u32;
 var<workgroup> all_irradiance: f32;
 
-// n · Γ of one side of a polygon as seen from the origin: its angle, and the way of its plane.
+// n · Γ of one side of a polygon seen from the origin: its angle times the cosine of its plane.
 fn side(a: vec3f, b: vec3f, normal: vec3f) -> f32 {
     let across = cross(a, b - a);
     let sine = length(across);
@@ -21,11 +21,11 @@ fn side(a: vec3f, b: vec3f, normal: vec3f) -> f32 {
     return atan2(sine, dot(a, b)) * dot(normal, across) / max(sine, 1e-37);
 }
 
-// The form factor from a point to a triangle that faces it: Lambert's formula, of the part above
-// the horizon (Baum, Rushmeier and Winget 1989, eq. 8). A triangle far smaller than it is far away
-// counts by its middle, which is off by the square of that ratio s; the formula is off by rounding
-// over s, since its terms cancel: both by 3e-5 where s is 5e-3. Terms of a light that grazes the
-// surface cancel too: what is left is off by 1e-7, absolutely.
+// The form factor from a point to a triangle that faces it: Lambert's formula for the part above
+// the horizon (Baum, Rushmeier and Winget 1989, eq. 8). A triangle whose size is a small share s of
+// its distance is represented by its middle, with an error of s²; the error of the formula is
+// rounding over s, since its terms cancel: both are 3e-5 for s = 5e-3. Terms of a light that grazes
+// the surface cancel too: the absolute error of the remainder is 1e-7.
 fn to_triangle(t: TracedTriangle, point: TracedPoint) -> f32 {
     let a = (t.corner - point.position) + (t.corner_low - point.position_low);
     let area_normal = cross(t.edge_u, t.edge_v);
@@ -38,7 +38,7 @@ fn to_triangle(t: TracedTriangle, point: TracedPoint) -> f32 {
         let cosines = -dot(area_normal, middle) * max(dot(point.normal, middle), 0.0);
         return 0.5 * cosines / (PI * square * square);
     }
-    // Cut at the horizon: at most four corners are left.
+    // Clipped at the horizon: at most four corners are left.
     var corners = array<vec3f, 3>(a, a + t.edge_u, a + t.edge_v);
     var cut: array<vec3f, 4>;
     var left = 0u;
@@ -60,7 +60,7 @@ fn to_triangle(t: TracedTriangle, point: TracedPoint) -> f32 {
     for (var k = 0u; k < left; k++) {
         sum += side(cut[k], cut[select(k + 1u, 0u, k + 1u == left)], point.normal);
     }
-    // Fronts are seen clockwise.
+    // Fronts are clockwise as seen from the point.
     return max(-sum / (2.0 * PI), 0.0);
 }
 
@@ -104,7 +104,7 @@ fn rank_lights(
         if lane < EVENNESS_POINTS {
             weight = to_light(light, point, sobol(lane)).factor;
         }
-        // Points of weights w are worth (Σ w)² / Σ w² of equal weight (Kish 1965, section 11.7).
+        // Points of weights w have the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
         let sum = added_up(lane, vec4f(weight, weight * weight, 0.0, 0.0));
         if lane == 0u {
             let worth = sum.x * sum.x / max(sum.y * f32(EVENNESS_POINTS), 1e-37);
@@ -119,7 +119,7 @@ fn rank_lights(
     }
 }
 
-// Puts a light in its place among the brightest: of equals the lower number comes first.
+// Inserts a light into the list of the brightest; ties are ordered by number.
 fn insert(light: u32, factor: f32) {
     let exitance = lights[light].exitance;
     let irradiance = factor * max(exitance.x, max(exitance.y, exitance.z));
@@ -145,8 +145,8 @@ fn insert(light: u32, factor: f32) {
     ranked_irradiance[at] = irradiance;
 }
 
-// The state of a point that has cast no ray. A wide light without a closed form is a surface like
-// any other.
+// Writes the state of a point before the first ray. A wide light without a closed form is treated
+// like any surface.
 fn write(p: u32, kept: u32) {
     var left = 0u;
     for (var k = 0u; k < kept; k++) {

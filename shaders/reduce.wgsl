@@ -1,15 +1,15 @@
-// Adds up the weights of the pixels that see each element: item buffers to form-factor rows,
-// dense, in fixed point, so that the order of the additions does not matter.
+// Adds up the weights of the pixels that see each element: item buffers to dense form-factor rows
+// in fixed point, so that the order of the additions does not matter.
 //
-// A thread walks down one pixel column of a strip, and looks the element up and adds to memory only
+// A thread processes one pixel column of a strip, and looks the element up and adds to memory only
 // where the item changes.
 
 const STRIP: u32 = 16u;
 
 struct Reduction {
     resolution: u32,      // N: an item buffer is N wide and 3N high
-    slots: u32,           // words of a row: open, back, then one an element
-    stride: u32,          // words from line to line of an item buffer, at least N
+    slots: u32,           // words of a row: open, back, then one per element
+    stride: u32,          // words per line of an item buffer, at least N
 }
 
 @group(0) @binding(0) var<storage, read> items: array<u32>;

@@ -1,9 +1,9 @@
-// Cosine-distributed rays from patches, and how many meet each element: a lane a ray, a line of
-// workgroups a patch. Needs shared/trace.wgsl, shared/lights.wgsl, shared/lattice.wgsl and
-// shared/element.wgsl before it.
+// Cosine-distributed rays from patches, and the number that hits each element: a lane per ray, a
+// line of workgroups per patch. Needs shared/trace.wgsl, shared/lights.wgsl, shared/lattice.wgsl
+// and shared/element.wgsl before it.
 //
-// Slots of a row: open, back, then the elements. Where there are panes three more rows of a patch
-// add up what these let through, per channel in units of 1/RowSettings::unit.
+// Slots of a row: open, back, then the elements. With panes three more rows of a patch add up their
+// transmittances, per channel in units of 1/RowSettings::unit.
 
 const OPEN: u32 = 0u;
 const BACK: u32 = 1u;
@@ -13,7 +13,7 @@ struct TracedPatch {
     position: vec3f,
     near: f32,
     position_low: vec3f,
-    own_triangle: u32,    // nothing meets it
+    own_triangle: u32,    // rays do not hit it
     normal: vec3f,
     rotation: f32,        // of the directions about the normal, in turns
 }

@@ -1,8 +1,8 @@
-// What the rays of each point amount to, and which points cast more: a lane a point. Needs
+// Evaluates the rays of each point, and selects the points that cast more: a lane per point. Needs
 // shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
 //
-// error = max(|E of the first half − E of the second|, largest ray / rays) / 2, of rays over the
-// hemisphere and of rays to lights; the larger says which are doubled.
+// error = max(|E of the first half − E of the second|, largest ray / rays) / 2, for rays over the
+// hemisphere and for rays to lights; those with the larger error are doubled.
 
 struct Sample {
     irradiance: vec3f,
@@ -20,7 +20,7 @@ struct Sample {
 
 const SINE_OF_SUN: f32 = 0.0046524;
 
-// The irradiance that lights of one kind send, by what is visible of each.
+// The irradiance of the lights of one kind, by the visible part of each.
 fn of_lights(p: u32, first: Visibilities, is_wide: bool, points: f32) -> vec3f {
     var irradiance = vec3f(0.0);
     var seen = first;
@@ -38,7 +38,7 @@ fn of_lights(p: u32, first: Visibilities, is_wide: bool, points: f32) -> vec3f {
     return irradiance;
 }
 
-// By light and sun.
+// Visibilities by light and sun.
 struct Visibilities {
     lights: array<Visible, 9>,
 }
@@ -80,7 +80,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     }
     let pending = states[p].pending;
     let normal = points[p].normal;
-    // Rays: of halves of as many.
+    // Number of rays, both halves together.
     var ray_count = states[p].ray_count;
     var shadow_count = states[p].shadow_count;
     if pending == 1u {
@@ -128,8 +128,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     out.rays = ray_count;
     out.shadow_rays = shadow_count;
     samples[p] = out;
-    // The halves are the first half of what follows. The sums of what is not doubled stay apart,
-    // since they are not read again but added up.
+    // Both halves become the first half of the next pass; without doubling too, since only the
+    // total of these sums is used again.
     let allowed = settings.noise * max(length(irradiance), settings.dim);
     let shadows_left = shadow_count < max(settings.max_rays / RAYS_PER_SHADOW_RAY, 2u);
     let rays_left = ray_count < settings.max_rays;

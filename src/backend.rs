@@ -7,11 +7,11 @@
 //! Backend::Cpu    cpu::RayRows              cpu::RayGather
 //! ```
 //!
-//! Both columns hold to one contract each ([`crate::FormFactors`], [`crate::Gather`]), so that a
-//! solver does not know which backend it uses, and [`Fallback`] can go from one to the other in the
-//! middle of a solve. Without the feature `gpu` only the CPU is there.
+//! Both columns implement one contract each ([`crate::FormFactors`], [`crate::Gather`]), so that a
+//! solver does not depend on the backend, and [`Fallback`] can switch from one to the other in the
+//! middle of a solve. Without the feature `gpu` only the CPU is available.
 //!
-//! A bake makes rows with what [costs least](cost): [`Backend::row_maker`]. Light is gathered on
+//! A bake makes rows with the [cheapest](cost) method: [`Backend::row_maker`]. Light is gathered on
 //! graphics hardware; a software device is slower than rays on the CPU.
 
 mod adapter;
@@ -40,13 +40,13 @@ use cpu::{RayGather, RayRows};
 #[cfg(feature = "gpu")]
 use gpu::{Gpu, HemicubeRows, TracedGather, TracedRows};
 
-/// What makes rows and gathers light.
+/// Computes rows and gathers light.
 #[derive(Clone, Debug)]
 pub enum Backend {
     /// Hemicubes on a graphics device.
     #[cfg(feature = "gpu")]
     Gpu(Gpu),
-    /// Rays on the CPU, as many a row as the hemicube's top face would have pixels.
+    /// Rays on the CPU; their number per row is that of the pixels of the hemicube's top face.
     Cpu,
 }
 
@@ -73,10 +73,10 @@ impl Backend {
 
     /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
     /// the top face, or from `rotations`·`resolution`² rays in a scene with clear panes or
-    /// cut-outs, which hemicubes do not see, and where there is no device.
+    /// cut-outs, which hemicubes do not support, and without a device.
     ///
-    /// A device draws hemicubes here even where rays would take less time, as they do where many
-    /// triangles meet few pixels: bakes ask [`Backend::row_maker`] first.
+    /// A device draws hemicubes here even where rays would take less time, which is the case with
+    /// many triangles and few pixels: bakes ask [`Backend::row_maker`] first.
     ///
     /// # Errors
     /// Those of [`Backend::rows_by`].
@@ -93,7 +93,7 @@ impl Backend {
         self.rows_by(maker, mesh, resolution, rotations)
     }
 
-    /// The same by this maker, of those that the backend has; by rays on the CPU otherwise.
+    /// The same with this row maker, if the backend has it; else with rays on the CPU.
     ///
     /// # Errors
     /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new),
@@ -121,7 +121,7 @@ impl Backend {
         }
     }
 
-    /// What can make rows of `scene`.
+    /// The row makers that support `scene`.
     fn row_makers(&self, scene: &Scene) -> &'static [RowMaker] {
         #[cfg(not(feature = "gpu"))]
         let _ = scene;
@@ -136,12 +136,12 @@ impl Backend {
         }
     }
 
-    /// What a bake of `scene` makes rows with, each of a hemicube with `resolution` pixels along an
-    /// edge of the top face or of `resolution`² rays: what [takes less time](cost) on an adapter
-    /// of this kind, to the same error.
+    /// Row maker for a bake of `scene` with hemicubes of `resolution` pixels along an edge of the
+    /// top face, or `resolution`² rays: the [faster one](cost) on an adapter of this kind, for the
+    /// same error.
     ///
-    /// It depends on the kind of the adapter, the number of triangles, clear panes, cut-outs and
-    /// `resolution` alone, so that every run chooses alike.
+    /// It depends only on the kind of the adapter, the number of triangles, clear panes, cut-outs
+    /// and `resolution`, so that every run chooses alike.
     pub fn row_maker(&self, scene: &Scene, resolution: u32) -> RowMaker {
         let (makers, count) = (self.row_makers(scene), scene.triangles().len());
         let cost = RowCost::of(self.assumed_kind());
@@ -149,12 +149,12 @@ impl Backend {
     }
 
     /// Whether light is gathered on the device: on graphics hardware. A software device casts rays
-    /// more slowly than the CPU does without it.
+    /// more slowly than the CPU alone.
     pub(crate) fn gathers_on_device(&self) -> bool {
         self.assumed_kind() != AdapterKind::Cpu
     }
 
-    /// The kind of adapter that choices are made for.
+    /// The kind of adapter that choices are based on.
     fn assumed_kind(&self) -> AdapterKind {
         match self {
             #[cfg(feature = "gpu")]
@@ -163,8 +163,8 @@ impl Backend {
         }
     }
 
-    /// Why rays on the CPU take the place of a software device's hemicubes in `scene`, if they do:
-    /// hemicubes do not see clear panes and cut-outs.
+    /// Why rays on the CPU replace a software device's hemicubes in `scene`, if they do: hemicubes
+    /// do not support clear panes and cut-outs.
     pub(crate) fn blind_to(&self, scene: &Scene) -> Option<Error> {
         #[cfg(not(feature = "gpu"))]
         let _ = scene;
@@ -175,8 +175,8 @@ impl Backend {
         }
     }
 
-    /// A gatherer over the scene of `mesh` with about `rays` rays a point: on graphics hardware, or
-    /// on the CPU.
+    /// A gatherer over the scene of `mesh` with about `rays` rays per point: on graphics hardware,
+    /// or on the CPU.
     ///
     /// # Errors
     /// Those of [`TracedGather::new`](crate::backend::gpu::TracedGather::new) and
@@ -185,15 +185,14 @@ impl Backend {
         self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
     }
 
-    /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): with so many
-    /// samples that the standard error of a point is about `noise` of its irradiance. Rays are
-    /// doubled where they disagree, up to 16 times. What is darker than a twentieth of the mean
-    /// reflected radiosity has that share of this instead.
-    /// Where the device fails, rays on the CPU go on.
+    /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): the number of
+    /// samples is such that the standard error of a point is about `noise` of its irradiance. Rays
+    /// are doubled where they disagree, up to 16 times. Where the light is darker than a twentieth
+    /// of the mean reflected radiosity the error is that share of this instead. If the device
+    /// fails, rays on the CPU replace it.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] for a noise that is not above 0 and at most 1; those of
-    /// [`Backend::gather`].
+    /// [`ErrorKind::Setting`] for a noise not in (0, 1]; those of [`Backend::gather`].
     pub fn gather_to_noise(
         &self,
         light: &GatheredMesh,
@@ -208,8 +207,8 @@ impl Backend {
         self.gather_or_cast_rays(&light.mesh, (rays, noise, dim), |_| ())
     }
 
-    /// As [`Backend::gather_evenly`], with rays on the CPU from when the device fails, or cannot
-    /// start: `failed` gets the reason.
+    /// As [`Backend::gather_evenly`], with rays on the CPU from the time when the device fails, or
+    /// if it cannot start: `failed` receives the reason.
     pub(crate) fn gather_or_cast_rays<'a>(
         &self,
         mesh: &Mesh,

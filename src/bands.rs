@@ -1,21 +1,21 @@
-//! Light in any number of bands: wavelengths of a spectrum, or whatever a plant, a sensor or a
-//! heater asks for.
+//! Light in any number of bands: wavelengths of a spectrum, or the bands of a plant, a sensor or a
+//! heater.
 //!
-//! A bake in red, green and blue decides the mesh, its vertices and how many rays each casts. What
-//! these rays meet is made into rows once, and all bands are looked up along the same rows:
+//! A bake in red, green and blue sets the mesh, its vertices and the number of rays of each. The
+//! hits of these rays are stored as rows once, and all bands are looked up along the same rows:
 //!
 //! ```text
-//!   BakeResult ── vertices ──┬── few rays: rows kept ──► Jacobi sweeps, each band to its own end
+//!   BakeResult ── vertices ──┬── few rays: rows stored ► Jacobi sweeps, each band to its own end
 //!                            │                                  │ reflected light of vertices
 //!   Bands ───────────────────┴── many rays: looked up once ◄────┘
 //!   ρ, τ, E by material and band          │
 //!                                         └──► BandLight: radiosity, irradiance, error by band
 //! ```
 //!
-//! Arithmetic is band by band, and so are the rules when to stop: a band has the same bits in any
-//! order of the bands and whichever others there are.
+//! Arithmetic and stop rules are per band: a band has the same bits in any order of the bands and
+//! with any other bands.
 //!
-//! Bands with wavelengths add up to colours: [`cie`].
+//! Bands with wavelengths can be converted to colours: [`cie`].
 //!
 //! ```
 //! # use std::ops::ControlFlow;

@@ -1,15 +1,15 @@
-//! Form factors of patches, row by row: the contract between what makes rows and what uses them.
+//! Form factors of patches, row by row: the contract between row sources and their users.
 //!
 //! ```text
 //! row source        RayRows, HemicubeRows, your own: a patch seen from its centroid
 //!   └ ProximityCorrection   near receivers: closed forms of the whole patch
-//!       └ AdaptiveViewpoints   occluders that split a patch: the mean of what its parts see
+//!       └ AdaptiveViewpoints   occluders that split a patch: the mean over its parts
 //!           └ Solver, view factors: checked rows
 //! ```
 //!
-//! Each layer is a [`FormFactors`] again; any of them can be left out. Sources stand in
-//! [`backend`](crate::backend); here are the contract, the layers that know no backend, the closed
-//! forms, and the policy that gives rows as many samples as their light is worth.
+//! Each layer is a [`FormFactors`] again and can be omitted. Sources are in
+//! [`backend`](crate::backend); here are the contract, the layers that are independent of the
+//! backend, the closed forms, and the policy that sets the number of samples of a row by its light.
 
 pub mod closed_form;
 pub(crate) mod proximity;
@@ -27,44 +27,44 @@ pub use viewpoints::AdaptiveViewpoints;
 
 /// A source of rows: hemicubes on a GPU, rays on the CPU, closed forms.
 ///
-/// **What a source must do.** It returns one row for each patch that is asked for, in that order,
-/// each of which passes [`Row::check`]. A row depends on the mesh, the patch, the source's settings
-/// (what [`FormFactors::fingerprint`] names) and the weight alone: not on what was asked for
-/// before, nor on the other patches of the batch. So a row can be thrown away and made again with
-/// the same bits, and a solve can be saved and resumed. Bits may differ between devices.
+/// **Requirements on a source.** It returns one row for each requested patch, in that order, each
+/// of which passes [`Row::check`]. A row depends only on the mesh, the patch, the source's settings
+/// (described by [`FormFactors::fingerprint`]) and the weight: not on earlier requests, nor on the
+/// other patches of the batch. So a row can be discarded and recomputed with the same bits, and a
+/// solve can be saved and resumed. Bits may differ between devices.
 ///
-/// **What a user does.** It asks for patches of the mesh that the source was made for, some
+/// **Requirements on a user.** It requests patches of the mesh that the source was made for, some
 /// [`FormFactors::preferred_batch_len`] at once; any number is allowed. Rows are checked where they
 /// are used: the solver, the view factors and the layers of this module return an error for a row
 /// that breaks its contract. An error leaves the source usable: the same or other patches can be
-/// asked for again.
+/// requested again.
 pub trait FormFactors {
     /// The rows of `patches`, in their order.
     ///
-    /// `weight` says what is at stake: the largest share of the emitted flux, in [0, 1] and of
-    /// the worst channel, that one of `patches` is about to shoot. A source may use fewer samples
-    /// for rows of little weight; 1 asks for all it can do.
+    /// `weight` is the importance of the rows: the largest share of the emitted flux, in [0, 1] and
+    /// of the worst channel, that one of `patches` is about to shoot. A source may use fewer
+    /// samples for rows of little weight; 1 requests the maximum.
     ///
     /// # Errors
-    /// What keeps the source from making them, [`ErrorKind::Device`] above all.
+    /// Errors of the source, mainly [`ErrorKind::Device`].
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error>;
 
-    /// How many rows are best asked for at once, 1 or more.
+    /// Preferred number of rows per request, ≥ 1.
     fn preferred_batch_len(&self) -> usize {
         1
     }
 
-    /// Everything that the bits of its rows depend on beside mesh, patch and weight, in words:
+    /// Text that identifies all that the bits of its rows depend on beside mesh, patch and weight:
     /// a saved solve is resumed only with rows of the same fingerprint.
     fn fingerprint(&self) -> String {
         "rows".into()
     }
 }
 
-/// The rows of `patches` by `source`, one each, every one of which keeps its contract.
+/// The rows of `patches` by `source`, one each, checked for their contract.
 ///
 /// # Errors
-/// [`ErrorKind::FormFactor`] when one does not, or there are too few or too many; those of
+/// [`ErrorKind::FormFactor`] when a row breaks it, or the number of rows is wrong; those of
 /// `source`.
 pub(crate) fn checked_rows(
     source: &mut (impl FormFactors + ?Sized),

@@ -1,15 +1,15 @@
-//! Radiative heat transfer between groups whose view factors are known.
+//! Radiative heat transfer between groups with known view factors.
 //!
-//! Groups are grey in each band of wavelengths, diffuse, and of one temperature each; what is
-//! between them takes no part. In every band the radiosity B and the irradiance H of a group are
-//!
+//! Groups are grey in each wavelength band, diffuse, and isothermal; the medium between them does
+//! not participate. In every band the radiosity B and the irradiance H of a group are
 //! ```text
 //! B = ε M(T) + (1 − ε) H        H_i = Σ_j F_ij B_j + open_i M(T_surroundings)
 //! ```
 //!
-//! with M the black body's part in the band, σT⁴ in all (M. F. Modest, "Radiative Heat Transfer",
-//! 3rd edition 2013, equations 5.28 to 5.31). A group has a temperature, or the net flux out
-//! q = Σ ε (M − H) is given and its temperature found; an adiabatic group has q = 0.
+//! with M the emission of a black body in the band, σT⁴ in total (M. F. Modest, "Radiative Heat
+//! Transfer", 3rd edition 2013, equations 5.28 to 5.31). For a group either the temperature is
+//! given, or the net flux out q = Σ ε (M − H), and the temperature is computed; an adiabatic group
+//! has q = 0.
 //!
 //! ```text
 //! ViewFactors ─→ one linear system (GMRES) where there is one band or no flux is given
@@ -37,14 +37,14 @@ pub use surface::{Boundary, HeatSettings, Surface};
 impl HeatBalance {
     /// Solves for the exchange between the groups of `factors`, one of `surfaces` each.
     ///
-    /// `progress` is told the residual after every product with the matrix, and may cancel: then
-    /// there is no balance. Reflectance may be 1. The same bits on every run.
+    /// `progress` is called with the residual after every product with the matrix, and may cancel:
+    /// then there is no balance. Reflectance may be 1. The result has the same bits on every run.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`], with the name of the group, for a temperature that is negative or
-    /// not finite, an emissivity outside [0, 1] or not one a band, a net flux out of a group that
-    /// absorbs nothing, a net flux that would take a temperature below 0 K, groups whose
-    /// temperature nothing determines, and band edges that do not ascend.
+    /// not finite, an emissivity outside [0, 1] or not one per band, a net flux out of a group that
+    /// absorbs nothing, a net flux that would require a temperature below 0 K, groups with an
+    /// undetermined temperature, and band edges that do not ascend.
     pub fn of(
         factors: &ViewFactors,
         surfaces: &[Surface],

@@ -1,6 +1,7 @@
-//! Processes that share out work, each with all of the input: as those of MPI do.
+//! Work distributed over processes that all have the whole input, as with MPI.
 //!
-//! Where all run alike, each calls [`Ranks::all_gather`] itself. Where one drives and others serve:
+//! Where all run alike, each calls [`Ranks::all_gather`] itself. Where process 0 drives and others
+//! serve:
 //!
 //! ```text
 //! process 0        ask ─ request ─→ all      own share ─┐
@@ -14,20 +15,21 @@ use crate::error::{Error, ErrorKind};
 
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
-/// What is shared out comes back the same, whichever process made it, so that all of them have the
-/// same bits, for any number of them. Every process must make the same calls in the same order.
+/// Distributed results do not depend on which process computed them, so that all processes have the
+/// same bits, for any number of processes. Every process must make the same calls in the same
+/// order.
 pub trait Ranks: std::fmt::Debug {
-    /// The number of this process, from 0.
+    /// Index of this process, from 0.
     fn rank(&self) -> usize;
 
-    /// How many there are, 1 or more.
+    /// Number of processes, ≥ 1.
     fn size(&self) -> usize;
 
-    /// Gives `bytes` to all processes: what each has given, by rank.
+    /// Sends `bytes` to all processes; returns the bytes of all of them, by rank.
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;
 }
 
-/// A process that works alone.
+/// A single process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Alone;
 
@@ -45,11 +47,11 @@ impl Ranks for Alone {
     }
 }
 
-/// What process 0 wants of `items`, of which every process does its own share for a request: in
-/// their order. The others [`serve`].
+/// Requests the results for `items` from all processes, each of which computes its share; returns
+/// them in order. The other processes [`serve`].
 ///
 /// # Errors
-/// Those of `own`, in any process.
+/// The errors of `own`, in any process.
 pub(crate) fn ask<Q: Serialize, R: Serialize + DeserializeOwned>(
     ranks: &mut dyn Ranks,
     request: &Q,
@@ -73,14 +75,14 @@ pub(crate) fn ask<Q: Serialize, R: Serialize + DeserializeOwned>(
     Ok(in_order(of_ranks, items))
 }
 
-/// Results of all ranks in the order of their `items`, which were dealt out one by one.
+/// Results of all ranks in the order of the `items`, which were assigned round-robin.
 pub(crate) fn in_order<R>(of_ranks: Vec<Vec<R>>, items: usize) -> Vec<R> {
     let size = of_ranks.len();
     let mut of_ranks: Vec<_> = of_ranks.into_iter().map(Vec::into_iter).collect();
     (0..items).filter_map(|k| of_ranks[k % size].next()).collect()
 }
 
-/// Does this process's share of all that process 0 [`ask`]s for, until it [`dismiss`]es.
+/// Computes this process's share of all that process 0 [`ask`]s for, until it [`dismiss`]es.
 pub(crate) fn serve<Q: DeserializeOwned, R: Serialize>(
     ranks: &mut dyn Ranks,
     mut own: impl FnMut(&Q, Share) -> Result<Vec<R>, Error>,
@@ -95,14 +97,14 @@ pub(crate) fn serve<Q: DeserializeOwned, R: Serialize>(
     }
 }
 
-/// Ends the service of all others.
+/// Ends the service of all other processes.
 pub(crate) fn dismiss(ranks: &mut dyn Ranks) {
     if ranks.size() > 1 {
         ranks.all_gather(&[]);
     }
 }
 
-/// Which of many things fall to one process: they are dealt out one by one.
+/// Selects the items of one process: they are assigned round-robin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Share {
     rank: usize,
@@ -114,18 +116,18 @@ impl Share {
         Share { rank: ranks.rank(), size: ranks.size() }
     }
 
-    /// Those of `items`.
+    /// The share of `items`.
     pub fn from<T>(self, items: &[T]) -> impl Iterator<Item = &T> {
         items.iter().skip(self.rank).step_by(self.size)
     }
 }
 
-/// `message` for other processes.
+/// `message`, serialized for other processes.
 pub(crate) fn encoded(message: &impl Serialize) -> Vec<u8> {
     postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
 }
 
-/// What another process has [`encoded`].
+/// A message that another process has [`encoded`].
 pub(crate) fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> T {
     postcard::from_bytes(bytes).expect("all processes run the same program")
 }

@@ -2,8 +2,8 @@
 //! elements.
 //!
 //! The equation is B_i = E_i + ρ_i Σ_j F_ij B_j. All methods work on flux (W) instead and keep the
-//! same state, what each element has received and what it has not passed on yet; they differ only
-//! in whose light is sent next:
+//! same state: the flux that each element has received and the part that it has not passed on yet.
+//! They differ only in which elements send next:
 //!
 //! ```text
 //! Solver (settings) ── begin ──▶ SolveSession ── advance, advance … ──▶ Solution
@@ -14,8 +14,8 @@
 //!                      FluxState: incident, unshot, Ledger
 //! ```
 //!
-//! After every batch of rows all light is accounted for, so a session can be looked at, saved and
-//! resumed, or given a scene whose materials or objects have changed.
+//! After every batch of rows all light is accounted for, so that a session can be inspected, saved
+//! and resumed, or given a scene whose materials or objects have changed.
 
 mod checkpoint;
 mod direct;
@@ -48,28 +48,29 @@ pub use method::Method;
 pub use session::SolveSession;
 pub use settings::Solver;
 
-/// Radiosity of every element, and how the solver got there.
+/// Radiosity of every element, and statistics of the solve.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Solution {
     /// Radiosity B of each element: emitted plus reflected, W/m² per channel.
     pub radiosity: Vec<Rgb>,
-    /// Where all emitted light has gone.
+    /// Energy balance of the emitted light.
     pub ledger: Ledger,
-    /// How it was solved.
+    /// The method that solved it.
     pub method: Method,
-    /// What was done, in the unit of its [`Method`]: shots, bounces, sweeps, products. For Jacobi,
-    /// the bounces that the radiosity has in full.
+    /// Steps done, in the unit of the [`Method`]: shots, bounces, sweeps, products. For Jacobi, the
+    /// number of bounces that the radiosity contains in full.
     pub steps: u64,
-    /// Rows that light was sent along, of patches or, in most methods, elements.
+    /// Rows that light was sent along: of patches with shooting, of elements with the other
+    /// methods.
     pub shots: u64,
-    /// Rows that had to be made; fewer than shots where rows were kept.
+    /// Rows computed; fewer than shots where rows were cached.
     pub rows_made: u64,
     /// Why the solver stopped.
     pub stop: StopReason,
 }
 
-/// How far a solver is, reported after every shot or row.
+/// Progress of a solver, reported after every shot or row.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Progress {
@@ -77,19 +78,19 @@ pub struct Progress {
     pub steps: u64,
     /// Rows that light was sent along so far.
     pub shots: u64,
-    /// Rows made so far.
+    /// Rows computed so far.
     pub rows_made: u64,
-    /// Share of the emitted flux that is unshot or overshot, in the worst channel; with GMRES an
-    /// upper bound of it, and 1 until a direct solve is through.
+    /// Unshot and overshot share of the emitted flux, worst channel; with GMRES an upper bound of
+    /// it, and 1 until a direct solve has finished.
     pub unshot_share: f64,
     /// Time since the solver was started.
     pub elapsed: Duration,
 }
 
 impl Solution {
-    /// Σ weight × solution: lights that were solved one by one on the same mesh, combined. Weights
-    /// are per channel and not below 0. Radiosity is linear in what is emitted, and so is the
-    /// ledger. Steps, shots and rows are the sums of all; the stop reason is the first that is not
+    /// Σ weight × solution: combines lights that were solved separately on the same mesh. Weights
+    /// are per channel and ≥ 0. Radiosity and ledger are linear in the emission. Steps, shots and
+    /// rows are sums over all parts; the stop reason is the first that is not
     /// [`StopReason::Converged`].
     ///
     /// # Errors

@@ -1,31 +1,30 @@
-//! View factors between whole groups of surfaces, as heat transfer means them.
+//! View factors between whole groups of surfaces, as used in heat transfer.
 //!
 //! F_ij is the fraction of the flux leaving group i that arrives at fronts of group j, averaged
-//! over the area of i. There are three ways to a matrix; [`ViewFactors::new`] takes one of the
-//! first two, by how long the first would take:
+//! over the area of i. There are three methods; [`ViewFactors::new`] selects one of the first two
+//! by the predicted time of the first:
 //!
 //! ```text
-//! ViewFactors::exact     exact but for an error far below what is asked for; time ~ polygons²,
-//!                        and more where many stand between
+//! ViewFactors::exact     error far below the requested one; time ~ polygons², and more with many
+//!                        blockers between
 //!   coplanar triangles ─→ convex polygons ─→ each pair once
-//!     in full view   closed form (contour integral), or Gauss cubature where far
-//!     occluded       adaptive cubature over one of the two: at each point the other, less the
-//!                    shadows of all blockers, by Lambert's formula; blockers found by a shaft
-//!                    around the pair; cells cut along visual events
+//!     unoccluded     closed form (contour integral), or Gauss cubature where far
+//!     occluded       adaptive cubature over one of the two: at each point Lambert's formula over
+//!                    the other, less the shadows of all blockers; blockers from a shaft around
+//!                    the pair; cells cut along visual events
 //!
-//! ViewFactors::sparse    with the error that is asked for; time ~ polygons, and pairs that see
-//!                        one another
+//! ViewFactors::sparse    with the requested error; time ~ polygons, and pairs that see one
+//!                        another
 //!   rays from each polygon ─→ pairs that matter
 //!     small          the count of rays
-//!     others         shadow rays, closed forms, or points that see the other past all blockers,
-//!                    whichever is cheapest
+//!     others         the cheapest of shadow rays, closed forms, or visible parts from points
 //!
 //! ViewFactors::sampled   means over the rows of a mesh's elements, hemicubes or rays; time ~
-//!                        elements; the error is estimated, not asked for
+//!                        elements; the error is estimated, not requested
 //! ```
 //!
-//! Of all, [`ViewFactors::checks`] measures closure, reciprocity and bounds, and
-//! [`ViewFactors::enforced`] makes a matrix that keeps them. Files: [`crate::io`].
+//! [`ViewFactors::checks`] measures closure, reciprocity and bounds of any matrix, and
+//! [`ViewFactors::enforced`] makes a matrix that satisfies them. Files: [`crate::io`].
 
 mod assembler;
 mod blocker_tree;
@@ -70,16 +69,16 @@ pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, MatrixSize, Missing, ViewFactors};
 pub use self::partial_matrix::PartialMatrix;
 
-/// Bytes at most at a time for each factor of an exact matrix. Measured: 28 to 34 by cubes with a
-/// box inside.
+/// Maximum memory per factor of an exact matrix, bytes. Measured: 28 to 34 for cubes with a box
+/// inside.
 const BYTES_OF_EXACT_FACTOR: usize = 35;
 
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
-    /// or by far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
-    /// [`ViewFactors::sparse`]. Which of them it was, [`ViewFactors::absent`] tells.
+    /// or far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
+    /// [`ViewFactors::sparse`]. [`ViewFactors::absent`] tells the two apart.
     ///
-    /// How long it would take is predicted from what stands between a few thousand pairs.
+    /// The time is predicted from the number of blockers between a few thousand pairs.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -98,8 +97,9 @@ impl ViewFactors {
         Ok(whole(scene, polygons, error, method, progress))
     }
 
-    /// About how large the matrix will be that [`ViewFactors::new`] makes: by the rays of some
-    /// polygons where it is sparse, and at most all pairs where it is exact. Takes some seconds.
+    /// Approximate size of the matrix that [`ViewFactors::new`] makes: estimated from the rays of
+    /// some polygons where it is sparse, all pairs as an upper bound where it is exact. Takes some
+    /// seconds.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -119,20 +119,21 @@ impl ViewFactors {
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
     ///
-    /// The groups of index `two_sided` give and take on both sides. `progress` is told convex
-    /// polygons done and in all, and may cancel: then there is no matrix. The same bits on every
-    /// run.
+    /// Groups with an index in `two_sided` emit and receive on both sides. `progress` is called
+    /// with the number of convex polygons done and their total, and may cancel: then there is no
+    /// matrix. The result has the same bits on every run.
     ///
-    /// Coplanar triangles become convex polygons. Pairs with nothing in between are exact: the
-    /// contour integral of Schröder and Hanrahan (1993), see
-    /// [`crate::form_factor::closed_form::polygon_to_polygon`]; 1e-13, or 6e-8 of the factor where
-    /// they are more than 8 radii apart. Of others, one is cut into triangles, and each of these is
-    /// integrated over by Radon's seven-point rule of what a point sees of the other: Lambert's
-    /// formula (1760) over what the shadows of all blockers leave of it, exact. Triangles are cut
-    /// until rules of different degree agree; the error told is what the last cuts have changed.
-    /// Reciprocity A_i F_ij = A_j F_ji holds to rounding, since every pair is met once.
+    /// Coplanar triangles become convex polygons. Unoccluded pairs are exact: the contour integral
+    /// of Schröder and Hanrahan (1993), see
+    /// [`crate::form_factor::closed_form::polygon_to_polygon`]; error 1e-13, or 6e-8 of the factor
+    /// where they are more than 8 radii apart. Of an occluded pair, one polygon is cut into
+    /// triangles. Radon's seven-point rule integrates over each triangle the form factor from a
+    /// point to the visible part of the other polygon, which is exact: Lambert's formula (1760)
+    /// over the polygon less the shadows of all blockers. Triangles are cut until rules of
+    /// different degree agree; the reported error is the change due to the last cuts. Reciprocity
+    /// A_i F_ij = A_j F_ji holds to rounding, since every pair is computed once.
     ///
-    /// Time grows with the square of the number of polygons, and with those that stand in between.
+    /// Time grows with the square of the number of polygons, and with the number of blockers.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -147,17 +148,18 @@ impl ViewFactors {
         Ok(whole(scene, polygons, error, Method::Exact, progress))
     }
 
-    /// The matrix of many polygons, of which each sees few: with two absolute standard errors of at
-    /// most `error` on every factor, where the limits on points and rays of a pair allow it.
+    /// The matrix of many polygons that each see few others: with two absolute standard errors of
+    /// at most `error` on every factor, where the limits on points and rays of a pair allow it.
     ///
-    /// Rays from every polygon find what sees what; a pair is estimated where a ray of either has
-    /// met the other, by the cheapest method that is good enough: the count of rays, shadow rays, a
-    /// closed form, or the visible part of one from points of the other. What no ray has met is
-    /// left out ([`Missing::Unmet`]): by far most of it is below `error`. `open` is what is left
-    /// over. `progress` and `two_sided` are those of [`ViewFactors::exact`]. The same bits on every
-    /// run, whatever the number of threads.
+    /// Rays from every polygon determine which polygons see each other. A pair is estimated if a
+    /// ray of either has hit the other, by the cheapest method that is accurate enough: the count
+    /// of rays, shadow rays, a closed form, or the visible part of one from points of the other.
+    /// Pairs that no ray has hit are left out ([`Missing::Unmet`]): by far most of their factors
+    /// are below `error`. `open` is the remainder of the row. `progress` and `two_sided` are those
+    /// of [`ViewFactors::exact`]. The result has the same bits on every run, for any number of
+    /// threads.
     ///
-    /// Where two surfaces lie in one place, rays meet one of them: sums of rows do not tell.
+    /// Where two surfaces coincide, rays hit one of them: sums of rows do not show this.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -172,9 +174,9 @@ impl ViewFactors {
         Ok(whole(scene, polygons, error, Method::Sparse, progress))
     }
 
-    /// Rows of the exact matrix, those of the groups `from`: to hold another matrix against.
+    /// Rows of the exact matrix for the groups `from`: a reference for another matrix.
     ///
-    /// Settings, errors and `progress`, told rows, are those of [`ViewFactors::exact`].
+    /// Settings, errors and `progress` (called with rows) are those of [`ViewFactors::exact`].
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -201,11 +203,11 @@ impl ViewFactors {
     /// Averages the rows of all elements of `mesh` over their groups, weighted by area: for scenes
     /// too large for [`ViewFactors::new`].
     ///
-    /// `progress` is told elements done and elements in all, and may cancel: then there is no
-    /// matrix. Each element is seen from its centroid: elements must be small against the distance
-    /// to what they see, or the error is that of the proximity assumption (Baum, Rushmeier, Winget
-    /// 1989). The standard error is judged by leaving out three elements of four; triangles that
-    /// are not divided leave nothing to judge by and count as all error.
+    /// `progress` is called with the number of elements done and their total, and may cancel: then
+    /// there is no matrix. Each element is seen from its centroid: elements must be small compared
+    /// with the distance to what they see, or the error is that of the proximity assumption (Baum,
+    /// Rushmeier, Winget 1989). The standard error is estimated by leaving out three elements of
+    /// four; for undivided triangles that is impossible, and their whole value counts as error.
     ///
     /// # Errors
     /// Those of `form_factors`, or [`ErrorKind::FormFactor`] for a row that breaks its contract.
@@ -222,14 +224,14 @@ impl ViewFactors {
         MatrixChecks::of(self)
     }
 
-    /// The groups whose enclosure leaks: more of their flux meets nothing than three standard
-    /// errors explain. The most open come first.
+    /// The groups whose enclosure leaks: the share of their flux that hits nothing exceeds three
+    /// standard errors. The most open come first.
     pub fn open_rows(&self) -> Vec<usize> {
         checks::open_rows(self)
     }
 
-    /// The groups whose rows sum to more than one, beyond three standard errors: something they see
-    /// is there twice, such as a poster in the plane of its wall. The largest sum comes first.
+    /// The groups whose rows sum to more than one by over three standard errors: they see
+    /// coinciding surfaces, such as a poster in the plane of its wall. The largest sum comes first.
     pub fn rows_over_unity(&self) -> Vec<usize> {
         checks::rows_over_unity(self)
     }
@@ -239,27 +241,27 @@ impl ViewFactors {
     /// First both factors of a pair are set to their mean, weighted by the inverse of their
     /// variances: A_i F_ij is then a symmetric matrix G. Then G is scaled from both sides, x_i G_ij
     /// x_j, until every row adds up to A_i: symmetric matrix scaling, which keeps symmetry and
-    /// zeros, makes nothing negative, and changes the factors least in the sense of relative
-    /// entropy (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix
-    /// scaling", SIAM J. Matrix Anal. Appl. 35, 2014). What a row loses to the open or to backs is
-    /// scaled with it; an open share within its error of zero is taken to be zero. No total comes
-    /// out above 1. What a factor was changed by is added to its error, in squares.
+    /// zeros, makes nothing negative, and minimizes the change of the factors in relative entropy
+    /// (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix scaling", SIAM
+    /// J. Matrix Anal. Appl. 35, 2014). The shares of a row that are open or hit backs are scaled
+    /// with it; an open share within its error of zero is set to zero. No total exceeds 1. The
+    /// change of a factor is added to its error, in squares.
     pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
         enforcement::enforce(self)
     }
 }
 
 impl PartialMatrix {
-    /// Makes those rows of `groups` that are not `done`, of the matrix that
-    /// [`ViewFactors::new`] makes with these settings, and adds them to what is.
+    /// Computes those rows of `groups` that are not in `done`, of the matrix that
+    /// [`ViewFactors::new`] makes with these settings, and returns them with those of `done`.
     ///
-    /// `ranks` share the work out; [`Alone`](crate::ranks::Alone) does it alone. `progress` is
-    /// told the rows that are done, polygons done and in all, and may stop the work: what is done
-    /// by then is returned.
+    /// `ranks` share the work; [`Alone`](crate::ranks::Alone) is a single process. `progress` is
+    /// called with the rows done, the number of polygons done and their total, and may stop the
+    /// work: the rows done so far are returned.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or what is
-    /// `done` is of another scene or other settings.
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or `done`
+    /// belongs to another scene or other settings.
     pub fn make(
         scene: &Scene,
         error: f64,
@@ -294,7 +296,7 @@ impl PartialMatrix {
     }
 }
 
-/// The whole matrix by `method`, or none where `progress` stops it.
+/// The whole matrix by `method`, or `None` if `progress` stops it.
 fn whole(
     scene: &Scene,
     polygons: ScenePolygons,
@@ -310,7 +312,7 @@ fn whole(
     if is_done { part.into_matrix().ok() } else { None }
 }
 
-/// `part` with rows of `groups` added, and whether that was not stopped.
+/// `part` with rows of `groups` added, and whether the work was completed.
 fn with_rows(
     part: PartialMatrix,
     scene: &Scene,
@@ -329,7 +331,7 @@ fn with_rows(
     (making.part, done.is_some())
 }
 
-/// Whether `error` and `two_sided` are settings of [`ViewFactors::new`].
+/// Whether `error` and `two_sided` are valid settings of [`ViewFactors::new`].
 fn check_settings(scene: &Scene, error: f64, two_sided: &[usize]) -> Result<(), Error> {
     let groups = scene.groups().len();
     let wrong = |place: &str, found: String, remedy: String| {

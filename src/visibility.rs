@@ -1,4 +1,4 @@
-//! What a ray meets first, and whether anything is in between.
+//! Ray casting: closest hits and occlusion between points.
 
 pub(crate) mod buried;
 mod collapse;

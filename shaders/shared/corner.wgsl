@@ -1,20 +1,20 @@
-// A corner of a triangle, and where a view has it. Put before the draw shader.
+// A corner of a triangle, and its view coordinates. Put before the draw shader.
 
 // A corner in two parts that add up to it.
 struct Corner {
-    high: vec3f,          // from the middle of the scene, in units of its size
-    back_is_covered: u32, // 1: fronts in the same place cover its triangle's back
-    low: vec3f,           // what rounding took off
+    high: vec3f,          // relative to the middle of the scene, in units of its size
+    back_is_covered: u32, // 1: coinciding fronts cover its triangle's back
+    low: vec3f,           // rounding remainder of `high`
     padding: u32,
 }
 
-// From the eye, itself in two parts, to a corner. Of corners near the eye the first difference is
-// exact: nothing is too small to be seen.
+// Vector from the eye, itself in two parts, to a corner. For corners near the eye the first
+// difference is exact: small objects keep their shape.
 fn from_eye(corner: Corner, eye: vec3f, eye_low: vec3f) -> vec3f {
     return (corner.high - eye) + (corner.low - eye_low);
 }
 
-// Whether the triangle of corner `index` shows the eye a back that is covered: it is not drawn.
+// Whether the eye sees a covered back of the triangle of corner `index`: it is not drawn.
 fn shows_covered_back(index: u32, eye: vec3f, eye_low: vec3f) -> bool {
     if corners[index].back_is_covered == 0u {
         return false;
@@ -26,7 +26,7 @@ fn shows_covered_back(index: u32, eye: vec3f, eye_low: vec3f) -> bool {
     return dot(a, cross(b - a, c - a)) >= 0.0;
 }
 
-// Where what is not drawn goes: beyond the far end.
+// Position of vertices that are not drawn: beyond the far end.
 const NOWHERE: vec4f = vec4f(0.0, 0.0, -1.0, 1.0);
 
 // Clip coordinates of a point with view coordinates x, y and w (along the view's axis). Lines from

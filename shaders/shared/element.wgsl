@@ -2,8 +2,8 @@
 
 const INNER: u32 = 0x80000000u;
 
-// Of each triangle of the scene its first node and how many cells lie along an edge, a power of
-// two; then the nodes of all quadtrees: INNER + first child, or an element.
+// Per triangle of the scene its first node and the number of cells along an edge, a power of two;
+// then the nodes of all quadtrees: INNER + first child, or an element.
 @group(2) @binding(0) var<storage, read> quadtrees: array<u32>;
 
 struct InElement {
@@ -11,7 +11,7 @@ struct InElement {
     weights: vec2f,       // of its second and third corner
 }
 
-// Found in a lattice of nodes at the deepest level that the quadtree is complete to, then by
+// Looked up in a lattice of nodes at the deepest level that the quadtree is complete to, then by
 // descent; `weights` are those of the triangle's second and third corner.
 fn element_at(triangle: u32, weights: vec2f) -> InElement {
     let first = quadtrees[2u * triangle];
@@ -24,7 +24,7 @@ fn element_at(triangle: u32, weights: vec2f) -> InElement {
         p = 1.0 - p;
     }
     var node = quadtrees[first + cell_index(square, side, beyond)];
-    // What lies out of the array reads as 0, an element: the descent ends.
+    // Reads outside of the array return 0, an element: the descent ends.
     while (node & INNER) != 0u {
         node &= ~INNER;
         if p.x > 0.5 {

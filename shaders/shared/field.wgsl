@@ -5,7 +5,7 @@ const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
 @group(2) @binding(1) var elements: texture_2d<f32>;   // reflected radiosity at corners
 
 // Reflected radiosity at a position of a triangle, by the weights of its second and third corner:
-// linear between the corners of the element, which lie below one another.
+// linear between the corners of the element, which are in three lines.
 fn reflected(triangle: u32, weights: vec2f) -> vec3f {
     let at = element_at(triangle, weights);
     let at_a = vec2u(at.element % ELEMENTS_A_LINE, at.element / ELEMENTS_A_LINE * 3u);

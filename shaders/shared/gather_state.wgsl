@@ -1,22 +1,22 @@
-// What a gather knows of each of its points between passes. Needs shared/lights.wgsl before it.
+// The state of each point of a gather between passes. Needs shared/lights.wgsl before it.
 //
 // rank_lights ─► hemisphere_rays, light_rays ─► settle ─► those again, of points that need more
 
-const LANES: u32 = 64u;               // a workgroup, of one point
+const LANES: u32 = 64u;               // size of a workgroup; each serves one point
 const RAYS_PER_SHADOW_RAY: u32 = 4u;
 
 // Sums over rays.
 struct RaySums {
-    light: vec3f,         // what surfaces reflect and the sky sends, but for lights sampled apart
+    light: vec3f,         // from surfaces and the sky, except lights sampled separately
     escaped: f32,
     lamps: vec3f,         // exitance of the other lights
     back: f32,
     inverse_distance: f32,
-    largest: f32,         // the largest of `light` by one ray: a length over the channels
+    largest: f32,         // largest contribution of one ray to `light`: length over channels
     padding: vec2f,
 }
 
-// Of places on a light, or of rays towards it: form factors of those that are seen, and of all.
+// Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
 struct Visible {
     seen: vec3f,
     all: f32,
@@ -24,21 +24,21 @@ struct Visible {
 
 struct RankedLight {
     light: u32,
-    factor: f32,          // form factor to all of it as if nothing were in between
-    is_wide: u32,         // rays over the hemisphere tell how much of it is seen
+    factor: f32,          // unoccluded form factor to all of it
+    is_wide: u32,         // whether rays over the hemisphere estimate its visible share
     padding: u32,
 }
 
-const SUN: u32 = MAX_EXPLICIT_LIGHTS; // its place in `visible`
+const SUN: u32 = MAX_EXPLICIT_LIGHTS; // its index in `visible`
 
 struct PointState {
-    rays: array<RaySums, 2>,          // the first half, or what was before; the second half
+    rays: array<RaySums, 2>,          // the first half, or all earlier rays; the second half
     lights: array<RankedLight, MAX_EXPLICIT_LIGHTS>,
-    visible: array<Visible, 18>,      // by light and sun, of the first half; of the second
+    visible: array<Visible, 18>,      // by light and sun, for the first half; for the second
     light_count: u32,
     ray_count: u32,       // rays over the hemisphere
     shadow_count: u32,    // to each light
-    pending: u32,         // 1: rays were doubled; 2: rays to lights were
+    pending: u32,         // 1: rays were doubled; 2: rays to lights were doubled
     ray_error: f32,
     shadow_error: f32,
     padding: array<u32, 2>,
@@ -48,20 +48,20 @@ struct GatherSettings {
     min_rays: u32,
     max_rays: u32,
     noise: f32,           // allowed, as a share of the irradiance
-    dim: f32,             // or of this, where the irradiance is less
+    dim: f32,             // irradiance below which `noise` is a share of this
     points: u32,
-    first: u32,           // rays of a half that passes before this have cast
-    pass_rays: u32,       // those that one casts
+    first: u32,           // number of rays of a half cast by preceding passes
+    pass_rays: u32,       // number of rays cast by one pass
     padding: u32,
 }
 
 struct Work {
-    // Workgroups of the next passes: of points whose rays are doubled, of those whose shadow rays
-    // are.
+    // Numbers of workgroups of the next passes: points whose rays are doubled, and points whose
+    // shadow rays are.
     ray_groups: array<atomic<u32>, 3>,
     shadow_groups: array<atomic<u32>, 3>,
     padding: array<u32, 2>,
-    points: array<u32>,   // the former's points, then from GatherSettings::points on the latter's
+    points: array<u32>,   // points of the former; of the latter from GatherSettings::points on
 }
 
 @group(1) @binding(0) var<storage, read> points: array<TracedPoint>;
@@ -84,7 +84,7 @@ fn added_up(lane: u32, value: vec4f) -> vec4f {
     return sums[0];
 }
 
-// The largest of all lanes.
+// The maximum over all lanes.
 fn largest_of(lane: u32, value: f32) -> f32 {
     workgroupBarrier();
     sums[lane].x = value;

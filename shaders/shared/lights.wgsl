@@ -1,8 +1,8 @@
-// Lights, and what clear panes let through of them. Needs shared/trace.wgsl before it.
+// Lights, and the transmittance of clear panes. Needs shared/trace.wgsl before it.
 
 const MAX_EXPLICIT_LIGHTS: u32 = 8u;
 const NO_LIGHT: u32 = 0xffffffffu;
-const ANY_LIGHT: u32 = 0xfffffffeu;   // of no triangle: what hides the sun is whatever is met
+const ANY_LIGHT: u32 = 0xfffffffeu;   // of no triangle: any hit hides the sun
 const PI: f32 = 3.14159265;
 
 struct TracedLight {
@@ -15,14 +15,14 @@ struct TracedLight {
 }
 
 struct Lamp {
-    triangle: u32,        // its place in `triangles`
-    end: f32,             // share of the light's area up to its end
+    triangle: u32,        // its index in `triangles`
+    end: f32,             // cumulative share of the light's area up to its end
 }
 
 @group(0) @binding(5) var<storage, read> lights: array<TracedLight>;
 @group(0) @binding(6) var<storage, read> lamps: array<Lamp>;
 
-// What clear panes between the ray's near distance and `end` let through. A ray along the side that
+// Transmittance of clear panes between the ray's near distance and `end`. A ray along the side that
 // two triangles of a pane share may count both or neither: one in some 10⁶ rays.
 fn passed(ray: Ray, end: f32) -> vec3f {
     var share = vec3f(1.0);
@@ -58,7 +58,7 @@ fn passed(ray: Ray, end: f32) -> vec3f {
     return share;
 }
 
-// A point that light is gathered at.
+// A gather point.
 struct TracedPoint {
     position: vec3f,
     near: f32,
@@ -82,27 +82,27 @@ fn sobol(k: u32) -> vec2f {
         remaining >>= 1u;
         column ^= column >> 1u;
     }
-    // 24 bits are what a number has; the middle of the cell is half of the last.
+    // A float has 24 bits; the offset to the middle of the cell is half of the last.
     return (vec2f(vec2u(reverseBits(k), bits) >> vec2u(8u)) + 0.5) * 5.9604645e-8;
 }
 
-// The same for sample k of a point: both coordinates are rotated.
+// The same for sample k of a point, with both coordinates rotated.
 fn rotated_sobol(k: u32, point: TracedPoint) -> vec2f {
     return fract(sobol(k) + vec2f(point.second_rotation, point.rotation));
 }
 
-// From a point to a place on a light.
+// A ray from a point to a point on a light.
 struct ToLight {
     ray: Ray,
     distance: f32,
-    factor: f32,          // the form factor of all of the light by this place; 0 where it is hidden
-                          // from the point by its own plane or the horizon
+    factor: f32,          // of all of the light, estimated from this point; 0 where its
+                          // own plane or the horizon hides it
     is_solid: bool,
 }
 
-// The place `at`, in the unit square, on a light: spread evenly over its area.
+// The ray to the point `at` of the unit square on a light: uniform over its area.
 fn to_light(light: TracedLight, point: TracedPoint, at: vec2f) -> ToLight {
-    // The first triangle that ends behind the place.
+    // The first triangle that ends beyond the point.
     var low = light.first;
     var high = light.first + light.count - 1u;
     while low < high {

@@ -1,17 +1,18 @@
-// Rays against triangles: a hierarchy of boxes, two a node, walked depth first, the nearer box
-// first. Coordinates are from the middle of the scene, in units of its size, in two parts each: see
-// shared/corner.wgsl. Boxes are wider than their contents by more than rounding.
+// Ray–triangle intersection with a hierarchy of boxes, two per node, traversed depth first, the
+// nearer box first. Coordinates are relative to the middle of the scene, in units of its size, in
+// two parts each: see shared/corner.wgsl. Boxes are wider than their contents by more than
+// rounding.
 
 const NOTHING: u32 = 0xffffffffu;
 const LEAF: u32 = 0x80000000u;        // a leaf: this, its triangles less one << 29, the first one
 const FAR: f32 = 1e30;
 const TURN: f32 = 6.2831853;
-const STACK: u32 = 33u;               // levels of the hierarchy, and two
-// A bound of rounding in the test of a triangle, some eight roundings of 2⁻²⁴ each.
+const STACK: u32 = 33u;               // levels of the hierarchy, plus two
+// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
 const ROUNDING: f32 = 5e-7;
 
-const BACK_IS_COVERED: u32 = 1u;      // flags of a triangle: nothing meets its back
-const HAS_HOLES: u32 = 2u;            // a mask says where it is solid
+const BACK_IS_COVERED: u32 = 1u;      // flags of a triangle: rays do not hit its back
+const HAS_HOLES: u32 = 2u;            // a mask defines its solid part
 
 struct Node {
     low_a: vec3f,         // the first child's box
@@ -26,18 +27,18 @@ struct Node {
 
 struct TracedTriangle {
     corner: vec3f,        // the first corner
-    index: u32,           // which of the scene's it is
-    corner_low: vec3f,    // what rounding took off it
+    index: u32,           // its index in the scene
+    corner_low: vec3f,    // rounding remainder of `corner`
     flags: u32,
     edge_u: vec3f,        // from there to the second corner
     light: u32,           // the light that it belongs to, or the row of a pane's transmittance
     edge_v: vec3f,        // to the third
-    extent: f32,          // no edge is longer
+    extent: f32,          // maximum edge length
 }
 
 struct TracedScene {
     panes: u32,           // root of the hierarchy of clear panes, or NOTHING
-    lights: u32,          // how many there are
+    lights: u32,          // number of lights
     sky_side: u32,        // pieces of the sky along the edge of a square; 0 if it is uniform
     has_sun: u32,
     sky: vec3f,           // radiosity of a surface as bright as a uniform sky
@@ -52,7 +53,7 @@ struct TracedScene {
     padding_5: u32,
     sun_middle: vec3f,    // towards it, unit length
     padding_6: u32,
-    sun_right: vec3f,     // across, as long as the tangent of its radius
+    sun_right: vec3f,     // across, with the tangent of its radius as length
     padding_7: u32,
     sun_up: vec3f,
     padding_8: u32,
@@ -61,11 +62,11 @@ struct TracedScene {
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> triangles: array<TracedTriangle>;
 @group(0) @binding(2) var<uniform> scene: TracedScene;
-// Of each triangle with holes two texels: texture coordinates in texels of the mask of its first
-// and second corner, then of the third and the mask's first word and width; in a third texel its
-// height, and whether it ends at its border in the place of being repeated.
+// Per triangle with holes three texels: texture coordinates, in texels of the mask, of its first
+// and second corner; those of the third, and the mask's first word and width; its height, and
+// whether it ends at its border instead of being repeated.
 @group(0) @binding(3) var mask_places: texture_2d<f32>;
-@group(0) @binding(4) var masks: texture_2d<u32>;   // a bit a texel, 32 a word: 1 where it is solid
+@group(0) @binding(4) var masks: texture_2d<u32>;   // a bit per texel, 32 per word: 1 where solid
 
 const TEXELS_A_LINE: u32 = 2048u;     // of textures that are read as arrays
 
@@ -73,22 +74,22 @@ struct Ray {
     origin: vec3f,
     origin_low: vec3f,
     direction: vec3f,     // unit length
-    near: f32,            // nothing nearer is met
+    near: f32,            // minimum distance of hits
 }
 
 struct Hit {
     distance: f32,
     u: f32,               // weights of the second and third corner
     v: f32,
-    triangle: u32,        // its place in `triangles`, or NOTHING
+    triangle: u32,        // its index in `triangles`, or NOTHING
     front: bool,
-    off: f32,             // what rounding may have done to the distance
+    off: f32,             // bound of the rounding error of the distance
 }
 
 var<private> stack: array<u32, STACK>;
 
-// Where triangle k is met, nearer than `end` or as near; `slack` widens it by the rounding of that,
-// so that no ray goes through a side that two triangles share.
+// The hit of triangle k, at most as far as `end`; `slack` scales a margin for rounding, so that no
+// ray passes through a side that two triangles share.
 fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
     let t = triangles[k];
     let s = (ray.origin - t.corner) + (ray.origin_low - t.corner_low);
@@ -101,7 +102,7 @@ fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
     let distance = dot(t.edge_v, q) * inverse;
     let off = ROUNDING * (abs(s.x) + abs(s.y) + abs(s.z)) * t.extent * abs(inverse);
     let seam = -off * slack;
-    // Written so that NaN is no hit, as of a ray in the triangle's plane.
+    // False for NaN, as for a ray in the triangle's plane.
     let is_met = facing != 0.0 && u >= seam && v >= seam && u + v <= 1.0 - seam
         && distance - off * t.extent > ray.near && distance <= end
         && (facing > 0.0 || (t.flags & BACK_IS_COVERED) == 0u);
@@ -139,13 +140,13 @@ fn is_solid(index: u32, u: f32, v: f32) -> bool {
     return ((bits >> (texel % 32u)) & 1u) != 0u;
 }
 
-// Components of a direction, none so small that its inverse is infinite.
+// Inverse of a direction, with a lower bound on its components, so that it is finite.
 fn inverse_of(direction: vec3f) -> vec3f {
     let least = select(vec3f(-1e-20), vec3f(1e-20), direction >= vec3f(0.0));
     return 1.0 / select(direction, least, abs(direction) < vec3f(1e-20));
 }
 
-// The child of node k to be entered next, the other one on the stack; NOTHING if none is met.
+// The child of node k to be entered next, the other one on the stack; NOTHING if none is hit.
 fn enter(k: u32, ray: Ray, inverse: vec3f, end: f32, top: ptr<function, u32>) -> u32 {
     let n = nodes[k];
     let low_a = (n.low_a - ray.origin) * inverse;
@@ -169,8 +170,8 @@ fn enter(k: u32, ray: Ray, inverse: vec3f, end: f32, top: ptr<function, u32>) ->
     return select(select(NOTHING, n.child_b, meets_b), n.child_a, meets_a);
 }
 
-// A direction given along two tangents and the normal, which turn about that: the tangents of Duff
-// et al. 2017, "Building an orthonormal basis, revisited".
+// Converts a direction from two tangents and the normal, rotated about the latter: the tangents of
+// Duff et al. 2017, "Building an orthonormal basis, revisited".
 fn turned(local: vec3f, n: vec3f, turns: f32) -> vec3f {
     let sign = select(-1.0, 1.0, n.z >= 0.0);
     let a = -1.0 / (sign + n.z);
@@ -184,7 +185,7 @@ fn turned(local: vec3f, n: vec3f, turns: f32) -> vec3f {
     return normalize(x * local.x + y * local.y + n * local.z);
 }
 
-// The nearest triangle that the ray meets; of equals the one with the lower number.
+// The nearest hit of the ray; ties are ordered by triangle number.
 fn nearest(ray: Ray) -> Hit {
     return nearest_but(ray, NOTHING);
 }
@@ -226,7 +227,7 @@ fn nearest_but(ray: Ray, own: u32) -> Hit {
     return best;
 }
 
-// Whether anything before `end` hides what is there; fronts of the light `but` do not.
+// Whether anything before `end` occludes it; fronts of the light `but` do not.
 fn is_hidden(ray: Ray, end: f32, but: u32) -> bool {
     let inverse = inverse_of(ray.direction);
     stack[0] = NOTHING;

@@ -1,4 +1,4 @@
-// `Work` as passes read it that cast rays of the points in its lists.
+// `Work` as read by the passes that cast rays of the points in its lists.
 
 struct WorkRead {
     groups: array<u32, 8>,

@@ -1,4 +1,4 @@
-//! What is known of the device that a backend runs on.
+//! Description of the device that a backend runs on.
 
 use std::fmt;
 
@@ -9,20 +9,20 @@ use std::fmt;
 pub struct AdapterInfo {
     /// Name as the driver gives it; `rays` for [`crate::Backend::Cpu`].
     pub name: String,
-    /// What sort of processor it is.
+    /// Kind of processor.
     pub kind: AdapterKind,
     /// Driver name and version, and the interface (Vulkan, Metal, Dx12); `none` for rays.
     pub driver: String,
 }
 
-/// Sorts of processors, the fastest first.
+/// Kinds of processors, the fastest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AdapterKind {
     /// A graphics card with memory of its own.
     DiscreteGpu,
     /// A graphics processor that shares the memory of the CPU.
     IntegratedGpu,
-    /// A graphics processor seen through a virtual machine.
+    /// A graphics processor accessed through a virtual machine.
     VirtualGpu,
     /// The driver does not say.
     #[default]

@@ -1,4 +1,4 @@
-//! What a row costs, by a hemicube and by rays: bakes choose by it.
+//! Cost of a row by hemicubes and by rays, for the choice of a bake.
 //!
 //! ```text
 //! hemicube               hemicube + triangle · T + pixel · 3 N²      T triangles, N pixels an edge
@@ -6,8 +6,8 @@
 //! N² rays on the CPU     ray_level · (1 + log₂ T) · N² · RAYS_AT_EQUAL_ERROR
 //! ```
 //!
-//! A device sends all triangles through its vertex stage, however few the pixels; a ray descends
-//! one more level of a tree where there are twice as many. So hemicubes are for many pixels and few
+//! A device processes all triangles in its vertex stage, however few the pixels; a ray descends one
+//! more level of a tree with twice the triangles. So hemicubes are for many pixels and few
 //! triangles. No clock is read: the choice is the same on every run.
 //!
 //! `RADIOSITY_BENCH=full cargo bench --bench error_model -- rows [SCENE.obj …]` measures the
@@ -16,16 +16,16 @@
 use super::adapter::AdapterKind;
 use super::row_maker::RowMaker;
 
-/// Seconds that parts of a row take, of the processors of one kind of adapter.
+/// Time of the parts of a row, on the processors of one kind of adapter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowCost {
-    /// A hemicube, whatever it shows: five views set up, a row reduced and read back; s.
+    /// A hemicube, for any content: five views set up, a row reduced and read back; s.
     pub hemicube: f64,
     /// A triangle of the scene, on those of the five faces that may see it; s.
     pub triangle: f64,
     /// A pixel, drawn and reduced; s.
     pub pixel: f64,
-    /// A row by rays on the device, whatever their number: s.
+    /// A row by rays on the device, for any number of rays; s.
     pub device_row: f64,
     /// A ray on the device, on each level of a binary tree of the triangles; s.
     pub device_ray_level: f64,
@@ -34,8 +34,8 @@ pub struct RowCost {
 }
 
 /// Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle cut into
-/// 1 to 4096, at 16 to 256 pixels. Hemicubes are off by up to half of that, rays by up to a factor
-/// of two. Rays on it: `docs/data/device.tsv`.
+/// 1 to 4096, at 16 to 256 pixels. The error of hemicubes is up to a half, that of rays up to a
+/// factor of two. Rays on it: `docs/data/device.tsv`.
 const SOFTWARE: RowCost = RowCost {
     hemicube: 1.8e-4,
     triangle: 1.3e-7,
@@ -46,7 +46,7 @@ const SOFTWARE: RowCost = RowCost {
 };
 
 /// NVIDIA H200 (Vulkan, driver 580) beside 16 cores: rooms of 38 and 4 010 triangles, 64 to 256
-/// pixels (`docs/data/device.tsv`). Hemicubes are off by a tenth of that, rays on the device by a
+/// pixels (`docs/data/device.tsv`). The error of hemicubes is a tenth, that of rays on the device a
 /// third.
 const DISCRETE: RowCost = RowCost {
     hemicube: 7.9e-5,
@@ -66,20 +66,20 @@ const INTEGRATED: RowCost = RowCost {
     ..DISCRETE
 };
 
-/// Rays that a row takes for the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
+/// Number of rays of a row with the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
 /// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
 pub const RAYS_AT_EQUAL_ERROR: f64 = 1.7;
 
-/// Scenes of fewer triangles count as so many: with less than that, rays slow down faster from
-/// triangle to triangle than hemicubes do, and more triangles could bring hemicubes back.
+/// Minimum number of triangles in the cost: for smaller scenes, the cost of rays grows faster with
+/// the number of triangles than that of hemicubes, and adding triangles could favour hemicubes
+/// again.
 const MIN_TRIANGLES: usize = 512;
 
-/// The same of rays on a device: an H200 takes 1.0 ns for one among 38 triangles and 1.2 ns among
-/// 4 010.
+/// The same for rays on a device: an H200 takes 1.0 ns per ray (38 triangles) to 1.2 ns (4 010).
 pub const MIN_DEVICE_TRIANGLES: usize = 8192;
 
 impl RowCost {
-    /// The cost where the adapter is of `kind`; the fastest where the driver does not say.
+    /// The cost for an adapter of `kind`; that of the fastest for unknown kinds.
     pub fn of(kind: AdapterKind) -> RowCost {
         match kind {
             AdapterKind::Cpu => SOFTWARE,
@@ -89,7 +89,7 @@ impl RowCost {
     }
 
     /// Seconds of a hemicube with `resolution` pixels along an edge of its top face, in a scene of
-    /// so many `triangles`.
+    /// `triangles` triangles.
     pub fn hemicube_seconds(&self, triangles: usize, resolution: u32) -> f64 {
         let pixels = 3.0 * f64::from(resolution).powi(2);
         self.hemicube + self.triangle * triangles as f64 + self.pixel * pixels
@@ -106,7 +106,7 @@ impl RowCost {
         self.device_row + self.device_ray_level * levels * rays
     }
 
-    /// Of `makers` the one that makes a row in the least time, to the error of a hemicube of
+    /// The one of `makers` that makes a row in the least time, with the error of a hemicube of
     /// `resolution`.
     pub fn cheapest(
         &self,
@@ -125,8 +125,8 @@ impl RowCost {
     }
 }
 
-/// Levels of a binary tree with so many leaves: 1 + log₂ of their number, linear between powers of
-/// two. Sums and products have the same bits on all machines, logarithms may not.
+/// Levels of a binary tree with this number of leaves: 1 + log₂ of their number, linear between
+/// powers of two. Sums and products have the same bits on all machines, logarithms may not.
 pub fn tree_levels(leaves: usize) -> f64 {
     let leaves = leaves.max(1);
     let doublings = leaves.ilog2();
@@ -171,7 +171,7 @@ mod tests {
                 assert_eq!(cheapest(kind, 128_000, resolution), RowMaker::DeviceRays, "{kind}");
             }
         }
-        // Where a device has none, hemicubes are drawn as long as triangles are few.
+        // Without rays on the device, hemicubes are drawn as long as triangles are few.
         let discrete = RowCost::of(AdapterKind::DiscreteGpu);
         let others = [RowMaker::Hemicubes, RowMaker::Rays];
         assert_eq!(discrete.cheapest(others, 4000, 64), Some(RowMaker::Hemicubes));

@@ -1,8 +1,9 @@
-//! Rays on the CPU: rows of form factors, and light gathered at points. Nothing of it needs a GPU;
+//! Rays on the CPU: rows of form factors, and light gathered at points, without a GPU;
 //! [`Backend::Cpu`](crate::Backend::Cpu) uses it for whole bakes.
 //!
-//! Beside them, for tests alone, a twin of every shader: the same entry points in plain sequential
-//! Rust, named as the WGSL files are, which the device's results are compared with pixel by pixel.
+//! For tests only, a twin of every shader: the same entry points in plain sequential Rust, with the
+//! names of the WGSL files. The results of the device are compared with those of the twins pixel by
+//! pixel.
 //!
 //! | shader | twin | compared in |
 //! |---|---|---|

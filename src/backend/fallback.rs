@@ -1,12 +1,12 @@
-//! One maker of rows or gatherer until its device fails, then another.
+//! Uses one row maker or gatherer until its device fails, then another.
 //!
 //! ```text
-//! ask ─► first ─ ok, or an error that is no device's ─► answer
-//!          │
-//!          └ device error e ─► next(e) ─► second, which answers this and all later questions
+//! request ─► first ─ ok, or an error other than of the device ─► result
+//!              │
+//!              └ device error e ─► next(e) ─► second: this and all later requests
 //! ```
 //!
-//! Rows and light that the first has made stay in use: what was solved until the failure is kept.
+//! Rows and light made by the first stay in use: the solution up to the failure is kept.
 
 use std::fmt;
 
@@ -15,10 +15,10 @@ use crate::form_factor::{FormFactors, Row};
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::{Mesh, NodeId};
 
-/// A first maker of rows, or gatherer, and a second one that replaces it when its device fails.
+/// A first row maker, or gatherer, and a second one that replaces it when its device fails.
 ///
-/// A solver that uses it as its [`FormFactors`] does not notice the change: flux already
-/// distributed stays distributed, and the second makes the rows that are still wanted.
+/// The change is transparent to a solver that uses it as its [`FormFactors`]: flux already
+/// distributed stays distributed, and the second makes the remaining rows.
 pub struct Fallback<'a, A, B = A> {
     first: A,
     second: Option<B>,
@@ -37,12 +37,12 @@ impl<'a, A, B> Fallback<'a, A, B> {
         Fallback { first, second: None, make_second: Box::new(make_second) }
     }
 
-    /// The maker that began.
+    /// The first row maker.
     pub fn first(&self) -> &A {
         &self.first
     }
 
-    /// The maker that goes on, once the first has failed.
+    /// The second row maker, if the first has failed.
     pub fn second(&self) -> Option<&B> {
         self.second.as_ref()
     }

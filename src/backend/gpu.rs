@@ -1,5 +1,5 @@
-//! The one room that knows wgpu: device, item buffer, reduction, rays; rows and gathered light come
-//! out.
+//! The only module that uses wgpu: device, item buffer, reduction and rays; its results are rows
+//! and gathered light.
 
 mod adapters;
 mod clock;

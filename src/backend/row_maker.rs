@@ -1,8 +1,9 @@
-//! What rows of form factors are made with.
+//! Methods of computing rows of form factors.
 
 use std::fmt;
 
-/// What makes rows of form factors. Shown as `hemicubes`, `rays on the device` or `rays`.
+/// A method of computing rows of form factors. Shown as `hemicubes`, `rays on the device` or
+/// `rays`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowMaker {
     /// Hemicubes on a graphics device: `gpu::HemicubeRows`.

@@ -1,4 +1,4 @@
-//! Rows of either backend behind one type, with the time that they take.
+//! Rows of either backend behind one type, with the time spent on them.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ pub struct BackendRows {
     seconds: f64,
 }
 
-/// What the row makers of all backends can do beside making rows.
+/// Functions of the row makers of all backends beside making rows.
 trait RowSource: FormFactors + std::fmt::Debug + Send + Sync {
     /// See [`BackendRows::with_full_share`].
     fn set_full_share(&mut self, full_share: f64);
@@ -29,7 +29,7 @@ trait RowSource: FormFactors + std::fmt::Debug + Send + Sync {
         vec![]
     }
 
-    /// Time of the passes, where they are timed one by one.
+    /// Time of the passes, if they are timed separately.
     fn pass_timings(&self) -> Option<Timings> {
         None
     }
@@ -85,30 +85,30 @@ impl From<TracedRows> for BackendRows {
 
 impl BackendRows {
     /// Full resolution, or all rays, for patches that shoot at least this share of the emitted
-    /// flux, in [0, 1]; with 0 for all.
+    /// flux, in [0, 1]; for all patches if 0.
     pub fn with_full_share(mut self, full_share: f64) -> BackendRows {
         self.source.set_full_share(full_share);
         self
     }
 
-    /// What these rows are made with.
+    /// The method of making these rows.
     pub fn maker(&self) -> RowMaker {
         self.maker
     }
 
     /// Hemicubes drawn so far at each resolution (pixels along an edge of the top face, count);
-    /// none where rays are cast.
+    /// empty for rays.
     pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
         self.source.drawn_by_resolution()
     }
 
-    /// Time of the passes so far: draw, reduce and readback. Casting rays is all draw.
+    /// Time of the passes so far: draw, reduce and readback. Casting rays counts as draw.
     pub fn timings(&self) -> Timings {
         let rays = Timings { draw: self.seconds, ..Default::default() };
         self.source.pass_timings().unwrap_or(rays)
     }
 
-    /// Seconds spent on rows so far, all in all.
+    /// Total seconds spent on rows so far.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }

@@ -4,8 +4,9 @@
 //!   bands at λ_b ──► XYZ = Σ_b B_b (x̄, ȳ, z̄)(λ_b) Δλ_b / ∫ ȳ dλ ──► linear BT.709
 //! ```
 //!
-//! Δλ_b is what the trapezoid rule gives a wavelength: half of the way to those on both sides. A
-//! spectrum of 1 W/(m² nm) at all visible wavelengths has Y = 1: these are ratios, not lumens.
+//! Δλ_b is the weight of a wavelength in the trapezoid rule: half of the distance between its
+//! neighbours. A spectrum of 1 W/(m² nm) at all visible wavelengths has Y = 1: these are ratios,
+//! not lumens.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -15,13 +16,13 @@ use super::spectra::Band;
 use crate::error::{Error, ErrorKind};
 use crate::scene::Rgb;
 
-/// A lobe of a colour matching function: height, wavelength of its top in nm, and its widths below
+/// A lobe of a colour matching function: height, wavelength of its peak in nm, and its widths below
 /// and above that, in nm.
 struct Lobe(f64, f64, f64, f64);
 
 /// The colour matching functions as sums of lobes (Wyman, Sloan and Shirley 2013, "Simple Analytic
-/// Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), table 1). They are off by
-/// less than what observers differ by.
+/// Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), table 1). Their error is
+/// less than the variation between observers.
 const X: [Lobe; 3] = [
     Lobe(1.056, 599.8, 37.9, 31.0),
     Lobe(0.362, 442.0, 16.0, 26.7),
@@ -30,7 +31,7 @@ const X: [Lobe; 3] = [
 const Y: [Lobe; 2] = [Lobe(0.821, 568.8, 46.9, 40.5), Lobe(0.286, 530.9, 16.3, 31.1)];
 const Z: [Lobe; 2] = [Lobe(1.217, 437.0, 11.8, 36.0), Lobe(0.681, 459.0, 26.0, 13.8)];
 
-/// From XYZ to linear BT.709 with its white point D65 (IEC 61966-2-1), by columns.
+/// Converts XYZ to linear BT.709 with its white point D65 (IEC 61966-2-1), by columns.
 const LINEAR_SRGB: DMat3 = DMat3::from_cols(
     DVec3::new(3.240_454_2, -0.969_266_0, 0.055_643_4),
     DVec3::new(-1.537_138_5, 1.876_010_8, -0.204_025_9),
@@ -62,16 +63,16 @@ pub fn linear_srgb(xyz: DVec3) -> Rgb {
     LINEAR_SRGB * xyz
 }
 
-/// What the standard observer makes of each of some bands.
+/// Weights of bands for the standard observer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observer {
-    /// Number of each band and the XYZ of its unit, by ascending wavelength: sums have the same
-    /// bits in any order of the bands.
+    /// Index of each band and the XYZ of its unit, by ascending wavelength: sums have the same bits
+    /// in any order of the bands.
     weights: Vec<(usize, DVec3)>,
 }
 
 impl Observer {
-    /// Of `bands`, all of which have wavelengths. Those that are not visible count next to nothing.
+    /// The weights of `bands`, all of which have wavelengths. Invisible bands have weights near 0.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for fewer than two bands, one without a wavelength, or two with the
@@ -107,12 +108,12 @@ impl Observer {
         Ok(Observer { weights: weights.collect() })
     }
 
-    /// XYZ of `values`, one a band.
+    /// XYZ of `values`, one per band.
     pub fn xyz(&self, values: &[f64]) -> DVec3 {
         self.weights.iter().map(|&(b, weight)| values[b] * weight).sum()
     }
 
-    /// The same as linear BT.709.
+    /// The same converted to linear BT.709.
     pub fn linear_srgb(&self, values: &[f64]) -> Rgb {
         linear_srgb(self.xyz(values))
     }
@@ -137,7 +138,7 @@ mod tests {
             (600.0, [1.0622, 0.6310, 0.0008]),
             (650.0, [0.2835, 0.1070, 0.0000]),
         ] {
-            // The fit is off by less than 1 % of the tops of the functions there.
+            // The error of the fit there is less than 1 % of the peaks of the functions.
             let off = (colour_matching(nm) - DVec3::from(table)) / DVec3::new(1.06, 1.0, 1.78);
             assert!(off.abs().max_element() < 0.01, "at {nm} nm: {off}");
         }
@@ -147,8 +148,8 @@ mod tests {
     fn equal_energy_is_equal_xyz() {
         let observer = Observer::new(&bands((360..=830).step_by(5).map(f64::from))).unwrap();
         let xyz = observer.xyz(&[1.0; 95]);
-        // Y by the fit itself, all but its tails beyond the ends; X and Z are those of the tables,
-        // 1, by a fit that is off by 1 % of the tops over a width of some 100 nm.
+        // Y is from the fit itself, except for its tails beyond the ends; X and Z of the tables are
+        // 1; the error of the fit is 1 % of the peaks over a width of some 100 nm.
         assert!((xyz.y - 1.0).abs() < 1e-4 && xyz.abs_diff_eq(DVec3::ONE, 0.01), "{xyz}");
     }
 

@@ -1,4 +1,4 @@
-//! How far the light of a band may be off.
+//! Estimated error of the light of a band.
 
 use crate::mesh::Mesh;
 
@@ -9,12 +9,12 @@ use crate::mesh::Mesh;
 pub struct BandError {
     /// The root of the sum of the squares of all parts.
     pub total: f64,
-    /// What two halves of the rays of a vertex disagree by.
+    /// Difference between two halves of the rays of a vertex.
     pub noise: f64,
-    /// Upper bound of the light of further bounces that is left out.
+    /// Upper bound of the omitted light of further bounces.
     pub unsettled: f64,
-    /// What the bake in red, green and blue told of itself: its mesh, above all, is that of the
-    /// bands too. It knows nothing of light that only bands have.
+    /// Estimated error of the bake in red, green and blue, mainly of its mesh, which is also that
+    /// of the bands. It does not include light that only bands have.
     pub of_bake: f64,
 }
 

@@ -1,22 +1,22 @@
-//! The light that a vertex gathers in every band, and how far it may be off.
+//! The light that a vertex gathers in every band, and its standard error.
 
 use super::lookup::Lookup;
 use super::spectra::Bands;
 use crate::gather::vertex_rows::VertexRow;
 
-/// Parts of the rays that are compared with each other.
+/// Number of sets of rays that are compared with each other.
 pub(super) const HALVES: u32 = 2;
 
-/// What one vertex reflects, W/m² by band.
+/// Reflected light of one vertex, W/m² by band.
 pub(super) struct GatheredVertex {
     pub reflected: Vec<f64>,
-    /// Standard error of that by the rays: half of what two halves of them differ by.
+    /// Its standard error due to the rays: half the difference between two halves of them.
     pub noise: Vec<f64>,
 }
 
 impl GatheredVertex {
-    /// A vertex of `material` whose row was made by two halves of the rays; `reflected` is what all
-    /// vertices reflect, W/m², bands side by side.
+    /// A vertex of `material` with a row from two halves of the rays; `reflected` is the reflected
+    /// light of all vertices, W/m², bands side by side.
     pub fn new(
         (lookup, bands): (&Lookup, &Bands),
         material: u32,

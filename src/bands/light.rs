@@ -19,11 +19,11 @@ use crate::scene::{Rgb, Sky};
 use crate::vertex::VertexMesh;
 use crate::visibility::buried;
 
-/// The rays of a vertex, over those by which the light settles before it is gathered: noise that
+/// Ratio of the rays of a vertex for the final gather to those for the iteration: noise that
 /// differs from vertex to vertex is averaged over all that a vertex sees.
 const SETTLING_RAY_DIVISOR: u32 = 16;
 
-/// Rays of a vertex by which the light settles, at least.
+/// Minimum number of rays of a vertex for the iteration.
 const MIN_SETTLING_RAYS: u32 = 64;
 
 /// Radiosity and irradiance of all bands at the vertices of a surface.
@@ -42,19 +42,19 @@ pub struct BandLight {
     pub noise: Vec<f64>,
     /// Estimated error of each band.
     pub errors: Vec<BandError>,
-    /// Sweeps after which each band was settled.
+    /// Sweeps until each band converged.
     pub sweeps: Vec<u32>,
     sky: Vec<f64>,
 }
 
 impl Bands {
-    /// The light of these bands at the vertices of `baked`, by rays on the CPU: as many for each as
-    /// its vertices gathered with. `progress` is told how many rows are made, and of how many;
-    /// where it breaks there is no light.
+    /// The light of these bands at the vertices of `baked`, by rays on the CPU: the same number as
+    /// its vertices gathered with. `progress` is called with the number of rows made and their
+    /// total; if it breaks there is no light.
     ///
     /// # Errors
     /// Those of [`Bands::check`] for the scene that was baked; [`ErrorKind::Setting`] where `baked`
-    /// was put together of several bakes.
+    /// was combined from several bakes.
     pub fn light(
         &self,
         baked: &BakeResult,
@@ -95,7 +95,7 @@ impl Bands {
     }
 }
 
-/// The vertices of a bake, and what they see.
+/// The vertices of a bake, and the data to gather there.
 struct Gathering<'a> {
     bands: &'a Bands,
     mesh: &'a Mesh,
@@ -105,8 +105,8 @@ struct Gathering<'a> {
     touching: f64,
 }
 
-/// How the light settled; then what vertices reflect, and its standard error, W/m², bands side by
-/// side.
+/// Statistics of the iteration; then the reflected light of vertices, and its standard error, W/m²,
+/// bands side by side.
 type Gathered = (Settled, Vec<f64>, Vec<f64>);
 
 impl<'a> Gathering<'a> {
@@ -123,7 +123,7 @@ impl<'a> Gathering<'a> {
         Gathering { bands, mesh, surface, lookup, touching }
     }
 
-    /// Settles the light by few rays, and gathers it with many.
+    /// Iterates the light with few rays, and gathers it with many.
     fn light(
         &self,
         rays: u32,
@@ -170,14 +170,14 @@ impl<'a> Gathering<'a> {
         Ok(Some((settled, reflected, noise)))
     }
 
-    /// Whether anything that meets `material` leaves again in any band. Rays pass clear panes.
+    /// Whether `material` reflects or transmits diffusely in any band. Rays pass clear panes.
     fn scatters(&self, material: u32) -> bool {
         let of_bands = &self.bands.materials[material as usize];
         let is_clear = self.mesh.scene().materials()[material as usize].clear_transmittance();
         is_clear.is_none() && (0..self.bands.bands.len()).any(|b| of_bands.albedo(b) > 0.0)
     }
 
-    /// The light that has settled by these `rows`.
+    /// The light that the iteration converges to with these `rows`.
     fn settled(
         &self,
         rows: &VertexRows,
@@ -205,8 +205,8 @@ impl<'a> Gathering<'a> {
         VertexSystem::new(self.bands, materials, equations).solve(|| progress(done))
     }
 
-    /// What was found for the `scattering` vertices, for all: `dark` of the others; and whether
-    /// each is buried.
+    /// Extends the results `found` of the `scattering` vertices to all, with `dark` for the others;
+    /// also whether each is buried.
     fn all_vertices<T>(
         &self,
         scattering: &[u32],
@@ -222,7 +222,7 @@ impl<'a> Gathering<'a> {
         vertices.map(of_vertex).unzip()
     }
 
-    /// Sets the values of vertex `v` to the mean of those of `neighbours`, by their weights.
+    /// Sets the values of vertex `v` to the weighted mean of those of `neighbours`.
     fn set_mean(&self, values: &mut [f64], v: u32, neighbours: &[(u32, f64)]) {
         let count = self.bands.bands.len();
         let mut mean = vec![0.0; count];
@@ -234,7 +234,7 @@ impl<'a> Gathering<'a> {
 }
 
 impl BandLight {
-    /// Makes radiosity and irradiance of the reflected radiosity that both hold.
+    /// Replaces the reflected radiosity in both vectors by radiosity and irradiance.
     fn reflect(&mut self, bands: &Bands, mesh: &Mesh, corners: &[[u32; 3]]) {
         let count = self.bands.len();
         let mut is_done = vec![false; self.radiosity.len() / count];
@@ -271,8 +271,8 @@ impl BandLight {
         &self.irradiance[v * self.bands.len()..][..self.bands.len()]
     }
 
-    /// The surface in the colours that the bands add up to: radiosity and irradiance as linear
-    /// BT.709. What is out of its gamut is brought to its border, channel by channel.
+    /// The surface in colours computed from the bands: radiosity and irradiance as linear BT.709.
+    /// Values out of its gamut are clamped, channel by channel.
     ///
     /// # Errors
     /// Those of [`Observer::new`].

@@ -1,6 +1,6 @@
-//! Light of all bands, looked up along the row of a point.
+//! Lookup of the light of all bands along the row of a point.
 //!
-//! Values of all bands lie side by side, place by place: a hit of a ray costs one look at the mesh,
+//! Values of all bands are stored together per vertex: a ray hit costs one lookup in the mesh,
 //! whatever the number of bands.
 
 use std::f64::consts::PI;
@@ -9,10 +9,10 @@ use super::spectra::Bands;
 use crate::gather::point_row::PointRow;
 use crate::mesh::Mesh;
 
-/// In the place of a material's index, for elements that do not emit in any band.
+/// Material index of elements that do not emit in any band.
 const NO_EMISSION: u32 = u32::MAX;
 
-/// What rows are looked up in.
+/// The data that rows are looked up in.
 pub(super) struct Lookup<'a> {
     bands: &'a Bands,
     /// The vertices at the corners of each element.
@@ -32,7 +32,7 @@ impl<'a> Lookup<'a> {
         Lookup { bands, corners, emission: (0..mesh.element_count()).map(emission).collect() }
     }
 
-    /// Adds to `irradiance` (W/m² by band) what emitters, luminaires, the sky and the sun send
+    /// Adds to `irradiance` (W/m² by band) the light of emitters, luminaires, the sky and the sun
     /// along `row`.
     pub fn add_emitted(&self, row: &PointRow, irradiance: &mut [f64]) {
         for &(material, factor) in &row.emitters {
@@ -52,8 +52,8 @@ impl<'a> Lookup<'a> {
         add(irradiance, row.sun, &self.bands.sun);
     }
 
-    /// Adds what surfaces reflect along `row`: `reflected` has that of all vertices, W/m², bands
-    /// side by side.
+    /// Adds the light reflected by surfaces along `row`: `reflected` has that of all vertices,
+    /// W/m², bands side by side.
     pub fn add_reflected(&self, row: &PointRow, reflected: &[f64], irradiance: &mut [f64]) {
         let count = irradiance.len();
         let of_vertex = |v: u32| &reflected[v as usize * count..][..count];
@@ -66,7 +66,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// The vertices around each hit of `row`, and the form factor that each stands for.
+    /// The vertices around each hit of `row`, and the form factor of each.
     pub fn weights(&self, row: &PointRow) -> impl Iterator<Item = ([u32; 3], [f64; 3])> {
         row.hits.iter().map(move |hit| {
             let ([u, v], factor) = (hit.barycentric, row.share * hit.passed);

@@ -1,4 +1,4 @@
-//! Bands, and what materials and the light from outside are in each.
+//! Bands, and the values of materials and outside light in each.
 
 use std::collections::HashSet;
 
@@ -8,46 +8,45 @@ use crate::scene::{Material, Rgb, Scene};
 /// A band of light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Band {
-    /// Its name, of ASCII letters, digits and any of `_ - .`: it is a part of names in files.
+    /// Its name, of ASCII letters, digits and any of `_ - .`: it is used in names in files.
     pub name: String,
-    /// Wavelength in nm, where values are those of a spectrum there, per nm.
+    /// Wavelength in nm, where values are spectral, per nm.
     pub wavelength: Option<f64>,
 }
 
-/// What a material does to light, one value a band each.
+/// Optical properties of a material, one value per band each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BandMaterial {
     /// Share of arriving light that leaves diffusely from the same side, in [0, 1).
     pub reflectance: Vec<f64>,
-    /// Share that leaves diffusely from the other side; in [0, 1) together with the reflectance.
+    /// Share that leaves diffusely from the other side; its sum with the reflectance is in [0, 1).
     pub transmittance: Vec<f64>,
     /// Emitted flux per area, W/m², or W/(m² nm) of a spectrum.
     pub exitance: Vec<f64>,
 }
 
-/// The bands of a scene, and what its materials and its sky are in each.
+/// The bands of a scene, and the values of its materials and its sky in each.
 ///
-/// Textures of reflectance and emission are left out: a material is the same everywhere, and only
-/// holes stay. A clear pane lets through what it does in red, green and blue in the mean, and
-/// reflects nothing.
+/// Textures of reflectance and emission are ignored: a material is uniform, and only holes are
+/// kept. A clear pane has the mean of its transmittances in red, green and blue, and reflects
+/// nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bands {
     /// The bands, in any order.
     pub bands: Vec<Band>,
     /// The materials of the scene, one for one.
     pub materials: Vec<BandMaterial>,
-    /// Radiance of a uniform sky, W/(m² sr) by band, in the place of the scene's.
+    /// Radiance of a uniform sky, W/(m² sr) by band, instead of the scene's.
     pub sky: Vec<f64>,
-    /// Irradiance of a surface that faces the sun, W/m² by band; there is none in a scene without
-    /// a sun.
+    /// Irradiance of a surface that faces the sun, W/m² by band; ignored in a scene without a sun.
     pub sun: Vec<f64>,
-    /// What the intensities of each luminaire of the scene are multiplied with, by band, in the
-    /// place of its [scale](crate::scene::Luminaire::scale).
+    /// Factors on the intensities of each luminaire of the scene, by band, instead of its
+    /// [scale](crate::scene::Luminaire::scale).
     pub luminaires: Vec<Vec<f64>>,
 }
 
 impl BandMaterial {
-    /// A material that lets nothing through and emits nothing.
+    /// A material that neither transmits nor emits.
     pub fn opaque(reflectance: Vec<f64>) -> BandMaterial {
         let nothing = vec![0.0; reflectance.len()];
         BandMaterial { reflectance, transmittance: nothing.clone(), exitance: nothing }
@@ -98,8 +97,8 @@ impl Bands {
         Bands { bands, materials, sky: nothing.clone(), sun: nothing, luminaires }
     }
 
-    /// The three bands `r`, `g` and `b` that a scene has by itself, its textures left out. The sky
-    /// is that of the scene if it is uniform, else black.
+    /// The three bands `r`, `g` and `b` of a scene itself, without its textures. The sky is that of
+    /// the scene if it is uniform, else black.
     pub fn of_rgb(scene: &Scene) -> Bands {
         let values = |rgb: Rgb| rgb.to_array().to_vec();
         let material = |m: &Material| BandMaterial {
@@ -117,11 +116,11 @@ impl Bands {
         }
     }
 
-    /// Checks that all is there for `scene`, and in its range.
+    /// Checks that all values for `scene` exist and are in range.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] for what is not: no band, a name that is used twice or cannot be one,
-    /// another number of materials or values, values out of range.
+    /// [`ErrorKind::Scene`] for no band, a duplicate or invalid name, a wrong number of materials
+    /// or values, values out of range.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
         let wrong = |place: &str, found: String, remedy: &str| {
             Err(Error::new(ErrorKind::Scene, place, found, remedy))
@@ -167,8 +166,8 @@ impl Bands {
         both.try_for_each(|(of_bands, material)| of_bands.check(material, &self.bands))
     }
 
-    /// Names of materials that reflect or emit in some band and are black in `scene`: its mesh has
-    /// no vertices where their light bends, since the bake did not see it.
+    /// Names of materials that reflect or emit in some band and are black in `scene`: its mesh is
+    /// not refined for their light, which the bake did not include.
     pub fn unseen_by(&self, scene: &Scene) -> Vec<String> {
         let some = |values: &[f64]| values.iter().any(|&x| x > 0.0);
         let unseen = |(of_bands, material): &(&BandMaterial, &Material)| {

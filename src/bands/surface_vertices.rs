@@ -1,14 +1,15 @@
-//! Values of the vertices of a mesh, carried to those that its surface has beside: hanging nodes
-//! and the centres of fans, each the mean of others.
+//! Extends values at the vertices of a mesh to the additional vertices of its surface: hanging
+//! nodes and the centres of fans, each the mean of others.
 
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::vertex::hanging_nodes::HangingNodes;
 use crate::vertex::keys::Vertices;
 
-/// The vertices of a mesh and, in the order of [`VertexMesh`](crate::VertexMesh), those beside.
+/// The vertices of a mesh and, in the order of [`VertexMesh`](crate::VertexMesh), the additional
+/// ones.
 pub(super) struct SurfaceVertices {
     pub vertices: Vertices,
-    /// For each vertex beside those of the mesh the others, before it, whose mean it is.
+    /// For each additional vertex the preceding vertices whose mean it is.
     beside: Vec<Vec<u32>>,
 }
 
@@ -24,12 +25,13 @@ impl SurfaceVertices {
         SurfaceVertices { vertices, beside }
     }
 
-    /// Vertices of the surface.
+    /// Number of vertices of the surface.
     pub fn count(&self) -> usize {
         self.vertices.positions.len() + self.beside.len()
     }
 
-    /// Adds to `values` of the mesh's vertices, `count` of each side by side, those beside.
+    /// Appends to `values` of the mesh's vertices, `count` of each side by side, those of
+    /// additional ones.
     pub fn extend(&self, values: &mut Vec<f64>, count: usize) {
         for others in &self.beside {
             for k in 0..count {

@@ -1,9 +1,10 @@
-//! The radiosity equation at the vertices, for all bands by the same rows.
+//! The radiosity equation at the vertices, for all bands with the same rows.
 //!
-//! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, by few rays,
-//! and s is what emitters, the sky and the sun cause. Jacobi's iteration adds one bounce a sweep.
-//! Rows sum to at most 1, so that with c = max (ρ + τ) in a band what is left after a sweep that
-//! changed R by δ is at most δ c / (1 − c), in the maximum norm: a band ends where that is small.
+//! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, from few rays,
+//! and s is the reflected light of emitters, the sky and the sun. Jacobi's iteration adds one
+//! bounce per sweep. Rows sum to at most 1, so that with c = max (ρ + τ) in a band the remainder
+//! after a sweep that changed R by δ is at most δ c / (1 − c), in the maximum norm: a band ends
+//! where that is small.
 
 use std::ops::ControlFlow;
 
@@ -14,16 +15,17 @@ use super::spectra::Bands;
 use crate::gather::point_row::PointRow;
 use crate::gather::vertex_rows::VertexRow;
 
-/// A band is settled where the light that is left is at most this share of the mean of what
-/// vertices reflect.
+/// A band has converged if its remainder is at most this share of the mean reflected light of
+/// vertices.
 const UNSETTLED: f64 = 1e-4;
 
-/// Sweeps at most: with a reflectance of 0.98 a band takes some 600. What is left is told.
+/// Maximum number of sweeps: at a reflectance of 0.98 a band takes some 600. The remainder is
+/// reported.
 const MAX_SWEEPS: u32 = 2000;
 
 /// The equation of one vertex.
 pub(super) struct VertexEquation {
-    /// What it reflects of what is emitted, W/m² by band.
+    /// Reflected part of the emitted light, W/m² by band.
     source: Vec<f64>,
     front: Vec<(u32, f32)>,
     behind: Vec<(u32, f32)>,
@@ -32,23 +34,23 @@ pub(super) struct VertexEquation {
 /// The equations of all vertices.
 pub(super) struct VertexSystem<'a> {
     bands: &'a Bands,
-    /// Material of each vertex; none where nothing reflects.
+    /// Material of each vertex; `None` where nothing reflects.
     materials: &'a [Option<u32>],
     equations: Vec<VertexEquation>,
 }
 
-/// What vertices reflect, and how far the sweeps got.
+/// Reflected light of vertices, and statistics of the iteration.
 pub(super) struct Settled {
     /// Reflected radiosity of all vertices, W/m², bands side by side.
     pub reflected: Vec<f64>,
-    /// Sweeps that each band took.
+    /// Number of sweeps of each band.
     pub sweeps: Vec<u32>,
-    /// Upper bound of the reflected radiosity that is left out at any vertex, over the mean.
+    /// Upper bound of the remainder of the reflected radiosity at any vertex, over the mean.
     pub unsettled: Vec<f64>,
 }
 
 impl VertexEquation {
-    /// Of a vertex of `material` with this row.
+    /// The equation of a vertex of `material` with this row.
     pub fn new(lookup: &Lookup, bands: &Bands, material: u32, row: &VertexRow) -> VertexEquation {
         let material = &bands.materials[material as usize];
         let mut source = vec![0.0; bands.bands.len()];
@@ -66,13 +68,13 @@ impl VertexEquation {
         VertexEquation { source, front, behind }
     }
 
-    /// Of a vertex that reflects nothing.
+    /// The equation of a vertex that reflects nothing.
     pub fn dark(bands: &Bands) -> VertexEquation {
         let source = vec![0.0; bands.bands.len()];
         VertexEquation { source, front: vec![], behind: vec![] }
     }
 
-    /// The mean of `others` by weights that sum to 1.
+    /// The weighted mean of `others`; weights sum to 1.
     pub fn mean(others: &[(&VertexEquation, f64)]) -> VertexEquation {
         let mut source = vec![0.0; others.first().map_or(0, |(first, _)| first.source.len())];
         let (mut front, mut behind) = (vec![], vec![]);
@@ -86,7 +88,7 @@ impl VertexEquation {
     }
 }
 
-/// The rows of a point as one over the vertices.
+/// Merges the rows of a point to one row over the vertices.
 fn merged(lookup: &Lookup, rows: &[PointRow]) -> Vec<(u32, f32)> {
     let corners = |(vertices, weights): ([u32; 3], [f64; 3])| vertices.into_iter().zip(weights);
     let mut entries: Vec<(u32, f64)> =
@@ -105,8 +107,8 @@ impl<'a> VertexSystem<'a> {
         VertexSystem { bands, materials, equations }
     }
 
-    /// Sweeps until every band is settled; none where `progress` breaks, which is called after each
-    /// sweep.
+    /// Sweeps until every band has converged; `None` if `progress` breaks, which is called after
+    /// each sweep.
     pub fn solve(&self, mut progress: impl FnMut() -> ControlFlow<()>) -> Option<Settled> {
         let count = self.bands.bands.len();
         let contraction: Vec<f64> = (0..count)
@@ -148,7 +150,7 @@ impl<'a> VertexSystem<'a> {
         Some(settled)
     }
 
-    /// One more bounce of what vertices reflect `now`.
+    /// Adds one bounce to the reflected light `now` of vertices.
     fn sweep(&self, now: &[f64], next: &mut [f64]) {
         let count = self.bands.bands.len();
         let vertices = next.par_chunks_mut(count).zip(&self.equations).zip(self.materials);

@@ -1,8 +1,9 @@
-//! The proximity correction: near receivers get the factor of the whole patch, not of its centroid.
+//! The proximity correction: near receivers get the factor of the whole patch instead of its
+//! centroid.
 //!
-//! A row source sees a patch from its centroid, as if all its light came from there. That is off
+//! A row source sees a patch from its centroid, as if all its light left from there. That is wrong
 //! for a receiver within a few patch diameters (the proximity assumption of Baum, Rushmeier and
-//! Winget 1989). For each entry whose receiver is near, with closed forms of Lambert for both
+//! Winget 1989). Each entry whose receiver is near is scaled, with closed forms of Lambert for both
 //! factors:
 //!
 //! ```text
@@ -11,9 +12,9 @@
 //!            F(patch's centroid → whole receiver)
 //! ```
 //!
-//! So what the source found hidden stays hidden. Receivers much larger than the patch are left as
-//! they are: there the centroid of the patch is the better one. All other entries are scaled alike,
-//! so that the row still sums to one.
+//! So receivers that the source sees as hidden stay hidden. Receivers much larger than the patch
+//! are not corrected: for them the centroid of the patch is the better viewpoint. All other entries
+//! are scaled by one factor, so that the row still sums to one.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -23,34 +24,34 @@ use super::{FormFactors, Row, checked_rows};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
-/// Lengths within this factor of a bound are below it. On grids many receivers are just at the
+/// Lengths within this factor of a bound count as below it. On grids many receivers are just at the
 /// reach, or just twice as large: rounding must not decide which of them are corrected.
 const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
 
-/// Receivers this many times as large as the patch keep their entries: their own centroid stands
-/// for them worse than the patch's for the patch.
+/// Receivers more than this number of times as large as the patch keep their entries: their own
+/// centroid represents them worse than the patch's represents the patch.
 const MAX_RECEIVER_SIZE: f64 = 2.0;
 
 /// Rows of another source, with the entries of near receivers corrected by closed forms.
 ///
 /// The correction is for the proximity assumption of Baum, Rushmeier and Winget (1989): that all
-/// light of a patch leaves its centroid, which is off for receivers within a few patch diameters.
+/// light of a patch leaves its centroid, which is wrong for receivers within a few patch diameters.
 #[derive(Debug)]
 pub struct ProximityCorrection<M> {
     source: M,
     near_field: NearField,
-    /// Sum over rows of the share that went to other receivers.
+    /// Sum over rows of the share that moved to other receivers.
     total_correction: f64,
     /// Rows corrected so far.
     rows: u64,
 }
 
-/// Which receivers are near a patch.
+/// Determines the receivers near a patch.
 #[derive(Debug)]
 struct NearField {
     /// In patch diameters.
     reach: f64,
-    /// About each element.
+    /// One per element.
     spheres: Vec<Sphere>,
 }
 
@@ -63,7 +64,7 @@ struct Sphere {
 
 impl<M: FormFactors> ProximityCorrection<M> {
     /// Corrects receivers in `mesh` whose surface is within `reach` patch diameters of the patch's;
-    /// below 0 none, not even those that touch it.
+    /// if below 0 none, not even those that touch it.
     pub fn new(source: M, mesh: &Mesh, reach: f64) -> ProximityCorrection<M> {
         let elements = (0..mesh.element_count()).map(|e| mesh.element(e));
         let spheres = elements.map(|node| Sphere::around(mesh, node)).collect();
@@ -76,13 +77,13 @@ impl<M: FormFactors> ProximityCorrection<M> {
         &self.source
     }
 
-    /// Size of the correction: the share of a row, in [0, 1], that went to other receivers than the
-    /// source found, in the mean over all rows so far.
+    /// Size of the correction: the share of a row, in [0, 1], that moved to other receivers, mean
+    /// over all rows so far.
     pub fn mean_correction(&self) -> f64 {
         if self.rows == 0 { 0.0 } else { self.total_correction / self.rows as f64 }
     }
 
-    /// The source's own rows, not corrected; checked, since the correction of a row that breaks its
+    /// The uncorrected rows of the source; checked, since the correction of a row that breaks its
     /// contract may panic.
     pub(super) fn uncorrected(
         &mut self,
@@ -93,7 +94,7 @@ impl<M: FormFactors> ProximityCorrection<M> {
         checked_rows(&mut self.source, mesh, patches, weight)
     }
 
-    /// Corrects `rows`, which are as seen from the centroids of `patches`.
+    /// Corrects `rows`, seen from the centroids of `patches`.
     pub(super) fn correct(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
         if self.near_field.reach < 0.0 {
             return;
@@ -124,7 +125,7 @@ impl<M: FormFactors> FormFactors for ProximityCorrection<M> {
 }
 
 impl NearField {
-    /// Corrects one row; returns the share of it that went to other receivers.
+    /// Corrects one row; returns the share of it that moved to other receivers.
     fn correct(&self, mesh: &Mesh, patch: NodeId, row: &mut Row) -> f64 {
         let (polygon, normal) = (mesh.corners(patch), mesh.normal(patch));
         let around = Sphere::around(mesh, patch);
@@ -143,7 +144,7 @@ impl NearField {
             let from_patch = back * mesh.area(element) / mesh.area(patch);
             let before = Row::form_factor(entry.share);
             let after = before * from_patch / from_centroid;
-            // The centroid may be in the receiver's plane, and see nothing of it.
+            // The centroid may be in the receiver's plane and not see it.
             if after.is_finite() {
                 near_before += before;
                 near_after += after;
@@ -172,7 +173,7 @@ impl Sphere {
         Sphere { centre, radius }
     }
 
-    /// A lower bound on the distance between what is in the two.
+    /// A lower bound on the distance between the contents of the two.
     fn gap(&self, other: &Sphere) -> f64 {
         self.centre.distance(other.centre) - self.radius - other.radius
     }

@@ -1,39 +1,39 @@
-//! How many samples a row gets: as many as the light that goes along it is worth.
+//! Number of samples of a row, by the light that it distributes.
 //!
-//! What a row of an N × N hemicube sends wrong falls as N^-1.5: of some N² pixels those on the
-//! outlines of what is seen err, some N of them, each by up to its weight of 1/N² or so, at random.
-//! A patch that shoots a share s of the emitted light adds s² N⁻³ to the mean square of what goes
-//! wrong in all, since rows err independently, and takes a time of N². The least of Σ s² N⁻³ for a
-//! given Σ N² is where s² N⁻⁵ is the same for all patches:
+//! The error of a row of an N × N hemicube falls as N^-1.5: of some N² pixels those on the outlines
+//! of visible surfaces are wrong, some N of them, each by up to its weight of 1/N² or so, at
+//! random. A patch that shoots a share s of the emitted light adds s² N⁻³ to the mean square error
+//! in total, since errors of rows are independent, and takes a time of N². Σ s² N⁻³ for a given Σ
+//! N² is minimal where s² N⁻⁵ is the same for all patches:
 //!
 //! ```text
-//! N ∝ s^0.4,  so half of N is enough for 2^2.5 times less light
+//! N ∝ s^0.4,  so half of N suffices for light less by a factor of 2^2.5
 //! ```
 //!
-//! N² rays in strata err alike. The share s is the row's weight.
+//! The error of N² stratified rays falls alike. The share s is the row's weight.
 //!
-//! Rows are kept and shot along again; since the brightest shoots first, not by more than the first
-//! time, and in all by some 1.2 times as much (the median in a Cornell box and in two rooms; five
-//! times at most).
+//! Rows are cached and used again; since the brightest patch shoots first, later shots carry no
+//! more than the first, and all shots together some 1.2 times as much (the median in a Cornell box
+//! and in two rooms; five times at most).
 
-/// Times that the resolution is halved at most. Chosen by hand; no measurement kept.
+/// Maximum number of halvings of the resolution. Plain choice; no recorded measurement.
 pub(crate) const MAX_HALVINGS: u32 = 2;
 
-/// Lowest resolution that is halved to, pixels along an edge: 768 pixels a hemicube. Fewer save no
-/// time worth having.
+/// Minimum halved resolution, pixels along an edge: 768 pixels per hemicube. Fewer save no
+/// significant time.
 pub(crate) const MIN_HALVED_RESOLUTION: u32 = 16;
 
-/// How often the resolution is halved for a row of `weight`, when it is full from
-/// `full_resolution_share` on: as often as leaves it no lower than N ∝ s^0.4 asks for.
+/// Number of halvings of the resolution for a row of `weight`, with full resolution from
+/// `full_resolution_share` on: the largest that keeps it at or above N ∝ s^0.4.
 pub(crate) fn halvings_for_importance(weight: f64, full_resolution_share: f64) -> u32 {
-    // Half the resolution is enough for this many times less light.
+    // Half the resolution suffices for light reduced by this factor.
     let fall = 2f64.powf(2.5);
     let is_enough = |&k: &u32| weight * fall.powi(k as i32) < full_resolution_share;
     (1..=MAX_HALVINGS).take_while(is_enough).last().unwrap_or(0)
 }
 
-/// An even `resolution` halved so often; even, and below [`MIN_HALVED_RESOLUTION`] only where
-/// `resolution` is.
+/// An even `resolution` halved this number of times; even, and below [`MIN_HALVED_RESOLUTION`] only
+/// if `resolution` is.
 pub(crate) fn halved(resolution: u32, halvings: u32) -> u32 {
     ((resolution >> halvings) / 2 * 2).max(MIN_HALVED_RESOLUTION).min(resolution)
 }
@@ -50,10 +50,10 @@ mod tests {
             let halvings = halvings_for_importance(share, 4e-3);
             assert!(halvings <= before, "no coarser for more light: {share}");
             before = halvings;
-            // In units of the full resolution, as it is and as the law has it.
+            // In units of the full resolution: the actual one, and the one by the law.
             let (resolution, law) = (0.5f64.powi(halvings as i32), (share / 4e-3).powf(0.4));
             assert!(resolution >= law.min(1.0), "{share}: {resolution} {law}");
-            // Another halving would be too much, or there is no more.
+            // Another halving would be too much, or the maximum is reached.
             assert!(
                 resolution / 2.0 <= law || halvings == MAX_HALVINGS,
                 "{share}: {resolution} {law}"

@@ -1,13 +1,13 @@
-//! A row of the form-factor matrix: where the light of one patch goes, sparse and exact.
+//! A row of the form-factor matrix: the distribution of the light of one patch, sparse and exact.
 //!
-//! Shares are whole numbers that sum to [`Row::TOTAL`], what is lost included:
+//! Shares are integers that sum to [`Row::TOTAL`], losses included:
 //!
 //! ```text
 //! Σ entries' shares + escaped + backface = 2³² − 1
 //! ```
 //!
-//! So a row neither loses nor makes light, its sum does not depend on the order, and a solve along
-//! it conserves energy whatever the errors of the single shares are.
+//! So a row conserves light, its sum does not depend on the order, and a solve with it conserves
+//! energy whatever the errors of the single shares are.
 
 use std::collections::BTreeMap;
 
@@ -18,25 +18,25 @@ use crate::geometry::rounding::Apportion;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
-/// Where light that leaves one patch goes: the row F_i· of the form-factor matrix, sparse.
+/// Distribution of the light that leaves one patch: the row F_i· of the form-factor matrix, sparse.
 ///
 /// F_ij is the fraction of the flux leaving patch i that arrives at the front of element j. Shares
-/// are whole numbers in units of 1/[`Row::TOTAL`], so that they add up exactly, in any order.
+/// are integers in units of 1/[`Row::TOTAL`], so that they add up exactly, in any order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Row {
-    /// Elements that receive, by ascending index, each with its share.
+    /// Receiving elements by ascending index, each with its share.
     pub entries: Vec<Entry>,
-    /// Share that meets nothing and leaves the scene.
+    /// Share that hits nothing and leaves the scene.
     pub escaped: u32,
-    /// Share that meets the back of a surface and is lost there.
+    /// Share that hits the back of a surface and is lost there.
     pub backface: u32,
-    /// What clear panes on the way let through of each entry, then of `escaped` and of `backface`,
-    /// per channel in units of 1/[`Row::TOTAL`]: the mean over the entry's light. The shares
-    /// themselves are those without panes. Empty where no light goes through a pane.
+    /// Transmittance of clear panes on the way for each entry, then for `escaped` and for
+    /// `backface`, per channel in units of 1/[`Row::TOTAL`]: the mean over the entry's light. The
+    /// shares themselves are those without panes. Empty where no light goes through a pane.
     pub passed: Vec<[u32; 3]>,
 }
 
-/// One nonzero of a [`Row`].
+/// A nonzero entry of a [`Row`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
     /// Receiving element.
@@ -46,15 +46,15 @@ pub struct Entry {
 }
 
 impl Row {
-    /// The share that is all of the light: F = 1.
+    /// The share of all of the light: F = 1.
     pub const TOTAL: u32 = u32::MAX;
 
-    /// The form factor, in [0, 1], that `share` stands for.
+    /// The form factor, in [0, 1], for `share`.
     pub fn form_factor(share: u32) -> f64 {
         f64::from(share) / f64::from(Row::TOTAL)
     }
 
-    /// Sum of all shares over [`Row::TOTAL`]: 1 for a row that neither loses nor makes light.
+    /// Sum of all shares over [`Row::TOTAL`]: 1 for a row that conserves light.
     pub fn closure(&self) -> f64 {
         self.sum() as f64 / f64::from(Row::TOTAL)
     }
@@ -64,25 +64,25 @@ impl Row {
         entries + u64::from(self.escaped) + u64::from(self.backface)
     }
 
-    /// The share per channel, in [0, 1], that `passed` stands for.
+    /// The transmittance per channel, in [0, 1], for `passed`.
     pub(crate) fn transmittance(passed: [u32; 3]) -> Rgb {
         Rgb::from_array(passed.map(Row::form_factor))
     }
 
-    /// What stands for the share `transmittance` per channel, in [0, 1].
+    /// The integers for `transmittance` per channel, in [0, 1].
     pub(crate) fn passed(transmittance: Rgb) -> [u32; 3] {
-        // Above 1 by rounding at most, and then it is 1.
+        // Above 1 only by rounding; clamped to 1.
         transmittance.to_array().map(|share| (share * f64::from(Row::TOTAL)).round() as u32)
     }
 
-    /// Bytes that keeping this row takes.
+    /// Memory of this row, bytes.
     pub fn bytes(&self) -> usize {
         let passed = self.passed.len() * size_of::<[u32; 3]>();
         size_of::<Row>() + self.entries.len() * size_of::<Entry>() + passed
     }
 
     /// Sets the shares of the entries, then `escaped` and `backface`, to these form factors, which
-    /// sum to 1 but for rounding; rounded by their running sum, so that the shares sum to
+    /// sum to 1 except for rounding; rounded by their running sum, so that the shares sum to
     /// [`Row::TOTAL`]. Entries that round to 0 are removed.
     pub(crate) fn set_factors(&mut self, factors: &[f64]) {
         let mut sum = 0.0;
@@ -92,20 +92,20 @@ impl Row {
             sum += factor;
             *slot = shares.part_up_to((sum * f64::from(Row::TOTAL)).round() as u32);
         }
-        // The largest slot can take what rounding of the sum has left.
+        // The largest slot takes the remainder of the rounded sum.
         let slots = self.entries.iter_mut().map(|e| &mut e.share);
         let largest = slots.chain([&mut self.escaped, &mut self.backface]).max_by_key(|s| **s);
         if let Some(share) = largest {
             *share += shares.remainder(Row::TOTAL);
         }
         let mut shares = self.entries.iter().map(|e| e.share);
-        // The last two are not of entries.
+        // The last two do not belong to entries.
         self.passed.retain(|_| shares.next() != Some(0));
         self.entries.retain(|e| e.share > 0);
     }
 
-    /// The mean of `rows`, each of which sums to [`Row::TOTAL`]: so does the mean, exactly, and
-    /// every share of it is off by less than one unit. The mean of no rows is an empty row.
+    /// The mean of `rows`, each of which sums to [`Row::TOTAL`]: so does the mean, exactly, and the
+    /// error of every share is less than one unit. The mean of no rows is an empty row.
     pub(crate) fn mean(rows: &[&Row]) -> Row {
         let count = rows.len().max(1) as u64;
         if rows.iter().any(|row| !row.passed.is_empty()) {
@@ -131,9 +131,9 @@ impl Row {
         Row { entries, escaped, backface, passed: vec![] }
     }
 
-    /// The mean of rows some of which go through panes: what passes is the mean by shares.
+    /// The mean of rows some of which go through panes: transmittances are weighted by shares.
     fn mean_through_panes(rows: &[&Row]) -> Row {
-        // By element; what escapes and what meets backs come last, as in `passed`.
+        // By element; escaped and back-face light come last, as in `passed`.
         let (escaped, backface) = (u64::from(u32::MAX) + 1, u64::from(u32::MAX) + 2);
         let mut sums: BTreeMap<u64, (f64, Rgb)> = BTreeMap::new();
         for row in rows {
@@ -159,7 +159,7 @@ impl Row {
     /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
     ///
     /// # Errors
-    /// [`ErrorKind::FormFactor`] that names `patch` and what is off.
+    /// [`ErrorKind::FormFactor`] that names `patch` and the violation.
     pub fn check(&self, mesh: &Mesh, patch: NodeId) -> Result<(), Error> {
         let broken = |found: String, remedy: &str| {
             let place = format!("form-factor row of patch {}", patch.0);
@@ -218,7 +218,7 @@ mod tests {
         (0..8).for_each(|k| near(share(&mean, k), rows.each_ref().map(|r| share(r, k))));
         near(mean.escaped, rows.each_ref().map(|r| r.escaped));
         near(mean.backface, rows.each_ref().map(|r| r.backface));
-        // Of equal rows, the row.
+        // The mean of equal rows is the row.
         assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
     }
 
@@ -231,20 +231,21 @@ mod tests {
             Row { backface, passed: passed.iter().map(|&p| [p; 3]).collect(), ..row }
         };
         let (all, half) = (Row::TOTAL, Row::TOTAL / 2);
-        // The second has no panes before it.
+        // The second has no panes.
         let rows =
             [row(&[(1, 3 << 20), (5, 1 << 20)], &[0, half, all, half]), row(&[(1, 1 << 20)], &[])];
         let mean = Row::mean(&rows.each_ref());
         assert_eq!(mean.sum(), u64::from(Row::TOTAL));
         assert_eq!(mean.entries.iter().map(|e| e.element).collect::<Vec<_>>(), [1, 5]);
         let passed: Vec<f64> = mean.passed.iter().map(|p| Row::transmittance(*p).x).collect();
-        // A quarter of what element 1 gets is of the second row; so are some half of the backs.
+        // A quarter of the light of element 1 is of the second row; so is about half of that on
+        // backs.
         let backs = rows.each_ref().map(|row| f64::from(row.backface));
         let of_backs = (backs[0] / 2.0 + backs[1]) / (backs[0] + backs[1]);
         for (found, want) in passed.iter().zip([0.25, 0.5, 1.0, of_backs]) {
             assert!((found - want).abs() < 1e-9, "{passed:?}");
         }
-        // An entry that is rounded away takes what passes it along.
+        // An entry that is rounded to 0 loses its transmittance too.
         let mut row = rows[0].clone();
         row.set_factors(&[0.0, 0.25, 0.0, 0.75]);
         assert_eq!((row.entries.len(), &row.passed[..]), (1, &rows[0].passed[1..]));

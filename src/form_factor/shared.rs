@@ -1,12 +1,12 @@
-//! Rows shared out between processes: one drives the solve, the others serve it.
+//! Rows distributed over processes: one drives the solve, the others serve it.
 //!
 //! ```text
 //! process 0        Solver ─→ SharedRows ─ patches ─→ all      own rows ─┐
 //! the others                 serve      ←─────────────┘       own rows ─┴─→ process 0
 //! ```
 //!
-//! Rows are whole numbers and come back in the order of their patches, so that a solve has the same
-//! bits with any number of processes whose sources make the same rows.
+//! Rows are integers and come back in the order of their patches, so that a solve has the same bits
+//! with any number of processes whose sources make the same rows.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,14 +15,14 @@ use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 use crate::ranks::{Ranks, Share, ask, dismiss, serve};
 
-/// Rows that are wanted: of these patches, of this weight.
+/// A request for rows of these patches, with this weight.
 #[derive(Serialize, Deserialize)]
 struct Request {
     weight: f64,
     patches: Vec<NodeId>,
 }
 
-/// Rows of several processes as those of one source: process 0 has it, the others call
+/// Combines the rows of several processes to one source: process 0 has it, the others call
 /// [`SharedRows::serve`].
 #[derive(Debug)]
 pub struct SharedRows<'a, F> {
@@ -31,19 +31,19 @@ pub struct SharedRows<'a, F> {
 }
 
 impl<'a, F: FormFactors> SharedRows<'a, F> {
-    /// Shares rows out to `ranks`, of which this process is number 0, with `source` for its own.
-    /// The others serve until this is dropped.
+    /// Distributes rows over `ranks`, of which this process is number 0, with `source` for its own
+    /// share. The others serve until this is dropped.
     pub fn new(source: F, ranks: &'a mut dyn Ranks) -> SharedRows<'a, F> {
         SharedRows { source, ranks }
     }
 
-    /// Makes rows over `mesh` for process 0 until it has no more to ask for. Meshes and settings of
-    /// sources must be the same in all processes.
+    /// Makes rows over `mesh` for process 0 until that is done. Meshes and settings of sources must
+    /// be the same in all processes.
     ///
-    /// An error of `source` is told to process 0, which then fails.
+    /// An error of `source` is sent to process 0, which then fails.
     ///
     /// # Panics
-    /// When process 0 does not share rows out.
+    /// When process 0 does not distribute rows.
     pub fn serve(source: &mut F, mesh: &Mesh, ranks: &mut dyn Ranks) {
         serve(ranks, |request, share| own_rows(source, mesh, request, share));
     }
@@ -57,7 +57,7 @@ impl<F: FormFactors> FormFactors for SharedRows<'_, F> {
     }
 
     fn preferred_batch_len(&self) -> usize {
-        // As many whatever the processes: a solve shoots in the order of its batches.
+        // Independent of the number of processes: a solve shoots in the order of its batches.
         self.source.preferred_batch_len()
     }
 
@@ -72,7 +72,7 @@ impl<F> Drop for SharedRows<'_, F> {
     }
 }
 
-/// The rows of `request` that fall to this process.
+/// This process's share of the rows of `request`.
 fn own_rows(
     source: &mut impl FormFactors,
     mesh: &Mesh,

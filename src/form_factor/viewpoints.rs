@@ -4,9 +4,9 @@
 //! device gets large batches:
 //!
 //! ```text
-//!   patch          1. see the patch and three of its children from their centroids; the middle
+//!   patch          1. view the patch and three of its children from their centroids; the middle
 //!  ╱ │ │ ╲            child has the patch's centroid, and so its view
-//! ○  ○ ○  ◉        2. where the mean of the children disagrees with the patch, go on with step 1
+//! ○  ○ ○  ◉        2. where the mean of the children disagrees with the patch, repeat step 1
 //! ╱│╲╲                for each child
 //! ○○○◉             3. the row of a view is the mean of its children's rows, where it has any
 //! ```
@@ -18,40 +18,41 @@ use super::{FormFactors, Row};
 use crate::error::Error;
 use crate::mesh::{Mesh, NodeId};
 
-/// Views of a patch whose children disagree with it: 1 of its own, 3 of its children's, 3 more for
-/// each of the four children.
+/// Number of views of a patch whose children disagree with it: 1 of its own, 3 of its children's, 3
+/// more for each of the four children.
 const VIEWS_PER_PATCH: usize = 16;
 
-/// Rows of patches as the mean of what their parts see, finer where the parts disagree.
+/// Rows of patches as the mean of the rows of their parts, finer where the parts disagree.
 ///
-/// A row source takes what the centroid of a patch sees for what all of it sees, which is off where
-/// an occluder hides a receiver from a part of the patch only (the visibility assumption of Baum,
-/// Rushmeier and Winget 1989; several viewpoints are their remedy too). Here a patch is seen from
-/// the centroids of its four children as well: its row is the mean of theirs, whose areas are
-/// equal. Where that mean differs from the patch's own row by more than the tolerance, each child
-/// is seen from its children in turn, to a given depth or to the elements. Elements have no
-/// children: they keep the one view from their centroid, and so do patches that are elements.
+/// A row source takes the view from the centroid of a patch for the view from all of it, which is
+/// wrong where an occluder hides a receiver from a part of the patch only (the visibility
+/// assumption of Baum, Rushmeier and Winget 1989; several viewpoints are their remedy too). Here a
+/// patch is seen from the centroids of its four children as well: its row is the mean of theirs,
+/// whose areas are equal. Where that mean differs from the patch's own row by more than the
+/// tolerance, each child is seen from its children in turn, to a given depth or to the elements.
+/// Elements have no children: they keep the one view from their centroid, and so do patches that
+/// are elements.
 ///
-/// **What disagreement is**: half the sum over scene triangles of |own share − mean share|, with
-/// the shares that leave the scene and that meet backs: the part of the light, in [0, 1], that
-/// lands on another triangle. Single elements are often some pixels wide, and their noise would
-/// drown an occluder. The children are compared by their mean, not one by one, since a view that
-/// shifts evenly over the patch has the centroid's view for its mean and is no error. What an
-/// occluder moves about within one scene triangle goes unseen.
+/// **Disagreement**: half the sum over scene triangles of |own share − mean share|, including the
+/// shares that leave the scene and that hit backs: the part of the light, in [0, 1], that lands on
+/// another triangle. Single elements are often some pixels wide, and their noise would hide the
+/// effect of an occluder. The mean of the children is compared, not each child, since a view that
+/// shifts evenly over the patch has the centroid's view for its mean and is no error. Displacements
+/// by an occluder within one scene triangle are not detected.
 ///
-/// **What it costs**: the middle child of a patch has the patch's centroid, so the patch's row is
-/// the middle child's too. Three more rows a patch are made to compare; once made they are used,
-/// disagreement or not. Twelve more come for each patch or part that is gone down into; see
+/// **Cost**: the middle child of a patch has the patch's centroid, so the patch's row is the middle
+/// child's too. Three more rows per patch are made to compare; they are used with or without
+/// disagreement. Twelve more are made for each patch or part that is refined; see
 /// [`AdaptiveViewpoints::extra_rows`].
 ///
-/// **What it is worth** (Cornell box in elements of 30 mm, hemicubes of 128 pixels, against rays
-/// from all over the patch; share of a row on the wrong triangle, over 60 patches): patches of 16
-/// elements err by an RMS of 0.066 (median 0.0042) from one viewpoint, 0.022 (0.0019) from four,
-/// 0.008 (0.0019) with a tolerance of 0.02, which takes 15 % more hemicubes than four each. Patches
-/// of four elements gain in the median, 0.0020 to 0.0008, hardly in the RMS: most of that is in
-/// patches whose elements are themselves cut by an occluder.
+/// **Benefit** (Cornell box in elements of 30 mm, hemicubes of 128 pixels, against rays from all
+/// over the patch; share of a row on the wrong triangle, over 60 patches): patches of 16 elements
+/// have an RMS error of 0.066 (median 0.0042) from one viewpoint, 0.022 (0.0019) from four, 0.008
+/// (0.0019) with a tolerance of 0.02, which takes 15 % more hemicubes than four each. Patches of
+/// four elements improve in the median, 0.0020 to 0.0008, hardly in the RMS: most of that is in
+/// patches whose elements are themselves split by an occluder.
 ///
-/// **Where the proximity correction goes**: inside, since near factors are those of the node that
+/// **Order with the proximity correction**: inside, since near factors are those of the node that
 /// was seen from; that is why this takes a [`ProximityCorrection`] (with a reach below 0 for none).
 /// Each part's row is corrected for that part, the middle child's anew from the uncorrected row. A
 /// [`ProximityCorrection`] around this would take the mean for the view from the patch's centroid
@@ -67,11 +68,11 @@ pub struct AdaptiveViewpoints<M> {
 /// A node that is seen from its centroid.
 struct ViewNode {
     node: NodeId,
-    /// What the source found; also that of the middle child.
+    /// The row of the source; also that of the middle child.
     uncorrected: Row,
     /// The same, corrected for near receivers.
     corrected: Row,
-    /// Views of the four children, the middle one last, where they are seen from.
+    /// Views of the four children, the middle one last, where refined.
     children: Vec<ViewNode>,
 }
 
@@ -80,13 +81,13 @@ impl ViewNode {
         ViewNode { node, uncorrected: Row::default(), corrected: Row::default(), children: vec![] }
     }
 
-    /// Adds the views of the children, where there are any.
+    /// Adds the views of the children, if any.
     fn add_children(&mut self, mesh: &Mesh) {
         self.children = mesh.children(self.node).into_iter().flatten().map(ViewNode::new).collect();
     }
 
-    /// The mean of the children's rows, or its own where it has none. With holes children count by
-    /// what is solid of them, in sixteenths of the most.
+    /// The mean of the children's rows, or its own where it has none. With holes the weight of a
+    /// child is its solid area, in sixteenths of the largest.
     fn mean_row(&self, mesh: &Mesh) -> Row {
         if self.children.is_empty() {
             return self.corrected.clone();
@@ -111,7 +112,8 @@ impl ViewNode {
             return 0.0;
         }
         let triangles = mesh.scene().triangles().len();
-        // Four times the difference, in shares; then what escapes, then what meets back faces.
+        // Four times the difference, in shares; then the escaped light, then the light on back
+        // faces.
         let mut difference = vec![0i64; triangles + 2];
         let children = self.children.iter().map(|child| (&child.corrected, -1));
         for (row, weight) in children.chain([(&self.corrected, 4)]) {
@@ -128,9 +130,9 @@ impl ViewNode {
 }
 
 impl<M: FormFactors> AdaptiveViewpoints<M> {
-    /// Sees patches from parts at most `levels` below them, and from more than their children where
-    /// these disagree with the patch by more than `tolerance`, a share of the light in [0, 1].
-    /// `levels` 0 leaves the rows as they are, `tolerance` 1 always stops at the children.
+    /// Views patches from parts at most `levels` below them, and from more than their children
+    /// where these disagree with the patch by more than `tolerance`, a share of the light in [0,
+    /// 1]. `levels` 0 leaves the rows as they are, `tolerance` 1 always stops at the children.
     pub fn new(
         source: ProximityCorrection<M>,
         tolerance: f64,
@@ -144,13 +146,13 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
         &self.source
     }
 
-    /// Rows made so far beyond one a patch.
+    /// Number of rows made so far beyond one per patch.
     pub fn extra_rows(&self) -> u64 {
         self.extra_rows
     }
 
-    /// Sees `views`, all at depth `level` below the patches, from their children, and goes on below
-    /// those that disagree with theirs. Patches themselves are seen here too.
+    /// Views `views`, all at depth `level` below the patches, from their children, and recurses
+    /// where these disagree. The patches' own views are made here too.
     fn refine(
         &mut self,
         mesh: &Mesh,
@@ -180,8 +182,8 @@ impl<M: FormFactors> AdaptiveViewpoints<M> {
         self.refine(mesh, &mut children, level + 1, weight)
     }
 
-    /// Asks the source for the rows of `views`, if they are patches, and of their children, all at
-    /// once; the middle child gets its parent's.
+    /// Requests the rows of `views`, if they are patches, and of their children from the source,
+    /// all at once; the middle child gets its parent's.
     fn cast_missing_rows(
         &mut self,
         mesh: &Mesh,
@@ -237,7 +239,7 @@ impl<M: FormFactors> FormFactors for AdaptiveViewpoints<M> {
         Ok(views.par_iter().map(|view| view.mean_row(mesh)).collect())
     }
 
-    /// As many patches as fill a batch of the source where their children disagree, and 1 at least.
+    /// Number of patches that fill a batch of the source where their children disagree, at least 1.
     fn preferred_batch_len(&self) -> usize {
         if self.levels == 0 {
             self.source.preferred_batch_len()

@@ -1,4 +1,4 @@
-//! Emission of a black body, in all and by bands of wavelengths.
+//! Emission of a black body, in total and by wavelength band.
 
 use std::f64::consts::PI;
 
@@ -11,22 +11,22 @@ const SECOND_RADIATION: f64 = 14387.76877;
 /// ∫ z³/(e^z − 1) dz from 0 to infinity is π⁴/15.
 const WHOLE: f64 = PI * PI * PI * PI / 15.0;
 
-/// Below this z = c₂/λT the power series of the integral is taken, above it that in e^−z.
+/// Below this z = c₂/λT the power series of the integral is used, above it that in e^−z.
 const SERIES_BELOW: f64 = 1.5;
 
 /// Share of a black body's emission below `wavelength` (µm) at `temperature` (K), 0 to 1.
 ///
 /// 15/π⁴ Σ e^−nz (z³ + 3z²/n + 6z/n² + 6/n³)/n with z = c₂/λT (S. L. Chang, K. T. Rhee, "Blackbody
 /// radiation functions", Int. Comm. Heat Mass Transfer 11, 1984); for small z a power series. Both
-/// to 1e-15.
+/// have an error of 1e-15.
 pub fn share_below(wavelength: f64, temperature: f64) -> f64 {
     Split::at(wavelength * temperature).below
 }
 
-/// Above this z, e^−z is as good as 0.
+/// Above this z, e^−z counts as 0.
 const NO_SHORTER_WAVES: f64 = 700.0;
 
-/// The emission of a black body, cut at a wavelength.
+/// The emission of a black body, split at a wavelength.
 #[derive(Clone, Copy)]
 struct Split {
     /// Share at shorter wavelengths.
@@ -46,7 +46,7 @@ impl Split {
             let above = power_series(z) / WHOLE;
             return Split { below: 1.0 - above, above };
         }
-        // Terms fall by e^−z < 0.23: 30 leave 1e-20 of the first.
+        // Terms fall by e^−z < 0.23: term 30 is 1e-20 of the first.
         let term = |n: f64| {
             (-n * z).exp() * (((z + 3.0 / n) * z + 6.0 / (n * n)) * z + 6.0 / (n * n * n)) / n
         };
@@ -55,14 +55,14 @@ impl Split {
     }
 
     fn between(self, longer: Split) -> f64 {
-        // The difference of the smaller ones, which have more digits.
+        // The difference of the smaller ones, which have more significant digits.
         if longer.below < 0.5 { longer.below - self.below } else { self.above - longer.above }
     }
 }
 
 /// ∫ t³/(e^t − 1) dt from 0 to z: z³ Σ B_k z^k / ((k + 3) k!), with Bernoulli's numbers B_k.
 fn power_series(z: f64) -> f64 {
-    // B_k / k! for k = 2, 4, …: z < 1.5 makes the first left out 5e-16 of the sum.
+    // B_k / k! for k = 2, 4, …: with z < 1.5 the first omitted term is 5e-16 of the sum.
     const TERMS: [f64; 11] = [
         1.0 / 12.0,
         -1.0 / 720.0,
@@ -96,7 +96,7 @@ impl Bands<'_> {
         self.edges.len() + 1
     }
 
-    /// Emission M in each band, W/m², of a black body that emits `all` (σT⁴) in all.
+    /// Emission M in each band, W/m², of a black body with total emission `all` (σT⁴).
     pub fn emission(&self, all: f64, of_band: &mut [f64]) {
         let temperature = temperature(all);
         let mut shorter = Split { below: 0.0, above: 1.0 };
@@ -110,11 +110,11 @@ impl Bands<'_> {
         }
     }
 
-    /// The derivative of the emission in each band by the emission in all: the shares, and
-    /// λT/4 times the derivative of the share below λ at either end.
+    /// The derivative of the emission in each band by the total emission: the shares, and λT/4
+    /// times the derivative of the share below λ at either end.
     pub fn slopes(&self, all: f64, of_band: &mut [f64]) {
         if all <= 0.0 {
-            // Towards 0 K the longest waves have it all.
+            // Towards 0 K all emission is in the band of the longest waves.
             of_band.fill(0.0);
             of_band[self.edges.len()] = 1.0;
             return;
@@ -140,12 +140,12 @@ impl Bands<'_> {
     }
 }
 
-/// Temperature of a black body that emits `all`, K; 0 where that is none or negative.
+/// Temperature of a black body that emits `all`, K; 0 if `all` is zero or negative.
 pub(super) fn temperature(all: f64) -> f64 {
     (all.max(0.0) / STEFAN_BOLTZMANN).sqrt().sqrt()
 }
 
-/// Emission of a black body of this temperature in all, W/m².
+/// Total emission of a black body of this temperature, W/m².
 pub(super) fn emission(temperature: f64) -> f64 {
     STEFAN_BOLTZMANN * temperature.powi(4)
 }

@@ -1,9 +1,9 @@
-//! The balance of all groups and bands, solved for.
+//! Solves for the balance of all groups and bands.
 //!
-//! Unknown is the radiosity B of each group in each band. One sweep takes B to irradiance
+//! The unknown is the radiosity B of each group in each band. One product maps B to the irradiance
 //! H = F B + open M, band by band, and H to B = ε M + (1 − ε) H; where the flux q is given, M is
-//! the one that makes Σ ε (M − H) = q, linear in H with one band. With several it is made linear
-//! around the last emission, until that no longer moves.
+//! determined by Σ ε (M − H) = q, linear in H with one band. With several it is linearized around
+//! the last emission, until that converges.
 
 use std::ops::ControlFlow;
 
@@ -16,14 +16,14 @@ use super::surface::{Boundary, HeatSettings, Surface, of_group};
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, ViewFactors};
 
-/// Emissions that move by less, relatively, are found.
+/// Maximum relative change of converged emissions.
 const SETTLED: f64 = 1e-13;
 
-/// Newton's steps at most; it takes a handful.
+/// Maximum number of Newton steps; typically a handful suffice.
 const MAX_STEPS: usize = 100;
 
-/// A step that moves them by more than this share of the step before it, once they are settled to
-/// a millionth, moves them by rounding.
+/// Ratio of a step to the one before it above which, after convergence to a millionth, the change
+/// is rounding.
 const STALLED: f64 = 0.5;
 
 pub(super) struct Exchange<'a> {
@@ -32,16 +32,16 @@ pub(super) struct Exchange<'a> {
     bands: Bands<'a>,
     /// Emission of the surroundings by band.
     surroundings: Vec<f64>,
-    /// Black body's emission at the temperature of each group: given, or as it is now thought.
+    /// Black body's emission at the temperature of each group: given, or the current iterate.
     emission: Vec<f64>,
 }
 
-/// How the black body's emission of a group follows its irradiance, by band: at + slope · change,
-/// where the change is the one that makes the net flux right.
+/// Linearized black body's emission of a group as a function of its irradiance, by band: at + slope
+/// · change, where the change is determined by the net flux.
 struct Linear {
     at: Vec<f64>,
     slope: Vec<f64>,
-    /// Flux out, and Σ ε slope; none where the temperature is given.
+    /// Flux out, and Σ ε slope; `None` where the temperature is given.
     flux: Option<(f64, f64)>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Exchange<'a> {
             Boundary::Temperature(t) => emission(t),
             Boundary::NetFlux(q) => q.abs(),
         });
-        // Those that are not known begin with the largest there is: there no share is 0.
+        // Unknown emissions begin with the largest known one: there no share is 0.
         let largest = known.fold(outside, f64::max);
         let emission = surfaces.iter().map(|s| match s.boundary {
             Boundary::Temperature(t) => emission(t),
@@ -114,7 +114,7 @@ impl<'a> Exchange<'a> {
         ))
     }
 
-    /// The emission of group `i` around what it is thought to be.
+    /// Linearizes the emission of group `i` around its current iterate.
     fn linear(&self, i: usize) -> Linear {
         let bands = self.bands.count();
         let (mut at, mut slope) = (vec![0.0; bands], vec![0.0; bands]);
@@ -130,7 +130,7 @@ impl<'a> Exchange<'a> {
         Linear { at, slope, flux }
     }
 
-    /// What arrives at each group in each band, of what leaves the others and, `from_outside`, the
+    /// Irradiance of each group in each band from the others and, if `from_outside`, the
     /// surroundings.
     fn irradiance(&self, radiosity: &[f64], from_outside: bool) -> Vec<f64> {
         let bands = self.bands.count();
@@ -149,8 +149,8 @@ impl<'a> Exchange<'a> {
         irradiance
     }
 
-    /// What leaves each group in each band where this arrives; without what is `given`, the part
-    /// that is proportional to what arrives.
+    /// Radiosity of each group in each band for this irradiance; without `given`, only the part
+    /// that is proportional to the irradiance.
     fn leaving(&self, linear: &[Linear], irradiance: &[f64], given: bool) -> Vec<f64> {
         let bands = self.bands.count();
         let mut leaving = irradiance.to_vec();
@@ -174,8 +174,8 @@ impl<'a> Exchange<'a> {
         leaving
     }
 
-    /// Sets the emission of groups with given flux to what their irradiance asks for, and tells how
-    /// far the one that moved farthest did, relatively.
+    /// Sets the emission of groups with given flux from their irradiance, and returns the largest
+    /// relative change.
     fn follow(&mut self, irradiance: &[f64]) -> f64 {
         let (bands, surfaces) = (&self.bands, self.surfaces);
         let count = bands.count();
@@ -248,7 +248,7 @@ impl<'a> Exchange<'a> {
         pairs.map(|((e, m), h)| e * (m - h)).sum()
     }
 
-    /// Standard error of the net flux from those of the factors in row `i`.
+    /// Standard error of the net flux due to the errors of the factors in row `i`.
     fn flux_error(&self, i: usize, radiosity: &[f64]) -> f64 {
         let bands = self.bands.count();
         let squares = self.factors.factors[i].iter().map(|factor| {
@@ -273,7 +273,7 @@ impl<'a> Exchange<'a> {
             let arriving = &irradiance[i * self.bands.count()..][..self.bands.count()];
             let pairs = surface.emissivity.iter().zip(arriving);
             let absorbed: f64 = pairs.map(|(e, h)| e * h).sum();
-            // What arrives with this flux is less than with none: at 0 K a group takes most.
+            // The irradiance with this flux is less than with none: at 0 K a group takes in most.
             let found = format!("net flux {q} where {absorbed:.6e} is absorbed");
             let remedy = "no temperature emits less than nothing: take less heat from it";
             return Err(of_group(&self.factors.names[i], found, remedy));
@@ -282,8 +282,8 @@ impl<'a> Exchange<'a> {
     }
 }
 
-/// Emission M of a black body, of which a group with this emissivity by band emits `emitted`;
-/// negative where that is.
+/// Emission M of a black body for which a group with this emissivity by band emits `emitted`;
+/// negative where `emitted` is.
 fn emission_of(bands: &Bands, emissivity: &[f64], emitted: f64) -> f64 {
     if let &[e] = emissivity {
         return if e > 0.0 { emitted / e } else { 0.0 };
@@ -292,7 +292,7 @@ fn emission_of(bands: &Bands, emissivity: &[f64], emitted: f64) -> f64 {
     if largest == 0.0 {
         return 0.0;
     }
-    // All would be emitted with the largest emissivity in every band.
+    // Lower bound: the largest emissivity in every band.
     let mut low = emitted / largest;
     if low <= 0.0 {
         return low;
@@ -306,7 +306,7 @@ fn emission_of(bands: &Bands, emissivity: &[f64], emitted: f64) -> f64 {
     while of(high) < emitted && high < f64::MAX / 4.0 {
         (low, high) = (high, 4.0 * high);
     }
-    // It grows with M: halved to the last bit.
+    // It grows with M: bisection to the last bit.
     loop {
         let middle = low + 0.5 * (high - low);
         if !(middle > low && middle < high) {

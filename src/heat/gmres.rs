@@ -1,16 +1,16 @@
-//! GMRES, restarted (Y. Saad, M. H. Schultz 1986), for a system that is only known by its product.
+//! Restarted GMRES (Y. Saad, M. H. Schultz 1986) for a system given by its product.
 
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-/// Products in a cycle: as many vectors are kept.
+/// Products in a cycle, and number of stored vectors.
 const RESTART: usize = 60;
 
-/// Numbers that a thread sums at once: in an order that does not depend on their number.
+/// Numbers summed sequentially in one chunk: the order does not depend on the number of threads.
 const CHUNK: usize = 4096;
 
-/// What came of it.
+/// Statistics of a solve.
 pub(super) struct Solved {
     /// Norm of the residual over that of the right-hand side.
     pub residual: f64,
@@ -19,8 +19,8 @@ pub(super) struct Solved {
 
 /// Improves `x` until A x = `right` to rounding, or until a cycle gains nothing.
 ///
-/// `product` is A. Norms weigh each number by its `weights`. `progress` is told the residual, over
-/// the norm of `right`, after every product; when it breaks there is no result.
+/// `product` is A. Norms weight each number by `weights`. `progress` is called with the residual,
+/// over the norm of `right`, after every product; `None` if it breaks.
 pub(super) fn solve(
     mut product: impl FnMut(&[f64]) -> Vec<f64>,
     right: &[f64],
@@ -43,12 +43,12 @@ pub(super) fn solve(
         if progress(length / scale).is_break() {
             return None;
         }
-        // The last cycle has come to rounding when it gains less than a digit.
+        // The last cycle has reached rounding if it gains less than a digit.
         if length <= f64::EPSILON * scale || length > 0.1 * before && length < 1e-10 * scale {
             return Some(Solved { residual: length / scale, products });
         }
-        // A cycle of as many products as numbers would be exact: one that gains nothing will not.
-        // Nor one of numbers that are not finite.
+        // A cycle with as many products as unknowns is exact: a cycle without a gain ends the
+        // solve. So do numbers that are not finite.
         if length >= before || !length.is_finite() {
             return Some(Solved { residual: length / scale, products });
         }
@@ -69,7 +69,7 @@ pub(super) fn solve(
     }
 }
 
-/// The products of one cycle.
+/// A cycle of products.
 struct Cycle {
     /// Orthonormal, the first along the residual; one more than there are columns.
     basis: Vec<Vec<f64>>,
@@ -77,7 +77,7 @@ struct Cycle {
     columns: Vec<Vec<f64>>,
     /// Cosine and sine of each Givens rotation.
     rotations: Vec<(f64, f64)>,
-    /// The residual in the basis, rotated; the last is what is left of it.
+    /// The residual in the basis, rotated; the last entry is the norm of the new residual.
     rotated: Vec<f64>,
 }
 
@@ -87,12 +87,12 @@ impl Cycle {
         Cycle { basis: vec![residual], columns: vec![], rotations: vec![], rotated: vec![length] }
     }
 
-    /// Norm of the residual that the vectors so far would leave.
+    /// Norm of the residual with the vectors so far.
     fn left(&self) -> f64 {
         self.rotated[self.rotated.len() - 1].abs()
     }
 
-    /// Takes the image of the newest vector; false where it is in the basis to rounding.
+    /// Adds the image of the newest vector; false where it is in the basis to rounding.
     fn extend(&mut self, mut image: Vec<f64>, weights: &[f64]) -> bool {
         let before = dot(&image, &image, weights).sqrt();
         let mut column = vec![0.0; self.basis.len()];
@@ -129,7 +129,7 @@ impl Cycle {
         goes_on
     }
 
-    /// Adds to `x` the combination of the vectors that leaves least.
+    /// Adds to `x` the combination of the vectors that minimizes the residual.
     fn add_to(&self, x: &mut [f64]) {
         let n = self.columns.len();
         let mut factors = self.rotated[..n].to_vec();

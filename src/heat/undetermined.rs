@@ -1,23 +1,23 @@
-//! Groups whose temperature nothing determines.
+//! Detects groups with an undetermined temperature.
 
 use super::surface::{Boundary, Surface, of_group};
 use crate::error::Error;
 use crate::geometry::union_find::UnionFind;
 use crate::view_factor::ViewFactors;
 
-/// Shares below are rounding.
+/// Shares below this are rounding.
 const LEAST_SHARE: f64 = 1e-12;
 
-/// Whether each group with given flux exchanges heat, directly or by others, with something that
-/// has a temperature: a group that absorbs, the surroundings, or
-/// backs of surfaces, which are cold.
+/// Whether each group with given flux exchanges heat, directly or through others, with something
+/// that has a temperature: a group that absorbs, the surroundings, or backs of surfaces, which are
+/// cold.
 pub(super) fn check(
     factors: &ViewFactors,
     surfaces: &[Surface],
     bands: usize,
 ) -> Result<(), Error> {
-    // A node for each group in each band: light stays in its band, but for what groups with given
-    // flux absorb and emit again.
+    // A node for each group in each band: light stays in its band, except where groups with given
+    // flux absorb it and emit again.
     let node = |group: usize, band: usize| group * bands + band;
     let mut sets = UnionFind::new(surfaces.len() * bands);
     for (i, row) in factors.factors.iter().enumerate() {

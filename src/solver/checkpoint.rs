@@ -4,12 +4,12 @@
 //! 7 bytes "radiosi", 1 byte version      MAGIC
 //! fingerprint of the mesh, text of the method, fingerprint of the row source   Identity   postcard
 //! the session                            SavedSession                                     postcard
-//! 8 bytes XXH3-64 of all before          little-endian
+//! 8 bytes XXH3-64 of all the above       little-endian
 //! ```
 //!
-//! A file is resumed only with a mesh, a method and rows of the same identity. Rows are not in it
-//! but for those that cannot be made again; what else was cached is rebuilt when it is asked for,
-//! as it was.
+//! A file is resumed only with a mesh, a method and a row source of the same identity. The file
+//! holds only those rows that cannot be computed again; other cached rows are rebuilt identically
+//! on demand.
 
 use std::fs;
 use std::path::Path;
@@ -31,7 +31,7 @@ const MAGIC: &[u8; 8] = b"radiosi\x02";
 /// Bytes of the checksum at the end of every file.
 const CHECKSUM_BYTES: usize = 8;
 
-/// What must be the same for a session to be resumed. Stop rules may differ.
+/// Data that must be equal for a session to be resumed. Stop rules may differ.
 #[derive(Serialize, Deserialize)]
 struct Identity {
     /// [`Mesh::fingerprint`].
@@ -43,11 +43,11 @@ struct Identity {
 }
 
 impl SolveSession<'_> {
-    /// Writes the state to `path`, so that [`Solver::resume`] can go on from there. Whenever this
-    /// is cut short, the file is either what it was or what it was to be.
+    /// Writes the state to `path` for [`Solver::resume`]. If the write is interrupted, the file is
+    /// either the old or the complete new one.
     ///
-    /// Takes 48 bytes an element, some 40 a patch that has shot, and what the method has in hand:
-    /// with GMRES 48 bytes an element for each product of the cycle.
+    /// Size: 48 bytes per element, about 40 per patch that has shot, and the intermediate state of
+    /// the method: with GMRES 48 bytes per element for each product of the cycle.
     ///
     /// # Errors
     /// [`ErrorKind::File`] when the file cannot be written.
@@ -64,10 +64,10 @@ impl SolveSession<'_> {
         )
     }
 
-    /// What [`SolveSession::save`] writes.
+    /// The bytes that [`SolveSession::save`] writes.
     ///
     /// # Panics
-    /// Never: a vector takes all bytes.
+    /// Never: serialization to a vector cannot fail.
     pub fn to_bytes(&self) -> Vec<u8> {
         let identity = Identity {
             mesh: self.mesh().fingerprint(),
@@ -89,13 +89,13 @@ fn append_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
 }
 
 impl Solver {
-    /// The session that [`SolveSession::save`] wrote to `path`, to go on over `mesh` with rows from
-    /// `form_factors`: it ends with the same bits as if it had not been interrupted. Stop rules and
-    /// memory for rows may have changed.
+    /// Resumes the session that [`SolveSession::save`] wrote to `path`, over `mesh` with rows from
+    /// `form_factors`: the result has the same bits as without the interruption. Stop rules and
+    /// memory for rows may differ.
     ///
     /// # Errors
-    /// [`ErrorKind::File`] when the file cannot be read, is damaged, or is that of another mesh,
-    /// method or source of rows; those of [`Solver::begin`].
+    /// [`ErrorKind::File`] when the file cannot be read, is damaged, or was written for another
+    /// mesh, method or row source; the errors of [`Solver::begin`].
     pub fn resume<'m>(
         &self,
         mesh: &'m Mesh,
@@ -105,7 +105,7 @@ impl Solver {
         self.resume_after(mesh, &ReceivedLight::default(), form_factors, path.as_ref())
     }
 
-    /// The same where the elements had `received` light before.
+    /// As [`Solver::resume`], for elements that had `received` light before the solve.
     pub(crate) fn resume_after<'m>(
         &self,
         mesh: &'m Mesh,
@@ -122,7 +122,7 @@ impl Solver {
         self.restore_bytes(session, form_factors, &bytes).map_err(|e| e.inside(path))
     }
 
-    /// The same from bytes.
+    /// As [`Solver::resume`], from bytes.
     ///
     /// # Errors
     /// Those of [`Solver::resume`].
@@ -135,7 +135,7 @@ impl Solver {
         self.restore_bytes(self.begin(mesh)?, form_factors, bytes)
     }
 
-    /// What `bytes` say of `session`, which has just begun.
+    /// Restores the state in `bytes` to `session`, which has just begun.
     fn restore_bytes<'m>(
         &self,
         session: SolveSession<'m>,
@@ -158,7 +158,7 @@ impl Solver {
     }
 }
 
-/// What is between header and checksum, if these are right.
+/// The bytes between header and checksum, if both are valid.
 fn verified_content(bytes: &[u8]) -> Result<&[u8], Error> {
     let Some(body) = bytes.strip_prefix(MAGIC) else {
         let found = format!("the first bytes are {:x?}", &bytes[..bytes.len().min(MAGIC.len())]);
@@ -173,7 +173,7 @@ fn verified_content(bytes: &[u8]) -> Result<&[u8], Error> {
     Ok(content)
 }
 
-/// A `T` from the beginning of `bytes`, and what is left.
+/// Reads a `T` from the beginning of `bytes`; returns it and the remaining bytes.
 fn take_from<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<(T, &'b [u8]), Error> {
     postcard::take_from_bytes(bytes).map_err(|e| refuse("content", e.to_string(), DAMAGED))
 }

@@ -1,12 +1,12 @@
 //! Gaussian elimination on the dense matrix: for small scenes, and as a reference for the other
 //! methods.
 //!
-//! The matrix is 1 − M, with M_ji = ρ_j F_ij, and what comes through from behind. Its columns are
-//! diagonally dominant, since no element sends out more than its light. So elimination needs no
-//! pivoting, and no entry grows to more than twice the largest (Higham 2002, Theorem 9.9). Each
-//! entry is a channel triple: one elimination solves all three. It goes by panels: the rows of a
-//! panel are eliminated one by one, then all rows below in parallel. What the solution sends is
-//! then distributed along the rows, so that its rounding shows in the ledger.
+//! The matrix is 1 − M, with M_ji = ρ_j F_ij, plus the transmitted light. Its columns are
+//! diagonally dominant, since no element sends out more light than it receives. So elimination
+//! needs no pivoting, and no entry grows to more than twice the largest (Higham 2002, Theorem 9.9).
+//! Each entry is a channel triple: one elimination solves all three. Elimination is by panels: the
+//! rows of a panel one by one, then all rows below in parallel. The solution is then distributed
+//! along the rows, so that its rounding error shows in the ledger.
 
 use std::sync::Arc;
 
@@ -20,11 +20,12 @@ use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Rows of the matrix in a panel: as many as a cache holds beside the row that they are subtracted
-/// from. At [`DIRECT_MAX_ELEMENTS`](super::Solver::DIRECT_MAX_ELEMENTS) they take 1.6 MB.
+/// Rows of the matrix in a panel: a cache holds these and the row that they are subtracted from. At
+/// [`DIRECT_MAX_ELEMENTS`](super::Solver::DIRECT_MAX_ELEMENTS) they take 1.6 MB.
 const PANEL_ROWS: usize = 16;
 
-/// Solves in one step. Holds all rows whatever the budget; they take less than the matrix.
+/// Solves in one step. Keeps all rows regardless of the budget; they take less memory than the
+/// matrix.
 pub(super) fn solve_directly(step: &mut StepContext) -> Result<StopReason, Error> {
     if step.refresh_and_check_convergence()? {
         return Ok(StopReason::Converged);
@@ -67,7 +68,8 @@ fn all_rows(step: &mut StepContext, mesh: &Mesh) -> Result<Option<Vec<Arc<Row>>>
     Ok(Some(rows))
 }
 
-/// Equation j: x_j − ρ_j Σ_i F_ij x_i = r_j, with x what each element sends and r what is unshot.
+/// Equation j: x_j − ρ_j Σ_i F_ij x_i = r_j, with x the flux that each element sends and r the
+/// unshot.
 struct LinearSystem {
     count: usize,
     /// Row-major, `count` + 1 columns; the right-hand side is the last.
@@ -96,7 +98,7 @@ impl LinearSystem {
         LinearSystem { count, matrix }
     }
 
-    /// Eliminates the unknowns from number `first` on, a panel of them, from all equations below.
+    /// Eliminates the unknowns of one panel, from number `first` on, from all equations below.
     fn eliminate_panel(&mut self, first: usize) {
         let stride = self.count + 1;
         let end = (first + PANEL_ROWS).min(self.count);
@@ -109,7 +111,7 @@ impl LinearSystem {
         below.par_chunks_mut(stride).for_each(|row| eliminate(row, panel, first));
     }
 
-    /// The unknowns, once all panels are eliminated.
+    /// Solves for the unknowns, once all panels are eliminated.
     fn substitute_back(&self) -> Vec<Rgb> {
         let mut x = vec![Rgb::ZERO; self.count];
         for (i, row) in self.matrix.chunks_exact(self.count + 1).enumerate().rev() {
@@ -120,8 +122,8 @@ impl LinearSystem {
     }
 }
 
-/// Subtracts multiples of `pivots`, the equations from number `first` on, from the equation `row`,
-/// so that it has none of their unknowns.
+/// Eliminates the unknowns of `pivots`, the equations from number `first` on, from the equation
+/// `row`.
 fn eliminate(row: &mut [Rgb], pivots: &[Rgb], first: usize) {
     for (k, pivot) in (first..).zip(pivots.chunks_exact(row.len())) {
         let factor = row[k] / pivot[k];

@@ -1,14 +1,14 @@
-//! Where the light is while a solver runs.
+//! The distribution of light while a solver runs.
 //!
 //! The state is flux, not radiosity: a patch that sends Φ along row i sends F_ij Φ to element j,
-//! which absorbs (1 − ρ_j) of it and has the rest to pass on. Divided by the receiver's area that
-//! is the textbook ΔB_j = ρ_j ΔB_i F_ij A_i/A_j, and no size of patch or element can make or lose
-//! energy.
+//! which absorbs the share 1 − ρ_j and keeps the rest as unshot. Divided by the receiver's area
+//! that is the textbook ΔB_j = ρ_j ΔB_i F_ij A_i/A_j; energy is conserved for patches and elements
+//! of any size.
 //!
-//! With s what was sent, e what is emitted and (Mx)_j = ρ_j Σ_i F_ij x_i, the unshot flux is the
-//! residual r = e − s + Ms of the radiosity equation, and what leaves is s + r = e + Ms. Solvers
-//! only differ in what they send next (Gortler, Cohen and Slusallek 1994): this state, and the
-//! ledger, is common to all.
+//! With s the flux sent, e the flux emitted and (Mx)_j = ρ_j Σ_i F_ij x_i, the unshot flux is the
+//! residual r = e − s + Ms of the radiosity equation, and the leaving flux is s + r = e + Ms.
+//! Solvers differ only in what they send next (Gortler, Cohen and Slusallek 1994); this state and
+//! the ledger are common to all.
 
 use std::ops::Range;
 
@@ -23,22 +23,23 @@ use crate::scene::Rgb;
 /// Flux of the elements, W per channel.
 #[derive(Clone)]
 pub(super) struct Flux {
-    /// The shares of what elements receive that others, behind them, send on.
+    /// Shares of the flux received by translucent elements that leave on the other side.
     transmission: Transmission,
-    /// Emitted by all, or received of it where that is known beforehand.
+    /// Total emitted flux; for lights in [`ReceivedLight`] the flux received from them.
     total: Rgb,
-    /// Emitted by each.
+    /// Emitted flux per element.
     pub emitted: Vec<Rgb>,
-    /// The share of what it receives that each reflects; no flux.
+    /// Reflectance per element; not a flux.
     pub reflectance: Vec<Rgb>,
-    /// Received by each.
+    /// Received flux per element.
     pub incident: Vec<Rgb>,
-    /// Received or emitted by each and not yet passed on; below 0 where it was passed on before.
+    /// Received or emitted per element and not yet passed on; below 0 where more was passed on than
+    /// received.
     pub unshot: Vec<Rgb>,
 }
 
 impl Flux {
-    /// What `mesh` emits, all of it unshot.
+    /// The emission of `mesh`, all of it unshot.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
@@ -46,8 +47,8 @@ impl Flux {
         Flux::after(mesh, &ReceivedLight::default())
     }
 
-    /// What `mesh` emits and has `received`, what is reflected of that unshot. What it has received
-    /// counts as emitted in the place of all that the lights emit which it is from.
+    /// The emission of `mesh` and the light `received`; the reflected part of the latter is unshot.
+    /// Received light counts as emitted, in place of the emission of the lights that it came from.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
@@ -84,28 +85,29 @@ impl Flux {
         Ok(Flux { transmission, total, emitted, reflectance, incident, unshot })
     }
 
-    /// Emitted by all elements.
+    /// Total emitted flux.
     pub fn total(&self) -> Rgb {
         self.total
     }
 
-    /// Emitted, reflected or let through by element `e`, shot or not.
+    /// Flux emitted, reflected or transmitted by element `e`, shot or not.
     pub fn leaving(&self, e: usize) -> Rgb {
         self.emitted[e] + self.scattered(e, &self.incident)
     }
 
-    /// What leaves element `e` of the flux that is `incident` on each: what it reflects of its own,
-    /// and what comes through from behind.
+    /// Flux that leaves element `e` when `incident` is received by each element: the reflected part
+    /// of its own and the flux transmitted from behind.
     pub fn scattered(&self, e: usize, incident: &[Rgb]) -> Rgb {
         self.reflectance[e] * incident[e] + self.transmitted(e, incident)
     }
 
-    /// The part of it that comes through from behind.
+    /// The part of [`Flux::scattered`] that is transmitted from behind.
     pub fn transmitted(&self, e: usize, incident: &[Rgb]) -> Rgb {
         self.transmission.transmitted(e, incident)
     }
 
-    /// The share of what element `e` receives that leaves again, from it or from those behind it.
+    /// Share of the flux received by element `e` that leaves again, from it or from those behind
+    /// it.
     pub fn albedo(&self, e: usize) -> Rgb {
         self.reflectance[e] + self.transmission.passed(e)
     }
@@ -115,48 +117,48 @@ impl Flux {
         self.transmission.behind(e)
     }
 
-    /// What is unshot or overshot in `elements`, as a share of the emitted: the worst channel.
+    /// Unshot and overshot flux of `elements` as a share of the emitted flux: the worst channel.
     pub fn unshot_share(&self, elements: &[Range<usize>]) -> f64 {
         let sum_of =
             |run: &Range<usize>| self.unshot[run.clone()].iter().map(|u| u.abs()).sum::<Rgb>();
         largest_share(elements.iter().map(sum_of).sum(), self.total)
     }
 
-    /// What leaves `elements`, as a share of the emitted: the worst channel.
+    /// Flux that leaves `elements` as a share of the emitted flux: the worst channel.
     pub fn leaving_share(&self, elements: &[Range<usize>]) -> f64 {
         let sum_of = |run: &Range<usize>| run.clone().map(|e| self.leaving(e)).sum::<Rgb>();
         largest_share(elements.iter().map(sum_of).sum(), self.total)
     }
 }
 
-/// Light that elements have received before any is shot: that of sky and luminaires, and of lights
-/// which were looked at from the elements, since most of what they emit goes elsewhere.
+/// Light that elements have received before any is shot: from sky and luminaires, and from lights
+/// that are sampled from the elements because most of their emission goes elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ReceivedLight {
     /// Irradiance of each element, W/m² per channel; empty for none.
     pub irradiance: Vec<Rgb>,
-    /// Materials, by their index, whose emission that is: they shoot none of it.
+    /// Indices of the materials whose emission it includes: they shoot none of it.
     pub materials: Vec<u32>,
 }
 
 impl ReceivedLight {
-    /// Whether the emission of `node` is in it.
+    /// Whether it includes the emission of `node`.
     fn is_of(&self, mesh: &Mesh, node: NodeId) -> bool {
         let material = mesh.scene().triangles()[mesh.triangle(node)].material;
         self.materials.contains(&material)
     }
 }
 
-/// What became of flux that was sent, W per channel.
+/// Destination of flux that was sent, W per channel.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Transfer {
-    /// By the fronts of elements, or let through by these.
+    /// Reflected at the fronts of elements, or transmitted there.
     pub scattered: Rgb,
-    /// By the fronts of elements.
+    /// Absorbed at the fronts of elements.
     pub absorbed: Rgb,
-    /// Met no surface.
+    /// Hit no surface.
     pub escaped: Rgb,
-    /// Met the back of a surface and was lost there.
+    /// Hit the back of a surface and was lost there.
     pub backface: Rgb,
     /// Lost in clear panes on the way.
     pub panes: Rgb,
@@ -173,8 +175,8 @@ impl Transfer {
     }
 }
 
-/// Sends `flux` along `row`; `receive` is called with each element and the flux that it receives,
-/// of which the share `albedo` leaves again.
+/// Sends `flux` along `row`; calls `receive` with each element and the flux that it receives, of
+/// which the share `albedo` leaves again.
 pub(super) fn send(
     flux: Rgb,
     row: &Row,
@@ -194,8 +196,8 @@ pub(super) fn send(
     Transfer { panes, ..transfer }
 }
 
-/// The same through panes, which `weaken` the flux that is sent to each entry, by its number; then
-/// what escapes, and what meets backs.
+/// As [`send`], through panes: `weaken` attenuates the flux to each entry (by its number), then the
+/// escaping flux, then the flux to back faces.
 fn send_through(
     flux: Rgb,
     row: &Row,
@@ -224,7 +226,7 @@ fn send_through(
     }
 }
 
-/// Flux of all elements, and the ledger of it.
+/// Flux of all elements, and its ledger.
 #[derive(Clone)]
 pub(super) struct FluxState<'m> {
     pub mesh: &'m Mesh,
@@ -232,12 +234,12 @@ pub(super) struct FluxState<'m> {
     pub ledger: Ledger,
 }
 
-/// Largest difference between emitted and accounted flux, over the emitted, that passes as
-/// rounding. Sums of some 10⁹ terms in f64 stay far below.
+/// Largest difference between emitted and accounted flux, relative to the emitted, that is taken
+/// for rounding. Sums of some 10⁹ terms in f64 stay far below.
 const MAX_ENERGY_IMBALANCE: f64 = 1e-9;
 
 impl<'m> FluxState<'m> {
-    /// What `mesh` emits and has `received`, none of it shot.
+    /// The emission of `mesh` and the light `received`, none of it shot.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when the emitted flux is not finite.
@@ -249,7 +251,7 @@ impl<'m> FluxState<'m> {
         Ok(FluxState { mesh, flux, ledger })
     }
 
-    /// Sends `flux`, which is no longer unshot anywhere, along `row`.
+    /// Distributes `flux`, already removed from the unshot flux, along `row`.
     pub fn distribute(&mut self, flux: Rgb, row: &Row) {
         let Flux { transmission, reflectance, incident, unshot, .. } = &mut self.flux;
         let receive = |e: usize, received: Rgb| {
@@ -265,7 +267,7 @@ impl<'m> FluxState<'m> {
         self.ledger.unshot += transfer.scattered - flux;
     }
 
-    /// Enters what is lost of flux that was sent into the ledger.
+    /// Adds the losses in `transfer` to the ledger.
     pub fn record_losses(&mut self, transfer: Transfer) {
         self.ledger.absorbed += transfer.absorbed;
         self.ledger.escaped += transfer.escaped;
@@ -273,8 +275,8 @@ impl<'m> FluxState<'m> {
         self.ledger.pane_loss += transfer.panes;
     }
 
-    /// Sums what is unshot anew, so that rounding does not add up, and verifies that emitted and
-    /// accounted flux are equal.
+    /// Sums the unshot flux anew, so that rounding does not accumulate, and verifies that emitted
+    /// and accounted flux are equal.
     ///
     /// # Errors
     /// [`ErrorKind::FormFactor`] when they differ by more than [`MAX_ENERGY_IMBALANCE`].
@@ -295,7 +297,7 @@ impl<'m> FluxState<'m> {
         ))
     }
 
-    /// Radiosity of each element, W/m²; 0 of holes.
+    /// Radiosity of each element, W/m²; 0 for holes.
     pub fn radiosity(&self) -> Vec<Rgb> {
         let radiosity = |e| match self.mesh.solid_area(self.mesh.element(e)) {
             0.0 => Rgb::ZERO,
@@ -319,12 +321,12 @@ mod tests {
         let state = FluxState::new(&mesh, &received).unwrap();
         let area = mesh.scattering_area();
         let close = |a: Rgb, b: Rgb| (a - b).abs().max_element() < 1e-9 * b.max_element();
-        // All that the lamp sends to surfaces that reflect, of which the rest is unshot.
+        // All flux that the lamp sends to reflecting surfaces; the reflected part of it is unshot.
         assert!(close(state.ledger.emitted, area * Rgb::new(1.0, 2.0, 3.0)), "{:?}", state.ledger);
         let reflected = mesh.mean_albedo() * area * Rgb::new(1.0, 2.0, 3.0);
         assert!(close(state.ledger.unshot, reflected), "{:?} {reflected}", state.ledger);
         assert!(state.ledger.imbalance() < 1e-12);
-        // What leaves is all of it, emission included.
+        // The leaving flux is all of it, emission included.
         for (e, radiosity) in state.radiosity().into_iter().enumerate() {
             let material = mesh.material(mesh.element(e));
             let leaving = material.exitance + material.reflectance * Rgb::new(1.0, 2.0, 3.0);

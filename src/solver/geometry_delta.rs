@@ -1,12 +1,12 @@
-//! What has moved between two scenes of the same triangles, and how much of a row that concerns.
+//! Differences between two scenes of the same triangles, and the part of a row that they affect.
 //!
-//! The triangles that moved are enclosed in two boxes a group: where they were and where they are.
-//! A row of a patch that did not move itself is wrong at most about
+//! Each group of moved triangles is enclosed in two boxes: the old and the new position. The error
+//! of a row whose own patch did not move is bounded by the sum of
 //!
-//! - what it sent to where they were: the row's own entries on them, or the form factor of the old
-//!   boxes, whichever is less;
-//! - what it sends to where they are: the form factor of each new box × the part of that box that a
-//!   few rays find open to the patch.
+//! - the light sent to the old position: the row's own entries on the moved triangles, or the form
+//!   factor of the old boxes, whichever is less;
+//! - the light sent to the new position: the form factor of each new box × the fraction of it that
+//!   is visible from the patch, estimated with a few rays.
 
 use std::sync::Arc;
 
@@ -21,26 +21,26 @@ use crate::scene::{Rgb, Scene};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// What has moved from one mesh to another.
+/// Differences between two meshes.
 pub(super) struct GeometryDelta {
-    /// Whether each triangle has moved, or lets another share of light through.
+    /// Whether each triangle has moved, or has another transmittance.
     has_moved: Vec<bool>,
-    /// Whether any of these is a clear pane, which rows have no entries on.
+    /// Whether any moved triangle is a clear pane; rows have no entries on panes.
     has_moved_panes: bool,
     /// Boxes about the moved triangles of each group that has any.
     groups: Vec<MovedBox>,
-    /// The scene as it is now; none where nothing has moved.
+    /// The new scene; `None` where nothing has moved.
     rays: Option<Arc<RayScene>>,
 }
 
-/// A box about triangles, where they were and where they are.
+/// Old and new bounding box of moved triangles.
 struct MovedBox {
     before: Aabb,
     after: Aabb,
 }
 
 impl GeometryDelta {
-    /// What has moved from `old` to `new`.
+    /// The differences between `old` and `new`.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] when the elements of the two are not the same.
@@ -80,8 +80,8 @@ impl GeometryDelta {
         self.groups.is_empty()
     }
 
-    /// Upper bound of the share of the light of `patch` that goes elsewhere than along its `row` of
-    /// before, if that is known; `mesh` is the one of before.
+    /// Upper bound of the share of the light of `patch` that no longer goes along its old `row`,
+    /// which need not be known; `mesh` is the old one.
     pub fn affected_fraction(&self, mesh: &Mesh, patch: NodeId, row: Option<&Row>) -> f64 {
         if self.has_moved[mesh.triangle(patch)] {
             return 1.0;
@@ -102,7 +102,7 @@ impl GeometryDelta {
         (sent_before.min(boxes_before) + boxes_after).min(1.0)
     }
 
-    /// The share of `row` on fronts of triangles that moved, and on any backs, which may be theirs.
+    /// Share of `row` on the fronts of moved triangles, and on any back faces, which may be theirs.
     fn share_on_moved(&self, mesh: &Mesh, row: &Row) -> f64 {
         let is_moved = |e: u32| self.has_moved[mesh.triangle(mesh.element(e as usize))];
         let entries = row.entries.iter().filter(|entry| is_moved(entry.element));
@@ -110,8 +110,8 @@ impl GeometryDelta {
             + Row::form_factor(row.backface)
     }
 
-    /// The part of `bounds` that what has not moved leaves open to `eye`, by rays to the middle and
-    /// half-way to the corners. (open + 1)/(rays + 1), never 0, since rays may miss a gap.
+    /// Fraction of `bounds` that unmoved geometry leaves visible from `eye`, by rays to the middle
+    /// and half-way to the corners: (open + 1)/(rays + 1), never 0, since rays may miss a gap.
     fn visible_fraction(&self, eye: DVec3, bounds: Aabb) -> f64 {
         let Some(rays) = &self.rays else { return 1.0 };
         let middle = bounds.centre();
@@ -125,19 +125,18 @@ impl GeometryDelta {
     }
 }
 
-/// What passes triangle `t` of `scene` if it is clear.
+/// Transmittance of triangle `t` of `scene` if it is a clear pane.
 fn share_passing(scene: &Scene, t: usize) -> Option<Rgb> {
     scene.clear_panes()?.transmittance(t)
 }
 
-/// The form factor to `bounds` from a point `eye` with that `normal`, as if nothing were in
-/// between; 1 from inside.
+/// Unoccluded form factor from a point `eye` with that `normal` to `bounds`; 1 from inside.
 fn form_factor_to(bounds: &Aabb, eye: DVec3, normal: DVec3) -> f64 {
     if bounds.contains(eye) {
         return 1.0;
     }
     let corners = bounds.corners();
     let to_face = |face: &[usize; 4]| point_to_polygon(eye, normal, &face.map(|k| corners[k]));
-    // Faces that are turned away have none.
+    // Faces that are turned away contribute 0.
     Aabb::FACES.iter().map(to_face).sum::<f64>().min(1.0)
 }

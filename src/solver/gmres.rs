@@ -1,19 +1,20 @@
-//! GMRES, restarted (Saad and Schultz 1986), on the flux that is unshot.
+//! Restarted GMRES (Saad and Schultz 1986) on the unshot flux.
 //!
-//! A cycle looks for what to send in the Krylov space of the unshot flux r, Ar, A²r … with
-//! A = 1 − M, such that the least is unshot afterwards. All it needs are products with M, that is,
-//! light sent along all rows, so that a product costs what a bounce of Jacobi does; but however
-//! near one the reflectance is, light that fills a scene evenly is a single direction, and found in
-//! a step. One cycle:
+//! A cycle searches the Krylov space of the unshot flux r, Ar, A²r … with A = 1 − M for the flux to
+//! send that minimizes the remaining unshot flux. It needs only products with M, that is, light
+//! sent along all rows, so that a product costs as much as a bounce of Jacobi. Even at reflectances
+//! near one, light that fills a scene evenly is a single direction, eliminated in one step. One
+//! cycle:
 //!
 //! 1. v₀ = r/|r|; product: w = A v_k by sending v_k along the rows of all elements;
 //! 2. modified Gram–Schmidt: w = Σ h_ik v_i + h_{k+1,k} v_{k+1}, a column of the Hessenberg matrix;
 //! 3. Givens rotations bring the Hessenberg matrix to the triangle R, and r to the vector g, whose
-//!    last component is the norm of what would be left unshot;
-//! 4. after the last product: R y = g, and Σ y_k v_k is what is sent.
+//!    last component is the norm of the residual;
+//! 4. after the last product: R y = g, and Σ y_k v_k is sent.
 //!
-//! Every vector is kept with what became of its light when it was sent, losses included. All of it
-//! is linear, so the ledger of what a cycle sends is known without sending it, whenever it ends.
+//! Every vector is stored with the destination of its light, losses included. All of it is linear,
+//! so the ledger of a cycle is known without sending its solution, at whatever product the cycle
+//! ends.
 
 use std::ops::ControlFlow;
 
@@ -28,8 +29,8 @@ use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// A full cycle that takes less than this share off what is unshot, in norm, stagnates: the next
-/// has twice the products. Chosen by hand; no measurement kept.
+/// A full cycle that reduces the unshot norm by less than this share stagnates: the next has twice
+/// the products. Plain choice; no recorded measurement.
 const MIN_CYCLE_REDUCTION: f64 = 0.5;
 
 /// Cycles of products; a step is a product.
@@ -44,11 +45,11 @@ pub(super) struct Gmres {
 /// The product of M with the newest basis vector, in progress.
 #[derive(Clone, Serialize, Deserialize)]
 struct Product {
-    /// Received by each element so far, W.
+    /// Flux received by each element so far, W.
     incident: Vec<Rgb>,
-    /// What became of all that was sent so far.
+    /// Destination of the flux sent so far.
     transfer: Transfer,
-    /// Elements below this have sent their part.
+    /// Elements below this index have sent their part.
     element: usize,
 }
 
@@ -58,7 +59,8 @@ impl Gmres {
         Gmres { restart, cycle: None, product: None }
     }
 
-    /// Whether this can be a state over `count` elements; one that was read from a file may not be.
+    /// Whether this is a valid state over `count` elements; one that was read from a file may not
+    /// be.
     pub fn is_consistent(&self, count: usize) -> bool {
         let is_vector = |w: &[Rgb]| w.len() == count && w.iter().all(|w| w.is_finite());
         let cycle_fits = self.cycle.as_ref().is_none_or(|cycle| cycle.is_consistent(is_vector));
@@ -68,7 +70,7 @@ impl Gmres {
         self.restart > 0 && cycle_fits && product_fits
     }
 
-    /// Goes on by as many elements as one batch of rows reaches.
+    /// Advances by as many elements as one batch of rows covers.
     pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
         let Some(cycle) = &mut self.cycle else {
             if step.refresh_and_check_convergence()? {
@@ -98,11 +100,11 @@ impl Gmres {
         Ok(None)
     }
 
-    /// Sends what leaves least unshot, by the products so far, and ends the cycle.
+    /// Sends the flux that minimizes the unshot flux, by the products so far, and ends the cycle.
     pub fn finish(&mut self, state: &mut FluxState, rows: &mut RowCache) {
         self.product = None;
         if let Some(cycle) = self.cycle.take() {
-            // With as many products as elements a cycle is exact: no scene stagnates for ever.
+            // A cycle with as many products as elements is exact, so that the doubling ends.
             if cycle.stagnates() && cycle.products() >= self.restart {
                 self.restart = self.restart.saturating_mul(2);
             }
@@ -112,25 +114,26 @@ impl Gmres {
 }
 
 impl Product {
-    /// Nothing is sent yet.
+    /// Before anything is sent.
     fn new(count: usize) -> Product {
         Product { incident: vec![Rgb::ZERO; count], transfer: Transfer::default(), element: 0 }
     }
 }
 
-/// One cycle, of all channels at once: as many systems that share rows. A channel that has
-/// converged goes on with vectors of 0.
+/// One cycle of all channels at once: one linear system per channel, on shared rows. A channel that
+/// has converged continues with vectors of 0.
 #[derive(Clone, Serialize, Deserialize)]
 struct Cycle {
-    /// Weights of the inner product: Σ A over A of each element. With these a vector's norm is no
-    /// less than the sum of its fluxes' magnitudes (Cauchy and Schwarz), and the product with M
-    /// nearly symmetric (it is where reflectance is one and rows are exact).
+    /// Weights of the inner product: total area over the area of each element. With these the norm
+    /// of a vector is no less than the sum of the magnitudes of its fluxes (Cauchy and Schwarz),
+    /// and the product with M is nearly symmetric (exactly where reflectance is one and rows are
+    /// exact).
     weights: Vec<f64>,
-    /// v: orthonormal vectors, the first along what is unshot.
+    /// v: orthonormal vectors, the first along the unshot flux.
     basis: Vec<Vec<Rgb>>,
-    /// What became of the light of each basis vector but the last …
+    /// Destination of the light of each basis vector but the last …
     transfers: Vec<Transfer>,
-    /// … and what each element received of it.
+    /// … and the flux that each element received of it.
     incident: Vec<Vec<Rgb>>,
     /// Columns of the Hessenberg matrix: A times each basis vector but the last, in the basis.
     hessenberg: Vec<Vec<Rgb>>,
@@ -138,16 +141,17 @@ struct Cycle {
     r_factor: Vec<Vec<Rgb>>,
     /// Cosine and sine of each Givens rotation.
     rotations: Vec<[Rgb; 2]>,
-    /// Norm of what was unshot when the cycle began.
+    /// Norm of the unshot flux when the cycle began.
     initial_norm: Rgb,
-    /// g: what was unshot, in the basis, after the rotations. The last is the norm of the residual.
+    /// g: the initial unshot flux in the basis, after the rotations. The last is the norm of the
+    /// residual.
     rotated_residual: Vec<Rgb>,
 }
 
 impl Cycle {
     fn new(state: &FluxState) -> Cycle {
         let weights = inner_product_weights(state.mesh);
-        // In parts of the largest, so that squares of it neither overflow nor vanish.
+        // Scaled by the largest, so that squares neither overflow nor underflow.
         let largest = state.flux.unshot.iter().fold(Rgb::ZERO, |max, u| max.max(u.abs()));
         let mut first = state.flux.unshot.clone();
         for u in &mut first {
@@ -176,8 +180,8 @@ impl Cycle {
         self.transfers.len()
     }
 
-    /// Sends the newest basis vector from as many elements as one batch of rows reaches. Answers
-    /// whether all have sent theirs, or `None` when the callback stops the solver.
+    /// Sends the newest basis vector from as many elements as one batch of rows covers. Returns
+    /// whether all have sent, or `None` when the callback stops the solver.
     fn advance_product(
         &self,
         product: &mut Product,
@@ -207,8 +211,8 @@ impl Cycle {
         Ok(Some(is_complete))
     }
 
-    /// Takes in the product with the newest basis vector, and adds to the basis the direction that
-    /// is new in it.
+    /// Appends the product with the newest basis vector, and its component orthogonal to the basis
+    /// as the next basis vector.
     fn extend(&mut self, product: Product, flux: &Flux) {
         let Product { incident, transfer, .. } = product;
         let k = self.products();
@@ -256,22 +260,22 @@ impl Cycle {
         self.rotations.push([c, s]);
     }
 
-    /// Norm of what would be unshot after the products so far.
+    /// Norm of the residual after the products so far.
     fn residual_norm(&self) -> Rgb {
         self.rotated_residual.last().map_or(Rgb::ZERO, |r| r.abs())
     }
 
-    /// Upper bound of what would be unshot, as a share of the emitted: the worst channel.
+    /// Upper bound of the remaining unshot flux as a share of the emitted: the worst channel.
     fn unshot_bound(&self, state: &FluxState) -> f64 {
         largest_share(self.residual_norm(), state.ledger.emitted)
     }
 
-    /// Whether less than [`MIN_CYCLE_REDUCTION`] of what was unshot is gone in some channel.
+    /// Whether some channel lost less than [`MIN_CYCLE_REDUCTION`] of its unshot flux.
     fn stagnates(&self) -> bool {
         largest_share(self.residual_norm(), self.initial_norm) > 1.0 - MIN_CYCLE_REDUCTION
     }
 
-    /// y: how much of each basis vector leaves least unshot.
+    /// y: the coefficients of the basis vectors that minimize the unshot flux.
     fn coefficients(&self) -> Vec<Rgb> {
         let count = self.r_factor.len();
         let mut y = vec![Rgb::ZERO; count];
@@ -282,10 +286,10 @@ impl Cycle {
         y
     }
 
-    /// Sends what leaves least unshot.
+    /// Sends the flux that minimizes the unshot flux.
     fn finish(self, state: &mut FluxState, rows: &mut RowCache) {
         let coefficients = self.coefficients();
-        // A times what is sent, in the basis: that much is no longer unshot.
+        // A times the flux sent, in the basis: the decrease of the unshot flux.
         let mut shot = vec![Rgb::ZERO; self.basis.len()];
         for (column, &y) in self.hessenberg.iter().zip(&coefficients) {
             for (sum, &h) in shot.iter_mut().zip(column) {
@@ -316,10 +320,10 @@ impl Cycle {
         state.record_losses(transfer);
     }
 
-    /// Whether all vectors satisfy `is_vector` and are as many as they should be.
+    /// Whether all vectors satisfy `is_vector` and their numbers are right.
     fn is_consistent(&self, is_vector: impl Fn(&[Rgb]) -> bool) -> bool {
         let count = self.products();
-        // Column k has k + 1 entries, and those below the diagonal.
+        // Column k has k + 1 entries plus those below the diagonal.
         let are_columns = |columns: &[Vec<Rgb>], below: usize| {
             let lengths = columns.iter().map(Vec::len);
             columns.len() == count && lengths.enumerate().all(|(k, len)| len == k + 1 + below)
@@ -335,7 +339,7 @@ impl Cycle {
     }
 }
 
-/// Σ A over A of each element of `mesh`; 0 of holes.
+/// Total area over the area of each element of `mesh`; 0 for holes.
 fn inner_product_weights(mesh: &Mesh) -> Vec<f64> {
     let area = |e: usize| mesh.solid_area(mesh.element(e));
     let count = mesh.element_count();
@@ -354,7 +358,7 @@ fn norm(weights: &[f64], a: &[Rgb]) -> Rgb {
     dot(weights, a, a).map(f64::sqrt)
 }
 
-/// `a` over `b`, and 0 where that is 0.
+/// `a` over `b`, and 0 where `b` is 0.
 fn ratio(a: Rgb, b: Rgb) -> Rgb {
     Rgb::select(b.cmpeq(Rgb::ZERO), Rgb::ZERO, a / b)
 }

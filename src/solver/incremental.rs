@@ -1,14 +1,14 @@
-//! Incremental solving: other lamps, other materials and moved objects, without starting over.
+//! Incremental solving: changed lamps and materials and moved objects, without starting over.
 //!
-//! The unshot flux is the residual r = e − s + Ms of what was sent, s. When e or the reflectances
-//! in M change, the residual is known at once from what each element received, and the solve goes
-//! on from there; light that is no longer there is shot as negative light (Chen 1990; George,
-//! Sillion and Greenberg 1990).
+//! The unshot flux is the residual r = e − s + Ms of the flux sent, s. When e or the reflectances
+//! in M change, the residual follows at once from the flux that each element has received, and the
+//! solve continues from there; light that is no longer there is shot as negative light (Chen 1990;
+//! George, Sillion and Greenberg 1990).
 //!
-//! When objects move, so do the form factors in M: what went along a row that sees them is taken
-//! back along that row and sent along a new one. Most rows see little of an object: what they are
-//! wrong about is at most what they send to where it was and is
-//! ([`geometry_delta`](super::geometry_delta)). Those with most misplaced flux are made anew, and
+//! When objects move, so do the form factors in M: the flux that went along a row that sees them is
+//! taken back along that row and sent along a new one. Most rows see little of an object: their
+//! error is at most the flux that they send to its old and new positions
+//! ([`geometry_delta`](super::geometry_delta)). Rows with most misplaced flux are recomputed, and
 //! the others stay as stale rows, within the limits of [`staleness`](super::staleness).
 
 use std::collections::BTreeMap;
@@ -31,16 +31,15 @@ use crate::scene::Rgb;
 use crate::visibility::buried;
 
 impl<'m> SolveSession<'m> {
-    /// Goes over to `mesh`, in which materials have changed: exitances, reflectances, or both.
-    /// Nothing is lost of what was solved, and kept rows stay; what has changed is unshot. Lamps
-    /// that are dimmed alike take no work at all; where most of the light is from other lamps than
-    /// it was, light starts anew, with the rows that there are.
+    /// Switches to `mesh`, in which materials have changed: exitances, reflectances, or both. The
+    /// solution and the cached rows are kept; the difference becomes unshot. Lamps that are all
+    /// dimmed by the same factor need no new shots. Where most of the light comes from other lamps
+    /// than before, the distribution starts anew, with the cached rows.
     ///
     /// `mesh` is made of the present one by [`Mesh::with_scene`].
     ///
-    /// # Errors
-    /// [`ErrorKind::Scene`] when elements are others or have moved, clear panes let another share
-    /// of light through, or the emitted flux is not finite. Nothing has changed then.
+    /// [`ErrorKind::Scene`] when the elements differ or have moved, the transmittance of clear
+    /// panes has changed, or the emitted flux is not finite. The session is then unchanged.
     pub fn update_materials(&mut self, mesh: &'m Mesh) -> Result<(), Error> {
         if !GeometryDelta::between(self.mesh(), mesh)?.is_empty() {
             let remedy = "use SolveSession::update_geometry, which takes sources of rows as well";
@@ -54,25 +53,25 @@ impl<'m> SolveSession<'m> {
         self.adopt_mesh(mesh)
     }
 
-    /// Goes over to `mesh`, in which triangles have moved; materials may have changed as well.
+    /// Switches to `mesh`, in which triangles have moved; materials may have changed as well.
     ///
-    /// Rows that see where triangles were or are get made anew, those first that most light went
-    /// along, until the flux that the others may have misplaced, at most
-    /// [`SolveSession::stale_flux_bound`], is no more than twice the unshot share that is asked
-    /// for; [`SolveSession::run`] then goes down to half of that share. A vase and a chair that
-    /// were moved in a furnished room misplaced in fact a sixth to a half of the bound.
+    /// Rows that see the old or new positions of moved triangles are recomputed, those that carried
+    /// most light first, until the flux that the others may have misplaced, at most
+    /// [`SolveSession::stale_flux_bound`], is no more than twice the requested unshot share;
+    /// [`SolveSession::run`] then solves down to half of that share. A vase and a chair moved in a
+    /// furnished room misplaced a sixth to a half of the bound.
     ///
-    /// `before` makes rows of the present mesh, as far as they are not kept, and `after` those of
-    /// `mesh`, which is made of the present one by [`Mesh::with_scene`]. The bound of a row is what
-    /// it sees of the triangles that have moved, and of a box about those of each group where they
-    /// are now, as far as a few rays find that this is open to it.
+    /// `before` makes rows of the present mesh where they are not cached, and `after` those of
+    /// `mesh`, which is made of the present one by [`Mesh::with_scene`]. The bound of a row is the
+    /// share that it sends to moved triangles, and to a box about the new position of each group
+    /// times the fraction of the box that a few rays show to be visible.
     ///
-    /// When `progress` stops it, or a device fails, rows that have not been made anew are taken as
-    /// they are: [`SolveSession::stale_flux_bound`] tells how much light that may concern.
+    /// When `progress` stops it, or a device fails, rows that have not been recomputed stay in use:
+    /// [`SolveSession::stale_flux_bound`] bounds the light that this may misplace.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`] when elements are others, or the emitted flux is not finite; nothing
-    /// has changed then. Those of [`SolveSession::advance`].
+    /// [`ErrorKind::Scene`] when elements differ, or the emitted flux is not finite; the session is
+    /// then unchanged. Those of [`SolveSession::advance`].
     pub fn update_geometry(
         &mut self,
         mesh: &'m Mesh,
@@ -113,7 +112,7 @@ impl<'m> SolveSession<'m> {
         stop
     }
 
-    /// Goes over to the materials and places of `mesh`, whose elements are the same.
+    /// Switches to the materials and positions of `mesh`, whose elements are the same.
     fn adopt_mesh(&mut self, mesh: &'m Mesh) -> Result<(), Error> {
         let emitted = Flux::emitted_by(mesh)?;
         self.finish()?;
@@ -128,9 +127,9 @@ impl<'m> SolveSession<'m> {
         self.state.recompute_and_verify_energy()
     }
 
-    /// Adds what `delta` may make wrong to the stale fraction of every row. Returns the fractions
-    /// of earlier moves that stay whatever is done now, since the rows that they are about cannot
-    /// be had any more to take the light back.
+    /// Adds the error due to `delta` to the stale fraction of every row. Returns the fractions of
+    /// earlier moves that cannot be removed, since the rows that they concern no longer exist to
+    /// take the light back.
     fn mark_stale(&mut self, old: &Mesh, delta: &GeometryDelta) -> BTreeMap<NodeId, f64> {
         let mut irreparable = BTreeMap::new();
         let patches: Vec<NodeId> = self.rows.histories.keys().copied().collect();
@@ -149,8 +148,8 @@ impl<'m> SolveSession<'m> {
         irreparable
     }
 
-    /// Patches whose rows are stale, by the flux that they may have misplaced, most first; of
-    /// equals the first in the mesh.
+    /// Patches with stale rows, by the flux that they may have misplaced, most first; ties in mesh
+    /// order.
     fn patches_by_misplaced_flux(&self) -> Vec<NodeId> {
         let stale = self.rows.histories.iter().filter(|(_, history)| history.stale_fraction > 0.0);
         let mut patches: Vec<(f64, NodeId)> = stale
@@ -163,7 +162,7 @@ impl<'m> SolveSession<'m> {
         patches.into_iter().map(|(_, patch)| patch).collect()
     }
 
-    /// Takes the light that went along the rows of `patches` back, and sends it along new ones.
+    /// Takes back the light that went along the rows of `patches`, and sends it along new ones.
     fn replace_rows(
         &mut self,
         old: &Mesh,
@@ -203,7 +202,7 @@ impl<'m> SolveSession<'m> {
             let history = rows.histories.entry(patch).or_default();
             history.stale_fraction = irreparable.get(&patch).copied().unwrap_or(0.0);
             if let Some(elements) = rejected {
-                // They shoot it again, from elsewhere.
+                // They shoot it again from another viewpoint.
                 history.sent = Rgb::ZERO;
                 state.return_to_unshot(&elements, sent);
             } else {
@@ -216,8 +215,8 @@ impl<'m> SolveSession<'m> {
 }
 
 impl<'m> FluxState<'m> {
-    /// Goes over to `mesh` with the flux `new` that it emits. What has become of light is kept in
-    /// that proportion which makes the least of it wrong; returns the proportion, by channel.
+    /// Switches to `mesh` with its emitted flux `new`. The distributed light is scaled by the
+    /// factor that minimizes the unshot flux; returns the factor, by channel.
     fn adopt_mesh(&mut self, mesh: &'m Mesh, new: Flux) -> Rgb {
         let FluxState { flux, ledger, .. } = self;
         let kept = weighted_median_ratio(&flux.emitted, &new.emitted);
@@ -257,7 +256,7 @@ impl<'m> FluxState<'m> {
     }
 }
 
-/// The c for which Σ |new − c old| is least: the weighted median of the ratios, by channel.
+/// The c that minimizes Σ |new − c old|: the weighted median of the ratios, by channel.
 fn weighted_median_ratio(old: &[Rgb], new: &[Rgb]) -> Rgb {
     let channel = |k: usize| {
         let emitters = old.iter().zip(new).map(|(o, n)| (o[k], n[k])).filter(|(o, _)| *o > 0.0);
@@ -269,7 +268,7 @@ fn weighted_median_ratio(old: &[Rgb], new: &[Rgb]) -> Rgb {
             sum += weight;
             2.0 * sum >= total
         });
-        // Nothing was emitted: there is nothing to keep or to scale.
+        // Nothing was emitted: nothing to keep or to scale.
         median.map_or(1.0, |(ratio, _)| *ratio)
     };
     Rgb::new(channel(0), channel(1), channel(2))

@@ -1,4 +1,4 @@
-//! The energy balance of a solve: where all emitted light has gone.
+//! The energy balance of a solve: the destination of all emitted light.
 //!
 //! emitted = absorbed + escaped + lost at back faces + lost in panes + unshot − overshot, per
 //! channel and at any time, up to rounding.
@@ -8,23 +8,24 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
-/// Where all emitted flux has gone, W per channel.
+/// Destination of all emitted flux, W per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     /// Exitance times area, over all elements.
     pub emitted: Rgb,
-    /// Not reflected at the fronts of elements.
+    /// Absorbed at the fronts of elements.
     pub absorbed: Rgb,
-    /// Met no surface.
+    /// Hit no surface.
     pub escaped: Rgb,
-    /// Met the back of a surface and was lost there.
+    /// Hit the back of a surface and was lost there.
     pub backface_loss: Rgb,
-    /// Lost in clear panes on the way to where the rest went.
+    /// Absorbed in clear panes on the way to a surface or out of the scene.
     pub pane_loss: Rgb,
     /// Received or emitted, not yet passed on.
     pub unshot: Rgb,
-    /// Passed on before it was received: 0 but for methods that send more than they have (shooting
-    /// with overshoot, GMRES, a direct solve's rounding). What is unshot may yet make up for it.
+    /// Passed on before it was received: 0 except for methods that send more than they have
+    /// (shooting with overshoot, GMRES, the rounding of a direct solve). Unshot flux may yet
+    /// compensate it.
     pub overshot: Rgb,
 }
 
@@ -40,18 +41,18 @@ impl Ledger {
         self.overshot += weight * other.overshot;
     }
 
-    /// Emitted minus all else, relative to emitted: the worst channel. 0 when nothing is emitted.
+    /// (Emitted − all other terms) / emitted: the worst channel. 0 when nothing is emitted.
     pub fn imbalance(&self) -> f64 {
         let lost = self.absorbed + self.escaped + self.backface_loss + self.pane_loss;
         let accounted = lost + self.unshot - self.overshot;
         largest_share((self.emitted - accounted).abs(), self.emitted)
     }
 
-    /// Adds the light that is unshot to `radiosity` (W/m², one value an element of `mesh`) as if it
-    /// fell evenly on all surfaces that reflect, again and again: the ambient term of Cohen, Chen,
-    /// Wallace and Greenberg (1988). For early pictures, or to correct for what was not shot; it
-    /// knows nothing of where that would have gone. Returns the ambient radiosity, W/m² per unit of
-    /// albedo.
+    /// Adds the unshot light to `radiosity` (W/m², one value per element of `mesh`) as if it fell
+    /// evenly on all reflecting surfaces, again and again: the ambient term of Cohen, Chen, Wallace
+    /// and Greenberg (1988). For early pictures, or to correct for unshot light; it ignores the
+    /// direction in which that light would have gone. Returns the ambient radiosity, W/m² per unit
+    /// of albedo.
     pub fn add_ambient(&self, mesh: &Mesh, radiosity: &mut [Rgb]) -> Rgb {
         let ambient = self.ambient(mesh);
         for (e, b) in radiosity.iter_mut().enumerate() {
@@ -60,16 +61,14 @@ impl Ledger {
         ambient
     }
 
-    /// Radiosity, W/m² per unit of albedo, that the unshot light would bring if it fell
-    /// evenly.
+    /// Radiosity, W/m² per unit of albedo, if the unshot light fell evenly on all surfaces.
     pub(super) fn ambient(&self, mesh: &Mesh) -> Rgb {
         let absorptance = (Rgb::ONE - mesh.mean_albedo()).max(Rgb::splat(f64::EPSILON));
         let area = mesh.scattering_area().max(f64::MIN_POSITIVE);
         (self.unshot - self.overshot) / area / absorptance
     }
 
-    /// Share of the emitted flux that is unshot or overshot: the worst channel. 0 when nothing is
-    /// emitted.
+    /// Unshot and overshot share of the emitted flux: the worst channel. 0 when nothing is emitted.
     pub fn unshot_share(&self) -> f64 {
         largest_share(self.unshot + self.overshot, self.emitted)
     }

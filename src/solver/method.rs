@@ -1,4 +1,4 @@
-//! The methods by which light is spread, and their names.
+//! The methods of light distribution, and their names.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,47 +6,47 @@ use std::str::FromStr;
 use super::Solver;
 use crate::error::{Error, ErrorKind};
 
-/// How light is spread. All methods solve the same equations to the same unshot share; all but
-/// shooting from patches larger than elements need a row for every element that has light.
+/// Method of light distribution. All methods solve the same equations to the same unshot share; all
+/// but shooting from patches larger than elements need a row for every element that has light.
 ///
 /// | method | a step | for |
 /// |---|---|---|
 /// | shooting | a shot | large scenes: only patches that matter get rows |
 /// | Jacobi | a bounce | light after a given number of bounces |
-/// | Gauss–Seidel | a sweep | what Jacobi does, in about half the sweeps |
+/// | Gauss–Seidel | a sweep | as Jacobi, in about half the sweeps |
 /// | GMRES | a product with all rows | reflectance near one |
 /// | direct | the solve | small scenes, and as a reference for the others |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Method {
-    /// Progressive shooting (Cohen, Chen, Wallace and Greenberg 1988): the patch with most unshot
-    /// flux shoots it, again and again. [`Solver::patch_tolerance`] and
-    /// [`Solver::min_patch_level`] say how large patches are.
+    /// Progressive shooting (Cohen, Chen, Wallace and Greenberg 1988): repeatedly, the patch with
+    /// most unshot flux shoots it. [`Solver::patch_tolerance`] and [`Solver::min_patch_level`] set
+    /// the size of patches.
     Shooting {
         /// Whether patches also shoot light that they have not received yet (Feda and Purgathofer
-        /// 1992): what they would receive and reflect if all that is unshot fell evenly on all
-        /// surfaces. Saves shots where reflectance is high. What was shot too much is made up for
-        /// by what comes in later, or shot as negative light; until then the ledger counts it as
+        /// 1992): the light that they would receive and reflect if all unshot light fell evenly on
+        /// all surfaces. Saves shots where reflectance is high. Excess light is compensated by
+        /// light that arrives later, or shot as negative light; until then the ledger counts it as
         /// [`overshot`](crate::solver::Ledger::overshot).
         overshoot: bool,
     },
-    /// All elements at once pass on what they have: E, then E + ME, then E + ME + M²E …
+    /// All elements at once pass on the light that they have: E, then E + ME, then E + ME + M²E …
     Jacobi,
-    /// One element after another passes on what it has by then, emitters first.
+    /// One element after another passes on the light that it has at that time, emitters first.
     GaussSeidel,
     /// Restarted GMRES (Saad and Schultz 1986).
     Gmres {
-        /// Products with all rows until it restarts, 1 or more; doubled after a cycle that
-        /// stagnates. Each product takes 48 bytes an element.
+        /// Products with all rows until a restart, ≥ 1; doubled after a cycle that stagnates. Each
+        /// product takes 48 bytes per element.
         restart: usize,
     },
-    /// Gaussian elimination, to rounding whatever unshot share is asked for; at most
+    /// Gaussian elimination, to rounding error regardless of the requested unshot share; at most
     /// [`Solver::DIRECT_MAX_ELEMENTS`] elements.
     Direct,
 }
 
 impl Method {
-    /// Every method as [`FromStr`] makes it of its name.
+    /// Every method as [`FromStr`] parses its name.
     pub const ALL: [Method; 6] = [
         Method::Shooting { overshoot: false },
         Method::Shooting { overshoot: true },
@@ -93,7 +93,7 @@ impl FromStr for Method {
 /// The settings that decide which equations are solved and in which order, as text.
 ///
 /// A saved state holds this text and is resumed only by a solver that yields the same. It is part
-/// of the file format and must not change: files that exist would be refused.
+/// of the file format and must not change: existing files would be refused.
 pub(super) fn saved_identity(solver: &Solver) -> String {
     match solver.method {
         Method::Shooting { overshoot } => {
@@ -114,7 +114,7 @@ pub(super) fn saved_identity(solver: &Solver) -> String {
 mod tests {
     use super::*;
 
-    /// The texts that version 1 of the file format holds.
+    /// The texts in version 1 of the file format.
     #[test]
     fn identity_in_saved_states_does_not_change() {
         let texts = Method::ALL.map(|method| saved_identity(&Solver::new(method)));

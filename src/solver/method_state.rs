@@ -1,5 +1,4 @@
-//! The one place that knows all methods: what a method has in hand between steps, and the dispatch
-//! to it.
+//! The intermediate state of each method between steps, and the dispatch to it.
 
 use super::direct::solve_directly;
 use super::flux_state::FluxState;
@@ -13,18 +12,18 @@ use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 
-/// What a method has in hand between steps.
+/// Intermediate state of a method between steps.
 #[derive(Clone)]
 pub(super) enum MethodState<'m> {
     Shooting(Shooting<'m>),
     Relaxation(Relaxation),
     Gmres(Gmres),
-    /// A direct solve is one step, with nothing in hand before or after.
+    /// A direct solve is one step without intermediate state.
     Direct,
 }
 
 impl<'m> MethodState<'m> {
-    /// Nothing in hand yet.
+    /// The state before the first step.
     pub fn new(solver: &Solver, mesh: &'m Mesh) -> MethodState<'m> {
         match solver.method {
             Method::Shooting { overshoot } => {
@@ -37,7 +36,7 @@ impl<'m> MethodState<'m> {
         }
     }
 
-    /// Goes on by one batch of rows; answers why it stops, if it does.
+    /// Advances by one batch of rows; returns the reason if it stops.
     pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
         match self {
             MethodState::Shooting(shooting) => shooting.advance(step),
@@ -47,8 +46,8 @@ impl<'m> MethodState<'m> {
         }
     }
 
-    /// Returns what is in hand to `state`, so that all light is accounted for. The method can go
-    /// on afterwards.
+    /// Returns flux held by the method to `state`, so that all light is accounted for. The method
+    /// can continue afterwards.
     pub fn finish(&mut self, state: &mut FluxState, rows: &mut RowCache) {
         match self {
             MethodState::Relaxation(relaxation) => relaxation.finish(state),

@@ -1,10 +1,10 @@
 //! The patches that shoot: a cut through the hierarchy of clusters, triangles and their quadtrees,
-//! finer where more light is at stake.
+//! finer where more light leaves.
 //!
 //! A patch is a cluster of triangles, a triangle, or a node of its quadtree. It shoots for all
 //! elements below it along one row, seen from one viewpoint. The cut begins with the largest
-//! patches; before a patch shoots, its error ([`patch_error`](super::patch_error)) is compared with
-//! the tolerance, and where it is above, its parts take its place:
+//! patches. Before a patch shoots, its error ([`patch_error`](super::patch_error)) is compared with
+//! the tolerance; above it, the patch is replaced by its parts:
 //!
 //! ```text
 //! clusters            ●                      ●
@@ -14,8 +14,8 @@
 //! elements      ○○○○    ○○○○             ○○○○  ○○○○
 //! ```
 //!
-//! The cut only ever gets finer. A viewpoint whose row shows that it stands inside a solid is
-//! rejected, and another place of the patch is taken.
+//! The cut is only ever refined. A viewpoint whose row shows that it is inside a solid is rejected,
+//! and another point of the patch is used.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -33,19 +33,19 @@ use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// Elements of emitters up to which all of these shoot by themselves. More are rooms that glow, not
-/// lamps. Chosen by hand; no measurement kept.
+/// Number of emitting elements up to which each shoots separately. Above, the emitters are glowing
+/// rooms rather than lamps. Plain choice; no recorded measurement.
 const MAX_EMITTER_ELEMENTS: usize = 1024;
 
-/// A batch of shots ends where the unshot flux is below this share of its brightest patch. Chosen
-/// by hand; no measurement kept.
+/// A batch of shots ends where the unshot flux is below this share of that of its brightest patch.
+/// Plain choice; no recorded measurement.
 const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
 
-/// Viewpoints of one patch that are rejected at most. If the next one is no better, the patch is
-/// split, or shoots from there where it is as small as patches may be.
+/// Maximum number of rejected viewpoints per patch. After that the patch is split, or shoots from
+/// the next viewpoint if it is of minimum size.
 const MAX_REJECTED_VIEWPOINTS: u32 = 4;
 
-/// An element is lit from this share of its patch's mean radiosity on.
+/// An element is lit if its radiosity is at least this share of the mean of its patch.
 const MIN_LIT_SHARE: f64 = 0.5;
 
 /// The patches that shoot. Together they cover every element once.
@@ -55,12 +55,12 @@ pub(super) struct PatchCut<'m> {
     clusters: &'m Clusters,
     /// Centroid of each element.
     centroids: Vec<DVec3>,
-    /// Area of all surfaces, square of the scene's unit.
+    /// Total surface area, square of the scene's unit.
     area: f64,
     patches: Vec<ShootingPatch>,
-    /// Nodes that see mostly back faces.
+    /// Viewpoints that see mostly back faces.
     occluded_viewpoints: HashSet<NodeId>,
-    /// Highest error of a patch that shoots.
+    /// Maximum error of a patch that shoots.
     tolerance: f64,
     /// Quadtree levels above the elements below which no patch is split.
     min_level: u32,
@@ -70,19 +70,19 @@ pub(super) struct PatchCut<'m> {
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct ShootingPatch {
     source: Source,
-    /// The elements below it, as ranges that do not touch.
+    /// Elements below it, as disjoint ranges that do not touch.
     #[serde(skip)]
     elements: Vec<Range<usize>>,
-    /// The node whose row it shoots along, once it has shot or is about to.
+    /// The node whose row it shoots along; set before the first shot.
     viewpoint: Option<NodeId>,
     distances: InverseDistanceMoments,
-    /// Emits, and has not shot yet.
+    /// Whether it emits and has not shot yet.
     is_unshot_emitter: bool,
-    /// How many of its viewpoints saw mostly back faces.
+    /// Number of its viewpoints that saw mostly back faces.
     rejected_viewpoints: u32,
 }
 
-/// Where in the hierarchy a patch is.
+/// Position of a patch in the hierarchy.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 enum Source {
     Cluster(u32),
@@ -100,9 +100,9 @@ pub(super) struct CutSnapshot {
 pub(super) struct Shot {
     /// Index of the patch in the cut.
     index: usize,
-    /// The node whose row it goes along.
+    /// The node whose row is used.
     pub patch: NodeId,
-    /// The elements that are shot for.
+    /// The elements whose flux is shot.
     pub elements: Vec<Range<usize>>,
 }
 
@@ -120,8 +120,8 @@ impl<'m> PatchCut<'m> {
         }
     }
 
-    /// The largest patches there are; but emitters that are few shoot by their elements, since what
-    /// is nearest a lamp depends most on its shape.
+    /// The largest patches; but if emitters are few, each of their elements is a patch, since the
+    /// light near a lamp depends strongly on its shape.
     pub fn new(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
         let mut cut = PatchCut::empty(mesh, tolerance, min_level);
         let triangles = 0..mesh.scene().triangles().len();
@@ -150,7 +150,7 @@ impl<'m> PatchCut<'m> {
         cut
     }
 
-    /// What is saved of it.
+    /// The saved form of the cut.
     pub fn snapshot(&self) -> CutSnapshot {
         let mut occluded_viewpoints: Vec<NodeId> =
             self.occluded_viewpoints.iter().copied().collect();
@@ -158,7 +158,7 @@ impl<'m> PatchCut<'m> {
         CutSnapshot { patches: self.patches.clone(), occluded_viewpoints }
     }
 
-    /// The cut that was saved, if it is one through `mesh`.
+    /// The cut that was saved, if it is a valid cut through `mesh`.
     pub fn from_snapshot(
         mesh: &'m Mesh,
         tolerance: f64,
@@ -189,7 +189,7 @@ impl<'m> PatchCut<'m> {
         (is_covered.into_iter().all(|c| c) && viewpoints_exist).then_some(cut)
     }
 
-    /// Goes over to `mesh`, whose elements are the same.
+    /// Switches to `mesh`, whose elements are the same.
     pub fn set_mesh(&mut self, mesh: &'m Mesh) {
         self.mesh = mesh;
         self.clusters = mesh.clusters();
@@ -197,8 +197,8 @@ impl<'m> PatchCut<'m> {
         self.area = surface_area(mesh);
     }
 
-    /// Rejects the viewpoint `node`, which sees mostly back faces by now, so that its patch shoots
-    /// from elsewhere: returns the elements of that patch. None where there is no other place.
+    /// Rejects the viewpoint `node`, which now sees mostly back faces, so that its patch shoots
+    /// from another. Returns the elements of that patch, or `None` if it has no other point.
     pub fn reject_viewpoint(&mut self, node: NodeId) -> Option<Vec<usize>> {
         let patch = self.patches.iter_mut().find(|patch| patch.viewpoint == Some(node))?;
         let elements: Vec<usize> = indices(&patch.elements).collect();
@@ -211,8 +211,9 @@ impl<'m> PatchCut<'m> {
     }
 
     /// The next shots, by unshot flux, most first; emitters before all others. Ends at `max_rows`
-    /// patches for which `is_missing` says that the row must be made, at `max_shots`, or where the
-    /// flux falls far below the first's, so that no dim patch shoots before a bright one is lit.
+    /// patches for which `is_missing` says that the row must be computed, at `max_shots`, or where
+    /// the flux falls below [`MIN_BATCH_FLUX_SHARE`] of the first's, so that no dim patch shoots
+    /// before a bright one has received its light.
     pub fn next_shots(
         &mut self,
         flux: &Flux,
@@ -220,7 +221,7 @@ impl<'m> PatchCut<'m> {
         max_shots: u64,
         is_missing: impl Fn(NodeId) -> bool,
     ) -> Vec<Shot> {
-        // Of equals the first in the cut.
+        // Ties go to the first in the cut.
         let entry = |patch: &ShootingPatch, k: usize| {
             let share = flux.unshot_share(&patch.elements);
             (share > 0.0).then(|| (patch.is_unshot_emitter, tie_stable_key(share), Reverse(k)))
@@ -229,7 +230,7 @@ impl<'m> PatchCut<'m> {
         let mut queue = BinaryHeap::from(all.collect::<Vec<_>>());
         let mut rows_left = max_rows.max(1);
         let mut shots: Vec<Shot> = vec![];
-        // Of the first shot: whether it is that of an emitter, and the least flux of the others.
+        // Of the first shot: whether the patch is an emitter, and the minimum flux of the others.
         let mut batch_limits = None;
         while let Some((is_emitter, share, Reverse(k))) = queue.pop() {
             let (emitters, min_share) = *batch_limits.get_or_insert_with(|| {
@@ -244,7 +245,7 @@ impl<'m> PatchCut<'m> {
             if self.split(k, flux) {
                 let parts = [k].into_iter().chain(count..self.patches.len());
                 queue.extend(parts.filter_map(|k| entry(&self.patches[k], k)));
-                // The limits are those of a patch that shoots.
+                // The limits are those of the first patch that shoots unsplit.
                 batch_limits = batch_limits.filter(|_| !shots.is_empty());
                 continue;
             }
@@ -253,7 +254,7 @@ impl<'m> PatchCut<'m> {
             if needs_row && rows_left == 0 {
                 break;
             }
-            // A viewpoint that two patches share gets its row for one of them first.
+            // A viewpoint shared by two patches gets its row for one of them first.
             if needs_row && shots.iter().any(|shot| shot.patch == patch) {
                 continue;
             }
@@ -264,8 +265,8 @@ impl<'m> PatchCut<'m> {
         shots
     }
 
-    /// Learns from a new row how near the receivers of `shot` are. Answers whether it is still to
-    /// be taken; if not, the patch has been split, or shoots from elsewhere.
+    /// Measures from a new row the distances of the receivers of `shot`. Returns whether the shot
+    /// is still to be taken; if not, the patch has been split, or another viewpoint is needed.
     pub fn accept_or_split(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
         let eye = self.mesh.centroid(shot.patch);
         let patch = &mut self.patches[shot.index];
@@ -289,13 +290,13 @@ impl<'m> PatchCut<'m> {
         !self.split(shot.index, flux)
     }
 
-    /// Notes that `shot` was taken.
+    /// Records that `shot` was taken.
     pub fn mark_shot(&mut self, shot: &Shot) {
         self.patches[shot.index].is_unshot_emitter = false;
     }
 
-    /// Replaces patch `k` by its parts where it is too coarse, and these by theirs; the first part
-    /// takes its index. Answers whether it did.
+    /// Replaces patch `k` by its parts where it is too coarse, recursively; the first part takes
+    /// its index. Returns whether it did.
     fn split(&mut self, k: usize, flux: &Flux) -> bool {
         let mut unchecked = vec![k];
         let mut has_split = false;
@@ -313,7 +314,7 @@ impl<'m> PatchCut<'m> {
         has_split
     }
 
-    /// Puts `parts` in the place of patch `k`: the first takes its index, the others come last.
+    /// Replaces patch `k` by `parts`: the first takes its index, the others are appended.
     fn replace(&mut self, k: usize, parts: Vec<Source>) {
         let distances = self.patches[k].distances;
         for (n, part) in parts.into_iter().enumerate() {
@@ -325,7 +326,7 @@ impl<'m> PatchCut<'m> {
         }
     }
 
-    /// Error of a patch, as the tolerance has it.
+    /// Error of a patch, for comparison with the tolerance.
     fn error(&self, patch: &ShootingPatch, flux: &Flux) -> f64 {
         let share = flux.leaving_share(&patch.elements);
         if share == 0.0 {
@@ -337,9 +338,9 @@ impl<'m> PatchCut<'m> {
         patch_error(share, self.mesh, surfaces, elements, viewpoint, *distances, flux)
     }
 
-    /// The node whose row `patch` is to shoot along: itself, where its middle is lit; else, as for
-    /// a cluster, the lit element nearest to where its light is. What no light comes to may lie in
-    /// other geometry, such as the floor under a block.
+    /// The node whose row `patch` is to shoot along: the patch itself if its middle is lit; else,
+    /// and for a cluster, the lit element nearest to the centroid of its light. Unlit elements may
+    /// lie inside other geometry, such as the floor under a block.
     fn viewpoint(&self, patch: &ShootingPatch, flux: &Flux) -> NodeId {
         let mesh = self.mesh;
         if let Some(viewpoint) = patch.viewpoint {
@@ -365,7 +366,7 @@ impl<'m> PatchCut<'m> {
         mesh.element(nearest.unwrap_or(patch.elements[0].start))
     }
 
-    /// The deepest node that has the centroid of `node`: the middle one of the middle children.
+    /// The deepest node with the centroid of `node`: the middle child, recursively.
     fn middle(&self, node: NodeId) -> NodeId {
         let mut middle = node;
         while let Some([.., child]) = self.mesh.children(middle) {
@@ -374,7 +375,7 @@ impl<'m> PatchCut<'m> {
         middle
     }
 
-    /// The patch at `source`, which has not shot; a cluster of one triangle is that triangle.
+    /// The patch at `source`, before its first shot; a cluster of one triangle is that triangle.
     fn patch(&self, source: Source, distances: InverseDistanceMoments) -> ShootingPatch {
         let mesh = self.mesh;
         let (source, mut elements) = match source {
@@ -406,7 +407,7 @@ impl<'m> PatchCut<'m> {
         }
     }
 
-    /// What a patch is split into; nothing where it is as small as patches may be.
+    /// The parts of a split patch; empty where it is of minimum size.
     fn parts(&self, source: Source) -> Vec<Source> {
         match source {
             Source::Cluster(c) => {
@@ -435,7 +436,7 @@ fn centroids(mesh: &Mesh) -> Vec<DVec3> {
     (0..mesh.element_count()).map(|e| mesh.centroid(mesh.element(e))).collect()
 }
 
-/// Quadtree levels below `node`, at most.
+/// Maximum number of quadtree levels below `node`.
 fn height(mesh: &Mesh, node: NodeId) -> u32 {
     mesh.children(node).map_or(0, |c| 1 + c.iter().map(|&k| height(mesh, k)).max().unwrap_or(0))
 }

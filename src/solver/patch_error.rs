@@ -1,7 +1,7 @@
 //! The estimated error of a patch that shoots along one row, seen from one viewpoint.
 //!
-//! Light that leaves elements e of a patch is sent as if all of it left the viewpoint v, in the
-//! direction of its normal. What this misplaces is estimated from moments of the source
+//! The light that leaves elements e of a patch is sent as if all of it left the viewpoint v, in the
+//! direction of its normal. The share that this misplaces is estimated from moments of the source
 //! distribution about the viewpoint, weighted by the flux Φ_e that leaves each element, and from
 //! moments of the inverse distance r of the receivers, weighted by form factor:
 //!
@@ -20,13 +20,14 @@
 //! ```
 //!
 //! A patch with share s adds s q² to the mean square of q over all light, so that equal errors √s q
-//! spend the patches where the flux is. Hanrahan, Salzman and Aupperle (1991) refine by brightness
-//! likewise, there the links between two patches.
+//! put the patches where the flux is. Hanrahan, Salzman and Aupperle (1991) refine links between
+//! two patches by brightness likewise.
 //!
 //! The second term is for patches that touch something next to their viewpoint. All light of such a
-//! patch, from m₂ of area, is sent to a spot of area 1/d₂, which is so made m₂ d₂ times too bright:
-//! a relative error whose mean square over all surfaces is p². Of the light of the scene that may
-//! be next to nothing. Patches that are darker than the mean (their area is A_p) make dimmer spots.
+//! patch, from an area m₂, is sent to a spot of area 1/d₂, which becomes m₂ d₂ times too bright: a
+//! relative error whose mean square over all surfaces is p². The light concerned may be a small
+//! share of the scene's, so that the first term misses it. Patches that are darker than the mean
+//! (their area is A_p) make dimmer spots.
 
 use std::ops::Range;
 
@@ -37,8 +38,8 @@ use super::flux_state::Flux;
 use crate::form_factor::Row;
 use crate::mesh::{Mesh, NodeId};
 
-/// Weight w of unevenness: a corner of the patch sends to what is next to it, not to the mean.
-/// Chosen by hand; no measurement kept.
+/// Weight w of unevenness: a corner of the patch sends to its neighbours, not to the mean receiver.
+/// Plain choice; no recorded measurement.
 const UNEVENNESS_WEIGHT: f64 = 3.0;
 
 /// Means of 1/r and 1/r² over what a patch sees, r the distance of a receiver's centroid from the
@@ -52,12 +53,12 @@ pub(super) struct InverseDistanceMoments {
 }
 
 impl InverseDistanceMoments {
-    /// In the middle of a cube of this surface area: a guess for patches whose row is not known.
+    /// Moments at the middle of a cube of this surface area: a guess for patches without a row.
     pub fn in_cube_of_area(area: f64) -> InverseDistanceMoments {
         InverseDistanceMoments { first: (6.0 / area).sqrt(), second: 6.0 / area }
     }
 
-    /// As `row` tells, seen from `viewpoint`. `centroids` are those of all elements.
+    /// Moments of `row`, seen from `viewpoint`. `centroids` are those of all elements.
     pub fn of_row(row: &Row, viewpoint: DVec3, centroids: &[DVec3]) -> InverseDistanceMoments {
         let mut moments = InverseDistanceMoments { first: 0.0, second: 0.0 };
         for entry in &row.entries {
@@ -93,8 +94,8 @@ struct SourceMoments {
 }
 
 impl SourceMoments {
-    /// Of one element: its flux and area, its centroid less the viewpoint, and its normal less that
-    /// of the viewpoint.
+    /// Moments of one element: its flux and area, its centroid less the viewpoint, and its normal
+    /// less that of the viewpoint.
     fn of_element(flux: f64, area: f64, offset: DVec3, normal_deviation: DVec3) -> SourceMoments {
         SourceMoments {
             flux,
@@ -106,7 +107,7 @@ impl SourceMoments {
         }
     }
 
-    /// Of the elements of both, about the same viewpoint.
+    /// Moments of the elements of both, about the same viewpoint.
     fn combine(self, other: SourceMoments) -> SourceMoments {
         SourceMoments {
             flux: self.flux + other.flux,
@@ -118,7 +119,7 @@ impl SourceMoments {
         }
     }
 
-    /// p where all surfaces together have this area, for a patch with the share `s` of the light.
+    /// p for total surface area `area` and a patch with the share `s` of the light.
     fn spot(&self, s: f64, area: f64, distances: InverseDistanceMoments) -> f64 {
         let brightness = (s * area / self.area).min(1.0);
         brightness * self.square_offset / self.flux * (distances.second / area).sqrt()
@@ -127,7 +128,7 @@ impl SourceMoments {
     /// q for unevenness `u` and receivers at `distances`.
     fn misplaced_share(&self, u: f64, distances: InverseDistanceMoments) -> f64 {
         let InverseDistanceMoments { first: d1, second: d2 } = distances;
-        // The square of the angle that the patch is seen under.
+        // The square of the angle subtended by the patch.
         let solid = self.square_offset / self.flux * d2;
         let by_place =
             self.offset.length() / self.flux * d1 + solid + UNEVENNESS_WEIGHT * u * solid.sqrt();
@@ -136,9 +137,9 @@ impl SourceMoments {
     }
 }
 
-/// Error of a patch of these `elements`, seen from the centroid of node `viewpoint`, from which the
-/// share `s` of the emitted light leaves; 0 where there is none. `centroids` are those of all
-/// elements of `mesh`, `area` is theirs together.
+/// Error of a patch of these `elements`, seen from the centroid of node `viewpoint`; `s` is its
+/// share of the emitted light, and the error is 0 where there is none. `centroids` are those of all
+/// elements of `mesh`, `area` is their total area.
 pub(super) fn patch_error(
     s: f64,
     mesh: &Mesh,

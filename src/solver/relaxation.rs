@@ -1,15 +1,15 @@
 //! Sweeps over all elements: Jacobi and Gauss–Seidel.
 //!
-//! To relax an element is to pass on what it has unshot, so that its residual is 0. A sweep relaxes
+//! To relax an element is to pass on its unshot flux, so that its residual is 0. A sweep relaxes
 //! every element once, emitters first, then all others, each by ascending index:
 //!
-//! - **Jacobi** sets all unshot flux aside when a sweep begins and passes on that: what comes in
-//!   meanwhile waits for the next sweep, so that a sweep is a bounce of light. After k sweeps what
-//!   leaves is e + Me + … + Mᵏe.
-//! - **Gauss–Seidel** passes on what an element has when the sweep reaches it.
+//! - **Jacobi** sets all unshot flux aside when a sweep begins and passes on that: flux that
+//!   arrives meanwhile waits for the next sweep, so that a sweep is a bounce of light. After k
+//!   sweeps the leaving flux is e + Me + … + Mᵏe.
+//! - **Gauss–Seidel** passes on the flux that an element has when the sweep reaches it.
 //!
-//! To relax always the element with most unshot flux, Southwell's way, is shooting (Gortler, Cohen
-//! and Slusallek 1994).
+//! Always relaxing the element with most unshot flux, Southwell's method, is shooting (Gortler,
+//! Cohen and Slusallek 1994).
 
 use std::ops::ControlFlow;
 
@@ -24,7 +24,8 @@ use crate::scene::Rgb;
 /// A sweep in progress; a step is a sweep.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Relaxation {
-    /// With Jacobi, what each element had when the sweep began and has not passed on yet, W.
+    /// With Jacobi, the flux that each element had when the sweep began and has not passed on yet,
+    /// W.
     jacobi_snapshot: Option<Vec<Rgb>>,
     cursor: SweepCursor,
 }
@@ -32,29 +33,29 @@ pub(super) struct Relaxation {
 /// A position in a sweep.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepCursor {
-    /// In the first half, that of emitters.
+    /// Whether in the first half, that of emitters.
     emitters: bool,
-    /// Elements below this are done in that half.
+    /// Elements below this index are done in that half.
     element: usize,
 }
 
 impl SweepCursor {
-    /// Where a sweep begins.
+    /// Start of a sweep.
     const START: SweepCursor = SweepCursor { emitters: true, element: 0 };
 }
 
 impl Relaxation {
-    /// Before the first sweep of Jacobi over `count` elements.
+    /// The state before the first sweep of Jacobi over `count` elements.
     pub fn jacobi(count: usize) -> Relaxation {
         Relaxation { jacobi_snapshot: Some(vec![Rgb::ZERO; count]), cursor: SweepCursor::START }
     }
 
-    /// Before the first sweep of Gauss–Seidel.
+    /// The state before the first sweep of Gauss–Seidel.
     pub fn gauss_seidel() -> Relaxation {
         Relaxation { jacobi_snapshot: None, cursor: SweepCursor::START }
     }
 
-    /// Whether this can be a state over `count` elements of Jacobi or else Gauss–Seidel; one that
+    /// Whether this is a valid state over `count` elements of Jacobi or else Gauss–Seidel; one that
     /// was read from a file may not be.
     pub fn is_consistent(&self, count: usize, jacobi: bool) -> bool {
         let snapshot_fits = match &self.jacobi_snapshot {
@@ -64,7 +65,7 @@ impl Relaxation {
         self.cursor.element <= count && snapshot_fits
     }
 
-    /// Goes on by as many elements as one batch of rows reaches.
+    /// Advances by as many elements as one batch of rows covers.
     pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
         let at_start = self.cursor.emitters && self.cursor.element == 0;
         if at_start {
@@ -83,7 +84,7 @@ impl Relaxation {
         let emits = |e: &usize| flux.emitted[*e] != Rgb::ZERO;
         let may_have_light = |e: &usize| match &self.jacobi_snapshot {
             Some(snapshot) => snapshot[*e] != Rgb::ZERO,
-            // What is black never has anything to pass on, unless it emits less than it did.
+            // A black element has nothing to pass on, unless its emission was reduced.
             None => flux.reflectance[*e] != Rgb::ZERO || flux.unshot[*e] != Rgb::ZERO,
         };
         let elements =
@@ -109,7 +110,7 @@ impl Relaxation {
         Ok(None)
     }
 
-    /// Returns what was set aside to `state`, and begins a new sweep.
+    /// Returns the flux set aside to `state`, and begins a new sweep.
     pub fn finish(&mut self, state: &mut FluxState) {
         let snapshot = self.jacobi_snapshot.iter_mut().flatten();
         for (unshot, flux) in state.flux.unshot.iter_mut().zip(snapshot) {

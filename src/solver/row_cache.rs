@@ -1,12 +1,12 @@
-//! Rows for a solver: cached within a memory budget, made again beyond it.
+//! Rows for a solver: cached within a memory budget, recomputed beyond it.
 //!
-//! Rows are never evicted to make room. Shooting takes the brightest patches first, and those are
-//! the ones that shoot again; the other methods visit all rows cyclically, for which least recently
-//! used has a hit rate of zero. So the first rows that fit stay.
+//! Rows are never evicted to make room. Shooting takes the brightest patches first, and those shoot
+//! again; the other methods visit all rows cyclically, for which LRU eviction has a hit rate of
+//! zero. So the first rows that fit stay.
 //!
-//! A row that is cached may be missing from memory, after a session was read from a file: it is
-//! rebuilt when it is asked for, with the same importance and so with the same bits. What is done
-//! with rows does not depend on whether they are missing.
+//! A cached row may be missing from memory after a session was read from a file: it is rebuilt on
+//! demand, with the same importance and so with the same bits. Results do not depend on whether
+//! rows are missing.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -19,33 +19,33 @@ use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
-/// Importance of the rows of elements, which all methods but shooting use again in every step: the
-/// same for all, whatever light they carry, so that the equations do not change between steps.
+/// Importance of the rows of elements, which all methods but shooting use again in every step:
+/// constant whatever light they carry, so that the equations do not change between steps.
 const ELEMENT_IMPORTANCE: f64 = 1.0;
 
-/// Rows by patch, and what went along each.
+/// Rows by patch, and the flux sent along each.
 #[derive(Clone)]
 pub(super) struct RowCache {
     rows: HashMap<NodeId, Arc<Row>>,
     /// Ordered, so that sums over them are the same on every run.
     pub histories: BTreeMap<NodeId, PatchHistory>,
-    /// Bytes of the budget that no row takes.
+    /// Unused bytes of the budget.
     free_bytes: usize,
-    /// Rows made so far.
+    /// Rows computed so far.
     pub rows_made: u64,
 }
 
-/// What is known of a patch that has sent light.
+/// Record of a patch that has sent light.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct PatchHistory {
     /// All the flux that went along its row, W.
     pub sent: Rgb,
-    /// The importance that its row was last made for: see [`FormFactors::rows`].
+    /// The importance with which its row was last computed: see [`FormFactors::rows`].
     pub importance: f64,
     /// Whether its row is cached, in memory or missing.
     pub cached: bool,
-    /// Upper bound of the share of its light that its row misplaces, since objects have moved. Such
-    /// a row cannot be made again.
+    /// Upper bound of the share of its light that its row misplaces since objects have moved. A
+    /// stale row cannot be computed again.
     pub stale_fraction: f64,
 }
 
@@ -60,12 +60,12 @@ impl RowCache {
         }
     }
 
-    /// Bytes of the budget that no row takes.
+    /// Unused bytes of the budget.
     pub fn free_bytes(&self) -> usize {
         self.free_bytes
     }
 
-    /// Puts back what was saved; the rows are missing.
+    /// Restores saved histories; the rows are missing.
     pub fn restore(
         &mut self,
         histories: BTreeMap<NodeId, PatchHistory>,
@@ -77,7 +77,7 @@ impl RowCache {
         self.free_bytes = free_bytes.min(self.free_bytes);
     }
 
-    /// Puts back a cached row.
+    /// Restores a cached row.
     pub fn restore_row(&mut self, patch: NodeId, row: Row) {
         self.rows.insert(patch, Arc::new(row));
     }
@@ -92,7 +92,7 @@ impl RowCache {
         self.rows.get(&patch)
     }
 
-    /// Caches `row`, made for `importance`, if it fits.
+    /// Caches `row`, computed with `importance`, if it fits.
     pub fn insert(&mut self, patch: NodeId, row: impl Into<Arc<Row>>, importance: f64) {
         let row = row.into();
         let history = self.histories.entry(patch).or_default();
@@ -111,7 +111,7 @@ impl RowCache {
         self.histories.entry(patch).or_default().cached = false;
     }
 
-    /// Notes that `flux` (W) went along the row of `patch`.
+    /// Records that `flux` (W) went along the row of `patch`.
     pub fn record_sent(&mut self, patch: NodeId, flux: Rgb) {
         self.histories.entry(patch).or_default().sent += flux;
     }
@@ -124,7 +124,7 @@ impl RowCache {
         largest_share(misplaced.sum(), emitted)
     }
 
-    /// Makes the rows of `patches`, checked, without caching them.
+    /// Computes and checks the rows of `patches`, without caching them.
     pub fn make(
         &mut self,
         mesh: &Mesh,
@@ -137,8 +137,8 @@ impl RowCache {
         Ok(rows)
     }
 
-    /// Makes those rows of `patches` that are cached but missing from memory, in the batches that
-    /// `row_source` prefers. Each is as it was, since it is made for the same importance.
+    /// Recomputes those rows of `patches` that are cached but missing from memory, in the batch
+    /// size of `row_source`. The same importance gives the same bits.
     pub fn rebuild_missing(
         &mut self,
         mesh: &Mesh,
@@ -164,7 +164,7 @@ impl RowCache {
     }
 
     /// The rows of the first of `elements`, in their order: as many as are cached or fit in one
-    /// batch of new rows, and at least one.
+    /// batch of new rows, at least one.
     pub fn next_element_rows(
         &mut self,
         mesh: &Mesh,

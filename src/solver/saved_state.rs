@@ -1,8 +1,8 @@
-//! The content of a saved session, and its way back: every part is checked before it is used.
+//! The content of a saved session, and its restoration: every part is checked before it is used.
 //!
 //! The order and types of all fields here, and of the types in them, are the file format: postcard
-//! writes no names. What a file holds must not change for [`checkpoint`](super::checkpoint)'s
-//! version.
+//! writes no names. The content must not change within a version of
+//! [`checkpoint`](super::checkpoint).
 
 use serde::{Deserialize, Serialize};
 
@@ -20,10 +20,10 @@ use crate::form_factor::{Entry, Row};
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
-/// What to do about a file that is damaged.
+/// Remedy for a damaged file.
 pub(super) const DAMAGED: &str = "the file is damaged: use another, or solve from the start";
 
-/// Highest number of steps, shots or rows in a file: more than any solve can do, and far from
+/// Maximum number of steps, shots or rows in a file: more than any solve reaches, and far from
 /// overflow.
 const MAX_COUNTER: u64 = 1 << 60;
 
@@ -32,7 +32,7 @@ pub(super) fn refuse(place: &str, found: impl Into<String>, remedy: &str) -> Err
     Error::new(ErrorKind::File, format!("saved state, {place}"), found, remedy)
 }
 
-/// A session as it is saved.
+/// The saved form of a session.
 #[derive(Serialize, Deserialize)]
 pub(super) struct SavedSession {
     counters: Counters,
@@ -43,12 +43,12 @@ pub(super) struct SavedSession {
     unshot: Vec<Rgb>,
     /// By ascending patch.
     histories: Vec<(NodeId, PatchHistory)>,
-    /// Stale rows, which cannot be made again.
+    /// Stale rows, which cannot be computed again.
     rows: Vec<(NodeId, SavedRow)>,
     method: SavedMethodState,
 }
 
-/// A [`Row`] as it is saved.
+/// The saved form of a [`Row`].
 #[derive(Serialize, Deserialize)]
 struct SavedRow {
     /// Element and share.
@@ -58,7 +58,7 @@ struct SavedRow {
     passed: Vec<[u32; 3]>,
 }
 
-/// A [`MethodState`] as it is saved.
+/// The saved form of a [`MethodState`].
 #[derive(Serialize, Deserialize)]
 enum SavedMethodState {
     Shooting(CutSnapshot),
@@ -68,7 +68,7 @@ enum SavedMethodState {
 }
 
 impl SavedSession {
-    /// What is saved of `session`.
+    /// The saved form of `session`.
     pub fn of(session: &SolveSession) -> SavedSession {
         let SolveSession { state, rows, method, counters, .. } = session;
         let histories: Vec<(NodeId, PatchHistory)> =
@@ -91,10 +91,10 @@ impl SavedSession {
         }
     }
 
-    /// `session`, which has just begun, as it was when it was saved.
+    /// Restores the saved state to `session`, which has just begun.
     ///
     /// # Errors
-    /// [`ErrorKind::File`] when a part cannot be that of such a session.
+    /// [`ErrorKind::File`] when a part is not valid for such a session.
     pub fn restore<'m>(
         self,
         session: SolveSession<'m>,
@@ -113,7 +113,7 @@ impl SavedSession {
         let method = self.method.restore(&solver, mesh)?;
         let stop = None;
         let session = SolveSession { solver, state, rows, method, counters, stop, row_source };
-        // What is in hand is accounted for only once it is finished.
+        // Flux held by the method is accounted for only once it is finished.
         session.clone().finish().map_err(|e| refuse("ledger", e.to_string(), DAMAGED))?;
         Ok(session)
     }
@@ -131,7 +131,7 @@ fn restore_flux(state: &mut FluxState, incident: Vec<Rgb>, unshot: Vec<Rgb>) -> 
     Ok(())
 }
 
-/// Whether it closes is checked when all else is restored.
+/// The balance is checked when all else is restored.
 fn restore_ledger(state: &mut FluxState, ledger: Ledger) -> Result<(), Error> {
     let Ledger { emitted, absorbed, escaped, backface_loss, pane_loss, unshot, overshot } = ledger;
     let parts = [absorbed, escaped, backface_loss, pane_loss, unshot, overshot];
@@ -189,7 +189,7 @@ impl SavedRow {
 }
 
 impl From<SavedRow> for Row {
-    /// Not checked yet.
+    /// Unchecked.
     fn from(saved: SavedRow) -> Row {
         let SavedRow { entries, escaped, backface, passed } = saved;
         let entries = entries.into_iter().map(|(element, share)| Entry { element, share });
@@ -207,7 +207,7 @@ impl SavedMethodState {
         }
     }
 
-    /// The state of the method of `solver`, if it can be one over `mesh`.
+    /// The state of the method of `solver`, if it is valid over `mesh`.
     fn restore<'m>(self, solver: &Solver, mesh: &'m Mesh) -> Result<MethodState<'m>, Error> {
         let count = mesh.element_count();
         let restored = match (self, solver.method) {
@@ -317,7 +317,7 @@ mod tests {
     fn restore_rejects_state_of_another_method_or_mesh() {
         let [shooting, _, jacobi, _, gmres, _] = Method::ALL.map(Solver::new);
         expect_refusal(shooting, "method", |s| s.method = SavedMethodState::Direct);
-        // A patch that is missing, and one that is there twice.
+        // A missing patch, and one that occurs twice.
         expect_refusal(shooting, "method", |s| patches(s).truncate(1));
         expect_refusal(shooting, "method", |s| patches(s).extend_from_within(..1));
         expect_refusal(jacobi, "method", |s| {

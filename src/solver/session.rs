@@ -15,13 +15,12 @@ use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 
-/// A solve that goes on by batches of rows: [`Solver::begin`] makes it.
+/// A solve that advances by batches of rows: [`Solver::begin`] creates it.
 ///
-/// Between batches it can be looked at, [saved](SolveSession::save), given a scene whose
+/// Between batches it can be inspected, [saved](SolveSession::save), given a scene whose
 /// [materials](SolveSession::update_materials) or [objects](SolveSession::update_geometry) have
-/// changed, or rows from another source; any will do that makes rows of its mesh. An error takes
-/// nothing from it: after a device failed it is where it was before the batch, and goes on with
-/// another.
+/// changed, or rows from any other source for its mesh. An error leaves it unchanged: after a
+/// device failure it is in the state before the batch, and continues with another device.
 ///
 /// ```
 /// # use radiosity::*;
@@ -64,7 +63,7 @@ impl fmt::Debug for SolveSession<'_> {
 }
 
 impl<'m> SolveSession<'m> {
-    /// Nothing is shot yet but what was `received`. The settings are checked already.
+    /// No flux is shot yet except what was `received`. The settings are checked already.
     pub(super) fn new(
         solver: Solver,
         mesh: &'m Mesh,
@@ -81,11 +80,11 @@ impl<'m> SolveSession<'m> {
         })
     }
 
-    /// Goes on by one batch of rows, or as far as kept rows go; answers why it stops, if it does. A
-    /// direct solve is one batch.
+    /// Advances by one batch of rows, or as far as cached rows go; returns the reason if it stops.
+    /// A direct solve is one batch.
     ///
-    /// `progress` is called for every row that light is sent along, or that is made in vain, and
-    /// may stop the solver, which can go on all the same.
+    /// `progress` is called for every row that is computed or that light is sent along, and may
+    /// stop the solver, which can be resumed.
     ///
     /// # Errors
     /// [`ErrorKind::FormFactor`](crate::ErrorKind::FormFactor) when a row breaks its contract; all
@@ -98,7 +97,7 @@ impl<'m> SolveSession<'m> {
         self.step(form_factors, &mut progress, Instant::now())
     }
 
-    /// Goes on until there is a reason to stop.
+    /// Advances until there is a reason to stop.
     ///
     /// # Errors
     /// Those of [`SolveSession::advance`].
@@ -137,13 +136,13 @@ impl<'m> SolveSession<'m> {
         Ok(self.stop)
     }
 
-    /// Takes back what the method has in hand, so that all light is accounted for.
+    /// Takes back flux held by the method, so that all light is accounted for.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
         self.method.finish(&mut self.state, &mut self.rows);
         self.state.recompute_and_verify_energy()
     }
 
-    /// What was reached.
+    /// The solution reached.
     ///
     /// # Errors
     /// [`ErrorKind::FormFactor`](crate::ErrorKind::FormFactor) when the ledger does not close.
@@ -160,7 +159,7 @@ impl<'m> SolveSession<'m> {
         })
     }
 
-    /// What was reached so far; the solve can go on.
+    /// The solution reached so far; the solve can continue.
     ///
     /// # Errors
     /// Those of [`SolveSession::into_solution`].
@@ -168,7 +167,7 @@ impl<'m> SolveSession<'m> {
         self.clone().into_solution()
     }
 
-    /// Where the light is by now; what GMRES has in hand is counted as unshot.
+    /// The energy balance so far; flux held by GMRES is counted as unshot.
     pub fn ledger(&self) -> &Ledger {
         &self.state.ledger
     }
@@ -183,13 +182,13 @@ impl<'m> SolveSession<'m> {
         &self.solver
     }
 
-    /// The most flux that may have gone the wrong way since objects were moved, along rows made
+    /// Maximum flux that may have been misplaced since objects were moved, along rows computed
     /// before: a share of the emitted flux, of the worst channel.
     pub fn stale_flux_bound(&self) -> f64 {
         self.rows.stale_flux_bound(self.state.ledger.emitted)
     }
 
-    /// From now on stops at this unshot share, and after this many steps in all.
+    /// Sets the unshot share and the total number of steps at which to stop.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`](crate::ErrorKind::Setting) when `unshot` is not in [0, 1].

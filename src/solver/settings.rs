@@ -1,4 +1,4 @@
-//! Settings of a solve, the rule that picks a method, and the solve itself.
+//! Settings of a solve, automatic choice of the method, and the solve itself.
 
 use std::ops::ControlFlow;
 
@@ -8,27 +8,27 @@ use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
 
-/// How light is spread, and when that stops. [`Solver::default`] shoots to 0.1 % unshot.
+/// Method of light distribution and stop rules. [`Solver::default`] shoots to 0.1 % unshot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
     /// The method.
     pub method: Method,
-    /// Stops when no channel has more than this share of its emitted flux unshot, in [0, 1].
-    /// Radiosity is off by no more than that brings: at most this × emitted flux / (1 − ρ) in all,
-    /// ρ the highest reflectance.
+    /// Stops when no channel has more than this share of its emitted flux unshot, in [0, 1]. The
+    /// resulting error of the radiosity is at most this × emitted flux / (1 − ρ) in total, ρ the
+    /// highest reflectance.
     pub unshot: f64,
     /// Stops after this many steps of the [`Method`]; for shooting, shots.
     pub max_steps: Option<u64>,
-    /// Bytes that kept rows may take; those that do not fit are made again.
+    /// Bytes for cached rows; those that do not fit are recomputed.
     pub row_memory: usize,
-    /// For shooting: the highest estimated error of a patch that shoots along one row, seen from
-    /// one place: √s q, where s is the share of the emitted light that it carries and q the share
-    /// of this that goes wrong, estimated from its size, the distance of its receivers and how
-    /// uneven its light is; more for a patch next to a contact, whose light would all go to a spot
-    /// there. Patches are as large as this permits, from clusters of many triangles down to
-    /// elements. 0 makes every patch as small as `min_patch_level` allows. Elements of
-    /// emitters shoot by themselves where they are few. Rows are taken to be right for near
-    /// receivers: see [`ProximityCorrection`](crate::form_factor::ProximityCorrection).
+    /// For shooting: maximum estimated error of a patch that shoots along one row, seen from one
+    /// viewpoint: √s q, where s is the share of the emitted light that it carries and q the share
+    /// of this that is misplaced, estimated from its size, the distance of its receivers and the
+    /// unevenness of its light; more for a patch next to a contact, whose light would all go to a
+    /// spot there. Patches are as large as this permits, from clusters of many triangles down to
+    /// elements. 0 makes every patch as small as `min_patch_level` allows. Elements of emitters
+    /// shoot separately where they are few. Rows are assumed to be correct for near receivers: see
+    /// [`ProximityCorrection`](crate::form_factor::ProximityCorrection).
     pub patch_tolerance: f64,
     /// For shooting: the smallest patches are this many quadtree levels above the elements: 4ᵏ
     /// elements, or a triangle.
@@ -43,22 +43,21 @@ impl Default for Solver {
 }
 
 impl Solver {
-    /// Elements that [`Method::Direct`] takes at most: its matrix has 24 bytes an entry, 400 MB in
-    /// all.
+    /// Maximum number of elements for [`Method::Direct`]: its matrix has 24 bytes per entry, 400 MB
+    /// in total.
     pub const DIRECT_MAX_ELEMENTS: usize = 4096;
 
-    /// Elements up to which [`Solver::for_mesh`] solves directly: a tenth of a second.
+    /// Number of elements up to which [`Solver::for_mesh`] solves directly: a tenth of a second.
     pub const AUTO_DIRECT_MAX_ELEMENTS: usize = 512;
 
-    /// Mean reflectance from which on [`Solver::for_mesh`] chooses GMRES where all rows fit in
-    /// memory: shooting would follow some 70 bounces for 0.1 % unshot, where GMRES takes some 10
-    /// products.
+    /// Mean reflectance from which [`Solver::for_mesh`] chooses GMRES where all rows fit in memory:
+    /// shooting would follow some 70 bounces for 0.1 % unshot, where GMRES takes some 10 products.
     pub const AUTO_GMRES_MIN_REFLECTANCE: f64 = 0.9;
 
-    /// The same where rows must be made again for every product: 2 300 bounces.
+    /// The same where rows must be recomputed for every product: 2 300 bounces.
     pub const AUTO_GMRES_MIN_REFLECTANCE_UNCACHED: f64 = 0.997;
 
-    /// [`Solver::patch_tolerance`], unless set.
+    /// Default of [`Solver::patch_tolerance`].
     pub const DEFAULT_PATCH_TOLERANCE: f64 = 4e-3;
 
     /// `method`, to 0.1 % unshot with a GiB of rows.
@@ -73,13 +72,13 @@ impl Solver {
         }
     }
 
-    /// The method that suits `mesh`, by its size and by its mean reflectance (by area, the highest
-    /// channel), with [`Solver::new`]'s settings:
+    /// Chooses the method for `mesh` by its size and its mean reflectance (by area, the highest
+    /// channel), with the settings of [`Solver::new`]:
     ///
     /// 1. direct, for up to [`Solver::AUTO_DIRECT_MAX_ELEMENTS`] elements;
-    /// 2. else GMRES, from [`Solver::AUTO_GMRES_MIN_REFLECTANCE`] on if all rows fit in memory even
-    ///    when full (8 bytes for each pair of elements), or from
-    ///    [`Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED`] on if they do not;
+    /// 2. else GMRES, from [`Solver::AUTO_GMRES_MIN_REFLECTANCE`] if all rows fit in memory even
+    ///    when dense (8 bytes for each pair of elements), or from
+    ///    [`Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED`] if they do not;
     /// 3. else shooting.
     pub fn for_mesh(mesh: &Mesh) -> Solver {
         let [shooting, _, _, _, gmres, direct] = Method::ALL.map(Solver::new);
@@ -100,10 +99,10 @@ impl Solver {
         }
     }
 
-    /// Spreads the light that `mesh` emits, with rows from `form_factors`.
+    /// Distributes the light that `mesh` emits, with rows from `form_factors`.
     ///
-    /// `progress` is called for every row that light is sent along, or that is made in vain, and
-    /// may stop the solver; what was reached is returned. Its ledger closes, whenever that is.
+    /// `progress` is called for every row that is computed or that light is sent along, and may
+    /// stop the solver; the solution so far is returned. Its ledger balances at any time.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1], a setting of the method is out of
@@ -121,7 +120,7 @@ impl Solver {
         session.into_solution()
     }
 
-    /// A session over `mesh` in which nothing is shot yet.
+    /// A session over `mesh` in which no flux is shot yet.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `unshot` is not in [0, 1], a setting of the method is out of
@@ -131,7 +130,7 @@ impl Solver {
         self.begin_after(mesh, &ReceivedLight::default())
     }
 
-    /// The same where the elements have `received` light already.
+    /// As [`Solver::begin`], for elements that have `received` light already.
     pub(crate) fn begin_after<'m>(
         &self,
         mesh: &'m Mesh,

@@ -1,15 +1,16 @@
 //! Progressive shooting (Cohen, Chen, Wallace and Greenberg 1988) in f64.
 //!
-//! The patch with most unshot flux sends it along its row, again and again: Southwell's relaxation
+//! Repeatedly, the patch with most unshot flux sends it along its row: Southwell's relaxation
 //! (Gortler, Cohen and Slusallek 1994). One step here:
 //!
-//! 1. the [`PatchCut`] names the next shots, as many as need one batch of new rows;
-//! 2. the rows that are missing are made, all of a batch at once;
-//! 3. each patch whose new row shows that it is too large for its light, or stands inside a solid,
-//!    is split or moved instead of shot;
+//! 1. the [`PatchCut`] selects the next shots, as many as need one batch of new rows;
+//! 2. the missing rows are computed, all of a batch at once;
+//! 3. each patch whose new row shows that it is too large for its light, or that its viewpoint is
+//!    inside a solid, is split or gets another viewpoint instead of shooting;
 //! 4. each other patch shoots: its unshot flux is distributed along its row.
 //!
-//! With overshoot (Feda and Purgathofer 1992) a patch also sends light that it is yet to receive.
+//! With overshoot (Feda and Purgathofer 1992) a patch also sends light that it has not received
+//! yet.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -24,8 +25,8 @@ use crate::mesh::{Mesh, NodeId};
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Most that is overshot, per flux that is unshot. To relax by ω = 1 + this converges in any order
-/// where ω < 2, since exchange areas are symmetric (Ostrowski 1954).
+/// Maximum overshot flux per unshot flux. Relaxation by ω = 1 + this converges in any order where ω
+/// < 2, since exchange areas are symmetric (Ostrowski 1954).
 const MAX_OVERSHOOT: f64 = 0.8;
 
 /// The patches that shoot.
@@ -36,13 +37,13 @@ pub(super) struct Shooting<'m> {
 }
 
 impl<'m> Shooting<'m> {
-    /// The first patches of `mesh`.
+    /// The initial patches of `mesh`.
     pub fn new(solver: &Solver, overshoot: bool, mesh: &'m Mesh) -> Shooting<'m> {
         let Solver { patch_tolerance, min_patch_level, .. } = *solver;
         Shooting { cut: PatchCut::new(mesh, patch_tolerance, min_patch_level), overshoot }
     }
 
-    /// The patches that were saved, if they are a cut through `mesh`.
+    /// The patches that were saved, if they are a valid cut through `mesh`.
     pub fn from_snapshot(
         solver: &Solver,
         overshoot: bool,
@@ -54,7 +55,7 @@ impl<'m> Shooting<'m> {
         Some(Shooting { cut, overshoot })
     }
 
-    /// Takes the next shots, if there is any to be taken.
+    /// Takes the next shots, if there are any.
     pub fn advance(&mut self, step: &mut StepContext) -> Result<Option<StopReason>, Error> {
         if step.refresh_and_check_convergence()? {
             return Ok(Some(StopReason::Converged));
@@ -118,10 +119,10 @@ impl<'m> Shooting<'m> {
     }
 }
 
-/// Rows of a batch of shots that were not cached, in their order.
+/// Rows of a batch of shots that were not cached, in the order of the shots.
 struct NewRows {
     rows: Vec<Row>,
-    /// What they were made for: the largest unshot share of a patch among them.
+    /// Importance with which they were computed: the largest unshot share of a patch among them.
     importance: f64,
 }
 
@@ -149,14 +150,14 @@ impl NewRows {
 /// Flux that a patch sends, W per channel.
 struct TakenFlux {
     flux: Rgb,
-    /// The part of it that was passed on before it was received, less what makes up for earlier
+    /// The part of it that was passed on before it was received, less the compensation of earlier
     /// overshoot.
     overshot: Rgb,
 }
 
 impl FluxState<'_> {
-    /// Takes the unshot flux of `elements`, and beyond it what `ambient_overshoot` (W/m² per unit
-    /// of albedo) brings, at most [`MAX_OVERSHOOT`] of the unshot flux of each.
+    /// Takes the unshot flux of `elements`, plus the flux due to `ambient_overshoot` (W/m² per unit
+    /// of albedo), at most [`MAX_OVERSHOOT`] of the unshot flux of each.
     fn take(&mut self, elements: &[Range<usize>], ambient_overshoot: Rgb) -> TakenFlux {
         let mut flux = Rgb::ZERO;
         let mut overshot = Rgb::ZERO;
@@ -176,7 +177,7 @@ impl FluxState<'_> {
         TakenFlux { flux, overshot }
     }
 
-    /// Enters flux that was overshot into the ledger.
+    /// Adds overshot flux to the ledger.
     fn record_overshoot(&mut self, overshot: Rgb) {
         self.ledger.unshot += overshot;
         self.ledger.overshot += overshot;

@@ -1,8 +1,8 @@
-//! What a method works on during one step of a session: the flux, the rows, the counters, the stop
-//! rules and the progress callback.
+//! The data that a method works on during one step of a session: flux, rows, counters, stop rules
+//! and progress callback.
 //!
 //! A method takes rows from the cache, sends flux along them with [`StepContext::distribute`],
-//! counts what it did and calls [`StepContext::report`] after each row. It knows nothing of the
+//! updates the counters and calls [`StepContext::report`] after each row. It does not depend on the
 //! session that called it.
 
 use std::ops::ControlFlow;
@@ -18,11 +18,11 @@ use crate::form_factor::{FormFactors, Row};
 use crate::mesh::NodeId;
 use crate::scene::Rgb;
 
-/// The lowest unshot share that is asked for, even where 0 is set. Less cannot change a radiosity
-/// in f64, not even in a room whose lamps emit 1e-12 of what others do.
+/// Minimum unshot share solved to, even where 0 is requested. Less cannot change a radiosity in
+/// f64, not even in a room whose lamps emit 1e-12 of the light of others.
 pub(super) const MIN_UNSHOT_SHARE: f64 = 1e-28;
 
-/// What was done.
+/// Counters of a solve.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Counters {
     /// In the unit of the method.
@@ -32,18 +32,18 @@ pub(super) struct Counters {
 }
 
 impl Counters {
-    /// The progress of a solve that was started at `start`.
+    /// Progress of a solve that was started at `start`.
     pub fn progress(self, rows_made: u64, unshot_share: f64, start: Instant) -> Progress {
         let Counters { steps, shots } = self;
         Progress { steps, shots, rows_made, unshot_share, elapsed: start.elapsed() }
     }
 }
 
-/// What a method works on during one step.
+/// Data of one step of a method.
 pub(super) struct StepContext<'a, 'm> {
     pub state: &'a mut FluxState<'m>,
     pub rows: &'a mut RowCache,
-    /// Makes the rows that are not cached.
+    /// Source of the rows that are not cached.
     pub row_source: &'a mut dyn FormFactors,
     pub counters: &'a mut Counters,
     pub progress: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
@@ -55,8 +55,8 @@ pub(super) struct StepContext<'a, 'm> {
 }
 
 impl StepContext<'_, '_> {
-    /// Recomputes what is unshot, verifies the ledger, and answers whether the unshot share is as
-    /// low as asked for.
+    /// Recomputes the unshot flux, verifies the ledger, and returns whether the unshot share is as
+    /// low as requested.
     ///
     /// # Errors
     /// Those of [`FluxState::recompute_and_verify_energy`].
@@ -65,18 +65,18 @@ impl StepContext<'_, '_> {
         Ok(self.state.ledger.unshot_share() <= self.unshot)
     }
 
-    /// Whether as many steps are done as were asked for.
+    /// Whether the maximum number of steps is reached.
     pub fn has_done_all_steps(&self) -> bool {
         self.max_steps.is_some_and(|max| self.counters.steps >= max)
     }
 
-    /// Sends `flux` (W), which is no longer unshot anywhere, along the row of `patch`.
+    /// Sends `flux` (W), already removed from the unshot flux, along the row of `patch`.
     pub fn distribute(&mut self, flux: Rgb, patch: NodeId, row: &Row) {
         self.state.distribute(flux, row);
         self.rows.record_sent(patch, flux);
     }
 
-    /// Reports progress; answers whether to go on.
+    /// Reports progress; returns whether to continue.
     pub fn report(&mut self, unshot_share: f64) -> ControlFlow<()> {
         (self.progress)(&self.counters.progress(self.rows.rows_made, unshot_share, self.start))
     }

@@ -1,12 +1,12 @@
-//! Assembles an exact matrix: all pairs of convex polygons, each met once, summed over groups.
+//! Assembles an exact matrix: all pairs of convex polygons, each computed once, summed over groups.
 //!
 //! ```text
-//! scene ─→ fronts: polygons that give and receive, in the order of groups
-//!      ├─→ backs: what of the backs of polygons can be met
+//! scene ─→ fronts: polygons that emit and receive, in the order of groups
+//!      ├─→ backs: visible parts of the backs of polygons
 //!      └─→ blockers: polygons of any group, in a tree
 //!
 //! for each front s:   for each group of later fronts, and for all backs:
-//!                         sum of pairs in full view + adaptive cubature of occluded pairs
+//!                         sum of unoccluded pairs + adaptive cubature of occluded pairs
 //! ```
 //!
 //! Later fronts only: A_i F_ij = A_j F_ji gives the other half. The tolerance of a group's error is
@@ -25,21 +25,22 @@ use super::scene_polygons::ScenePolygons;
 use super::shared_work::share_out;
 use crate::sampling::hash::split_mix64;
 
-/// Share of the error asked for to which the error bound of every sum is brought. Its estimate is
-/// brought to a tenth of that again: rows of thousands of factors then close to a tenth of what was
-/// asked.
+/// Share of the requested error to which the error bound of every sum is reduced. Its estimate is
+/// reduced to a tenth of that: rows of thousands of factors then close to a tenth of the requested
+/// error.
 const BOUND_SHARE: f64 = 0.1;
 
-/// Times that progress is told of a large scene. Chosen by hand.
+/// Number of progress calls for a large scene. Plain choice.
 const PROGRESS_CALLS: usize = 100;
 
-/// Fewest polygons between two tellings of progress, so that all cores have work. Chosen by hand.
+/// Minimum number of polygons between two progress calls, so that all cores have work. Plain
+/// choice.
 const MIN_BATCH: usize = 4;
 
-/// Most polygons between two tellings of progress, so that cancelling is heard. Chosen by hand.
+/// Maximum number of polygons between two progress calls, for a timely cancellation. Plain choice.
 const MAX_BATCH: usize = 64;
 
-/// Makes the rows of the polygons `wanted`; none if that is stopped.
+/// Computes the rows of the polygons `wanted`; `None` if stopped.
 pub(super) fn make(
     polygons: ScenePolygons,
     error: f64,
@@ -59,28 +60,28 @@ pub(super) fn make(
     Some(())
 }
 
-/// All that it takes to find what one polygon gives to others.
+/// Data for computing the exchange of one polygon with others.
 pub(super) struct Assembler {
-    /// Polygons that give and receive, by group.
+    /// Polygons that emit and receive, by group.
     fronts: Vec<ConvexPolygon>,
-    /// What of the backs of polygons can be met.
+    /// Visible parts of the backs of polygons.
     backs: Vec<ConvexPolygon>,
     blockers: BlockerTree,
     /// Radiating area of each group, in squares of the scene's unit.
     areas: Vec<f64>,
-    /// Absolute error asked of every factor.
+    /// Requested absolute error of every factor.
     error: f64,
 }
 
 impl Assembler {
-    /// Of `polygons`, with an absolute error of every factor well below `error`.
+    /// An assembler of `polygons`, with an absolute error of every factor well below `error`.
     pub fn new(polygons: ScenePolygons, error: f64) -> Assembler {
         let ScenePolygons { fronts, blockers, .. } = polygons;
         let backs = blockers.backs(&BlockerTree::new(fronts.polygons.clone()));
         Assembler { fronts: fronts.polygons, backs, blockers, areas: fronts.areas, error }
     }
 
-    /// What polygon `s` gives to later ones and to backs.
+    /// The exchange of polygon `s` with later ones and with backs.
     fn row(&self, s: usize) -> PolygonRow {
         let mut visibility = PointVisibility::default();
         let from = &self.fronts[s];

@@ -1,7 +1,7 @@
-//! The convex polygons of a scene in a tree of boxes, to find those in a shaft.
+//! The convex polygons of a scene in a bounding volume tree, to find those in a shaft.
 //!
-//! Polygons are halved at the median of their box centres along the longest side of their common
-//! box, until few are left. A query goes down where boxes meet it.
+//! Polygons are split at the median of their box centres along the longest side of their common
+//! box, down to leaves of a few. A query descends into boxes that intersect it.
 
 use std::ops::ControlFlow;
 
@@ -14,7 +14,7 @@ use crate::geometry::aabb::Aabb;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::polygon::{max_distance, polygon_difference};
 
-/// Polygons in one leaf of the tree, at most. Chosen by hand; no measurement was kept.
+/// Maximum number of polygons in a leaf. Plain choice; no recorded measurement.
 const LEAF_SIZE: usize = 4;
 
 /// Convex polygons in a tree of boxes.
@@ -40,12 +40,12 @@ impl BlockerTree {
         self.polygons[k as usize].normal
     }
 
-    /// What of the polygons is strictly within `shaft`.
+    /// The parts of polygons strictly within `shaft`.
     pub fn within(&self, shaft: &Shaft) -> Vec<Blocker> {
         self.few_within(shaft, usize::MAX).unwrap_or_default()
     }
 
-    /// The same, or nothing where they are more than `most`.
+    /// As [`BlockerTree::within`], or `None` if there are more than `most`.
     pub fn few_within(&self, shaft: &Shaft, most: usize) -> Option<Vec<Blocker>> {
         let mut blockers = Vec::new();
         self.bvh.visit(
@@ -61,18 +61,19 @@ impl BlockerTree {
         (blockers.len() <= most).then_some(blockers)
     }
 
-    /// What of the polygons of these indices is strictly within `shaft`.
+    /// The parts of the polygons of these indices strictly within `shaft`.
     pub fn of_these_within(&self, indices: &[u32], shaft: &Shaft) -> Vec<Blocker> {
         indices.iter().filter_map(|&k| self.part_within(k, shaft)).collect()
     }
 
-    /// What of polygon `k` is strictly within `shaft`, if anything.
+    /// The part of polygon `k` strictly within `shaft`, if any.
     fn part_within(&self, k: u32, shaft: &Shaft) -> Option<Blocker> {
         let polygon = &self.polygons[k as usize];
         Some(Blocker { corners: shaft.clip(&polygon.corners)?, normal: polygon.normal })
     }
 
-    /// The polygons in leaves of the tree that meet `bounds`: all that overlap, and perhaps others.
+    /// The polygons in leaves of the tree that meet `bounds`: all that overlap, and possibly
+    /// others.
     fn nearby(&self, bounds: &Aabb) -> Vec<&ConvexPolygon> {
         let mut polygons = Vec::new();
         self.bvh.visit(
@@ -85,8 +86,8 @@ impl BlockerTree {
         polygons
     }
 
-    /// The backs of all polygons, less what is hidden right there by a polygon of `fronts` that
-    /// lies on it: such a plate has two fronts.
+    /// The backs of all polygons, less the parts covered by a polygon of `fronts` in the same
+    /// plane: such a plate has two fronts.
     pub fn backs(&self, fronts: &BlockerTree) -> Vec<ConvexPolygon> {
         let mut backs = Vec::new();
         for &k in self.bvh.order() {

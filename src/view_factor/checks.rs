@@ -1,35 +1,35 @@
-//! What must hold of a matrix of view factors, measured on raw numbers.
+//! Laws that a matrix of view factors must satisfy, measured on raw numbers.
 //!
-//! | law | in numbers | measured by |
+//! | law | formula | measured by |
 //! |---|---|---|
 //! | closure | Σ_j F_ij + open_i + back_i = 1 | [`MatrixChecks::closure`] |
 //! | reciprocity | A_i F_ij = A_j F_ji | [`MatrixChecks::reciprocity`] |
 //! | bounds | 0 ≤ F_ij ≤ min(1, A_j / A_i) | [`MatrixChecks::bounds`] |
 //! | | Σ_j F_ij + back_i ≤ 1 | [`MatrixChecks::row_sums`] |
 //!
-//! The share of a row that is open tells of the scene: more than its error, and the enclosure has a
-//! gap; less than minus its error, and surfaces lie twice in one place.
+//! The open share of a row indicates faults of the scene: if above its error, the enclosure has a
+//! gap; if below minus its error, surfaces coincide.
 
 use super::matrix::{Missing, ViewFactors};
 
-/// How far a matrix is from what must hold. A good row sum is no proof of good entries: that of a
-/// hemicube is perfect while its entries are off. Dimensionless, as form factors are.
+/// Deviations of a matrix from the laws. A correct row sum does not prove correct entries: that of
+/// a hemicube is exact while its entries have errors. Dimensionless, as form factors are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MatrixChecks {
-    /// Row sum + open + back − 1, over rows. The `open` of an exact or sparse matrix is left over,
-    /// not measured: there it is row sum + back − 1, over the rows that are closed.
+    /// Row sum + open + back − 1, over rows. The `open` of an exact or sparse matrix is the
+    /// remainder, not measured: there it is row sum + back − 1, over the closed rows.
     pub closure: ErrorStats,
     /// (A_i F_ij − A_j F_ji) / min(A_i, A_j), over pairs: an error of the smaller group's factor.
     pub reciprocity: ErrorStats,
-    /// By how much a value is below 0 or above 1, or A_i F_ij above A_j, as a share of A_i; over
-    /// all factors.
+    /// Amount by which a value is below 0 or above 1, or A_i F_ij above A_j, as a share of A_i;
+    /// over all factors.
     pub bounds: ErrorStats,
-    /// By how much the sum of a row and its back is above 1; over all rows.
+    /// Amount by which the sum of a row and its back share is above 1; over all rows.
     pub row_sums: ErrorStats,
 }
 
-/// Size of an error over many places.
+/// Size of an error over many values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ErrorStats {
@@ -37,11 +37,11 @@ pub struct ErrorStats {
     pub rms: f64,
     /// The largest magnitude.
     pub max: f64,
-    /// Row and column of the largest; of a whole row, twice the row.
+    /// Row and column of the largest; for a whole row, twice the row.
     pub at: (usize, usize),
 }
 
-/// The open share of a row is not zero if it is more than so many standard errors away.
+/// An open share is not zero if it is more than this number of standard errors away.
 const OPEN_SIGMAS: f64 = 3.0;
 
 /// Rounding of the open share of a row of thousands of factors, beside its standard error.
@@ -87,7 +87,7 @@ fn closure_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)
     })
 }
 
-/// What of the flux of group `i` arrives at fronts and backs.
+/// Share of the flux of group `i` that arrives at fronts and backs.
 fn row_sum(m: &ViewFactors, i: usize) -> f64 {
     m.factors[i].iter().map(|f| f.value).sum::<f64>() + m.back[i].value
 }
@@ -116,7 +116,7 @@ fn bound_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> 
     })
 }
 
-/// How far an open share may be from zero for all that.
+/// Maximum deviation of an open share from zero that still counts as closed.
 fn open_tolerance(m: &ViewFactors, i: usize) -> f64 {
     OPEN_SIGMAS * m.open[i].error + OPEN_ROUNDING
 }

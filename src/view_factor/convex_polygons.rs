@@ -1,12 +1,12 @@
-//! Convex polygons of a scene: coplanar neighbouring triangles, merged.
+//! Convex polygons of a scene: merged coplanar neighbouring triangles.
 //!
 //! Fewer and larger polygons mean fewer pairs, and no shadow edges along the diagonals of quads.
 //!
 //! ```text
-//! weld corners ─→ find sides shared by two triangles that run along them in opposite directions
-//!              ─→ flood coplanar regions; one that is convex as a whole becomes one polygon
-//!              ─→ of others, join neighbours across the longest sides while the union is convex
-//!              ─→ drop corners at which the outline goes straight on
+//! weld corners ─→ find sides shared by two consistently wound triangles
+//!              ─→ flood coplanar regions; each that is convex as a whole becomes one polygon
+//!              ─→ in others, join neighbours across the longest sides while the union is convex
+//!              ─→ drop corners at which the outline is straight
 //! ```
 
 use std::collections::{BTreeMap, HashMap};
@@ -19,7 +19,7 @@ use crate::geometry::polygon::area_vector;
 use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 
-/// A convex plane polygon, counter-clockwise seen from its front, in units of the scene's size.
+/// A convex planar polygon, counter-clockwise seen from its front, in units of the scene's size.
 #[derive(Clone, Debug)]
 pub(super) struct ConvexPolygon {
     pub corners: Vec<DVec3>,
@@ -27,12 +27,12 @@ pub(super) struct ConvexPolygon {
     pub normal: DVec3,
     /// In squares of the scene's size.
     pub area: f64,
-    /// Group of its triangles; that of the first one where groups are merged.
+    /// Group of its triangles; that of the first triangle where groups are merged.
     pub group: u32,
 }
 
 impl ConvexPolygon {
-    /// The polygon with these corners; none if it has no area.
+    /// The polygon with these corners; `None` if it has no area.
     pub fn new(corners: Vec<DVec3>, group: u32) -> Option<ConvexPolygon> {
         let vector = area_vector(&corners);
         let area = vector.length();
@@ -55,21 +55,21 @@ impl ConvexPolygon {
 /// Which triangles may become one polygon.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Merge {
-    /// Those of one group: polygons that give and receive.
+    /// Within one group: polygons that emit and receive.
     WithinGroups,
-    /// Any: polygons that stand in the way.
+    /// Across groups: blockers.
     AcrossGroups,
 }
 
-/// Polygons of a scene, and what became of its triangles.
+/// Polygons of a scene, and the polygon of each triangle.
 pub(super) struct MergedTriangles {
     /// In the order of first triangles.
     pub polygons: Vec<ConvexPolygon>,
-    /// Per triangle, the index of the polygon that it is a part of; none without area.
+    /// Per triangle, the index of its polygon; `None` for triangles without area.
     pub of_triangle: Vec<Option<u32>>,
 }
 
-/// The scene as convex polygons around its middle, every length divided by `unit`.
+/// The scene as convex polygons relative to its centre, every length divided by `unit`.
 ///
 /// A connected coplanar region that is convex as a whole becomes one polygon; of any other region
 /// neighbours are joined across their longest common sides as long as the union stays convex.
@@ -80,12 +80,12 @@ pub(super) fn convex_polygons(scene: &Scene, unit: f64, merge: Merge) -> MergedT
     outlines.finish(scene)
 }
 
-/// Polygons under way: loops of welded corners.
+/// Polygons under construction: loops of welded corners.
 struct Outlines {
     corners: Vec<DVec3>,
-    /// Per triangle its polygon's loop while it stands for that polygon, else empty.
+    /// Per triangle, the loop of its polygon if it is the representative, else empty.
     loops: Vec<Vec<u32>>,
-    /// Per triangle, the one that stands for its polygon, or one nearer to it.
+    /// Per triangle, its parent in the union-find forest of polygons.
     parent: Vec<usize>,
     normals: Vec<DVec3>,
     /// Pairs of triangles that may merge, and the squared length of their common side.
@@ -108,7 +108,7 @@ impl Outlines {
             for k in 0..3 {
                 let (a, b) = (outline[k], outline[(k + 1) % 3]);
                 let beyond = match (sides.get(&(a, b)), sides.get(&(b, a))) {
-                    // Where more than two triangles meet, none is the continuation.
+                    // A side shared by more than two triangles is not merged across.
                     (Some(here), Some(there)) if here.len() == 1 && there.len() == 1 => there[0],
                     _ => continue,
                 };
@@ -131,7 +131,8 @@ impl Outlines {
         t
     }
 
-    /// Regions of triangles coplanar with the region's first; those convex as a whole are joined.
+    /// Joins those regions of triangles coplanar with the region's first that are convex as a
+    /// whole.
     fn join_whole_regions(&mut self) {
         let mut region: Vec<usize> = vec![usize::MAX; self.loops.len()];
         let mut beside: Vec<Vec<usize>> = vec![Vec::new(); self.loops.len()];
@@ -193,15 +194,15 @@ impl Outlines {
         off.all(|off| off <= COPLANARITY)
     }
 
-    /// The loop around all of `members`, if it is one and convex.
+    /// The loop around all of `members`, if there is a single convex one.
     fn union(&self, members: &[usize], normal: DVec3) -> Option<Vec<u32>> {
-        // A corner visited twice would make the walk below ambiguous, and is never convex.
+        // A corner visited twice would make the traversal below ambiguous, and is never convex.
         let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &t in members {
             let outline = &self.loops[t];
             for (k, &a) in outline.iter().enumerate() {
                 let b = outline[(k + 1) % outline.len()];
-                // A side against one already there is inside the union: both go.
+                // A pair of opposite sides is inside the union: both are removed.
                 match next.get_mut(&b).map(|ends| (ends.iter().position(|&e| e == a), ends)) {
                     Some((Some(at), ends)) => drop(ends.swap_remove(at)),
                     _ => next.entry(a).or_default().push(b),
@@ -226,7 +227,7 @@ impl Outlines {
         (outline.len() == next.len() && self.convex(&outline, normal)).then_some(outline)
     }
 
-    /// Whether a loop turns left or goes straight on everywhere, and once around.
+    /// Whether all turns of a loop are left turns or straight, and the loop goes around once.
     fn convex(&self, outline: &[u32], normal: DVec3) -> bool {
         let mut around = 0.0;
         for k in 0..outline.len() {
@@ -250,7 +251,7 @@ impl Outlines {
 
     fn finish(self, scene: &Scene) -> MergedTriangles {
         let mut polygons = Vec::new();
-        // Of the triangles that stand for polygons.
+        // Indices of polygons, by representative triangle.
         let mut numbers = vec![None; self.loops.len()];
         for (t, outline) in self.loops.iter().enumerate() {
             let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT_SINE;
@@ -266,14 +267,14 @@ impl Outlines {
     }
 }
 
-/// A position, from the middle of the scene and over `unit`.
+/// A position relative to the centre of the scene, divided by `unit`.
 pub(super) fn in_units(scene: &Scene, unit: f64) -> impl Fn(DVec3) -> DVec3 + use<> {
     let centre = scene.bounds().centre();
     move |p| (p - centre) / unit
 }
 
-/// Per triangle its corners as numbers of distinct positions, and these positions, from the middle
-/// of the scene and over `unit`.
+/// Per triangle its corners as indices of distinct positions, and these positions, relative to the
+/// centre of the scene and divided by `unit`.
 fn weld(scene: &Scene, unit: f64) -> (Vec<Vec<u32>>, Vec<DVec3>) {
     let mut weld = Weld::default();
     let loops = (0..scene.triangles().len())

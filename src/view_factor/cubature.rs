@@ -1,21 +1,24 @@
-//! Adaptive cubature of an occluded pair: over one polygon, of what its points see of the other.
+//! Adaptive cubature of an occluded pair: integrates over one polygon the form factor to the
+//! visible part of the other.
 //!
 //! ```text
 //!        target            A₁F₁₂ = ∫ over the domain of F(point → visible part of the target)
 //!      ───────────
-//!          ▬▬  blockers    F at a point is exact (see `point_visibility`); it is smooth but where
-//!      ╱╲  ╱╲  ╱╲  ╱╲      the point crosses a visual event (see `visual_events`)
+//!          ▬▬  blockers    F at a point is exact (see `point_visibility`); it is smooth except
+//!      ╱╲  ╱╲  ╱╲  ╱╲      where the point crosses a visual event (see `visual_events`)
 //!        domain: cells
 //! ```
 //!
-//! The domain is cut into triangles, cells. A cell with nothing left between it and the target is a
-//! closed form; one that a single blocker hides entirely is zero; over others Radon's seven-point
-//! rule is applied. The cell with the largest error bound is cut again, along an event plane if one
-//! crosses it, else in two, until the bounds and estimates of all cells of a sum are small enough.
+//! The domain is cut into triangular cells. A cell without blockers between it and the target has a
+//! closed form; one hidden entirely by a single blocker is zero; Radon's seven-point rule is
+//! applied to the others. The cell with the largest error bound is cut again, along an event plane
+//! if one crosses it, else in two, until the bounds and estimates of all cells of a sum are small
+//! enough.
 //!
-//! Every cell carries two errors. Its *bound* decides what is cut: the difference of two rules of
-//! different degree, plus what seven points may miss. Its *estimate* is told: what the last cut has
-//! changed. Errors of cells are independent (cuts are jittered), so squares add up.
+//! Every cell has two errors. The *bound* decides which cell is cut: the difference of two rules of
+//! different degree, plus the error that seven points may miss. The *estimate* is reported: the
+//! change due to the last cut. Errors of cells are independent (cuts are jittered), so their
+//! squares add up.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -31,40 +34,41 @@ use crate::geometry::plane::Plane;
 use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
 
-/// Most cells that a sum is cut into; the error that is left then is told. Limits time and memory;
-/// chosen by hand.
+/// Maximum number of cells of a sum; the remaining error is reported. Limits time and memory; plain
+/// choice.
 const MAX_CELLS: usize = 40_000;
 
-/// Error bound of a cell behind blockers, as a share of what it could exchange with nothing in the
-/// way, if it is all of the domain or an event plane halves it; less in proportion for smaller
-/// cells. Seven points can agree by chance; only many cells cannot. Measured: at 0.1, one pair in
-/// ten thousand was off by four estimates; at 0.25, none.
+/// Error bound of a cell behind blockers, as a share of its unoccluded exchange, if it is the whole
+/// domain or an event plane halves it; in proportion less for smaller cells. Seven points can agree
+/// by chance; many cells cannot. Measured: at 0.1, the error of one pair in ten thousand was four
+/// times its estimate; at 0.25, of none.
 const COARSE_CELL_BOUND: f64 = 0.25;
 
-/// Share of a cell's area in which a sharp shadow may end unseen if all points of the rule see all,
-/// or nothing: the strip between a side and the points next to it has up to a tenth of the area.
+/// Share of a cell's area in which a sharp shadow may end undetected if all points of the rule see
+/// all or nothing of the target: the strip between a side and the nearest points has up to a tenth
+/// of the area.
 const RIM_AREA_SHARE: f64 = 0.1;
 
-/// Corners are looked from a little within the cell, by this share of the way to its centroid: on
-/// the rim itself blockers may touch. Chosen by hand.
+/// Corners are sampled inside the cell, by this share of the way to its centroid, since blockers
+/// may touch the boundary. Plain choice.
 const CORNER_INSET: f64 = 1e-3;
 
-/// Visible or hidden flux below this share of the unoccluded flux is none: above rounding.
+/// Visible or hidden flux below this share of the unoccluded flux counts as zero: above rounding.
 const NOTHING_SHARE: f64 = 1e-9;
 
-/// The error estimate of a cell is at least this share of its bound: one cut that changes nothing
-/// proves little. Chosen by hand; no measurement kept.
+/// Minimum error estimate of a cell, as a share of its bound: a single cut without change proves
+/// little. Plain choice; no recorded measurement.
 const MIN_ESTIMATE_SHARE: f64 = 0.03;
 
-/// Error estimate asked for of a sum, as a share of its tolerance, to which the bound is brought:
-/// rows of thousands of factors then close to a tenth of what was asked.
+/// Error estimate requested of a sum, as a share of its tolerance, which applies to the bound: rows
+/// of thousands of factors then close to a tenth of the requested error.
 const ESTIMATE_SHARE: f64 = 0.1;
 
-/// Cuts in two are off the middle by up to this share of the side, so that errors along a line of
-/// cells are independent. Chosen by hand.
+/// Maximum offset of cuts in two from the middle, as a share of the side, so that errors along a
+/// line of cells are independent. Plain choice.
 const CUT_JITTER: f64 = 0.1;
 
-/// A pair of polygons with others between: one of the two, the domain, in cells.
+/// An occluded pair of polygons: one of the two, the domain, in cells.
 pub(super) struct OccludedPair {
     /// Area of the domain.
     pub area: f64,
@@ -83,29 +87,29 @@ pub(super) struct OccludedPair {
 /// A triangle of the domain. Fluxes and errors are A₁F₁₂, in squares of the unit of length.
 pub(super) struct Cell {
     corners: [DVec3; 3],
-    /// What of the blockers is between this cell and the target; empty if all of the target is seen
-    /// from all of the cell, or nothing from anywhere.
+    /// The parts of blockers between this cell and the target; empty if all of the target is
+    /// visible from all of the cell, or nothing from anywhere.
     blockers: Vec<Blocker>,
     flux: f64,
-    /// Error that cuts are decided by.
+    /// Error that decides on cuts.
     error_bound: f64,
-    /// Error that is told; at most the bound.
+    /// Reported error; at most the bound.
     error_estimate: f64,
-    /// Number that the place of its next cut is drawn from.
+    /// Seed of the position of its next cut.
     seed: u64,
 }
 
 /// Flux of a cell by one rule.
 #[derive(Clone, Copy, Default)]
 struct CellFlux {
-    /// Past the blockers.
+    /// With blockers.
     visible: f64,
-    /// As if there were none.
+    /// Without blockers.
     unoccluded: f64,
 }
 
 impl CellFlux {
-    /// Adds what a point with this share of the cell's area sees.
+    /// Adds the form factors of a point with weight `weight` of the cell's area `area`.
     fn add(&mut self, area: f64, weight: f64, factors: PointFactors) {
         self.visible += area * weight * factors.visible;
         self.unoccluded += area * weight * factors.unoccluded;
@@ -113,8 +117,8 @@ impl CellFlux {
 }
 
 impl Cell {
-    /// The triangle `corners` of the domain of `pair`. Of `candidates`, the parts between the
-    /// triangle and the target are kept.
+    /// The cell with these `corners` in the domain of `pair`. Of `candidates`, the parts between
+    /// the triangle and the target are kept.
     pub fn new(
         pair: &OccludedPair,
         corners: [DVec3; 3],
@@ -169,7 +173,8 @@ impl Cell {
         let unseen = COARSE_CELL_BOUND * degree_5.unoccluded * balance.max(area / pair.area)
             + RIM_AREA_SHARE * area * rim;
         self.flux = degree_5.visible;
-        // What the rules differ by, of what is seen and of what is hidden, and what they may miss.
+        // Differences of the rules for visible and for hidden flux, plus the error that they may
+        // miss.
         self.error_bound = visible_change.abs();
         self.error_bound += (unoccluded_change - visible_change).abs() + unseen;
         self.error_estimate = self.error_bound;
@@ -186,9 +191,9 @@ impl Cell {
         visibility.factors(point, pair.normal, &pair.target, facing, &self.blockers)
     }
 
-    /// If the points of the rule see all of the target, or nothing of it, by `flux`: how far from
-    /// that is what a corner sees, as a form factor. A straight shadow that passes by all points
-    /// takes in a corner.
+    /// If, by `flux`, the points of the rule see all of the target or nothing of it: the largest
+    /// deviation from that at a corner, as a form factor. A straight shadow that misses all points
+    /// covers a corner.
     fn largest_corner_deviation(
         &self,
         pair: &OccludedPair,
@@ -216,8 +221,8 @@ impl Cell {
 
     /// The cell's parts, cut along an event plane if one crosses it, else in two.
     ///
-    /// What the cut changes is what was off before, and more than is off in the parts together:
-    /// spread evenly over them, it is their error estimate.
+    /// The change due to the cut estimates the error before it, which exceeds that of the parts
+    /// together: spread evenly over the parts, in squares, it is their error estimate.
     fn split(&self, pair: &OccludedPair, visibility: &mut PointVisibility) -> Vec<Cell> {
         let triangles = match most_balanced_split(&pair.event_planes, &self.corners) {
             Some((_, plane)) => split_triangle(&self.corners, plane),
@@ -251,8 +256,8 @@ impl Cell {
     }
 }
 
-/// A cell waiting to be cut, the largest error bound first; ties go by number, so that the order is
-/// the same on every run.
+/// A cell to be cut, the largest error bound first; ties go by number, so that the order is the
+/// same on every run.
 struct HeapEntry {
     error_bound: f64,
     pair: usize,

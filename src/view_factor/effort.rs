@@ -1,22 +1,22 @@
-//! Predicts how long an exact matrix takes: what stands between pairs drawn at random.
+//! Predicts the time for an exact matrix from the blockers between random pairs.
 
 use super::pair_visibility::FacingPair;
 use super::scene_polygons::ScenePolygons;
 use super::shaft::fully_occludes;
 use crate::sampling::hash::split_mix64_nth;
 
-/// Pairs that are looked at. Chosen by hand: what one pair in a hundred has is met 41 times, give
-/// or take a sixth.
+/// Number of sampled pairs. Plain choice: a property of one pair in a hundred is sampled 41 times,
+/// with a standard deviation of a sixth.
 const PAIRS: u64 = 4096;
 
-/// Blockers of a pair that are counted at most; beyond, a pair takes as long as it may.
+/// Maximum number of blockers counted per pair; the cost of a pair is capped there.
 const MAX_BLOCKERS: usize = 64;
 
-/// What a pair in full view takes, in blockers between others. Measured: 2 µs against some 100 µs.
+/// Cost of an unoccluded pair, in blockers of other pairs. Measured: 2 µs against some 100 µs.
 const PAIR_COST: f64 = 0.02;
 
-/// Blockers between all pairs from which on an exact matrix takes too long: by measurements 45 to
-/// 500 µs each, so one to eight minutes of one core. Chosen by hand.
+/// Number of blockers between all pairs above which an exact matrix takes too long: measured 45 to
+/// 500 µs each, so one to eight minutes of one core. Plain choice.
 const MAX_EXACT_WORK: f64 = 1e6;
 
 /// Whether the exact matrix of `polygons` would take minutes or more.
@@ -25,7 +25,7 @@ pub(super) fn is_exact_too_long(polygons: &ScenePolygons) -> bool {
     let fronts = &fronts.polygons;
     let count = fronts.len() as f64;
     let all_pairs = 0.5 * count * (count - 1.0);
-    // Known before any is drawn.
+    // Known before any pair is sampled.
     if all_pairs * MAX_BLOCKERS as f64 <= MAX_EXACT_WORK {
         return false;
     }

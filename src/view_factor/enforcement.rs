@@ -1,4 +1,4 @@
-//! A matrix made to keep energy: closure and reciprocity enforced, and what it took.
+//! Enforces closure and reciprocity of a matrix, and reports the change.
 //!
 //! ```text
 //! both factors of a pair → their mean, weighted by inverse variances → symmetric G = A_i F_ij
@@ -14,7 +14,7 @@ use super::matrix::{Factor, ViewFactors};
 /// Exchange areas A_i F_ij from one group, by ascending index of the other.
 type ExchangeRow = Vec<(u32, f64)>;
 
-/// What enforcing closure and reciprocity has changed. Dimensionless, as form factors are.
+/// Changes due to enforced closure and reciprocity. Dimensionless, as form factors are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct EnforcementReport {
@@ -22,18 +22,18 @@ pub struct EnforcementReport {
     pub rms_change: f64,
     /// The largest change of a factor.
     pub max_change: f64,
-    /// Number of rows taken for closed: their open share, within its error of zero, is now zero.
+    /// Number of rows treated as closed: their open share, within its error of zero, is now zero.
     pub closed_rows: usize,
-    /// The largest closure error of a row that is left: not zero where a row has no factor that
-    /// could take up what is missing.
+    /// The largest remaining closure error of a row: not zero where a row has no factor that could
+    /// make up for the deficit.
     pub closure_left: f64,
 }
 
-/// Steps of the symmetric scaling (a Sinkhorn iteration) at most; each about halves the error, so
-/// that a few dozen do unless zeros keep a row from closing. Chosen by hand.
+/// Maximum number of steps of the symmetric scaling (a Sinkhorn iteration); each about halves the
+/// error, so that a few dozen suffice unless zeros keep a row from closing. Plain choice.
 const MAX_SINKHORN_STEPS: usize = 2000;
 
-/// Relative closure error of a row that is good enough: rounding of a sum of a thousand terms.
+/// Accepted relative closure error of a row: rounding of a sum of a thousand terms.
 const CLOSURE_TOLERANCE: f64 = 1e-13;
 
 /// [`ViewFactors::enforced`].
@@ -48,7 +48,7 @@ pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) 
     });
     let row_total = |i: usize| (row_sum(&exchange[i], |_| 1.0) + x[i] * lost[i]) / matrix.areas[i];
     let totals: Vec<f64> = (0..n).into_par_iter().map(row_total).collect();
-    // Below 1 by the rounding of a sum, so that no order of summation is above it.
+    // Below 1 by the rounding of a sum, so that it is not above 1 in any order of summation.
     let largest_total =
         totals.iter().copied().fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
     let closure_left = totals.iter().map(|total| (total - 1.0).abs()).fold(0.0, f64::max);
@@ -79,7 +79,7 @@ pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) 
     (enforced, EnforcementReport { rms_change, max_change, closed_rows, closure_left })
 }
 
-/// What group `i` loses to the open and to backs, as an exchange area.
+/// The exchange area of group `i` with the open and with backs.
 fn lost_exchange(matrix: &ViewFactors, i: usize, is_closed: bool) -> f64 {
     let open = if is_closed { 0.0 } else { matrix.open[i].value };
     matrix.areas[i] * (open + matrix.back[i].value).max(0.0)
@@ -94,7 +94,7 @@ fn symmetric_exchange(matrix: &ViewFactors) -> Vec<ExchangeRow> {
         others.filter(|&j| !is_known(j as usize, i as u32)).collect()
     };
     let one_way: Vec<Vec<u32>> = (0..n).into_par_iter().map(one_way).collect();
-    // Per group, those that see it and that it does not see.
+    // Per group, those that see it but that it does not see.
     let mut unseen: Vec<Vec<u32>> = vec![Vec::new(); n];
     for (i, to) in one_way.iter().enumerate() {
         to.iter().for_each(|&j| unseen[j as usize].push(i as u32));
@@ -124,16 +124,16 @@ fn mean_exchange(matrix: &ViewFactors, i: usize, j: usize) -> f64 {
     (weight * value_there + (1.0 - weight) * value_back).max(0.0)
 }
 
-/// A row with other values.
+/// A row with new values.
 struct ChangedRow {
     factors: Vec<Factor>,
-    /// Of the changes of factors.
+    /// Sum of the squared changes of factors.
     sum_of_squares: f64,
     max_change: f64,
 }
 
-/// The row `before` with these `values`; what a factor changes by is added to its error, in
-/// squares. One that was not there is all error.
+/// The row `before` with these `values`; the change of a factor is added to its error, in squares.
+/// The whole value of a new factor counts as error.
 fn changed_row(before: &[Factor], values: impl Iterator<Item = (u32, f64)>) -> ChangedRow {
     let mut before = before.iter().peekable();
     let mut row = ChangedRow { factors: vec![], sum_of_squares: 0.0, max_change: 0.0 };
@@ -153,12 +153,12 @@ fn row_sum(row: &ExchangeRow, x: impl Fn(usize) -> f64) -> f64 {
     row.iter().map(|&(j, area)| area * x(j as usize)).sum()
 }
 
-/// The x with x_i (Σ_j G_ij x_j + lost_i) = A_i, as closely as there is one (P. A. Knight, D. Ruiz,
+/// The best approximation of the x with x_i (Σ_j G_ij x_j + lost_i) = A_i (P. A. Knight, D. Ruiz,
 /// B. Uçar 2014, see [`ViewFactors::enforced`]).
 fn scaling(exchange: &[ExchangeRow], lost: &[f64], areas: &[f64]) -> Vec<f64> {
     let mut x = vec![1.0; areas.len()];
     for _ in 0..MAX_SINKHORN_STEPS {
-        // A group without area gives nothing.
+        // A group without area emits nothing.
         let ratio = |i: usize| match areas[i] > 0.0 {
             true => x[i] * (row_sum(&exchange[i], |j| x[j]) + lost[i]) / areas[i],
             false => 0.0,

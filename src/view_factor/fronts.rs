@@ -1,25 +1,26 @@
-//! The polygons that give and receive: those of all groups, and the backs of two-sided ones.
+//! The polygons that emit and receive: those of all groups, and the backs of two-sided ones.
 
 use super::convex_polygons::{ConvexPolygon, Merge, MergedTriangles, convex_polygons};
 use crate::scene::Scene;
 
-/// Polygons that give and receive, by group, and which of them a triangle is a part of.
+/// Polygons that emit and receive, by group, and the polygon of each triangle.
 pub(super) struct Fronts {
     pub polygons: Vec<ConvexPolygon>,
     /// Radiating area of each group, in squares of the scene's unit.
     pub areas: Vec<f64>,
-    /// Per triangle, the index of the polygon that is met from its front, and from its back.
+    /// Per triangle, the index of the polygon that a ray hits on its front, and on its back.
     of_triangle: Vec<[Option<u32>; 2]>,
 }
 
 impl Fronts {
-    /// Those of `scene`, all lengths divided by `unit`. Groups of index `two_sided` have two.
+    /// The polygons of `scene`, all lengths divided by `unit`. Groups of index `two_sided` have two
+    /// sides.
     pub fn new(scene: &Scene, unit: f64, two_sided: &[usize]) -> Fronts {
         let MergedTriangles { polygons, of_triangle } =
             convex_polygons(scene, unit, Merge::WithinGroups);
         let mut is_two_sided = vec![false; scene.groups().len()];
         two_sided.iter().for_each(|&group| is_two_sided[group] = true);
-        // Which side of which polygon each front is; the backs come after the fronts.
+        // Polygon and side of each front; the backs come after the fronts.
         let count = polygons.len();
         let backs = (0..count).filter(|&k| is_two_sided[polygons[k].group as usize]);
         let mut sides: Vec<(usize, usize)> = (0..count).map(|k| (k, 0)).collect();
@@ -39,7 +40,7 @@ impl Fronts {
         Fronts { polygons: fronts, areas, of_triangle }
     }
 
-    /// The index of the polygon that is met where triangle `t` is met from its front, or its back.
+    /// The index of the polygon hit by a ray on the front of triangle `t`, or on its back.
     pub fn met(&self, t: usize, from_front: bool) -> Option<u32> {
         self.of_triangle[t][usize::from(!from_front)]
     }

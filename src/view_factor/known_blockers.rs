@@ -1,7 +1,8 @@
-//! Which blockers stand around each polygon, by what rays have met.
+//! Blockers around each polygon that rays have hit.
 //!
-//! Polygons on the same side of one blocker, such as the storeys of a wall, see much the same: each
-//! knows what the rays of any of them have met, and whose rays have met any of them.
+//! Polygons on the same side of one blocker, such as the storeys of a wall, have similar
+//! surroundings: they share the blockers that the rays of any of them have hit, and those whose
+//! rays have hit any of them.
 
 use rustc_hash::FxHashMap;
 
@@ -10,19 +11,20 @@ use super::convex_polygons::ConvexPolygon;
 use super::fronts::Fronts;
 use super::ray_rows::FirstHalf;
 
-/// A blocker, and whether it is its front.
+/// A blocker, and whether the side is its front.
 type Side = (u32, bool);
 
 /// Blockers known around fronts.
 pub(super) struct KnownBlockers {
-    /// Per front, the side that it is a part of.
+    /// Per front, the side of a blocker that it is a part of.
     sides: Vec<Option<Side>>,
     /// Indices of blockers, ascending.
     of_sides: FxHashMap<Side, Vec<u32>>,
 }
 
 impl KnownBlockers {
-    /// Of `fronts`, each a part of one of the `blockers`, by the first half of their rays.
+    /// The blockers of `fronts`, each a part of one of the `blockers`, by the first half of their
+    /// rays.
     pub fn new(
         fronts: &Fronts,
         blockers: &BlockerTree,
@@ -52,7 +54,7 @@ impl KnownBlockers {
         KnownBlockers { sides, of_sides }
     }
 
-    /// Those around front `s`, ascending.
+    /// The blockers around front `s`, ascending.
     pub fn around(&self, s: usize) -> &[u32] {
         let known = self.sides[s].and_then(|side| self.of_sides.get(&side));
         known.map_or(&[], Vec::as_slice)

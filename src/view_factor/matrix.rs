@@ -1,11 +1,11 @@
 //! The matrix itself: areas, factors and their errors, as plain data.
 //!
-//! Rows leave, columns receive. A row's factors, its open share and what meets backs sum to one.
+//! Rows emit, columns receive. The factors, the open share and the back share of a row sum to one.
 
 /// The matrix of area-averaged form factors between the groups of a scene, sparse, with a standard
 /// error beside every factor.
 ///
-/// All vectors have one entry a group, in the order of
+/// All vectors have one entry per group, in the order of
 /// [`Scene::groups`](crate::scene::Scene::groups). F_ij is the fraction of the flux leaving group i
 /// (the row) that arrives at fronts of group j (the column), 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,36 +16,37 @@ pub struct ViewFactors {
     pub areas: Vec<f64>,
     /// Per group i, the groups j that it sees, by ascending index.
     pub factors: Vec<Vec<Factor>>,
-    /// Fraction of the flux leaving group i that meets nothing. Of an exact or a sparse matrix this
-    /// is what is left over: in a closed scene, the closure error of the row.
+    /// Fraction of the flux leaving group i that hits nothing. For an exact or a sparse matrix this
+    /// is the remainder: in a closed scene, the closure error of the row.
     pub open: Vec<Estimate>,
-    /// Fraction of the flux leaving group i that meets the back of a surface.
+    /// Fraction of the flux leaving group i that hits the back of a surface.
     pub back: Vec<Estimate>,
-    /// What it means that a pair is not in `factors`.
+    /// Meaning of a pair that is not in `factors`.
     pub absent: Missing,
 }
 
-/// What it means that there is no factor.
+/// Meaning of an absent factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// The factor is zero: one is behind the other, or all is hidden.
+    /// The factor is zero: one is behind the other, or occluded entirely.
     Zero,
-    /// No pixel or ray from one has met the other; the factor may be small.
+    /// No pixel or ray from one has hit the other; the factor may be small.
     NotSeen,
-    /// No ray from either has met the other; the factor is below the error asked for, but for few.
+    /// No ray from either has hit the other; the factor is below the requested error, with few
+    /// exceptions.
     Unmet,
 }
 
-/// How large a matrix will be, by [`ViewFactors::predicted_size`].
+/// Predicted size of a matrix, by [`ViewFactors::predicted_size`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MatrixSize {
     /// Factors above zero.
     pub factors: usize,
-    /// Memory that making it takes, beyond the scene.
+    /// Memory for computing it, beyond the scene, bytes.
     pub bytes: usize,
 }
 
-/// One nonzero of a matrix of view factors.
+/// A nonzero entry of a matrix of view factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {
     /// Index of the group that receives.
@@ -66,7 +67,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Both divided by `area`; zero if that is zero: a group without area neither gives nor takes.
+    /// Both divided by `area`; zero if that is zero: a group without area neither emits nor
+    /// receives.
     pub(super) fn over(self, area: f64) -> Estimate {
         if area == 0.0 {
             return Estimate::default();
@@ -76,7 +78,7 @@ impl Estimate {
 }
 
 impl ViewFactors {
-    /// The factor from group `i` to group `j`; zero where there is none.
+    /// The factor from group `i` to group `j`; zero where absent.
     ///
     /// # Panics
     /// When there is no group `i`.

@@ -1,22 +1,21 @@
-//! The exchange of two polygons that rays have found, by the cheapest method that is good enough.
+//! The exchange of two polygons that rays have hit, by the cheapest method that is accurate enough.
 //!
-//! With U the exchange if nothing stood between, in closed form, τ the standard error wanted, and D
-//! the rays of both polygons over their areas, the first line that applies:
+//! With U the unoccluded exchange in closed form, τ the requested standard error, and D the rays of
+//! both polygons over their areas, the first line that applies:
 //!
 //! ```text
 //! √(U / D) ≤ τ                     the count of rays over D
-//! few rays do, (U / 2τ)²           shadow rays
-//! nothing is in the shaft          U
-//! little is in it                  points of one polygon: what each sees of the other, exactly
-//! much, but rays have met little   the same past what they have met, less what they found behind
-//! much was met                     sets of rays, until they agree
+//! (U / 2τ)² is small               shadow rays
+//! no blocker in the shaft          U
+//! few blockers in it               points of one polygon: the visible part of the other, exactly
+//! many, but rays have hit few      the same past these, less the hits hidden by other blockers
+//! rays have hit many               sets of rays, until they agree
 //! ```
 //!
-//! The choice rests on U, not on the count, so that chance does not choose. What comes out of the
-//! other methods is divided by the chance that a ray meets the pair at all, 1 − exp(−D A₁F₁₂):
-//! those that are met stand for those that are not, and sums are right on the average
-//! (D. G. Horvitz, D. J. Thompson, "A generalization of sampling without replacement from a finite
-//! universe", 1952).
+//! The choice depends on U, not on the count, so that it is not random. The result of the other
+//! methods is divided by the probability that a ray hits the pair at all, 1 − exp(−D A₁F₁₂): pairs
+//! that are hit stand for those that are missed, and sums are unbiased (D. G. Horvitz, D. J.
+//! Thompson, "A generalization of sampling without replacement from a finite universe", 1952).
 
 use rayon::prelude::*;
 
@@ -32,45 +31,46 @@ use super::shaft::fully_occludes;
 use super::visible_mean::{MIN_POINTS, visible_mean};
 use crate::sampling::hash::split_mix64;
 
-/// Shadow rays that are cast before a shaft is looked at; fewer are not cast, for their error would
-/// be uncertain. Measured: 13 µs, where a shaft takes 8 µs.
+/// Minimum number of shadow rays, tried before a shaft is built; with fewer their error would be
+/// uncertain. Measured: 13 µs, where a shaft takes 8 µs.
 const MIN_SHADOW_RAYS: u32 = 32;
 
-/// Shadow rays at most where much is in the shaft: beyond, points are tried. Chosen by hand.
+/// Maximum number of shadow rays where a shaft has many blockers; above, points are tried. Plain
+/// choice.
 const MAX_SHADOW_RAYS: f64 = 1000.0;
 
-/// Times of a point's view, and of one blocker of it, in shadow rays: some 1 µs and 0.25 µs, by 10
-/// to 16 µs measured past 40 to 70 blockers, where a ray takes 0.4 µs.
+/// Cost of a point's view, and of one blocker of it, in shadow rays: some 1 µs and 0.25 µs, from
+/// measured 10 to 16 µs with 40 to 70 blockers, where a ray takes 0.4 µs.
 const POINT_COST: f64 = 2.5;
 const BLOCKER_COST: f64 = 0.6;
 
-/// Blockers in a shaft that are few: beyond, those that rays have met are likely fewer. Chosen by
-/// hand.
+/// Number of blockers in a shaft up to which all are used; above, the blockers hit by rays are
+/// likely fewer. Plain choice.
 const FEW_BLOCKERS: usize = 64;
 
-/// Known blockers past which points are dearer than rays. Chosen by hand.
+/// Number of known blockers above which points cost more than rays. Plain choice.
 const MAX_KNOWN_BLOCKERS: usize = 256;
 
-/// Rays of a set, sets at first, and at most: limits time, and the error that is left is told.
-/// Chosen by hand.
+/// Rays per set, initial and maximum number of sets: limits time, and the remaining error is
+/// reported. Plain choice.
 const SET_RAYS: u32 = 1 << 16;
 const FIRST_SETS: usize = 16;
 const MAX_SETS: usize = 1 << 12;
 
-/// All that it takes to find the exchange of a pair.
+/// Data for estimating the exchange of pairs.
 pub(super) struct PairEstimator<'a> {
     pub fronts: &'a Fronts,
     pub blockers: &'a BlockerTree,
     pub caster: &'a RayCaster<'a>,
-    /// Of every front.
+    /// One per front.
     pub rows: &'a [RayRow],
     /// Per front, the blockers known around it, ascending.
     pub known: &'a [&'a [u32]],
 }
 
 impl PairEstimator<'_> {
-    /// A₁F₁₂ of polygons `s` and `t`, of whose rays so many `hits` met the other, with a standard
-    /// error of about `tolerance`, in squares of the scene's unit.
+    /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, with a standard error of
+    /// about `tolerance`, in squares of the scene's unit.
     pub fn exchange(
         &self,
         [s, t]: [u32; 2],
@@ -84,7 +84,8 @@ impl PairEstimator<'_> {
         let unoccluded = pair.unoccluded();
         let density = self.ray_density(s) + self.ray_density(t);
         if unoccluded.value <= density * tolerance * tolerance {
-            // Of few, the root of the count itself holds the truth less than 19 of 20 times.
+            // For small counts, the root of the count itself covers the true value less than 19 of
+            // 20 times.
             let error = f64::from(hits + 1).sqrt() / density;
             return Estimate { value: f64::from(hits) / density, error };
         }
@@ -101,7 +102,7 @@ impl PairEstimator<'_> {
         &self.fronts.polygons[s as usize]
     }
 
-    /// The exchange of a pair for which counts are not good enough.
+    /// The exchange of a pair for which counts are not accurate enough.
     fn refined(
         &self,
         [s, t]: [u32; 2],
@@ -140,7 +141,7 @@ impl PairEstimator<'_> {
         visible_mean(&pair, &between, unoccluded.value, tolerance, seed, visibility)
     }
 
-    /// The exchange from the smaller polygon past the blockers that are known around it.
+    /// The exchange from the smaller polygon with the blockers that are known around it.
     fn past_known(
         &self,
         [s, t]: [u32; 2],
@@ -165,7 +166,7 @@ impl PairEstimator<'_> {
         };
         let row = &self.rows[small as usize];
         let hidden = rays_that_met(&row.hidden, large);
-        // Where the second half of the rays met something unknown, one more might have.
+        // If the second half of the rays hit unknown blockers, assume one more hit.
         let likely = hidden + row.unknown.min(1);
         let per_ray = 2.0 / self.ray_density(small);
         Estimate {
@@ -195,20 +196,20 @@ impl PairEstimator<'_> {
     }
 }
 
-/// An exchange that was estimated since one of `density` rays a unit of area met it, standing also
-/// for others that none has met.
+/// Corrects an exchange that was estimated because one of `density` rays per unit of area hit it:
+/// it also stands for pairs that no ray hit.
 fn among_missed(exchange: Estimate, density: f64) -> Estimate {
     let missed = (-density * exchange.value).exp();
     let met = 1.0 - missed;
     if met == 0.0 {
         return exchange;
     }
-    // The standard deviation of a value that is there with the chance `met`.
+    // The standard deviation of a value that occurs with probability `met`.
     let of_chance = exchange.value / met * missed.sqrt();
     Estimate { value: exchange.value / met, error: (exchange.error / met).hypot(of_chance) }
 }
 
-/// How many rays met polygon `s`, by an ascending list.
+/// Number of rays that hit polygon `s`, by an ascending list.
 fn rays_that_met(counts: &[Count], s: u32) -> u32 {
     counts.binary_search_by_key(&s, |count| count.polygon).map_or(0, |k| counts[k].rays)
 }

@@ -1,12 +1,12 @@
-//! What two convex polygons see of one another: nothing, all, or a part past others.
+//! Mutual visibility of two convex polygons: none, full, or partial behind blockers.
 //!
 //! ```text
-//! one behind the other                       → nothing
+//! one behind the other                       → hidden
 //! clip each by the plane of the other
-//! lay a shaft around both, clip blockers     → no blocker left: all, in closed form
-//! one blocker between every two points       → nothing
+//! build a shaft around both, clip blockers   → no blocker left: unoccluded, in closed form
+//! one blocker between every two points       → hidden
 //! else choose the domain to integrate over,
-//! cut it where whole edges align, into cells → occluded, for adaptive cubature
+//! cut it by blockers that stand on it        → occluded, for adaptive cubature
 //! ```
 
 use glam::DVec3;
@@ -23,22 +23,22 @@ use super::visual_events::{event_planes, parts_between_planes, standing_on};
 use crate::geometry::polygon::{clip, fan, max_distance, merge_close_corners, polygon_area};
 use crate::sampling::hash::split_mix64;
 
-/// Of two polygons whose extents have a ratio below this, the shorter one is integrated over: all
-/// it could receive may come from a spot of the longer that no cell of that one finds. Chosen by
-/// hand; no measurement kept.
+/// Ratio of the extents of two polygons below which the shorter one is the domain: all that it
+/// receives may come from a spot of the longer that no cell of that one samples. Plain choice; no
+/// recorded measurement.
 const MIN_EXTENT_RATIO: f64 = 0.25;
 
-/// What is known of the exchange between two polygons before any refinement.
+/// The exchange between two polygons before any refinement.
 pub(super) enum PairVisibility {
     /// Neither sees the other.
     Hidden,
-    /// All that faces the other sees all of it: A₁F₁₂ in closed form.
+    /// Fully visible: A₁F₁₂ in closed form.
     Unoccluded(Estimate),
-    /// Others stand between.
+    /// Blockers are between them.
     Occluded(Box<OccludedPair>),
 }
 
-/// One of two polygons, clipped to what is before the other's plane.
+/// One of two polygons, clipped to the part in front of the other's plane.
 struct End {
     corners: Vec<DVec3>,
     normal: DVec3,
@@ -46,7 +46,7 @@ struct End {
     standing: Vec<Blocker>,
 }
 
-/// Two convex polygons that are before one another: each clipped to what is before the other's
+/// Two convex polygons that face one another: each clipped to the part in front of the other's
 /// plane.
 pub(super) struct FacingPair {
     pub a: Vec<DVec3>,
@@ -58,7 +58,7 @@ pub(super) struct FacingPair {
 }
 
 impl FacingPair {
-    /// Of `s` and `t`; none where one is behind the other.
+    /// The pair of `s` and `t`; `None` where one is behind the other.
     pub fn new(s: &ConvexPolygon, t: &ConvexPolygon) -> Option<FacingPair> {
         let (&at_s, &at_t) = (s.corners.first()?, t.corners.first()?);
         if !reaches_before(t, s, at_s) || !reaches_before(s, t, at_t) {
@@ -72,23 +72,23 @@ impl FacingPair {
         both.then_some(FacingPair { a, a_normal: s.normal, b, b_normal: t.normal })
     }
 
-    /// The space between both.
+    /// The shaft between both.
     pub fn shaft(&self) -> Shaft {
         Shaft::new(&self.a, self.a_normal, &self.b, self.b_normal)
     }
 
-    /// A₁F₁₂ with nothing in between.
+    /// Unoccluded A₁F₁₂.
     pub fn unoccluded(&self) -> Estimate {
         unoccluded_exchange(&self.a, self.a_normal, &self.b, self.b_normal)
     }
 
-    /// The same, the other polygon first.
+    /// The same pair in the other order.
     pub fn swapped(self) -> FacingPair {
         let FacingPair { a, a_normal, b, b_normal } = self;
         FacingPair { a: b, a_normal: b_normal, b: a, b_normal: a_normal }
     }
 
-    /// Whether integrating over `a` rather than over `b` is cheaper past what is `between`.
+    /// Whether integrating over `a` rather than over `b` is cheaper with the blockers `between`.
     pub fn is_better_from_a(&self, between: &[Blocker]) -> bool {
         let end = |corners: &[DVec3], normal| End {
             corners: corners.to_vec(),
@@ -98,7 +98,7 @@ impl FacingPair {
         is_better_domain(&end(&self.a, self.a_normal), &end(&self.b, self.b_normal))
     }
 
-    /// What they see of one another past all that is `between`, within their shaft; `seed` makes
+    /// Their mutual visibility with all blockers `between`, clipped to their shaft; `seed` makes
     /// cuts differ from pair to pair.
     pub fn past(
         self,
@@ -124,7 +124,7 @@ impl FacingPair {
 }
 
 impl PairVisibility {
-    /// Of `s` and `t` past `blockers`; `seed` makes cuts differ from pair to pair.
+    /// The visibility of `s` and `t` past `blockers`; `seed` makes cuts differ from pair to pair.
     pub fn between(
         s: &ConvexPolygon,
         t: &ConvexPolygon,
@@ -138,13 +138,14 @@ impl PairVisibility {
     }
 }
 
-/// Whether a corner of `polygon` is before the plane of `other`, which passes through `origin`.
+/// Whether a corner of `polygon` is in front of the plane of `other`, which passes through
+/// `origin`.
 fn reaches_before(polygon: &ConvexPolygon, other: &ConvexPolygon, origin: DVec3) -> bool {
     polygon.corners.iter().any(|&p| other.normal.dot(p - origin) > CONTACT_HEIGHT)
 }
 
-/// Whether `a` rather than `b` is to be integrated over: the much shorter one; else the one on
-/// which fewer blockers stand, for from there less changes at once; else the smaller one.
+/// Whether `a` rather than `b` is the domain: the one that is much shorter; else the one on which
+/// fewer blockers stand, since visibility jumps less there; else the smaller one.
 fn is_better_domain(a: &End, b: &End) -> bool {
     let extent_a = max_distance(&a.corners, a.corners[0]);
     let extent_b = max_distance(&b.corners, b.corners[0]);

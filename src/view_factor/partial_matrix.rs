@@ -1,7 +1,7 @@
-//! A matrix in the making: what some of its polygons exchange with later ones.
+//! A partial matrix: the exchange of some of its polygons with later ones.
 //!
-//! Pairs are met once, in the row of the earlier polygon. So half of what a group exchanges is in
-//! its own rows and half in those of others: rows become a matrix when all are there.
+//! Pairs are computed once, in the row of the earlier polygon. So half of the exchange of a group
+//! is in its own rows and half in those of others: rows become a matrix when all are there.
 
 use std::ops::{ControlFlow, Range};
 
@@ -20,31 +20,31 @@ const MAGIC: &[u8; 8] = b"radipar\x01";
 /// Bytes of the checksum at the end of every file.
 const CHECKSUM_BYTES: usize = 8;
 
-/// How the numbers of a matrix are found.
+/// Method of computing a matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Method {
     Exact,
     Sparse,
 }
 
-/// Rows of a matrix of view factors that are done, of some groups or all.
+/// Finished rows of a matrix of view factors, of some groups or all.
 ///
-/// To share out work between processes that know nothing of one another, and to go on where a
-/// process was stopped: as bytes it can be kept, and [`PartialMatrix::merge`] puts several
-/// together. The matrix has the same bits however its rows came together.
+/// For distributing work between independent processes, and for resuming a stopped process: it can
+/// be stored as bytes, and [`PartialMatrix::merge`] combines several. The matrix has the same bits
+/// however its rows were combined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartialMatrix {
     /// Hash of the scene and the settings.
     input: u64,
     method: Method,
     names: Vec<String>,
-    /// What lengths were divided by.
+    /// Divisor of all lengths.
     unit: f64,
     /// Radiating area of each group, in squares of `unit`.
     areas: Vec<f64>,
-    /// Of each polygon, ascending.
+    /// Group of each polygon, ascending.
     groups: Vec<u32>,
-    /// Of each polygon, if it is done.
+    /// Row of each polygon, if it is done.
     rows: Vec<Option<PolygonRow>>,
 }
 
@@ -58,7 +58,7 @@ pub(super) struct PolygonRow {
     pub back: Exchange,
 }
 
-/// What a polygon exchanges with a group.
+/// Exchange of a polygon with a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Exchange {
     /// The group.
@@ -74,7 +74,7 @@ impl Exchange {
     }
 }
 
-/// Rows being made, and who is told of it.
+/// Rows being computed, and their progress callback.
 pub(super) struct Making<'a> {
     pub part: PartialMatrix,
     pub ranks: &'a mut dyn Ranks,
@@ -82,7 +82,7 @@ pub(super) struct Making<'a> {
 }
 
 impl Making<'_> {
-    /// Tells how much is done; none where that stops the work in any process.
+    /// Reports progress; `None` if that stops the work in any process.
     pub fn tell_all(&mut self, done: usize, of: usize) -> Option<()> {
         let goes_on = (self.progress)(&self.part, done, of).is_continue();
         let goes_on = match self.ranks.size() {
@@ -98,7 +98,7 @@ impl Making<'_> {
 }
 
 impl PartialMatrix {
-    /// No row of the matrix of `scene`.
+    /// The matrix of `scene` without any row.
     pub(super) fn none(
         scene: &Scene,
         error: f64,
@@ -119,7 +119,7 @@ impl PartialMatrix {
         }
     }
 
-    /// Groups of which rows are missing, by their index.
+    /// Indices of the groups with missing rows.
     pub fn missing(&self) -> Vec<usize> {
         let rows = self.rows.iter().zip(&self.groups).filter(|(row, _)| row.is_none());
         let mut missing: Vec<usize> = rows.map(|(_, &group)| group as usize).collect();
@@ -127,10 +127,11 @@ impl PartialMatrix {
         missing
     }
 
-    /// Puts the rows of `parts` together.
+    /// Combines the rows of `parts`.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when there are none, or they are of different scenes or settings.
+    /// [`ErrorKind::Setting`] when `parts` is empty, or they belong to different scenes or
+    /// settings.
     pub fn merge(parts: impl IntoIterator<Item = PartialMatrix>) -> Result<PartialMatrix, Error> {
         let mut parts = parts.into_iter();
         let Some(mut merged) = parts.next() else {
@@ -146,12 +147,12 @@ impl PartialMatrix {
         Ok(merged)
     }
 
-    /// How its numbers are found.
+    /// The method of computing it.
     pub(super) fn method(&self) -> Method {
         self.method
     }
 
-    /// The polygons of `groups` that have no row.
+    /// The polygons of `groups` without a row.
     pub(super) fn polygons_without_rows(&self, groups: Range<usize>) -> Vec<u32> {
         let is_wanted = |&s: &u32| {
             groups.contains(&(self.groups[s as usize] as usize)) && self.rows[s as usize].is_none()
@@ -159,7 +160,7 @@ impl PartialMatrix {
         (0..self.groups.len() as u32).filter(is_wanted).collect()
     }
 
-    /// Whether `other` is of the same input.
+    /// Whether `other` belongs to the same input.
     pub(super) fn check_fits(&self, other: &PartialMatrix, place: &str) -> Result<(), Error> {
         let same = self.input == other.input
             && self.method == other.method
@@ -176,7 +177,7 @@ impl PartialMatrix {
     /// The matrix.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when rows are missing, with some of their groups.
+    /// [`ErrorKind::Setting`] when rows are missing; names some of their groups.
     pub fn into_matrix(self) -> Result<ViewFactors, Error> {
         let missing = self.missing();
         if !missing.is_empty() {
@@ -195,7 +196,7 @@ impl PartialMatrix {
             while let Some((row, _)) = rows.next_if(|(_, group)| **group as usize == i) {
                 let PolygonRow { fronts, back } = row.unwrap_or_default();
                 for Exchange { to, error, value } in fronts {
-                    // Pairs within a group are met once and count both ways.
+                    // Pairs within a group are computed once and count both ways.
                     let ways = if i == to as usize { 2.0 } else { 1.0 };
                     sums.push((to, ways * value, (ways * f64::from(error)).powi(2)));
                 }
@@ -227,10 +228,10 @@ impl PartialMatrix {
         Ok(ViewFactors { names: self.names, areas, factors, open, back, absent })
     }
 
-    /// As bytes, for a file or another process.
+    /// Serializes the rows, for a file or another process.
     ///
     /// # Panics
-    /// Never: a vector takes all bytes.
+    /// Never: serialization to a vector cannot fail.
     pub fn to_bytes(&self) -> Vec<u8> {
         let bytes = postcard::to_extend(self, MAGIC.to_vec());
         let mut bytes = bytes.expect("a vector takes all bytes");
@@ -238,7 +239,7 @@ impl PartialMatrix {
         bytes
     }
 
-    /// What [`PartialMatrix::to_bytes`] has made.
+    /// Reads the bytes that [`PartialMatrix::to_bytes`] wrote.
     ///
     /// # Errors
     /// [`ErrorKind::File`] when these bytes are something else, or damaged.
@@ -262,7 +263,7 @@ impl PartialMatrix {
         }
     }
 
-    /// Whether this can be a part of a matrix; one that was read may not be.
+    /// Whether this is a valid partial matrix; one that was read from a file may not be.
     fn is_consistent(&self) -> bool {
         let is_size = |x: f64| x.is_finite() && x >= 0.0;
         let groups = self.names.len();
@@ -273,7 +274,7 @@ impl PartialMatrix {
             row.fronts.iter().chain([&row.back]).all(is_exchange)
                 && row.fronts.is_sorted_by(|a, b| a.to < b.to)
         };
-        // The group of what meets backs is always the first.
+        // The group of the exchange with backs is always the first.
         self.areas.len() == groups
             && self.areas.iter().copied().all(is_size)
             && self.unit.is_finite()
@@ -285,7 +286,7 @@ impl PartialMatrix {
     }
 }
 
-/// A hash of all that the numbers of a matrix depend on.
+/// A hash of all inputs of a matrix.
 fn input_hash(scene: &Scene, error: f64, two_sided: &[usize]) -> u64 {
     let mut hash = Xxh3::new();
     hash.update(&error.to_le_bytes());
@@ -298,7 +299,7 @@ fn input_hash(scene: &Scene, error: f64, two_sided: &[usize]) -> u64 {
     hash.digest()
 }
 
-/// What is left of each row when all that arrives anywhere is taken off.
+/// The remainder of each row: 1 less all that arrives anywhere.
 fn open_shares(factors: &[Vec<Factor>], back: &[Estimate], areas: &[f64]) -> Vec<Estimate> {
     let mut open = Vec::with_capacity(areas.len());
     for ((row, back), &area) in factors.iter().zip(back).zip(areas) {

@@ -1,4 +1,4 @@
-//! What a point sees of a polygon past others: exact, by subtracting shadows.
+//! Form factor from a point to the visible part of a polygon: exact, by subtracting shadows.
 //!
 //! ```text
 //!      ┌──────┬╌╌╌╌┬───┐   target: convex regions that are visible so far
@@ -8,9 +8,9 @@
 //!               •          point
 //! ```
 //!
-//! A region that meets a shadow is split by the planes of the cone, one after another: what is
-//! outside a plane stays visible, what is inside all of them is dropped. Lambert's formula over the
-//! regions that are left is exact but for rounding.
+//! A region that a shadow overlaps is split by the planes of the cone, one after another: the part
+//! outside a plane stays visible, the part inside all of them is dropped. Lambert's formula over
+//! the remaining regions is exact up to rounding.
 
 use std::ops::Range;
 
@@ -21,9 +21,9 @@ use crate::form_factor::closed_form::lambert;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::{PLANE_TOLERANCE, split_through_origin};
 
-/// Boxes around shadows are larger than the shadows by this share of the distance to the farthest
-/// corner of the target: well above rounding. A blocker no farther before the point than this share
-/// of the target has no bounded shadow.
+/// Boxes around shadows are enlarged by this share of the distance to the farthest corner of the
+/// target: well above rounding. A blocker nearer to the point, along the target's normal, than this
+/// share of the target's distance has no bounded shadow.
 const SHADOW_MARGIN: f64 = 1e-9;
 
 /// A convex region of the target that is visible so far.
@@ -34,10 +34,11 @@ struct Region {
     bounds: Aabb,
 }
 
-/// Finds what single points see of a polygon; keeps its memory from point to point.
+/// Computes the visible part of a polygon from single points; reuses its memory from point to
+/// point.
 #[derive(Default)]
 pub(super) struct PointVisibility {
-    /// Corners of regions relative to the point, also of regions that are gone.
+    /// Corners of regions relative to the point, also of removed regions.
     corners: Vec<DVec3>,
     visible_regions: Vec<Region>,
     /// Planes through the point along a blocker's edges: unit normals inwards.
@@ -53,14 +54,14 @@ pub(super) struct PointVisibility {
 pub(super) struct PointFactors {
     /// To its visible part.
     pub visible: f64,
-    /// To all of it, as if nothing stood between.
+    /// To all of it, without blockers.
     pub unoccluded: f64,
 }
 
 impl PointVisibility {
     /// Form factors from the surface element at `point` with unit `normal` to `target`, whose unit
-    /// normal is `facing`, past `blockers`, all of them convex, before the element's plane, and
-    /// between it and the target's plane.
+    /// normal is `facing`, behind `blockers`, all of them convex, in front of the element's plane,
+    /// and between it and the target's plane.
     pub fn factors(
         &mut self,
         point: DVec3,
@@ -122,10 +123,10 @@ impl PointVisibility {
         facing != 0.0 && self.shadow_cone.len() > 2
     }
 
-    /// Takes the cone, and so all that is in the box `shadow`, off all visible regions. Corners at
-    /// most `tolerance` (a length) off a plane of the cone are on it.
+    /// Subtracts the cone, whose shadow is within the box `shadow`, from all visible regions.
+    /// Corners at most `tolerance` (a length) off a plane of the cone are on it.
     fn subtract_shadow(&mut self, shadow: &Aabb, tolerance: f64) {
-        // From the last: what takes the place of a region that is gone has been dealt with.
+        // From the last: a region swapped into a removed one's slot has been processed already.
         for k in (0..self.visible_regions.len()).rev() {
             if !self.visible_regions[k].bounds.overlaps(shadow) {
                 continue;
@@ -157,9 +158,9 @@ impl PointVisibility {
     }
 }
 
-/// A box around what `blocker` hides, from `point`, of a plane at `depth` before it that faces
-/// `facing`, expanded by `margin`; everything where all of the blocker is beside the point or
-/// behind it.
+/// A box around the part of a plane that `blocker` hides from `point`, expanded by `margin`; the
+/// plane is at `depth` in front of the point and faces `facing`. Unbounded where all of the blocker
+/// is beside the point or behind it.
 fn shadow_bounds(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
     let least = SHADOW_MARGIN * depth;
     let mut bounds = Aabb::EMPTY;
@@ -171,7 +172,7 @@ fn shadow_bounds(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, mar
         let v = corner - point;
         let height = -facing.dot(v);
         if (height > least) != (height_before > least) {
-            // Where the edge gets beside the point, its shadow goes far off.
+            // Where the edge gets beside the point, its shadow goes to infinity.
             let crossing = before.lerp(v, (least - height_before) / (height - height_before));
             bounds.include(crossing * (depth / least));
         }
@@ -194,7 +195,7 @@ mod tests {
 
     #[test]
     fn visible_factor_matches_a_sum_over_rays() {
-        // Two overlapping shadows, seen from aside; the target in 400 × 400 squares.
+        // Two overlapping shadows, seen obliquely; the target in 400 × 400 squares.
         let eye = DVec3::new(0.1, -0.2, 0.0);
         let target = rectangle([-1.0, 1.0], [-1.0, 1.0], 2.0);
         let sides = [([-0.3, 0.2], [-0.4, 0.1], 0.7), ([0.0, 0.5], [-0.1, 0.6], 1.1)];
@@ -216,8 +217,9 @@ mod tests {
         }
         let factors =
             PointVisibility::default().factors(eye, DVec3::Z, &target, DVec3::NEG_Z, &blockers);
-        // Outlines of the shadows, below 10 long, pass through squares of side 1/200 with a kernel
-        // below 0.08: if all were off by half a square the same way, 0.002; they are not.
+        // The outlines of the shadows, shorter than 10, pass through squares of side 1/200 with a
+        // kernel below 0.08: if all were off by half a square the same way, the error would be
+        // 0.002; they are not.
         assert!((factors.visible - sum).abs() < 5e-4, "{} {sum}", factors.visible);
         assert!(factors.visible < 0.9 * factors.unoccluded && factors.visible > 0.0);
     }

@@ -1,4 +1,4 @@
-//! Points spread evenly over convex polygons.
+//! Evenly distributed points on convex polygons.
 
 use glam::DVec3;
 
@@ -6,22 +6,23 @@ use super::tolerances::SAME_POSITION;
 use crate::geometry::polygon::fan;
 use crate::sampling::hash::split_mix64;
 
-/// Points of one scrambled set at most; further ones come from further sets.
+/// Maximum number of points of a scrambled set; further points come from further sets.
 const SET_SIZE: u32 = 1 << 16;
 
-/// Half a step between the coordinates of a set, which are multiples of 2⁻²⁴: no point is on a rim.
+/// Half a step between the coordinates of a set, which are multiples of 2⁻²⁴: no point is on the
+/// boundary.
 const HALF_STEP: f64 = 0.5 / (1 << 24) as f64;
 
-/// Point `k` of a scrambled Sobol set in four dimensions, in (0, 1)⁴; every `seed` gives a set of
-/// its own (B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Of a power of two,
-/// both halves are as evenly spread as the whole.
+/// Point `k` of a scrambled Sobol set in four dimensions, in (0, 1)⁴; every `seed` gives another
+/// set (B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Of a power-of-two
+/// number of points, both halves are as evenly distributed as the whole.
 pub(super) fn scrambled_point(k: u32, seed: u64) -> [f64; 4] {
     let set = split_mix64(seed.wrapping_add(u64::from(k / SET_SIZE))) as u32;
     sobol_burley::sample_4d(k % SET_SIZE, 0, set).map(|x| f64::from(x) + HALF_STEP)
 }
 
-/// A convex polygon that points are spread over: the unit square folded onto it piece by piece, so
-/// that what is evenly spread there is so here.
+/// A convex polygon to sample: maps the unit square piecewise onto it, preserving area and so even
+/// distribution.
 pub(super) struct PolygonPoints {
     pieces: Vec<Piece>,
 }
@@ -32,7 +33,7 @@ struct Piece {
     /// Edges from the origin.
     edges: [DVec3; 2],
     is_parallelogram: bool,
-    /// Share of the polygon's area up to its end.
+    /// Cumulative share of the polygon's area up to the end of this piece.
     end: f64,
 }
 
@@ -58,7 +59,7 @@ impl PolygonPoints {
         PolygonPoints { pieces: fan(polygon).map(piece).collect() }
     }
 
-    /// The point that (u, v) in (0, 1)² stands for: equal areas stand for equal areas.
+    /// The point at (u, v) in (0, 1)²: an area-preserving map.
     pub fn at(&self, u: f64, v: f64) -> DVec3 {
         let before = self.pieces.partition_point(|piece| piece.end <= u);
         let k = before.min(self.pieces.len() - 1);
@@ -70,8 +71,8 @@ impl PolygonPoints {
     }
 }
 
-/// The square folded onto the triangle of u + v ≤ 1 along its diagonal, where halves meet
-/// (E. Heitz, "A low-distortion map between triangle and square", 2019).
+/// The square folded onto the triangle of u + v ≤ 1 along its diagonal (E. Heitz, "A low-distortion
+/// map between triangle and square", 2019).
 fn onto_triangle(u: f64, v: f64) -> [f64; 2] {
     let half = 0.5 * u.min(v);
     if u > v { [u - half, half] } else { [half, v - half] }
@@ -83,7 +84,7 @@ mod tests {
 
     #[test]
     fn points_fill_a_polygon_evenly() {
-        // A kite of area 4 whose triangles are unlike: 1 below y = 1, 3 above.
+        // A kite of area 4 with unequal triangles: 1 below y = 1, 3 above.
         let kite = [(0.0, 0.0), (1.0, 1.0), (0.0, 4.0), (-1.0, 1.0)];
         let kite = kite.map(|(x, y)| DVec3::new(x, y, 2.0));
         let points = PolygonPoints::new(&kite);
@@ -95,7 +96,7 @@ mod tests {
         let share = |is_in: &dyn Fn(&DVec3) -> bool| {
             all.iter().filter(|p| is_in(p)).count() as f64 / all.len() as f64
         };
-        // A line cuts some 64 of the 4096 cells of a net; half of them off would be 0.008.
+        // A line cuts some 64 of the 4096 cells of a net; half of them wrong would be 0.008.
         assert!((share(&|p| p.y < 1.0) - 0.25).abs() < 0.008);
         assert!((share(&|p| p.x < 0.0) - 0.5).abs() < 0.008);
         assert!(all.iter().all(|p| (p.z - 2.0).abs() < 1e-15));

@@ -1,17 +1,17 @@
-//! Rows of view factors from rays: how many rays of a polygon meet each other one first.
+//! Rows of view factors from rays: the number of rays of a polygon that hit each other one first.
 //!
-//! Rays start from points all over a polygon, in directions in proportion to the cosine, both from
-//! one low-discrepancy set of four dimensions. Each stands for the same share of the flux, so that
-//! a factor is a count.
+//! Rays start from points all over a polygon, with cosine-distributed directions, both from one
+//! low-discrepancy set of four dimensions. Each carries the same share of the flux, so that a
+//! factor is a count.
 //!
 //! ```text
-//!     ╲  │  ╱      first half: which blockers stand around
-//!   ▭──╲─│─╱──▭    second half: what is behind blockers that the first half has not met
+//!     ╲  │  ╱      first half: blockers around the polygon
+//!   ▭──╲─│─╱──▭    second half: fronts behind blockers that the first half missed
 //!  ───────────────
 //! ```
 //!
-//! A factor past only those blockers that are *known* is too large. By how much, the second half of
-//! the rays tells without bias, since what is known does not depend on it.
+//! A factor with only the *known* blockers is too large. The second half of the rays estimates the
+//! excess without bias, since the known blockers do not depend on it.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -26,40 +26,40 @@ use super::tolerances::CONTACT_HEIGHT;
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// A polygon, and how many rays have met it.
+/// A polygon, and the number of rays that hit it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Count {
     pub polygon: u32,
     pub rays: u32,
 }
 
-/// What the first half of the rays of a polygon has met.
+/// Hits of the first half of the rays of a polygon.
 #[derive(Serialize, Deserialize)]
 pub(super) struct FirstHalf {
     /// Fronts, by ascending index.
     pub fronts: Vec<Count>,
-    /// Rays that met a back.
+    /// Rays that hit a back.
     back: u32,
     /// Indices of blockers, ascending.
     pub blockers: Vec<u32>,
 }
 
-/// What the rays of a polygon have met.
+/// Hits of the rays of a polygon.
 #[derive(Serialize, Deserialize)]
 pub(super) struct RayRow {
-    /// Rays in all, met something or not.
+    /// Total number of rays, with or without a hit.
     pub rays: u32,
     /// Fronts, by ascending index.
     pub fronts: Vec<Count>,
-    /// Rays that met a back.
+    /// Rays that hit a back.
     pub back: u32,
-    /// Rays of the second half that met a blocker that was not known.
+    /// Rays of the second half that hit an unknown blocker.
     pub unknown: u32,
-    /// Fronts behind those blockers, that the rays would have met past known ones alone.
+    /// Fronts behind those blockers, which the rays would have hit if only known blockers existed.
     pub hidden: Vec<Count>,
 }
 
-/// The triangles of a scene for rays, in units around its middle.
+/// The triangles of a scene for rays, in units relative to its centre.
 pub(super) struct RayCaster<'a> {
     fronts: &'a Fronts,
     rays: RayScene,
@@ -68,7 +68,7 @@ pub(super) struct RayCaster<'a> {
 }
 
 impl<'a> RayCaster<'a> {
-    /// For `scene`, all lengths divided by `unit`; `blockers` has each triangle's.
+    /// For `scene`, all lengths divided by `unit`; `blockers` has the blocker of each triangle.
     pub fn new(
         scene: &Scene,
         unit: f64,
@@ -92,7 +92,7 @@ impl<'a> RayCaster<'a> {
         of_fronts
     }
 
-    /// What the first half of `rays` rays from polygon `s` meets.
+    /// Casts the first half of `rays` rays from polygon `s`.
     pub fn first_half(&self, s: u32, rays: u32) -> FirstHalf {
         let (mut met, mut blockers) = (Met::default(), vec![]);
         self.cast(s, 0..rays / 2, |_, _, hit| {
@@ -106,7 +106,8 @@ impl<'a> RayCaster<'a> {
         FirstHalf { fronts: counted(met.fronts), back: met.backs, blockers }
     }
 
-    /// All of `rays` rays from polygon `s`, after their first half; the `known` blockers ascend.
+    /// Casts the second half of `rays` rays from polygon `s` and adds the first; `known` blockers
+    /// ascend.
     pub fn row(&self, s: u32, rays: u32, first: &FirstHalf, known: &[u32]) -> RayRow {
         let is_known = |hit: &Hit| {
             self.blockers[hit.triangle].is_none_or(|blocker| known.binary_search(&blocker).is_ok())
@@ -128,8 +129,8 @@ impl<'a> RayCaster<'a> {
         RayRow { rays, fronts, back, unknown, hidden: counted(hidden) }
     }
 
-    /// The share of a set of rays from polygon `s` that meet polygon `t` first; each `seed` gives
-    /// other rays.
+    /// Share of a set of rays from polygon `s` that hit polygon `t` first; each `seed` gives other
+    /// rays.
     pub fn share(&self, s: u32, t: u32, rays: u32, seed: u64) -> f64 {
         let mut count = 0;
         self.cast_set(s, 0..rays, seed, |_, _, hit| {
@@ -147,8 +148,8 @@ impl<'a> RayCaster<'a> {
         self.rays.occluded(from, to - from, CONTACT_HEIGHT..1.0 - CONTACT_HEIGHT, is_other)
     }
 
-    /// Calls `meets` with the start and direction of each of these rays of polygon `s` that meets
-    /// something, and what it meets.
+    /// Calls `meets` with start, direction and hit of each of these rays of polygon `s` that hits
+    /// something.
     fn cast(&self, s: u32, rays: Range<u32>, meets: impl FnMut(DVec3, DVec3, &Hit)) {
         self.cast_set(s, rays, u64::from(s) << 32, meets);
     }
@@ -176,18 +177,18 @@ impl<'a> RayCaster<'a> {
         }
     }
 
-    /// What a ray from polygon `s` meets first beyond `start`.
+    /// The first hit of a ray from polygon `s` beyond `start`.
     fn first_hit(&self, s: u32, from: DVec3, direction: DVec3, start: f64) -> Option<Hit> {
         let is_other = |hit: &Hit| !self.fronts.both_sides(hit.triangle).contains(&Some(s));
         self.rays.closest_hit_of(from, direction, start, None, is_other)
     }
 }
 
-/// What rays have met first, in any order.
+/// First hits of rays, in any order.
 #[derive(Default)]
 struct Met {
     fronts: Vec<u32>,
-    /// Rays that met a back.
+    /// Rays that hit a back.
     backs: u32,
 }
 

@@ -1,7 +1,7 @@
-//! View factors from form-factor rows: hemicubes or rays, one row an element.
+//! View factors from form-factor rows: hemicubes or rays, one row per element.
 //!
-//! F of a group is the mean of the rows of its elements, weighted by area. The error is judged by
-//! leaving out three of every four sibling elements:
+//! F of a group is the mean of the rows of its elements, weighted by area. The error is estimated
+//! by leaving out three of every four sibling elements:
 //!
 //! ```text
 //!     ╱╲          the middle one of four siblings is seen from the same point as the triangle
@@ -17,8 +17,8 @@ use crate::error::Error;
 use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 
-/// Sum of one factor over the elements of a group, and over the coarser elements that these are
-/// parts of. In squares of the scene's length unit.
+/// Sum of one factor over the elements of a group, and over the coarser elements that contain them.
+/// In squares of the scene's length unit.
 #[derive(Clone, Copy, Default)]
 struct FactorSum {
     fine: f64,
@@ -31,9 +31,9 @@ impl FactorSum {
         self.coarse += coarse_area * Row::form_factor(share);
     }
 
-    /// Elements are four to a coarser one, the middle one of them seen from the same point. If the
-    /// errors of the four are independent and alike, the difference of the two means has three
-    /// times the variance of the finer mean.
+    /// Four elements form a coarser one, whose viewpoint is that of the middle one. If the errors
+    /// of the four are independent and have the same distribution, the difference of the two means
+    /// has three times the variance of the finer mean.
     fn estimate(self, area: f64) -> Estimate {
         let error = (self.fine - self.coarse).abs() / 3f64.sqrt();
         Estimate { value: self.fine, error }.over(area)
@@ -100,8 +100,8 @@ pub(super) fn sample(
     }))
 }
 
-/// Per element, the area it stands for when of every four siblings only the middle one is seen
-/// from.
+/// Per element, the area that it represents when of every four siblings only the middle one has a
+/// row.
 fn coarse_areas(mesh: &Mesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.element_count()];
     let mut stack: Vec<NodeId> =

@@ -4,20 +4,19 @@
 //! A₁F₁₂ ≈ U · Σ K V / Σ K      K = cos θ cos θ′ / r², V = 1 where nothing is in between
 //! ```
 //!
-//! U, the exchange with nothing in between, is known in closed form, so that only the visible share
-//! is left to chance.
+//! U, the unoccluded exchange, is known in closed form, so that only the visible share is random.
 
 use super::matrix::Estimate;
 use super::pair_visibility::FacingPair;
 use super::polygon_points::{PolygonPoints, scrambled_point};
 use glam::DVec3;
 
-/// Rays that make the standard error `tolerance` where half of them are blocked: U √(¼ / n).
+/// Number of rays for the standard error `tolerance` if half of them are blocked: U √(¼ / n).
 pub(super) fn rays_needed(unoccluded: f64, tolerance: f64) -> f64 {
     (0.5 * unoccluded / tolerance).powi(2)
 }
 
-/// A₁F₁₂ of `pair` from `rays` shadow rays; `unoccluded` with nothing in between.
+/// A₁F₁₂ of `pair` from `rays` shadow rays; `unoccluded` is the value without blockers.
 pub(super) fn shadowed_exchange(
     pair: &FacingPair,
     unoccluded: f64,
@@ -43,9 +42,9 @@ pub(super) fn shadowed_exchange(
         return Estimate::default();
     }
     let share = visible / all;
-    // As many rays of equal weight would be as sure (L. Kish 1965). Two more of each kind keep the
-    // error honest where nearly all agree: A. Agresti, B. A. Coull, "Approximate is better than
-    // 'exact' for interval estimation of binomial proportions", 1998.
+    // Number of rays of equal weight with the same variance (L. Kish 1965). Two more of each kind
+    // keep the error estimate valid where nearly all agree: A. Agresti, B. A. Coull, "Approximate
+    // is better than 'exact' for interval estimation of binomial proportions", 1998.
     let equal_rays = all * all / squares;
     let likely = (share * equal_rays + 2.0) / (equal_rays + 4.0);
     let error = (likely * (1.0 - likely) / equal_rays).sqrt();

@@ -1,11 +1,11 @@
-//! Shafts: the space between two polygons, in which others can stand in the way.
+//! Shafts: the space between two polygons that blockers can be in.
 //!
 //! ```text
 //!        b                The shaft of a and b is the convex hull of both: all segments from one
 //!     ───────             to the other. Its faces are the two polygons and, along each of their
 //!    ╱       ╲            edges, a supporting plane that leans on a corner of the other.
 //!   ╱  ▬▬     ╲
-//!  ╱           ╲          A blocker matters as far as it is strictly within: clipped by all
+//!  ╱           ╲          Of a blocker only the part strictly within matters: clipped by all
 //!  ─────────────          planes, and dropped if nothing but contact is left.
 //!        a
 //! ```
@@ -20,9 +20,9 @@ use crate::geometry::aabb::Aabb;
 use crate::geometry::plane::Plane;
 use crate::geometry::polygon::{clip, max_distance, merge_close_corners, polygon_area};
 
-/// The convex hull of two convex polygons that are all before one another.
+/// The convex hull of two convex polygons that face one another entirely.
 pub(super) struct Shaft {
-    /// The hull is on the positive side of each.
+    /// Planes with the hull on the positive side.
     planes: Vec<Plane>,
     bounds: Aabb,
 }
@@ -39,7 +39,7 @@ impl Shaft {
         Shaft { planes, bounds }
     }
 
-    /// What of `polygon` is strictly within the shaft; none if that has no area.
+    /// The part of `polygon` strictly within the shaft; `None` if that has no area.
     pub fn clip(&self, polygon: &[DVec3]) -> Option<Vec<DVec3>> {
         for plane in &self.planes {
             if polygon.iter().all(|&p| plane.signed_distance(p) <= CONTACT_HEIGHT) {
@@ -60,16 +60,16 @@ impl Shaft {
         (polygon_area(&kept) > SLIVER_WIDTH * extent).then_some(kept)
     }
 
-    /// Whether a part of a box may be strictly within the shaft; true for some that are not.
+    /// Whether a part of a box may be strictly within the shaft; conservative.
     pub fn intersects(&self, bounds: &Aabb) -> bool {
         let is_reached = |plane: &Plane| plane.max_signed_distance(bounds) > CONTACT_HEIGHT;
         self.bounds.overlaps(bounds) && self.planes.iter().all(is_reached)
     }
 }
 
-/// Adds the planes along the edges of `a`, `b` before it, that have both on their positive side.
-/// None along an edge that has a corner of `b` beside it in the plane of `a`: there that plane is
-/// the hull's.
+/// Adds the planes along the edges of `a`, with `b` in front of it, that have both on their
+/// positive side. An edge with a corner of `b` beside it in the plane of `a` gets none: there the
+/// plane of `a` bounds the hull.
 fn add_supporting_planes(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut Vec<Plane>) {
     let Some(&origin) = a.first() else { return };
     let size = a.iter().chain(b).map(|p| p.distance(origin)).fold(0.0, f64::max);
@@ -92,9 +92,10 @@ fn add_supporting_planes(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut V
 }
 
 /// Normal of the plane through the line from `start` along the unit vector `along` and one of
-/// `points` that has all of them on its positive side or on it; none if all are on the line.
+/// `points` that has all of them on its positive side or on it; `None` if all are on the line.
 fn supporting_normal(start: DVec3, along: DVec3, points: &[DVec3]) -> Option<DVec3> {
-    // Perpendicular to the line first: its length times an error of angle is far above contact.
+    // Perpendicular to the line first: an angular error over the line's length would be far above
+    // contact.
     let perpendicular = |p: DVec3| {
         let n = (p - start).cross(along).normalize_or_zero();
         n.reject_from_normalized(along).normalize_or_zero()
@@ -108,15 +109,14 @@ fn supporting_normal(start: DVec3, along: DVec3, points: &[DVec3]) -> Option<DVe
     (normal != DVec3::ZERO).then_some(normal)
 }
 
-/// A convex polygon that stands in the way, and its unit normal.
+/// A convex polygon that may block light, and its unit normal.
 #[derive(Clone, Debug)]
 pub(super) struct Blocker {
     pub corners: Vec<DVec3>,
     pub normal: DVec3,
 }
 
-/// Whether every segment between `a` and `b` crosses `blocker`: it does if those between corners
-/// do.
+/// Whether every segment between `a` and `b` crosses `blocker`: true if those between corners do.
 pub(super) fn fully_occludes(blocker: &Blocker, a: &[DVec3], b: &[DVec3]) -> bool {
     let Blocker { corners: blocker, normal } = blocker;
     let Some(&origin) = blocker.first() else { return false };

@@ -1,4 +1,4 @@
-//! A list of things to do, shared out between the processes that there are and the threads of each.
+//! Work lists distributed over all processes and the threads of each.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -6,9 +6,10 @@ use serde::de::DeserializeOwned;
 
 use crate::ranks::{Ranks, Share, decoded, encoded, in_order};
 
-/// What `work` makes of all `items`, in their order.
+/// The results of `work` for all `items`, in their order.
 ///
-/// Items are dealt out one by one: neighbours take about as long, so that all have as much to do.
+/// Items are assigned round-robin: neighbours take about the same time, so that the load is
+/// balanced.
 pub(super) fn share_out<T: Sync, R: Send + Serialize + DeserializeOwned>(
     items: &[T],
     ranks: &mut dyn Ranks,

@@ -1,10 +1,10 @@
 //! Assembles a sparse matrix of many polygons: rays find the pairs that matter, and each of these
-//! is estimated as cheaply as its error allows.
+//! is estimated by the cheapest method that its error allows.
 //!
 //! ```text
 //! each front:   first half of its rays ─→ blockers known around it
-//!               second half            ─→ row: counts of the fronts met
-//! each pair that a ray from either end has met:  see `pair_estimate`
+//!               second half            ─→ row: counts of the fronts hit
+//! each pair that a ray from either end has hit:  see `pair_estimate`
 //! ```
 //!
 //! Time grows with the number of polygons and of pairs that see one another, memory with the
@@ -27,39 +27,40 @@ use super::scene_polygons::ScenePolygons;
 use super::shared_work::share_out;
 use crate::scene::Scene;
 
-/// Standard errors are this share of the error asked for, so that 19 of 20 factors are within it.
+/// Ratio of the standard error to the requested error: 19 of 20 factors are within the latter.
 const ERROR_SHARE: f64 = 0.5;
 
-/// Rays of a polygon, times the error asked for: a factor as large as that is met by a few. Chosen
-/// by hand; fewer leave more to shadow rays, more take longer themselves.
+/// Rays of a polygon times the requested error: a factor equal to the error is hit by a few. Plain
+/// choice; fewer leave more to shadow rays, more take longer themselves.
 const RAYS_TIMES_ERROR: f64 = 1.6;
 
-/// Rays of a polygon: at least, so that its half tells something; at most, to limit time.
+/// Minimum number of rays of a polygon, so that half of them are significant; maximum, to limit
+/// time.
 const MIN_RAYS: f64 = 64.0;
 const MAX_RAYS: f64 = (1 << 24) as f64;
 
-/// Polygons between two tellings of progress. Chosen by hand.
+/// Polygons between two progress calls. Plain choice.
 const BATCH: usize = 256;
 
-/// Pairs that one thread takes at a time. Chosen by hand.
+/// Number of pairs in one work item. Plain choice.
 const PAIRS_AT_A_TIME: usize = 64;
 
-/// Polygons whose rays predict how many factors there will be, and rays of all of them: some
-/// seconds. Chosen by hand.
+/// Number of polygons whose rays predict the number of factors, and total number of these rays:
+/// some seconds. Plain choice.
 const PREDICTING_POLYGONS: RangeInclusive<usize> = 16..=256;
 const PREDICTING_RAYS: usize = 1 << 24;
 
-/// Bytes at most at a time for each factor: what rays have met, the rows and the matrix. Measured:
-/// 61, 84 and 87 where there are 2, 5 and 15 million factors.
+/// Maximum memory per factor, bytes: ray hits, rows and matrix. Measured: 61, 84 and 87 with 2, 5
+/// and 15 million factors.
 const BYTES_OF_FACTOR: usize = 90;
 
-/// About how large a matrix will be, by the rays of some polygons: too large where groups have
+/// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
 /// many polygons.
 pub(super) fn predicted_size(scene: &Scene, polygons: ScenePolygons, error: f64) -> MatrixSize {
     let ScenePolygons { unit, fronts, blocker_of_triangle, .. } = polygons;
     let caster = RayCaster::new(scene, unit, &fronts, blocker_of_triangle);
     let count = fronts.polygons.len();
-    // A pair is there if rays of either met the other: as if twice as many had looked from one.
+    // A pair exists if rays of either hit the other: equivalent to twice the rays from one.
     let first_half = 4 * rays_a_polygon(error);
     let (least, most) = PREDICTING_POLYGONS.into_inner();
     let drawn = (PREDICTING_RAYS / first_half as usize).clamp(least, most).min(count);
@@ -77,7 +78,7 @@ fn rays_a_polygon(error: f64) -> u32 {
     rays.next_power_of_two()
 }
 
-/// Makes the rows of the polygons `wanted` of `scene`; none if that is stopped.
+/// Computes the rows of the polygons `wanted` of `scene`; `None` if stopped.
 pub(super) fn make(
     scene: &Scene,
     polygons: ScenePolygons,
@@ -90,7 +91,7 @@ pub(super) fn make(
     let count = fronts.polygons.len();
     let rays = rays_a_polygon(error);
     let all: Vec<u32> = (0..count as u32).collect();
-    // Two rounds of rays over all polygons, and one of pairs.
+    // Two passes of rays over all polygons, and one of pairs.
     let of = 2 * count + wanted.len();
     let halves: Vec<FirstHalf> = in_batches(&all, making, 0..of, |&s| caster.first_half(s, rays))?;
     let of_fronts = caster.blockers_of_fronts();
@@ -106,7 +107,7 @@ pub(super) fn make(
     let later = met_either_way(rows);
     let mut done = 2 * count;
     for batch in wanted.chunks(BATCH * making.ranks.size()) {
-        // Some polygons have a thousand times the pairs of others.
+        // The number of pairs of polygons varies by a factor of a thousand.
         let pieces = |&s: &u32| later[s as usize].chunks(PAIRS_AT_A_TIME).map(move |c| (s, c));
         let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
         let of_piece = |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
@@ -127,8 +128,8 @@ pub(super) fn make(
     Some(())
 }
 
-/// What `work` makes of all `items`, in parallel; none if that is stopped. `told` is how many items
-/// were done before, and how many there are in all.
+/// The results of `work` for all `items`, in parallel; `None` if stopped. `told` is the range of
+/// progress: items done before, and the total.
 fn in_batches<R: Send + Serialize + DeserializeOwned>(
     items: &[u32],
     making: &mut Making,
@@ -144,7 +145,7 @@ fn in_batches<R: Send + Serialize + DeserializeOwned>(
     Some(results)
 }
 
-/// One exchange a group, from those with its polygons, which ascend.
+/// Sums exchanges with polygons, in ascending order of their groups, to one exchange per group.
 fn sums_by_group(exchanges: Vec<Exchange>) -> Vec<Exchange> {
     let groups = exchanges.chunk_by(|a, b| a.to == b.to);
     let sum = |of_group: &[Exchange]| {
@@ -155,8 +156,8 @@ fn sums_by_group(exchanges: Vec<Exchange>) -> Vec<Exchange> {
     groups.map(sum).collect()
 }
 
-/// Per polygon the later ones that its rays have met, or whose rays have met it, with the rays of
-/// both.
+/// Per polygon the later ones that its rays have hit, or whose rays have hit it, with the sum of
+/// the rays of both.
 fn met_either_way(rows: &[RayRow]) -> Vec<Vec<Count>> {
     let mut met_by: Vec<Vec<Count>> = rows.iter().map(|_| vec![]).collect();
     for (t, row) in (0..).zip(rows) {
@@ -172,7 +173,7 @@ fn met_either_way(rows: &[RayRow]) -> Vec<Vec<Count>> {
     (0..).zip(met_by).map(union).collect()
 }
 
-/// What polygon `s` exchanges with `later` ones, each under the group that it is of.
+/// The exchanges of polygon `s` with `later` ones, each labelled with the other's group.
 fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) -> Vec<Exchange> {
     let fronts = estimator.fronts;
     let area_share = |s: u32| {
@@ -193,7 +194,7 @@ fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) 
     exchanges
 }
 
-/// What polygon `s` gives to backs, by counts of its rays.
+/// The exchange of polygon `s` with backs, by counts of its rays.
 fn to_backs(fronts: &Fronts, row: &RayRow, s: u32) -> Exchange {
     let per_ray = fronts.polygons[s as usize].area / f64::from(row.rays);
     let value = per_ray * f64::from(row.back);

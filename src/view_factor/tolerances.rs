@@ -1,11 +1,11 @@
-//! Tolerances of geometry in one place: what counts as touching, flat or the same.
+//! Geometric tolerances: thresholds for contact, coplanarity and equality.
 //!
-//! A scene is moved to its middle and divided by a power of two, its unit, so that coordinates are
-//! below 1 and carry rounding of about 1e-16. Lengths below are in that unit unless they are
-//! shares. Different notions need different values; each must be above the rounding of what it is
-//! compared with, and above every tolerance that produced it:
+//! A scene is centred and divided by a power of two, its unit, so that coordinates are below 1 and
+//! carry rounding of about 1e-16. Lengths below are in that unit unless they are shares. Each
+//! tolerance must be above the rounding of the quantity compared with it, and above every tolerance
+//! that this results from:
 //!
-//! | what | value | of | above |
+//! | constant | value | of | above |
 //! |---|---|---|---|
 //! | [`COPLANARITY`] | 4e-15 | unit | rounding of coordinates |
 //! | [`PLANE_TOLERANCE`] | 1e-13 | share of the extent | rounding of a few operations |
@@ -18,31 +18,31 @@
 //! [`PLANE_TOLERANCE`]: crate::geometry::polygon::PLANE_TOLERANCE
 
 /// Corners at most this far from a plane, in units of the scene's size, are in it: above the
-/// rounding of coordinates, and below [`CONTACT_HEIGHT`], so that no piece stands before its own
+/// rounding of coordinates, and below [`CONTACT_HEIGHT`], so that no piece is in front of its own
 /// plane.
 pub(super) const COPLANARITY: f64 = 4e-15;
 
 /// Heights over a plane up to this, in units of the scene's size, are contact: well above rounding,
-/// and above what pieces may be off their own planes, [`COPLANARITY`].
+/// and above the deviation of pieces from their own planes, [`COPLANARITY`].
 pub(super) const CONTACT_HEIGHT: f64 = 1e-12;
 
-/// What is left of a piece within a shaft is only contact if its area is at most its length times
-/// this: clipping at contact heights may have put its edges out of order. In units of the scene's
-/// size.
+/// The clipped part of a piece within a shaft is only contact if its area is at most its length
+/// times this: clipping at contact heights may have put its edges out of order. In units of the
+/// scene's size.
 pub(super) const SLIVER_WIDTH: f64 = 4.0 * CONTACT_HEIGHT;
 
-/// Positions closer than this are one: as corners of a polygon, in shares of its extent, for the
-/// line through both is too uncertain to cut by; as planes, in units of the scene's size; as
+/// Positions closer than this are equal: as corners of a polygon, in shares of its extent, since
+/// the line through both is too uncertain to cut by; as planes, in units of the scene's size; as
 /// corners of a piece over the plane of another, in shares of its extent.
 pub(super) const SAME_POSITION: f64 = 1e-9;
 
 /// Directions are the same if the square of the sine of their angle is at most this.
 pub(super) const SAME_DIRECTION_SQUARED: f64 = 1e-18;
 
-/// An edge shorter than this share of a shaft has a direction too uncertain to lay a plane along:
-/// rounding of its ends, 1e-16, moves the plane by up to [`CONTACT_HEIGHT`] at the far end.
+/// Minimum length of an edge, as a share of a shaft, for a plane along it: rounding of the ends of
+/// a shorter one, 1e-16, moves the plane by over [`CONTACT_HEIGHT`] at the far end.
 pub(super) const MIN_LEANING_EDGE: f64 = 1e-4;
 
-/// A turn at a corner of an outline, as the sine of its angle, up to which the outline goes
-/// straight on. Chosen by hand, above the rounding of short edges; no measurement kept.
+/// Maximum sine of the turn at a corner of an outline that counts as straight. Plain choice, above
+/// the rounding of short edges; no recorded measurement.
 pub(super) const STRAIGHT_SINE: f64 = 1e-9;

@@ -1,7 +1,7 @@
-//! Exchange of two polygons with nothing between them: closed form, or cubature where they are far.
+//! Unoccluded exchange of two polygons: closed form, or cubature where they are far apart.
 //!
-//! Most pairs of a scene are far apart, where a Gauss product rule over both polygons with 3⁴ or 2⁴
-//! points is right to 6e-8 of a small factor and much cheaper than the contour integral.
+//! Most pairs of a scene are far apart. There a Gauss product rule over both polygons with 3⁴ or 2⁴
+//! points has an error of 6e-8 of a small factor and is much cheaper than the contour integral.
 
 use std::f64::consts::PI;
 
@@ -15,19 +15,19 @@ use crate::geometry::quadrature::{
     TWO_POINT_MIN_GAP, collapsed_point,
 };
 
-/// Relative error of [`far_exchange`] at most: 16^(−6), from the table in
+/// Maximum relative error of [`far_exchange`]: 16^(−6), from the table in
 /// [`quadrature`](crate::geometry::quadrature), and checked below.
 const FAR_ERROR: f64 = 6e-8;
 
-/// Absolute error of the closed form at most, as a share of what the smaller polygon gives in all,
-/// its area (see [`polygon_to_polygon`]).
+/// Maximum absolute error of the closed form, as a share of the area of the smaller polygon (see
+/// [`polygon_to_polygon`]).
 const CLOSED_FORM_ERROR: f64 = 1e-13;
 
 /// Four corners make a parallelogram if both diagonals have the same middle, within this share of
 /// one of them: rounding, far below [`FAR_ERROR`].
 const PARALLELOGRAM_TOLERANCE: f64 = 1e-12;
 
-/// A₁F₁₂ and its error for two convex polygons, unit normals given, that are all before one another
+/// A₁F₁₂ and its error for two convex polygons, unit normals given, that face one another entirely
 /// with nothing between them, in squares of the unit of length.
 pub(super) fn unoccluded_exchange(
     a: &[DVec3],
@@ -43,11 +43,11 @@ pub(super) fn unoccluded_exchange(
     Estimate { value: polygon_to_polygon(a, b) * area, error }
 }
 
-/// A₁F₁₂ of two convex polygons, unit normals given, that are all before one another, in squares of
-/// the unit of length; none if the gap between them is below 8 radii of the larger.
+/// A₁F₁₂ of two convex polygons, unit normals given, that face one another entirely, in squares of
+/// the unit of length; `None` if the gap between them is below 8 radii of the larger.
 ///
-/// Gauss product rules over both on cos θ cos θ′ / (π r²), three points a direction, or two beyond
-/// 40 radii; relative error at most [`FAR_ERROR`].
+/// Gauss product rules over both on cos θ cos θ′ / (π r²), three points per direction, or two
+/// beyond 40 radii; relative error at most [`FAR_ERROR`].
 fn far_exchange(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> Option<f64> {
     let (centre_a, radius_a) = bounding_sphere(a);
     let (centre_b, radius_b) = bounding_sphere(b);

@@ -4,15 +4,15 @@
 //!     target            from each point: the visible part of the target, exactly
 //!    ────────           (see `point_visibility`)
 //!      ▬▬   blockers
-//!   •  •  •  •          points: a low-discrepancy set; how far the means of its eight parts
-//!    domain             differ is the error
+//!   •  •  •  •          points: a low-discrepancy set; the error is the deviation between
+//!    domain             the means of its eight parts
 //! ```
 //!
-//! The mean is taken of the visible share, and the whole is known in closed form: what varies from
-//! point to point because the target is nearer to some costs nothing.
+//! The mean is of the visible share, and the whole is known in closed form: the variation due to
+//! the distance of the target adds no error.
 //!
-//! Much cheaper than adaptive cubature where the error asked for is not far below what a few
-//! hundred points give.
+//! Much cheaper than adaptive cubature where the requested error is not far below that of a few
+//! hundred points.
 
 use glam::DVec3;
 
@@ -23,26 +23,28 @@ use super::polygon_points::{PolygonPoints, scrambled_point};
 use super::shaft::Blocker;
 use crate::geometry::polygon::polygon_area;
 
-/// Parts of the points: each is as evenly spread as such a number of points can be.
+/// Parts of the point set: each is evenly distributed for its number of points.
 const PARTS: usize = 8;
 
-/// Two standard errors of a mean of eight hold the truth 19 of 20 times if they are this much
-/// larger than those of many: Student's t for 7 degrees of freedom and 95 %, over 2.
+/// Factor by which two standard errors of a mean of eight exceed those of a large sample for the
+/// same coverage, 19 of 20 times: Student's t for 7 degrees of freedom and 95 %, over 2.
 const STUDENT_FACTOR: f64 = 2.365 / 2.0;
 
-/// Points of a part at first, and at most: limits time, and the error that is left is told.
-/// Chosen by hand.
+/// Initial and maximum number of points of a part: limits time, and the remaining error is
+/// reported. Plain choice.
 const FIRST_POINTS: u32 = 2;
 const MAX_POINTS: u32 = 512;
 
-/// Visible shares this near to one another, to nothing, or to all, are the same: above rounding.
+/// Visible shares that differ by less than this from each other, from 0 or from 1 count as equal:
+/// above rounding.
 const NOTHING_SHARE: f64 = 1e-9;
 
-/// Points that a pair takes at least.
+/// Minimum number of points of a pair.
 pub(super) const MIN_POINTS: u32 = PARTS as u32 * FIRST_POINTS;
 
-/// A₁F₁₂ of `pair` past all that is `between`, from points of its first polygon, with a standard
-/// error of `tolerance` if eight times [`MAX_POINTS`] do; `unoccluded` with nothing between.
+/// A₁F₁₂ of `pair` past all blockers `between`, from points of its first polygon, with a standard
+/// error of `tolerance` if eight times [`MAX_POINTS`] suffice; `unoccluded` is the value without
+/// blockers.
 pub(super) fn visible_mean(
     pair: &FacingPair,
     between: &[Blocker],
@@ -72,7 +74,7 @@ pub(super) fn visible_mean(
         if mean.error <= tolerance || count >= MAX_POINTS {
             return mean;
         }
-        // All of them are the first half of twice as many.
+        // All of them are the first half of twice the number.
         let halves = std::array::from_fn(|k| match parts.get(2 * k..2 * k + 2) {
             Some(two) => two[0].and(two[1]),
             None => Seen::default(),
@@ -81,12 +83,12 @@ pub(super) fn visible_mean(
     }
 }
 
-/// What points see: sums over them.
+/// Sums over points of the form factors.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     visible: f64,
     unoccluded: f64,
-    /// Of all points, the one that sees the smallest share, and the largest.
+    /// The smallest and the largest visible share of a point.
     shares: Option<[f64; 2]>,
 }
 
@@ -107,8 +109,8 @@ impl Seen {
     }
 }
 
-/// The visible share, by parts of `count` points each, and its standard error. `sharpness` is
-/// what share of all that changes over the domain may change between two neighbouring points.
+/// The visible share, by parts of `count` points each, and its standard error. `sharpness` is the
+/// fraction of the whole variation over the domain that may occur between two neighbouring points.
 fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate {
     let all = parts.iter().fold(Seen::default(), |sum, part| sum.and(*part));
     let Some([low, high]) = all.shares else { return Estimate::default() };
@@ -118,8 +120,8 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
     let squares: f64 = parts.iter().map(|part| deviation(part).powi(2)).sum();
     let independent = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();
     let of_parts = independent * dependence(sharpness);
-    // A spot that no point has met is likely no larger than what one point stands for, and sees
-    // what others see; or the contrary, where all see all or nothing.
+    // A spot without points is assumed to have the area of one point and a share within the range
+    // of the others; or the opposite value, where all see all or nothing.
     let points = f64::from(count) * PARTS as f64;
     let range = high - low;
     let unmet = match range < NOTHING_SHARE && (low < NOTHING_SHARE || high > 1.0 - NOTHING_SHARE) {
@@ -129,16 +131,17 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
     Estimate { value, error: of_parts.hypot(sharpness * unmet) }
 }
 
-/// The standard error of the mean of all points in that of eight independent parts. Where what
-/// points see jumps, parts may be so. Where only its slope jumps, the mean of n evenly spread
-/// points is off by n^(−5/4) or less (of n cells √n have errors of the order of n^(−3/2)), so that
-/// that of all is off by 8^(−3/4) of what independent parts would leave.
+/// Ratio of the standard error of the mean of all points to that of eight independent parts. Where
+/// the visible share jumps, parts may be independent. Where only its slope jumps, the mean of n
+/// evenly distributed points has an error of n^(−5/4) or less (of n cells √n have errors of the
+/// order of n^(−3/2)), so that the error of all is 8^(−3/4) of that of independent parts.
 fn dependence(sharpness: f64) -> f64 {
     (STUDENT_FACTOR * sharpness).max((PARTS as f64).powf(-0.75))
 }
 
-/// The least way on the first polygon of `pair` over which what is visible of the other may change
-/// from all to nothing: s d / D, for a blocker at distance d and a target of width s at distance D.
+/// Minimum distance on the first polygon of `pair` over which the visibility of the other may
+/// change from full to none: s d / D, for a blocker at distance d and a target of width s at
+/// distance D.
 fn narrowest_penumbra(pair: &FacingPair, between: &[Blocker]) -> f64 {
     let height = |corner: &DVec3| pair.a_normal.dot(corner - pair.a[0]).max(0.0);
     let corners = between.iter().flat_map(|blocker| &blocker.corners);
@@ -148,7 +151,7 @@ fn narrowest_penumbra(pair: &FacingPair, between: &[Blocker]) -> f64 {
     (narrowest_width(&pair.b, pair.b_normal) * lowest / farthest).max(f64::MIN_POSITIVE)
 }
 
-/// The width of a convex polygon across the edge where it is narrowest.
+/// The smallest width of a convex polygon, measured perpendicular to its edges.
 fn narrowest_width(polygon: &[DVec3], normal: DVec3) -> f64 {
     let across = |k: usize| {
         let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
@@ -158,8 +161,8 @@ fn narrowest_width(polygon: &[DVec3], normal: DVec3) -> f64 {
     (0..polygon.len()).map(across).fold(f64::INFINITY, f64::min)
 }
 
-/// Blockers in the order of their distances from the middle of a polygon: near ones hide the most,
-/// and what is gone is not cut again.
+/// Blockers by distance from the middle of a polygon: near ones hide the most, and removed regions
+/// are not cut again.
 fn nearest_first(blockers: &[Blocker], polygon: &[DVec3]) -> Vec<Blocker> {
     let middle = polygon.iter().sum::<DVec3>() / polygon.len() as f64;
     let square = |blocker: &Blocker| {
@@ -196,7 +199,7 @@ mod tests {
 
     #[test]
     fn means_are_within_two_standard_errors() {
-        // In mid air, and right on the square, where what points see jumps.
+        // In mid air, and right on the square, where the visible share jumps.
         let airborne = DVec3::new(0.1, 0.25, 0.5);
         for (low, size) in [(airborne, 0.6), (DVec3::new(0.3, 0.37, 1e-6), 0.4)] {
             let (pair, plates) = past(&[(low, size)]);

@@ -1,8 +1,8 @@
-//! Visual events: where on a polygon what it sees past others changes its manner.
+//! Visual events: the curves on a polygon where the visible share of another is not smooth.
 //!
-//! What a point sees of a target past blockers is smooth but where a corner of one meets an edge of
-//! another, seen from the point. In general only the second derivatives jump there. Two events are
-//! sharper, and worth cutting along:
+//! The visible part of a target past blockers is a smooth function of the point except where a
+//! corner of one meets an edge of another, seen from the point. In general only the second
+//! derivatives jump there. Two events are sharper, and worth cutting along:
 //!
 //! ```text
 //!   ── target edge       The plane through two parallel edges: a whole edge of a shadow crosses a
@@ -10,12 +10,12 @@
 //!     ── ╲ blocker edge  event plane.
 //!  ───────╳───── domain
 //!
-//!         │ blocker      A blocker that stands on the domain: what is seen jumps at its foot. The
+//!         │ blocker      A blocker that stands on the domain: visibility jumps at its foot. The
 //!  ───────┴───── domain  domain is cut along the blocker's own plane before anything else.
 //! ```
 //!
 //! (D. Lischinski, F. Tampieri, D. P. Greenberg, "Discontinuity Meshing for Accurate Radiosity",
-//! IEEE Computer Graphics and Applications 12(6), 1992, for the places and orders of
+//! IEEE Computer Graphics and Applications 12(6), 1992, for the positions and orders of
 //! discontinuities.)
 
 use glam::DVec3;
@@ -26,18 +26,18 @@ use crate::geometry::plane::Plane;
 use crate::geometry::polygon::{clip, fan};
 
 /// A blocker stands on a plane if two of its corners are lower than this share of its height over
-/// the plane. Chosen by hand; no measurement kept.
+/// the plane. Plain choice; no recorded measurement.
 const MAX_FOOT_HEIGHT: f64 = 1e-2;
 
-/// Blockers of a pair that are asked for event planes, and blockers that a domain is cut by before
-/// it is cut into cells, at most: limits time. Chosen by hand.
+/// Maximum number of blockers of a pair that yield event planes, and that cut a domain before it is
+/// cut into cells: limits time. Plain choice.
 const MAX_EVENT_BLOCKERS: usize = 12;
 
-/// Event planes kept of a pair at most: limits time. Chosen by hand.
+/// Maximum number of event planes of a pair: limits time. Plain choice.
 const MAX_EVENT_PLANES: usize = 64;
 
-/// An event plane that leaves at most this share of a cell's width on one side is not cut along.
-/// Chosen by hand.
+/// An event plane that leaves at most this share of a cell's width on one side is not used for a
+/// cut. Plain choice.
 const MIN_BALANCE: f64 = 1e-3;
 
 /// The planes through two parallel edges, one of a blocker, one of the target or of another
@@ -81,14 +81,14 @@ fn plane_through_parallel((a, along): DirectedEdge, (b, other): DirectedEdge) ->
     Some(Plane::through(a, normal))
 }
 
-/// Whether both are one plane, whichever way their normals point.
+/// Whether both are the same plane, with either orientation.
 fn is_same_plane(a: &Plane, b: &Plane) -> bool {
     let sign = a.normal.dot(b.normal).signum();
     (a.normal * sign - b.normal).length_squared() <= SAME_DIRECTION_SQUARED
         && (a.offset * sign - b.offset).abs() <= SAME_POSITION
 }
 
-/// Both sides of a triangle cut by a plane, in triangles.
+/// Both sides of a triangle cut by a plane, as triangles.
 pub(super) fn split_triangle(corners: &[DVec3; 3], plane: &Plane) -> Vec<[DVec3; 3]> {
     let origin = plane.nearest_to_origin();
     let sides = [1.0, -1.0].map(|sign| clip(corners, origin, sign * plane.normal));

@@ -1,9 +1,9 @@
-//! Which nodes of a binary tree become the children of wide ones.
+//! Collapse of a binary tree: selects the nodes that become the children of wide ones.
 //!
 //! ```text
-//!        ●                        ●            A ray pays for each wide node that it meets, in
-//!      ╱   ╲                  ╱ ╱ │ ╲          proportion to its area. With C(n, i) for what the
-//!     ●     ●       ──►     a  b  c  ●         tree below n costs as i roots at most:
+//!        ●                        ●            The expected cost of a wide node for a ray is
+//!      ╱   ╲                  ╱ ╱ │ ╲          in proportion to its area. With C(n, i) for the
+//!     ●     ●       ──►     a  b  c  ●         cost of the tree below n with at most i roots:
 //!    ╱ ╲   ╱ ╲                      ╱ ╲
 //!   a   b c   ●                    d   e       C(n, i) = least of C(left, k) + C(right, i − k),
 //!            ╱ ╲                                         C(n, i − 1)
@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Ylitie, Karras, Laine 2017, "Efficient incoherent ray traversal on GPUs through compressed wide
-//! BVHs", section 3.1. Leaves are as they are, and cost the same anyway.
+//! BVHs", section 3.1. Leaves are kept, so that their cost is constant.
 
 use arrayvec::ArrayVec;
 
@@ -20,23 +20,23 @@ use super::sah_tree::SahTree;
 /// Boxes in a wide node.
 pub(super) const WIDTH: usize = 8;
 
-/// How the tree is cut below each of its nodes.
+/// The optimal collapse below each node of a tree.
 pub(super) struct Collapse {
     cuts: Vec<Cut>,
 }
 
-/// The subtree of one node, by the number of roots less one.
+/// The collapse of one node's subtree, by the number of roots less one.
 #[derive(Clone, Copy)]
 struct Cut {
     cost: [f32; WIDTH],
-    /// Roots that the left child's part has, at most; 0 where the node itself is the root.
+    /// Maximum number of roots in the left child's part; 0 where the node itself is the root.
     left: [usize; WIDTH],
 }
 
 impl Collapse {
     pub fn new(tree: &SahTree) -> Collapse {
         let mut cuts = vec![Cut { cost: [0.0; WIDTH], left: [0; WIDTH] }; tree.nodes.len()];
-        // Children come behind their parents.
+        // Children come after their parents.
         for (number, node) in tree.nodes.iter().enumerate().rev() {
             if let Some(first) = node.children {
                 cuts[number] = Cut::of(node.bounds.half_area(), &cuts[first], &cuts[first + 1]);
@@ -45,7 +45,7 @@ impl Collapse {
         Collapse { cuts }
     }
 
-    /// The children of a wide node in the place of `root`; of a leaf the leaf alone.
+    /// The children of a wide node that replaces `root`; for a leaf the leaf alone.
     pub fn children(&self, tree: &SahTree, root: usize) -> ArrayVec<usize, WIDTH> {
         let mut children = ArrayVec::new();
         let mut open = vec![(root, WIDTH)];
@@ -63,7 +63,8 @@ impl Collapse {
 
 impl Cut {
     fn of(area: f32, left: &Cut, right: &Cut) -> Cut {
-        // Parted into `roots`, at least 2: cost and roots of the left.
+        // Minimum cost of a split into `roots`, at least 2, and the number of roots of the left
+        // part.
         let parted = |roots: usize| {
             let cost = |k: usize| (left.cost[k - 1] + right.cost[roots - k - 1], k);
             (1..roots).map(cost).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 1))

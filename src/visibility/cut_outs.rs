@@ -1,21 +1,21 @@
-//! The holes of triangles that rays are cast at: what meets one meets nothing.
+//! The holes of triangles that rays are cast at: a ray through a hole has no hit.
 
 use glam::DVec2;
 
 use crate::scene::Scene;
 use crate::scene::texture::TextureMap;
 
-/// Where triangles have holes.
+/// Holes of triangles.
 #[derive(Debug)]
 pub(crate) struct CutOuts {
-    /// Of each material of the scene.
+    /// One per material of the scene.
     masks: Vec<Option<TextureMap>>,
-    /// Of each triangle its material, and the texture coordinates of its corners.
+    /// Per triangle, its material and the texture coordinates of its corners.
     places: Vec<(u32, [DVec2; 3])>,
 }
 
 impl CutOuts {
-    /// Those of some `triangles` of `scene`, in their order. None in a scene without.
+    /// The holes of some `triangles` of `scene`, in their order; `None` in a scene without.
     pub fn new(scene: &Scene, triangles: impl Iterator<Item = usize>) -> Option<CutOuts> {
         if !scene.has_cut_outs() {
             return None;
@@ -33,8 +33,8 @@ impl CutOuts {
         Some(CutOuts { masks, places })
     }
 
-    /// Whether the triangle of this number is there, where its second and third corner have these
-    /// weights.
+    /// Whether triangle number `triangle` is solid at the point where its second and third corner
+    /// have these weights.
     #[inline]
     pub fn is_solid(&self, triangle: usize, [u, v]: [f64; 2]) -> bool {
         let (material, [a, b, c]) = self.places[triangle];

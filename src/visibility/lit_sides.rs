@@ -1,22 +1,21 @@
-//! Which sides of triangles light can reach: they are the ones that reflect.
+//! Determines the sides of triangles that light can reach: these sides reflect.
 //!
-//! Each side asks by itself, with a few walks from places on it. A walk goes on diffusely from
-//! whatever it meets, whichever side that is, and ends where there is light: at a lamp that it sees
-//! or meets, or in the sky.
+//! Each side is tested by a few random walks from points on it. A walk scatters diffusely at every
+//! hit, on either side, and ends at light: at a lamp that it sees or hits, or in the sky.
 //!
 //! ```text
-//!        lamp                    The walk from the upper side of t bounces about the room and
+//!        lamp                    The walk from the upper side of t scatters in the room and
 //!   ┌─────▀▀─────┐               sees the lamp. That from its lower side stays within the body:
-//!   │   ↗ ↖      │               no walk from there ever does. The wall's outer side sees nothing
-//!   │  ╱   ╲     │               but the night.
+//!   │   ↗ ↖      │               no walk from there leaves it. The wall's outer side sees the
+//!   │  ╱   ╲     │               dark sky only.
 //!   │ ╱ ┌──t──┐  │
-//!   │   │ ↓↗↘ │  │  → nothing    A ray that slips through a seam is an exception. A side is lit
-//!   └───┴─────┴──┘               if the walks from its sheet say so, and its own do not object.
+//!   │   │ ↓↗↘ │  │  → nothing    Single rays pass through seams: a side is lit if the walks from
+//!   └───┴─────┴──┘               its sheet reach light, and its own do not contradict.
 //! ```
 //!
-//! A **sheet** is one side of triangles that continue one another at sides that no third shares,
-//! however each of them is wound. Places count, not triangles: a body that stands through another
-//! is lit where it is outside, and what is inside of either is dark.
+//! A **sheet** is a set of connected sides of triangles, across edges shared by exactly two
+//! triangles, however each is wound. The result depends on the position, not on the triangle: of
+//! bodies that intersect, the outside is lit and the inside is dark.
 
 mod closed_rooms;
 mod repeated;
@@ -36,42 +35,42 @@ use repeated::repeated_triangles;
 use sheets::{Answers, Sheets, SideIndex};
 use walks::Walks;
 
-/// A sheet is dark if fewer of the walks from it than this reach any light. What gets into the gap
-/// between the Cornell box's lamp and its ceiling is 3 to 5 %, and seams let through next to none;
-/// of the second of two rooms, which has no lamp, it is 25 to 40 %.
+/// A sheet is dark if a smaller share of the walks from it reaches light. The share is 3 to 5 % in
+/// the gap between the Cornell box's lamp and its ceiling, and almost 0 through seams; in the
+/// second of two rooms, which has no lamp, it is 25 to 40 %.
 const LIT_SHARE: f64 = 0.1;
 
-/// A side from which no walk reaches light is dark if that is less likely than this, by the share
-/// of the walks from its sheet that do.
+/// A side from which no walk reaches light is dark if the probability of that, given the share of
+/// the walks from its sheet that do, is below this.
 const OBJECTION: f64 = 0.05;
 
-/// A triangle that no walk reaches light from faces as its sheet does if more walks from there do,
-/// by this factor, than from the other. Chosen by hand: a part of a screen that is inside of a body
-/// need not be turned.
+/// A triangle from which no walk reaches light is flipped if the share of walks from the sheet of
+/// its back that do exceeds that of its front by this factor. Plain choice: a part of a screen that
+/// is inside of a body need not be flipped.
 const FAR_MORE: f64 = 2.0;
 
-/// A second side is not made for light below this share of the mean: an error of all of it there
-/// is one of 0.2 % in the measure, which takes nothing for darker than a twentieth of the mean.
+/// A second side is not made for light below this share of the mean: an error of that whole amount
+/// is 0.2 % in the error measure, which counts nothing as darker than a twentieth of the mean.
 const MIN_IRRADIANCE: f64 = 1e-4;
 
-/// Places on a back at which the fronts that it lies behind are looked for, and the share of its
-/// area that may stay open between them. Chosen by hand.
+/// Number of points on a back at which covering fronts are searched, and the share of its area that
+/// may stay uncovered. Plain choice.
 const COVERED_PLACES: u32 = 64;
 const OPEN_SHARE: f64 = 1e-6;
 
 impl Scene {
-    /// The same scene with [`Sides`] carried out: triangles of [`Sides::Auto`] turned so that light
-    /// reaches their fronts, and a second triangle, with the corners the other way round, wherever
-    /// both sides reflect, or let light through. All materials have one side then. Triangles come
-    /// in their order, second ones after all others; lamps that reflect on both sides add a
-    /// material that does not emit.
+    /// The same scene with [`Sides`] applied: triangles of [`Sides::Auto`] are flipped so that
+    /// light reaches their fronts, and a second triangle with reversed corners is added wherever
+    /// both sides reflect or transmit light. All materials then have one side. Triangles keep their
+    /// order, second ones after all others; lamps that reflect on both sides add a material that
+    /// does not emit.
     ///
-    /// Which sides light reaches is found by walks from places on each, the same for the same
-    /// scene: at least four a side, of up to 16 bounces. A triangle that none reaches stays as it
-    /// is wound, and so do the walls of a closed room around all of the scene; a surface that
-    /// reflects nothing has one side. Of triangles with the same corners, material and group,
-    /// whichever way round, the first is kept; of lamps one for each side, unless light from one
-    /// gets much further. Warnings say how many were dropped, turned and doubled.
+    /// Lit sides are determined by random walks from points on each side, the same for the same
+    /// scene: at least four per side, of up to 16 bounces. A triangle that light does not reach
+    /// keeps its winding, and so do the walls of a closed room around all of the scene; a surface
+    /// that reflects nothing has one side. Of triangles with the same corners, material and group,
+    /// in either winding, the first is kept; of lamps one for each side, unless light from one
+    /// reaches much further. Warnings give the numbers of dropped, flipped and doubled triangles.
     #[must_use]
     pub fn resolve_sides(&self) -> Scene {
         if is_resolved(self) {
@@ -107,7 +106,7 @@ impl Scene {
     }
 }
 
-/// [`Scene::resolve_sides`], where there is anything to do.
+/// [`Scene::resolve_sides`], where necessary.
 pub(crate) fn resolved(scene: Arc<Scene>) -> Arc<Scene> {
     if is_resolved(&scene) { scene } else { Arc::new(scene.resolve_sides()) }
 }
@@ -119,7 +118,7 @@ fn is_resolved(scene: &Scene) -> bool {
         && !(0..scene.triangles().len()).any(is_missing)
 }
 
-/// What becomes of each triangle of `scene`, whose materials have these `sides`.
+/// The treatment of each triangle of `scene`, whose materials have these `sides`.
 fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     let count = scene.triangles().len();
     let sheets = Sheets::new(scene);
@@ -134,14 +133,14 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     let treatment = |t: usize| {
         let is_glass = scene.material(t).specular.is_some_and(|specular| specular.is_glass());
         if is_glass && !scene.material(t).scatters() {
-            // Both of its sides count anyway, and it encloses a body as it is.
+            // Both of its sides are used anyway, and it encloses a body as it is.
             return Treatment::default();
         }
         let is_translucent = scene.material(t).is_translucent();
         let [is_front_lit, is_back_lit] = [2 * t, 2 * t + 1].map(|side| lit.is_lit[side]);
         let turned = match (walks.sides_of(t), walks.shines_from_back(t)) {
             (Sides::Auto, Some(shines_from_back)) => shines_from_back,
-            // What is translucent has both sides, and no triangle of it need face another way.
+            // A translucent triangle has both sides and is never flipped.
             (Sides::Auto, None) if is_translucent => false,
             (Sides::Auto, None) => walks.has_light() && lit.is_rather_back(t) && !is_room[t],
             _ => false,
@@ -166,17 +165,17 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     (0..count).map(treatment).collect()
 }
 
-/// Which sides light reaches.
+/// The sides that light reaches.
 struct LitSides<'a> {
     is_lit: Vec<bool>,
     light: &'a Answers<'a>,
-    /// Irradiance that is worth a second side, W/m² summed over the channels.
+    /// Minimum irradiance for a second side, W/m² summed over the channels.
     least: f64,
 }
 
 impl<'a> LitSides<'a> {
-    /// By the `light` that walks from `asked` sides found, both of each triangle; none of the
-    /// others is lit.
+    /// From the results `light` of walks from the `asked` sides, both of each triangle; all others
+    /// are dark.
     fn new(scene: &Scene, light: &'a Answers, asked: &[SideIndex]) -> LitSides<'a> {
         let mut is_lit = vec![false; 2 * scene.triangles().len()];
         let (mut flux, mut lit_area) = (0.0, 0.0);
@@ -185,7 +184,8 @@ impl<'a> LitSides<'a> {
                 let (own, share) = (light.of(side), light.of_sheet(side).share());
                 own.hits == 0.0 && (1.0 - share).powf(own.places) < OBJECTION
             };
-            // Where neither has light, one that might have had it by chance is dark with the other.
+            // Where no walk from either side reaches light and that is improbable for one if lit,
+            // both are dark.
             let neither = sides.iter().all(|&side| light.of(side).hits == 0.0);
             let is_dark = neither && sides.iter().any(objects);
             for side in sides.iter().filter(|&side| !is_dark && !objects(side)) {
@@ -216,8 +216,8 @@ impl<'a> LitSides<'a> {
     }
 }
 
-/// Whether all of the back of triangle `t` lies in one place with fronts of others, and light
-/// reaches that place: whoever looks there may meet the back instead of them.
+/// Whether all of the back of triangle `t` coincides with fronts of others that light reaches: rays
+/// there may hit the back instead of these.
 fn is_in_the_way(scene: &Scene, walks: &Walks, t: usize) -> bool {
     let (back, mut rng) = (2 * t + 1, Rng::with_seed(split_mix64(t as u64)));
     let (corners, normal) = (scene.corners(t), scene.normal(t));

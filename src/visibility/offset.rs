@@ -1,8 +1,8 @@
-//! Offsets that keep rays and views from meeting the surface that they start from.
+//! Offsets that keep rays and views from hitting the surface that they start from.
 //!
 //! A computed point lies off its surface by rounding, and neighbours of one plane lie off each
-//! other's planes. A ray therefore skips its first stretch, or its origin is lifted off the
-//! surface. Too small, and surfaces shade themselves; too large, and contact is lost.
+//! other's planes. A ray therefore skips a short distance at its start, or its origin is lifted off
+//! the surface. If too small, surfaces shade themselves; if too large, contact is missed.
 //!
 //! | constant | value | in units of | used by |
 //! |---|---|---|---|
@@ -16,25 +16,25 @@
 //! | [`PATH_CONTACT`] | 1e-9 | the scene's diagonal | paths from points on triangles |
 //! | [`PATH_CONTACT_ULPS`] | 64 | steps of coordinates | paths far from the origin |
 //!
-//! Why they differ: rays in 64 bits need only be above rounding, 1e-6 of a patch in scenes up to
-//! 1e9 patch sizes from the origin; at the end of a segment only the target itself must not count.
-//! Hemicubes have 32-bit coordinates, and skip the patch's own triangle anyway. Gather points skip
-//! no triangle, and their lift must exceed what a device confuses: a quarter of 1024 steps is four
-//! times the 2⁻⁴⁸ of its split floats.
+//! Reasons for the differences: rays in 64 bits need only be above rounding, 1e-6 of a patch in
+//! scenes up to 1e9 patch sizes from the origin; at the end of a segment only the target itself is
+//! excluded. Hemicubes have 32-bit coordinates, and skip the patch's own triangle anyway. Gather
+//! points skip no triangle, and their lift must exceed the resolution of a device: a quarter of
+//! 1024 steps is four times the 2⁻⁴⁸ of its split floats.
 //!
-//! Paths ignore the triangle that they start from, so that only rounding and what lies in its plane
-//! is left: plates 1e-5 of a scene apart stay two plates.
+//! Paths ignore the triangle that they start from, so that only rounding and coplanar surfaces
+//! matter: plates 1e-5 of a scene apart stay separate.
 //!
-//! The shares were chosen by hand within these bounds; no measurement was kept.
+//! The shares are plain choices within these bounds; no recorded measurement.
 
-/// Rays from a point on a surface start this far off, in units of the square root of the area of
-/// its patch or triangle.
+/// Start distance of rays from a point on a surface, in units of the square root of the area of its
+/// patch or triangle.
 pub(crate) const RAY_START: f64 = 1e-6;
 
-/// Tests of occlusion between two points leave out this share of the way at the start.
+/// Share of the segment that tests of occlusion between two points skip at the start.
 pub(crate) const SEGMENT_START: f64 = 1e-6;
 
-/// Tests of occlusion between two points leave out this share of the way at the end.
+/// Share of the segment that tests of occlusion between two points skip at the end.
 pub(crate) const SEGMENT_END: f64 = 1e-9;
 
 /// Near plane of a hemicube, in units of the square root of its patch's area.
@@ -44,14 +44,15 @@ pub(crate) const NEAR_PLANE: f64 = 1e-4;
 /// smallest element there.
 pub(crate) const SURFACE_LIFT: f64 = 1e-4;
 
-/// Least height of a gather point, in steps between 64-bit coordinates of the scene.
+/// Minimum height of a gather point, in steps between 64-bit coordinates of the scene.
 pub(crate) const MIN_LIFT_ULPS: f64 = 1024.0;
 
-/// A gather point sees nothing nearer than this share of its height.
+/// Minimum distance of hits from a gather point, as a share of its height.
 pub(crate) const NEAR_OF_LIFT: f64 = 0.25;
 
-/// What a path meets within this share of the scene's diagonal is in contact with where it starts.
+/// Maximum distance, as a share of the scene's diagonal, at which surfaces are in contact with the
+/// start of a path.
 pub(crate) const PATH_CONTACT: f64 = 1e-9;
 
-/// And what it meets within this many steps between 64-bit coordinates of the scene.
+/// The same, in steps between 64-bit coordinates of the scene.
 pub(crate) const PATH_CONTACT_ULPS: f64 = 64.0;

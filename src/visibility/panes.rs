@@ -1,7 +1,7 @@
-//! What passes the panes of a scene along a segment that ends where light meets a surface.
+//! Transmittance of the panes of a scene along a segment that ends where light hits a surface.
 //!
-//! Panes have a hierarchy of boxes of their own, which is asked once the end is known: nothing that
-//! looks for surfaces meets a pane, and a scene without panes has no such hierarchy.
+//! Panes have a separate bounding volume hierarchy, which is traversed once the end is known: rays
+//! to surfaces do not hit panes, and a scene without panes has no such hierarchy.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
@@ -16,22 +16,22 @@ use crate::scene::{Rgb, Scene};
 /// The panes of a scene, for rays.
 #[derive(Debug)]
 pub(crate) struct Panes {
-    /// None in a scene without.
+    /// `None` in a scene without panes.
     rays: Option<RayScene>,
-    /// Share per channel that passes each of its triangles.
+    /// Transmittance per channel of each of its triangles.
     transmittance: Vec<Rgb>,
 }
 
-/// Barycentric weights below this are on the side between two triangles, both of which rays meet
-/// there: above the tolerance of the hits, [`super::triangle_plane::BARYCENTRIC_TOLERANCE`].
+/// A hit with a barycentric weight below this is on the edge between two triangles, which both
+/// report it: above the tolerance of the hits, [`super::triangle_plane::BARYCENTRIC_TOLERANCE`].
 const SEAM: f64 = 1e-11;
 
-/// Of what is met on such sides, this share of the distance apart, is one place: rounding of the
+/// Hits on such edges whose distances differ by at most this share are the same: rounding of the
 /// distances is some 1e-15.
 const SAME_PLACE: f64 = 1e-9;
 
 impl Panes {
-    /// Those of `scene`.
+    /// The panes of `scene`.
     pub fn of_scene(scene: &Scene) -> Panes {
         let Some(panes) = scene.clear_panes() else {
             return Panes { rays: None, transmittance: vec![] };
@@ -44,20 +44,19 @@ impl Panes {
         Panes { rays: Some(rays), transmittance }
     }
 
-    /// Whether there are none.
+    /// Whether the scene has no panes.
     pub fn is_none(&self) -> bool {
         self.rays.is_none()
     }
 
-    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and what
-    /// passes each: a share per channel.
+    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and the
+    /// transmittance of each, per channel.
     pub fn hierarchy(&self) -> Option<(&RayScene, &[Rgb])> {
         Some((self.rays.as_ref()?, &self.transmittance))
     }
 
-    /// The share per channel of light along `direction` (any length) from `from` that passes all
-    /// panes within `reach` in units of it; all where there are none. A pane right at its end does
-    /// not count.
+    /// Transmittance per channel of all panes along `direction` (any length) from `from` within
+    /// `reach` in units of it; 1 without panes. A pane right at the end does not count.
     #[inline]
     pub fn transmittance(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
         match &self.rays {
@@ -99,7 +98,7 @@ mod tests {
 
     #[test]
     fn sides_between_two_triangles_count_once() {
-        // A square of glass, above another that lies askew to it; the floor is out of the way.
+        // A square of glass, above another at a different angle; the floor is out of the way.
         let transmittance = Rgb::new(0.5, 0.25, 0.75);
         let specular = Some(Specular::Glass { refractive_index: 1.5, transmittance });
         let glass = Material { specular, ..Material::grey("glass", 0.0) };

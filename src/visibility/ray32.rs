@@ -1,14 +1,14 @@
-//! Rays in the hierarchy's own unit and in 32 bits, and how they meet boxes.
+//! Rays in the hierarchy's own unit and in 32 bits, and their intersection with boxes.
 //!
 //! ```text
-//!            near  far                      A box is met between the last near
-//!              │    │                       side that is passed and the first
-//!  far  ───────┼────●──         ╱           far one, if they come in that order
+//!            near  far                      A ray is in a box from the last near
+//!              │    │                       plane that it crosses to the first
+//!  far  ───────┼────●──         ╱           far one, if these are in that order
 //!              │  ╱ │                       (Kay, Kajiya 1986).
 //!  near ───────●────┼──
 //! ```
 //!
-//! Boxes grow by a margin above 32-bit rounding, and reaches are rounded outwards.
+//! Boxes are enlarged by a margin above 32-bit rounding, and reaches are rounded outwards.
 
 use std::ops::Range;
 
@@ -21,15 +21,15 @@ use super::sah_tree::Aabb32;
 /// Longest side of the scene in the hierarchy's own unit.
 pub(super) const SCENE_SIZE: f32 = 1e5;
 
-/// Boxes grow by this much on every side, in the hierarchy's unit: 1e-6 of the scene, several
-/// roundings of a 32-bit coordinate (6e-8 each).
+/// Margin of boxes on every side, in the hierarchy's unit: 1e-6 of the scene, several roundings of
+/// a 32-bit coordinate (6e-8 each).
 const BOX_MARGIN: f32 = 1e-6 * SCENE_SIZE;
 
-/// Components of directions count as no smaller than this, so that none has an infinite inverse.
-/// Across the scene that is off by less than any rounding.
+/// Minimum magnitude of components of directions, so that none has an infinite inverse. Across the
+/// scene the error is below any rounding.
 const MIN_COMPONENT: f32 = 1e-20;
 
-/// From the scene's unit to the hierarchy's.
+/// Conversion from the scene's unit to the hierarchy's.
 #[derive(Debug)]
 pub(super) struct LocalUnit {
     /// Middle of the scene.
@@ -37,7 +37,7 @@ pub(super) struct LocalUnit {
     scale: f64,
 }
 
-/// Eight boxes side by side: planes of their low and high sides along x, y and z, four a vector.
+/// Eight boxes: planes of their low and high sides along x, y and z, four per vector.
 pub(super) type BoxPlanes = [[[Vec4; 2]; 3]; 2];
 
 /// A ray in the hierarchy's unit. Distances are in units of its direction.
@@ -47,7 +47,7 @@ pub(super) struct Ray32 {
     /// Its largest component is 1 or -1.
     pub direction: Vec3A,
     inverse: Vec3A,
-    /// Of each axis the side of a box that is passed first: 0 where it is the low one.
+    /// Per axis the side of a box that the ray crosses first: 0 for the low one.
     near_sides: [usize; 3],
     pub start: f32,
     pub end: f32,
@@ -64,19 +64,19 @@ impl LocalUnit {
         (point - self.origin) * self.scale
     }
 
-    /// A position in the hierarchy's unit, in that of the scene.
+    /// Converts a position from the hierarchy's unit to that of the scene.
     pub fn in_scene_unit(&self, position: DVec3) -> DVec3 {
         position / self.scale + self.origin
     }
 
-    /// Around a triangle, with the margin.
+    /// Bounds of a triangle, with the margin.
     pub fn bounds(&self, corners: [DVec3; 3]) -> Aabb32 {
         let [a, b, c] = corners.map(|corner| self.place(corner).as_vec3a());
         Aabb32 { low: a.min(b).min(c) - BOX_MARGIN, high: a.max(b).max(c) + BOX_MARGIN }
     }
 
-    /// The ray along `direction` (any length) from `from` within `reach` in units of it, and how
-    /// many units of the ray's own one such unit is.
+    /// The ray along `direction` (any length) from `from` within `reach` in units of it, and the
+    /// length of that unit in units of the ray's own.
     #[inline]
     pub fn ray(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> (Ray32, f64) {
         let length = direction.abs().max_element();
@@ -90,7 +90,7 @@ impl LocalUnit {
             direction: unit,
             inverse: unit.recip(),
             near_sides: [signs & 1, signs >> 1 & 1, signs >> 2],
-            // The margin of boxes covers what begins at 0.
+            // The margin of boxes covers a start at 0.
             start: if reach.start < 0.0 { start } else { start.max(0.0) },
             end: rounded_up(reach.end * length),
         };
@@ -98,7 +98,7 @@ impl LocalUnit {
     }
 }
 
-/// A distance in 32 bits that nothing nearer than `distance` is beyond; finite.
+/// A finite distance in 32 bits, not below `distance`.
 #[inline]
 pub(super) fn rounded_up(distance: f64) -> f32 {
     let rounded = distance as f32;
@@ -111,8 +111,9 @@ pub(super) fn splat(v: Vec3A) -> [Vec4; 3] {
 }
 
 impl Ray32 {
-    /// Which of eight boxes are met between start and end, a bit each, and the distances at which
-    /// they are entered. `plane` tells those of [`BoxPlanes`] as seen from the ray's origin.
+    /// Mask of the boxes, of eight, that the ray hits between start and end, one bit each, and the
+    /// distances of entry. `plane` returns the planes of [`BoxPlanes`] relative to the ray's
+    /// origin.
     #[inline(always)]
     pub fn meets(&self, plane: impl Fn(usize, usize, usize) -> Vec4) -> (u32, [[f32; 4]; 2]) {
         let inverse = splat(self.inverse);

@@ -6,10 +6,9 @@
 //!          by a margin            within a margin
 //! ```
 //!
-//! Backs that fronts in the same place cover ([`Scene::is_back_covered`]) are not met. Nor are
-//! clear panes ([`Scene::is_clear`]): [`Panes`](super::panes::Panes) tell what they let through;
-//! nor holes, [`CutOuts`], which are looked up where a triangle is hit. Whether there are any is
-//! asked once a ray.
+//! Rays do not hit backs covered by coinciding fronts ([`Scene::is_back_covered`]), clear panes
+//! ([`Scene::is_clear`]; for their transmittance see [`Panes`](super::panes::Panes)), or holes
+//! ([`CutOuts`], looked up at hits). Whether there are holes is tested once per ray.
 //!
 //! The hierarchy only prunes: its margins are above 32-bit rounding, so that no hit is lost between
 //! it and the exact test. Of hits at equal distances the lowest triangle index wins, whatever the
@@ -34,8 +33,8 @@ use super::wide_bvh::{Child, WideBvh};
 
 pub(crate) use super::triangle_plane::Hit;
 
-/// Triangles that rays can be cast at. The hierarchy is in 32 bits and conservative; the
-/// intersections are in 64.
+/// Triangles for ray casting. The hierarchy is in 32 bits and conservative; the intersections are
+/// in 64.
 #[derive(Debug)]
 pub(crate) struct RayScene {
     bvh: WideBvh,
@@ -43,19 +42,19 @@ pub(crate) struct RayScene {
     /// In the order of the hierarchy.
     triangles: Vec<TrianglePlane>,
     unit: LocalUnit,
-    /// None where nothing has holes.
+    /// `None` if no triangle has holes.
     cut_outs: Option<CutOuts>,
 }
 
 impl RayScene {
-    /// For triangles by their corners.
+    /// The scene of triangles given by their corners.
     pub fn new(corners: impl Iterator<Item = [DVec3; 3]>) -> RayScene {
         let corners: Vec<[DVec3; 3]> = corners.collect();
         let all = (0..corners.len() as u32).collect();
         RayScene::of_some(corners, all)
     }
 
-    /// For those of the triangles whose numbers are `met`; nothing meets the others.
+    /// The scene of the triangles whose indices are in `met`; rays do not hit the others.
     fn of_some(corners: Vec<[DVec3; 3]>, met: Vec<u32>) -> RayScene {
         let unit = LocalUnit::new(&Aabb::from_points(corners.iter().flatten().copied()));
         let corners = |k: u32| corners[met[k as usize] as usize];
@@ -67,7 +66,7 @@ impl RayScene {
         RayScene { bvh, tree, triangles, unit, cut_outs: None }
     }
 
-    /// The same, where nothing meets the backs of triangles that are `covered`.
+    /// The same scene, in which rays do not hit the backs of `covered` triangles.
     pub fn with_covered_backs(mut self, covered: impl Fn(usize) -> bool) -> RayScene {
         for plane in &mut self.triangles {
             plane.back_is_covered = covered(plane.triangle as usize);
@@ -75,17 +74,17 @@ impl RayScene {
         self
     }
 
-    /// The same, where rays go through these holes.
+    /// The same scene with these holes.
     pub fn with_cut_outs(self, cut_outs: Option<CutOuts>) -> RayScene {
         RayScene { cut_outs, ..self }
     }
 
-    /// For the triangles of `scene` that block light, by their numbers: made once for a scene.
+    /// The triangles of `scene` that block light, by their indices: built once per scene.
     pub fn of_scene(scene: &Scene) -> Arc<RayScene> {
         scene.derived(RayScene::made_of)
     }
 
-    /// The same with the triangles that light goes through as if nothing were there: they are seen.
+    /// The same with clear triangles, which do not affect light but are visible.
     pub fn with_clear(scene: &Scene) -> Arc<RayScene> {
         let has_clear = (0..scene.triangles().len()).any(|t| scene.is_clear(t));
         match has_clear {
@@ -106,24 +105,24 @@ impl RayScene {
             .with_cut_outs(CutOuts::new(scene, 0..count))
     }
 
-    /// The binary tree that the hierarchy was made of, in its own unit: see
+    /// The binary tree that the hierarchy was built from, in its own unit: see
     /// [`RayScene::in_scene_unit`].
     pub fn tree(&self) -> &SahTree {
         &self.tree
     }
 
-    /// A position in the hierarchy's unit, in that of the scene.
+    /// Converts a position from the hierarchy's unit to that of the scene.
     pub fn in_scene_unit(&self, position: Vec3A) -> DVec3 {
         self.unit.in_scene_unit(position.as_dvec3())
     }
 
-    /// The triangles by their numbers, in the order of the tree.
+    /// The indices of the triangles, in the order of the tree.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
         self.triangles.iter().map(|plane| plane.triangle as usize)
     }
 
-    /// The nearest triangle along `direction` (any length) from `from`, further than `start` and
-    /// not triangle `ignored`. Distances are in units of `direction`.
+    /// The nearest hit along `direction` (any length) from `from`, further than `start` and not on
+    /// triangle `ignored`. Distances are in units of `direction`.
     pub fn closest_hit(
         &self,
         from: DVec3,
@@ -134,7 +133,7 @@ impl RayScene {
         self.closest_hit_of(from, direction, start, ignored, |_| true)
     }
 
-    /// The same of those hits that `counts`.
+    /// The same among hits for which `counts` is true.
     pub fn closest_hit_of(
         &self,
         from: DVec3,
@@ -171,8 +170,8 @@ impl RayScene {
         best
     }
 
-    /// The same for many `directions` from one place, which takes less time: `met` is told each
-    /// direction and what it meets, in their order.
+    /// The same for many `directions` from one point, which is faster: calls `met` with each
+    /// direction and its hit, in their order.
     pub fn closest_hits(
         &self,
         from: DVec3,
@@ -219,8 +218,8 @@ impl RayScene {
         best
     }
 
-    /// Whether any hit that `counts` lies along `direction` (any length) from `from`, within
-    /// `reach` in units of it.
+    /// Whether any hit for which `counts` is true lies along `direction` (any length) from `from`,
+    /// within `reach` in units of it.
     pub fn occluded(
         &self,
         from: DVec3,
@@ -246,14 +245,14 @@ impl RayScene {
         self.bvh.trace(Child::ROOT, &mut ray, |k| {
             let hit = self.triangles[k].intersect(from, direction, reach.clone());
             blocked |= hit.is_some_and(|h| counts(&h));
-            // Nothing is nearer than that: the rest is left out.
+            // Ends the traversal.
             blocked.then_some(f32::NEG_INFINITY)
         });
         blocked
     }
 }
 
-/// Of the hits that `counts`, those that are in none of the `holes`.
+/// The hits for which `counts` is true and that are not in `holes`.
 fn solid_hits(holes: &CutOuts, counts: impl Fn(&Hit) -> bool) -> impl Fn(&Hit) -> bool {
     move |hit| holes.is_solid(hit.triangle, [hit.u, hit.v]) && counts(hit)
 }
@@ -295,8 +294,8 @@ mod tests {
         }
     }
 
-    /// Triangles that are hard on a hierarchy: edges 1e-6 to 1 of the scene, slivers, a grid with
-    /// shared sides, one in the other down to 1e-30, all in the same place.
+    /// Difficult triangles for a hierarchy: edges 1e-6 to 1 of the scene, slivers, a grid with
+    /// shared sides, nested ones down to 1e-30, coinciding ones.
     fn hard_triangles() -> Vec<[DVec3; 3]> {
         let mut random = fastrand::Rng::with_seed(1);
         let mut place = || DVec3::from_array([(); 3].map(|_| random.f64()));
@@ -328,7 +327,7 @@ mod tests {
             let mut met = 0;
             for k in 0..200 {
                 let mut on_triangle = |k: usize| {
-                    // Corners, places on sides, and anywhere.
+                    // Corners, points on sides, and points anywhere.
                     let [a, b, c] = hard[random.usize(..hard.len())];
                     let (u, v) = (random.f64(), random.f64());
                     [a, a.lerp(b, u), a + (b - a) * u + (c - a) * v * (1.0 - u)][k % 3]

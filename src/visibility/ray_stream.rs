@@ -1,7 +1,7 @@
 //! Many rays from one point, traced through the hierarchy together.
 //!
 //! ```text
-//! node ── its boxes as seen from the point: once for all
+//! node ── its boxes relative to the point, for all rays
 //!   │       ray 0 ─► boxes 1 4 ─┐       children, the nearest      rays
 //!   │       ray 1 ─► boxes 4    ├──►    4                          0 1 3
 //!   │       ray 3 ─► boxes 2 4 ─┘       2                          3
@@ -9,10 +9,10 @@
 //! next: the nearest child with its rays
 //! ```
 //!
-//! Each box is met by all rays that come as far, one after the other (Tsakok 2009, "Faster
-//! incoherent rays: Multi-BVH ray stream tracing"): no ray waits for its own last step, and what
-//! depends on the point alone is worked out once. What is nearer to the point comes first for all;
-//! a ray that is left alone goes on by itself.
+//! Each box is tested against all rays that reach it, one after the other (Tsakok 2009, "Faster
+//! incoherent rays: Multi-BVH ray stream tracing"): no ray waits for its own last step, and terms
+//! that depend on the origin alone are computed once. Nearer boxes come first for all rays; a
+//! single remaining ray is traced on its own.
 
 use arrayvec::ArrayVec;
 use glam::Vec4;
@@ -21,15 +21,16 @@ use super::collapse::WIDTH;
 use super::ray32::{BoxPlanes, Ray32, splat};
 use super::wide_bvh::{Child, ChildKind, WideBvh};
 
-/// Rays traced together at most. Their numbers are bytes; twice as many take as long each.
+/// Maximum number of rays traced together. Their indices are bytes; twice as many are no faster per
+/// ray.
 pub(super) const MAX_STREAM: usize = 64;
 
-/// Rays in lists: their numbers.
+/// Lists of indices of rays.
 type Rays = ArrayVec<u8, MAX_STREAM>;
 
 impl WideBvh {
-    /// As [`WideBvh::trace`] for each of `rays`, at most [`MAX_STREAM`] from one origin: `may_meet`
-    /// is told the number of the ray first.
+    /// As [`WideBvh::trace`] for each of `rays`, at most [`MAX_STREAM`] from one origin: the first
+    /// argument of `may_meet` is the index of the ray.
     #[inline(always)]
     pub fn trace_stream(
         &self,
@@ -37,7 +38,7 @@ impl WideBvh {
         mut may_meet: impl FnMut(usize, usize) -> Option<f32>,
     ) {
         let Some(&Ray32 { origin, .. }) = rays.first() else { return };
-        // Rays that reach each open child, one list behind the other: where the last ones begin.
+        // Rays that reach each open child, one list after the other, and where the last ones begin.
         let mut waiting: Vec<u8> = (0..rays.len() as u8).collect();
         let mut open = vec![(Child::ROOT, 0)];
         while let Some((child, begin)) = open.pop() {
@@ -65,7 +66,7 @@ impl WideBvh {
                     for &(_, k) in order.iter().rev() {
                         let begin = waiting.len();
                         open.push((node.children[k], begin));
-                        // Without a branch: which rays meet it is not to be foreseen.
+                        // Without a branch: hits are unpredictable.
                         waiting.resize(begin + active.len(), 0);
                         let mut end = begin;
                         for (&ray, met) in active.iter().zip(&met) {
@@ -96,7 +97,7 @@ impl WideBvh {
     }
 }
 
-/// The planes as seen from `origin`, and the squares of the distances to their boxes.
+/// The planes relative to `origin`, and the squared distances to their boxes.
 #[inline(always)]
 fn seen_from(planes: &BoxPlanes, origin: [Vec4; 3]) -> (BoxPlanes, [[f32; 4]; 2]) {
     let mut seen = *planes;

@@ -1,33 +1,35 @@
-//! A binary tree of boxes by the surface area heuristic, shallow whatever the boxes are.
+//! A binary tree of boxes by the surface area heuristic, with a depth limit for any input.
 //!
 //! ```text
-//! boxes ──► parted where rays are expected to meet the fewest ──► leaves of at most four
+//! boxes ──► splits with the least expected number of hits ──► leaves of at most four
 //!           at most 31 levels; halves where the heuristic
-//!           tells nothing apart or levels run out
+//!           does not discriminate or levels run out
 //! ```
 //!
-//! Merging neighbours from below takes quadratic time, and ends in a chain deeper than any stack,
-//! where thousands of boxes are the same or lie one in the other; so the tree is built from above.
+//! Bottom-up merging takes quadratic time, and yields a chain deeper than the stack where thousands
+//! of boxes coincide or are nested; so the tree is built top-down.
 
 use std::ops::Range;
 
 use glam::Vec3A;
 
-/// Levels below the root, at most: enough to halve any number of boxes that 32 bits count.
+/// Maximum number of levels below the root: enough to halve any number of boxes that fits in 32
+/// bits.
 pub(crate) const MAX_LEVELS: u32 = 31;
 
-/// Boxes in a leaf, at most.
+/// Maximum number of boxes in a leaf.
 pub(super) const MAX_LEAF_SIZE: usize = 4;
 
-/// What a ray pays for a step down, in tests of one triangle: few boxes stay together in a leaf
-/// where parting them saves less. Of 0, 1, 2, 3, 4, 8 and 100 the best in rooms of 32 to 128 000
-/// triangles, or within 3 % of it.
+/// Cost of a step down, in tests of one triangle: a few boxes stay together in a leaf where a split
+/// saves less. Of 0, 1, 2, 3, 4, 8 and 100 the best in rooms of 32 to 128 000 triangles, or within
+/// 3 % of it.
 const STEP_COST: f32 = 2.0;
 
-/// Bins along an axis, between which a split may lie. Chosen by hand; no measurement was kept.
+/// Number of bins along an axis, between which splits are tried. Plain choice; no recorded
+/// measurement.
 const SAH_BINS: usize = 32;
 
-/// Boxes that one thread parts at a time. Chosen by hand: results do not depend on it.
+/// Minimum number of boxes of a parallel task. Plain choice: results do not depend on it.
 const BOXES_A_TASK: usize = 4096;
 
 /// An axis-aligned box in 32 bits.
@@ -58,10 +60,10 @@ impl Aabb32 {
     }
 }
 
-/// A binary tree over boxes that are numbers.
+/// A binary tree over indices of boxes.
 #[derive(Debug)]
 pub(crate) struct SahTree {
-    /// All boxes, those of a node side by side.
+    /// All boxes; those of a node are contiguous.
     pub order: Vec<u32>,
     /// The root first; parents before their children. One empty leaf if there are no boxes.
     pub nodes: Vec<SahNode>,
@@ -69,19 +71,19 @@ pub(crate) struct SahTree {
 
 #[derive(Clone, Debug)]
 pub(crate) struct SahNode {
-    /// Around all boxes below.
+    /// Bounds of all boxes below.
     pub bounds: Aabb32,
-    /// Where the boxes below are in the order.
+    /// Range of the boxes below in the order.
     pub items: Range<usize>,
-    /// The first of two children side by side; none of a leaf.
+    /// The first of two adjacent children; `None` for a leaf.
     pub children: Option<usize>,
 }
 
 impl SahTree {
-    /// Parts `boxes` where rays are expected to meet the fewest of them (Wald 2007, "On fast
-    /// Construction of SAH-based Bounding Volume Hierarchies", sections 3.1 to 3.3), and into
-    /// halves where nothing tells them apart, or levels run out. That takes n log n time even if
-    /// all boxes are the same, or lie one in the other.
+    /// Splits `boxes` by the surface area heuristic (Wald 2007, "On fast Construction of SAH-based
+    /// Bounding Volume Hierarchies", sections 3.1 to 3.3), and into halves where it does not
+    /// discriminate, or levels run out. That takes n log n time even if all boxes coincide or are
+    /// nested.
     pub fn new(boxes: &[Aabb32]) -> SahTree {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
         let nodes = nodes_over(boxes, &mut order, MAX_LEVELS);
@@ -89,7 +91,7 @@ impl SahTree {
     }
 }
 
-/// The nodes over boxes in this `order`, which is changed; the root has `levels` below it at most.
+/// The nodes over boxes in this `order`, which is changed; at most `levels` below the root.
 fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32) -> Vec<SahNode> {
     let mut nodes = vec![SahNode::over(boxes, order, 0..order.len())];
     if order.len() > BOXES_A_TASK {
@@ -97,7 +99,7 @@ fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32) -> Vec<SahNode> 
         let (first, second) = order.split_at_mut(half);
         let below = |part| nodes_over(boxes, part, levels - 1);
         let (mut first, mut second) = rayon::join(|| below(first), || below(second));
-        // Both roots side by side, and then what is below each.
+        // Both roots are adjacent, followed by the nodes below each.
         first.iter_mut().for_each(|node| node.shift(0, 2));
         second.iter_mut().for_each(|node| node.shift(half, first.len() + 1));
         nodes[0].children = Some(1);
@@ -133,16 +135,16 @@ impl SahNode {
         SahNode { bounds, items, children: None }
     }
 
-    /// Puts so many items and nodes before those of its tree.
+    /// Shifts the ranges by this number of items and nodes that precede those of its tree.
     fn shift(&mut self, items: usize, nodes: usize) {
         self.items = self.items.start + items..self.items.end + items;
         self.children = self.children.map(|first| first + nodes);
     }
 }
 
-/// Reorders `part` of the boxes into two, neither of which needs more than `levels`; the first ends
-/// at the number returned. With it what a ray is expected to meet, see [`SahBin::cost`]: without
-/// bounds where nothing tells the boxes apart.
+/// Reorders `part` of the boxes into two parts, neither of which needs more than `levels`. Returns
+/// the end of the first and the expected cost, see [`SahBin::cost`]; the split is a halving if the
+/// heuristic does not discriminate.
 fn split(boxes: &[Aabb32], part: &mut [u32], levels: u32) -> (usize, f32) {
     let half = part.len() / 2;
     if let &mut [a, b] = part {
@@ -152,7 +154,7 @@ fn split(boxes: &[Aabb32], part: &mut [u32], levels: u32) -> (usize, f32) {
     let around = |all: Aabb32, &k: &u32| all.union(&Aabb32 { low: centre(k), high: centre(k) });
     let centres = part.iter().fold(Aabb32::EMPTY, around);
     let scale = SAH_BINS as f32 / centres.size();
-    // Where all centres are at one place of an axis, NaN makes that bin 0.
+    // If all centres coincide along an axis, NaN makes that bin 0.
     let bin = |k: u32| ((centre(k) - centres.low) * scale).to_array().map(|x| x as usize);
     let bin = |k: u32, axis: usize| bin(k)[axis].min(SAH_BINS - 1);
     match best_sah_split(boxes, part, bin, levels) {
@@ -175,8 +177,8 @@ fn split(boxes: &[Aabb32], part: &mut [u32], levels: u32) -> (usize, f32) {
     }
 }
 
-/// The axis, and the first bin of the second part, for which a ray is expected to meet the fewest
-/// boxes; and how many, see [`SahBin::cost`].
+/// The axis and the first bin of the second part with the minimum expected cost, and that cost, see
+/// [`SahBin::cost`].
 fn best_sah_split(
     boxes: &[Aabb32],
     part: &[u32],
@@ -205,7 +207,7 @@ fn best_sah_split(
     best
 }
 
-/// How many boxes, and the one around them.
+/// A number of boxes and their bounds.
 #[derive(Clone, Copy)]
 struct SahBin {
     count: usize,
@@ -220,12 +222,12 @@ impl SahBin {
         self.bounds = self.bounds.union(bounds);
     }
 
-    /// The boxes that a ray is expected to meet, times half the area around all that it may meet.
+    /// Expected number of boxes that a ray hits, times half the area of the bounds of the whole.
     fn cost(&self) -> f32 {
         self.count as f32 * self.bounds.half_area()
     }
 
-    /// Levels that halving it over and over takes.
+    /// Number of levels of repeated halving.
     fn levels(&self) -> u32 {
         self.count.next_power_of_two().ilog2()
     }

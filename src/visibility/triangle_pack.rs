@@ -1,44 +1,44 @@
-//! Four triangles side by side, and which of them a ray may meet: 32 bits before the exact test.
+//! Packs of four triangles, tested against a ray in 32 bits before the exact test.
 //!
 //! ```text
-//!            c             The ray meets the plane at o + t d. With the edges a and b, and s from
-//!           ╱ ╲            the corner to o, Cramer's rule says where (Möller, Trumbore 1997):
+//!            c             The ray hits the plane at o + t d. With the edges a and b, and s from
+//!           ╱ ╲            the corner to o, by Cramer's rule (Möller, Trumbore 1997):
 //!        b ╱ · ╲
 //!         ╱     ╲            D = d·(b×a)    u D = d·(b×s)    v D = d·(s×a)    t D = b·(s×a)
 //!        ●───────
-//!      corner  a             met where u ≥ 0, v ≥ 0, u + v ≤ 1, start ≤ t ≤ end
+//!      corner  a             hit where u ≥ 0, v ≥ 0, u + v ≤ 1, start ≤ t ≤ end
 //! ```
 //!
 //! Here these hold within a margin above all rounding, and nothing is divided by D, which may be 0.
 //! With h = 2⁻²⁴ for one rounding, r for the scene's size and the largest coordinate of o, and e
-//! for the longer edge: places are off by 2√3 h r, products of three factors by some 6 h of them
-//! and the direction and s are no longer than √3 and √3 r; so u D and v D are off by 24 h r e, and
-//! D by 14 h e². A wrong sign of D, if it is smaller than that, turns up to 25 h r e over:
-//! within 64 h r e all in all. t D is off by 14 h r e², and by D's error times t, which no hit in
-//! the scene has above 2 r: within twice 64 h r e².
+//! for the longer edge: positions are off by 2√3 h r, products of three factors by some 6 h of
+//! them, and the direction and s are no longer than √3 and √3 r; so u D and v D are off by 24 h r
+//! e, and D by 14 h e². A wrong sign of D, if it is smaller than that, adds up to 25 h r e: in
+//! total within 64 h r e. t D is off by 14 h r e², and by D's error times t, which no hit in the
+//! scene has above 2 r: within twice 64 h r e².
 
 use glam::{DVec3, Vec3A, Vec4};
 
 use super::ray32::{Ray32, SCENE_SIZE, splat};
 use super::sah_tree::MAX_LEAF_SIZE;
 
-/// The margin, as a share of places times edges: 64 roundings.
+/// The margin, as a share of positions times edges: 64 roundings.
 const MARGIN: f32 = 32.0 * f32::EPSILON;
 
-/// Up to four triangles in the hierarchy's unit; the rest are NaN and never met.
+/// Up to four triangles in the hierarchy's unit; unused slots are NaN and never hit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePack {
     corner: [Vec4; 3],
     edges: [[Vec4; 3]; 2],
     /// Length of the longest edge at a corner.
     longest: f32,
-    /// The first of them in the order of the tree.
+    /// Index of the first triangle in the order of the tree.
     pub first: u32,
 }
 
-/// What all rays from one origin share.
+/// Terms shared by all rays from one origin.
 pub(super) struct PackSeen {
-    /// By the direction: D, u D and v D.
+    /// Coefficients of the direction: D, u D and v D.
     normal: [Vec4; 3],
     u: [Vec4; 3],
     v: [Vec4; 3],
@@ -49,12 +49,13 @@ pub(super) struct PackSeen {
 }
 
 impl TrianglePack {
-    /// Of `triangles` by their corners, four at most.
+    /// A pack of at most four `triangles`, given by their corners.
     pub fn new(first: usize, triangles: impl Iterator<Item = [DVec3; 3]>) -> TrianglePack {
         let nothing = [Vec4::NAN; 3];
         let (mut corner, mut edges, mut longest) = (nothing, [nothing; 2], 0.0_f32);
         for (lane, [a, b, c]) in triangles.take(MAX_LEAF_SIZE).enumerate() {
-            // In 64 bits, so that edges far shorter than the scene are exact to their own length.
+            // In 64 bits, so that edges far shorter than the scene are exact relative to their own
+            // length.
             let [a, u, v] = [a, b - a, c - a].map(DVec3::as_vec3a);
             longest = longest.max(u.length()).max(v.length());
             for axis in 0..3 {
@@ -84,7 +85,7 @@ impl TrianglePack {
 }
 
 impl PackSeen {
-    /// Those that `ray` may meet, a bit each.
+    /// Mask of the triangles that `ray` may hit, one bit each.
     #[inline(always)]
     pub fn may_meet(&self, ray: &Ray32) -> u32 {
         let d = splat(ray.direction);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-/// Where a ray first met a triangle.
+/// The hit of a ray on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
     pub triangle: usize,
@@ -13,25 +13,25 @@ pub(crate) struct Hit {
     /// Barycentric weights of the second and third corner.
     pub u: f64,
     pub v: f64,
-    /// Whether the triangle's front was met.
+    /// Whether the ray hit the front.
     pub front: bool,
 }
 
 /// Barycentric weights down to minus this count as inside, which closes the seam between
-/// neighbours: far above the rounding of the test (some 1e-15), far below anything visible.
+/// neighbours: far above the rounding of the test (some 1e-15), far below visibility.
 pub(super) const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
 
 /// A triangle, prepared for intersection.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePlane {
     corner: DVec3,
-    /// On the front; of any length.
+    /// Of any length, on the front.
     normal: DVec3,
     /// Gradients of the barycentric weights of the second and third corner.
     gradients: [DVec3; 2],
-    /// Its number.
+    /// Index of the triangle.
     pub triangle: u32,
-    /// Whether nothing meets its back.
+    /// Whether rays do not hit its back.
     pub back_is_covered: bool,
 }
 
@@ -49,14 +49,14 @@ impl TrianglePlane {
         TrianglePlane { corner: a, normal, gradients, triangle, back_is_covered: false }
     }
 
-    /// Where the line from a place along a direction meets the triangle, within `reach` in units of
-    /// the direction: its plane first (Badouel 1990).
+    /// Intersection of the line from a point along a direction with the triangle, within `reach` in
+    /// units of the direction: its plane first (Badouel 1990).
     #[inline(always)]
     pub fn intersect(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> Option<Hit> {
         let &TrianglePlane { corner, normal, gradients, triangle, back_is_covered } = self;
         let (facing, to) = (normal.dot(direction), corner - from);
-        // What is too far off or behind is told without a division. Written so that NaN is no hit,
-        // as of a line in the plane.
+        // Hits out of range are rejected without a division. Negated, so that NaN, as for a line in
+        // the plane, is no hit.
         let (rise, steep) = (normal.dot(to) * facing.signum(), facing.abs());
         if !(rise > reach.start * steep && rise <= reach.end * steep) || steep == 0.0 {
             return None;
@@ -74,8 +74,8 @@ impl TrianglePlane {
         inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
     }
 
-    /// The same if it is further than `start`, and nearer than `best`: of equals the lower number
-    /// is, whatever the order of the visit.
+    /// The same if it is further than `start`, and nearer than `best`: of equal distances the lower
+    /// index wins, in any order of traversal.
     #[inline(always)]
     pub fn nearer(
         &self,
@@ -87,7 +87,7 @@ impl TrianglePlane {
         if Some(self.triangle as usize) == ignored {
             return None;
         }
-        // Rounded up, so that an equal is still looked at.
+        // Rounded up, so that equal distances are still compared.
         let rounding = |b: &Hit| 4.0 * f64::EPSILON * b.distance.abs();
         let end = best.as_ref().map_or(f64::INFINITY, |b| b.distance + rounding(b));
         let hit = self.intersect(from, direction, start..end)?;

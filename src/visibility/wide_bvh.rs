@@ -1,13 +1,13 @@
-//! The hierarchy of boxes for rays: eight-wide, with four triangles a leaf.
+//! The bounding volume hierarchy for rays: eight-wide, with four triangles per leaf.
 //!
 //! ```text
 //! triangles ──► binary tree of boxes ──► nodes of eight boxes ──► leaves of four triangles
-//!               (sah_tree)               met at once (ray32)      met at once (triangle_pack)
+//!               (sah_tree)               tested at once (ray32)   tested at once (triangle_pack)
 //! ```
 //!
-//! A step down costs a wait for the one before and a branch that is hard to foresee, far more than
-//! its arithmetic; so nodes are wide and few (Dammertz, Hanika, Keller 2008; Wald, Benthin, Boulos
-//! 2008). Both tests are in 32 bits and miss nothing: what they let through is for the exact test.
+//! A step down costs the latency of the one before and an unpredictable branch, far more than its
+//! arithmetic; so nodes are wide and few (Dammertz, Hanika, Keller 2008; Wald, Benthin, Boulos
+//! 2008). Both tests are in 32 bits and conservative: candidates go to the exact test.
 
 use arrayvec::ArrayVec;
 use glam::{DVec3, Vec4};
@@ -17,7 +17,7 @@ use super::ray32::{BoxPlanes, Ray32, splat};
 use super::sah_tree::{MAX_LEVELS, SahTree};
 use super::triangle_pack::TrianglePack;
 
-/// Open boxes at most: on each level all of a node but the one that is entered.
+/// Maximum number of open boxes: per level all boxes of a node except the one entered.
 const MAX_OPEN: usize = (WIDTH - 1) * MAX_LEVELS as usize + WIDTH;
 
 #[derive(Debug)]
@@ -30,12 +30,11 @@ pub(super) struct WideBvh {
 #[derive(Debug)]
 pub(super) struct WideNode {
     pub planes: BoxPlanes,
-    /// Where there are fewer than eight, the others are packs without triangles in boxes that no
-    /// ray meets.
+    /// Unused ones of the eight are packs without triangles in boxes that no ray hits.
     pub children: [Child; WIDTH],
 }
 
-/// The number of a node, or of a pack with the highest bit set.
+/// The index of a node, or of a pack with the highest bit set.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Child(u32);
 
@@ -61,7 +60,8 @@ impl Child {
 }
 
 impl WideBvh {
-    /// Of the tree's boxes, which are those of triangles by their corners in the hierarchy's unit.
+    /// Built from the boxes of `tree`, which are those of triangles given by their corners in the
+    /// hierarchy's unit.
     pub fn new(tree: &SahTree, corners: impl Fn(u32) -> [DVec3; 3]) -> WideBvh {
         let nothing = TrianglePack::new(0, std::iter::empty());
         let mut bvh = WideBvh { nodes: vec![], packs: vec![nothing] };
@@ -69,8 +69,8 @@ impl WideBvh {
         bvh
     }
 
-    /// Adds the node at the tree's `root` and all below; gives its number. As deep as the tree at
-    /// most.
+    /// Adds the node at the tree's `root` and all below; returns its index. At most as deep as the
+    /// tree.
     fn add(
         &mut self,
         tree: &SahTree,
@@ -99,9 +99,8 @@ impl WideBvh {
         Child(number as u32)
     }
 
-    /// Calls `may_meet` with each triangle below `root` that `ray` may meet before its end, by
-    /// their numbers in the order of the tree, the nearer ones first by and large. It may give a
-    /// new end.
+    /// Calls `may_meet` with each triangle below `root` that `ray` may hit before its end, by their
+    /// indices in the order of the tree, approximately front to back. It may return a new end.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -147,7 +146,7 @@ impl WideBvh {
                     }
                 }
             }
-            // What begins behind the end of the ray is left out.
+            // Boxes that begin beyond the end of the ray are skipped.
             child = loop {
                 match open.pop() {
                     None => return,
@@ -159,13 +158,13 @@ impl WideBvh {
     }
 }
 
-/// A box that is met and not entered yet; the order is that of entry.
+/// A box that is hit and not entered yet, ordered by entry.
 #[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
 struct OpenBox(u64);
 
 impl OpenBox {
-    /// Bits of floats that are not negative have the order of the floats. (Negative entries come
-    /// last; the order is for speed alone.)
+    /// The bits of non-negative floats have the order of the floats. (Negative entries come last;
+    /// the order only affects speed.)
     #[inline(always)]
     fn new(entry: f32, child: Child) -> OpenBox {
         OpenBox(u64::from(entry.to_bits()) << 32 | u64::from(child.0))

@@ -1,4 +1,4 @@
-//! Irradiance gathered with rays on the CPU: a second opinion, and the backend without a GPU.
+//! Irradiance gathered with rays on the CPU: an independent check, and the backend without a GPU.
 //!
 //! ```text
 //!                ┌ rays over the hemisphere ─► reflected light, escaped, backface, 1/distance
@@ -7,8 +7,8 @@
 //!                └ shadow rays to luminaires ─► see `LuminaireLight`
 //! ```
 //!
-//! The number of rays doubles until halves of them agree, or the most is reached: of those over the
-//! hemisphere or of those to lights, whichever disagree more.
+//! The number of rays is doubled until halves of them agree, or the maximum is reached: either
+//! those over the hemisphere or those to lights, whichever disagree more.
 
 mod direct_light;
 mod doubled;
@@ -39,10 +39,10 @@ use wide_light::WideLight;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
 ///
-/// Every ray carries the same share of the hemisphere, so what reflected light it finds has the
-/// error of an average over n stratified samples. A light's irradiance is its closed form times the
-/// share of it that a quarter as many rays find visible, weighted by their form factors; or that
-/// the rays over the hemisphere find, where the light fills much of it.
+/// Every ray carries the same share of the hemisphere, so that the reflected light has the error of
+/// an average over n stratified samples. A light's irradiance is its closed form times its visible
+/// share, weighted by form factors, from a quarter of the number of rays; or from the rays over the
+/// hemisphere where the light fills much of it.
 #[derive(Debug)]
 pub struct RayGather {
     scene: Arc<RayScene>,
@@ -50,23 +50,23 @@ pub struct RayGather {
     lights: Lights,
     rotations: CellRotation,
     samples: HemisphereSamples,
-    /// Rays a point: at least and at most.
+    /// Minimum and maximum number of rays per point.
     min_rays: u32,
     max_rays: u32,
-    /// Error that is allowed, as a share of the irradiance; none where infinite.
+    /// Allowed error, as a share of the irradiance; infinite for none.
     noise: f64,
-    /// Irradiance below which the error is a share of this instead, W/m².
+    /// Irradiance below which the error is a share of this value instead, W/m².
     dim: f64,
 }
 
-/// Rays at most for one where all agree. Chosen by hand; no measurement kept.
+/// Maximum number of rays over the minimum. Plain choice; no recorded measurement.
 const MAX_OVERSAMPLING: u32 = 16;
 
-/// Rays over the hemisphere for one shadow ray to each light. Chosen by hand; no measurement kept.
+/// Rays over the hemisphere per shadow ray to each light. Plain choice; no recorded measurement.
 pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
 
 impl RayGather {
-    /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
+    /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
@@ -88,17 +88,17 @@ impl RayGather {
     /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
     /// `noise`·max(E, `dim`), E being the irradiance and `dim` in W/m². The estimate is half the
     /// larger of: the difference between the irradiance of both halves of the rays, and the largest
-    /// contribution of one ray. Rays over the hemisphere and rays to lights have one each, whose
-    /// squares add up; the larger says which are doubled. Few points need more rays, such as those
-    /// that see a bright spot through a gap.
+    /// contribution of one ray. Rays over the hemisphere and rays to lights have one estimate each,
+    /// whose squares add up; those with the larger are doubled. Few points need more rays, such as
+    /// those that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
         let max_rays = most_rays(self.min_rays, noise);
         let samples = samples(self.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
-    /// Mean of 1/distance over the hemisphere above `point`, per scene unit, by as many rays as it
-    /// gathers with at least; directions that see nothing count 0. No light is looked up.
+    /// Mean of 1/distance over the hemisphere above `point`, per scene unit, by the minimum number
+    /// of rays; directions without a hit count 0. No light is looked up.
     pub(crate) fn inverse_distance(&self, point: &GatherPoint) -> f64 {
         let rotation = self.rotations.at(point.position, point.near);
         let directions = self.samples.directions_in(0..self.min_rays, point.normal, rotation);
@@ -109,8 +109,8 @@ impl RayGather {
         sum / f64::from(self.min_rays)
     }
 
-    /// What arrives at `point` from each of `fields`, all of one scene, with the same rays: as many
-    /// as the first takes.
+    /// Irradiance at `point` from each of `fields`, all of one scene, with the same rays; the
+    /// number is set by the first.
     fn irradiance<const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
@@ -141,7 +141,7 @@ impl RayGather {
         rays.samples(count, direct.mean() + of_luminaires, noise)
     }
 
-    /// Shadow rays to each light, at least and at most.
+    /// Minimum and maximum number of shadow rays to each light.
     fn shadow_rays(&self) -> [u32; 2] {
         [self.min_rays, self.max_rays].map(|rays| (rays / RAYS_PER_SHADOW_RAY).max(2))
     }
@@ -155,8 +155,8 @@ impl RayGather {
         }
     }
 
-    /// What the rays of `range` find. Emission of the lights that `direct` sends rays to is not in
-    /// it, and of wide ones how much is visible.
+    /// Sums over the rays of `range`. They exclude the emission of lights that `direct` sends rays
+    /// to, and of wide lights, for which the visible share is counted.
     fn trace<'d, const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
@@ -202,7 +202,7 @@ impl RayGather {
     }
 }
 
-/// The power of two nearest to `count`: rays that a point casts at least.
+/// The power of two nearest to `count`: minimum number of rays of a point.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
@@ -215,7 +215,7 @@ pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
     Ok(1 << f64::from(count).log2().round().max(1.0) as u32)
 }
 
-/// Rays that a point casts at most, which casts `min_rays` and more where a finite `noise` asks.
+/// Maximum number of rays of a point with at least `min_rays`, and more only for a finite `noise`.
 pub(crate) fn most_rays(min_rays: u32, noise: f64) -> u32 {
     match noise.is_finite() {
         true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
@@ -223,9 +223,9 @@ pub(crate) fn most_rays(min_rays: u32, noise: f64) -> u32 {
     }
 }
 
-/// Directions of `max_rays` rays in `scene`, of which `min_rays` are cast at least. Under a sky
-/// that is brighter above than at its sides all places would be off alike by rays that are nearer
-/// to the normal than they should.
+/// Directions of `max_rays` rays in `scene`, of which at least `min_rays` are cast. Under a sky
+/// that is brighter above than at its sides, rays with a bias towards the normal would cause the
+/// same error at all points.
 pub(crate) fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> HemisphereSamples {
     match scene.sky().uniform_radiance() {
         Some(_) => HemisphereSamples::progressive(max_rays),
@@ -236,13 +236,13 @@ pub(crate) fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> Hemisphere
 /// Sums over rays.
 struct HemisphereRays<'d, const FIELDS: usize> {
     wide: &'d [WideLight],
-    /// By wide light: rays that meet it, and rays towards it.
+    /// By wide light: number of rays that hit it, and of rays towards it.
     of_wide: Vec<Visible>,
-    /// Without what surfaces reflect; `direct` is not in `irradiance` yet.
+    /// Without reflected light; `direct` is not in `irradiance` yet.
     of_all_fields: IrradianceSample,
-    /// What surfaces reflect, by field.
+    /// Reflected light, by field.
     reflected: [Rgb; FIELDS],
-    /// The largest radiosity that one ray found, reflected by the first field or the sky's, W/m².
+    /// The largest radiosity along one ray, reflected by the first field or from the sky, W/m².
     largest: f64,
 }
 
@@ -275,7 +275,7 @@ impl<const FIELDS: usize> Found for HemisphereRays<'_, FIELDS> {
         self.largest = self.largest.max(other.largest);
     }
 
-    /// From the first field.
+    /// Irradiance of the first field.
     fn mean(&self, count: u32) -> Rgb {
         let IrradianceSample { irradiance, direct, .. } = self.of_all_fields;
         (irradiance + direct + self.reflected[0]) / f64::from(count) + self.of_wide_lights()
@@ -292,7 +292,7 @@ impl<const FIELDS: usize> HemisphereRays<'_, FIELDS> {
         self.wide.iter().zip(&self.of_wide).map(|(wide, seen)| wide.irradiance(seen)).sum()
     }
 
-    /// The irradiance from each field by `count` rays, and what lights send by other rays.
+    /// The irradiance from each field by `count` rays, plus that of lights by other rays.
     fn samples(&self, count: u32, of_lights: Rgb, noise: f64) -> [IrradianceSample; FIELDS] {
         let (share, mut out) = (1.0 / f64::from(count), self.of_all_fields);
         out.escaped *= share;

@@ -1,4 +1,4 @@
-//! Twin of `shaders/item_buffer.wgsl`: the item that every pixel of a hemicube sees.
+//! Twin of `shaders/item_buffer.wgsl`: the item visible at every pixel of a hemicube.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -10,14 +10,14 @@ use super::shared::{
 use crate::backend::gpu::layout::{BACK, Corner, FaceView, OPEN, TriangleCells};
 use crate::hemicube::Face;
 
-/// What the shader is bound to.
+/// Bindings of the shader.
 #[derive(Clone, Copy, Debug)]
 pub struct ItemBuffer<'a> {
     pub corners: &'a [Corner],
     pub triangles: &'a [TriangleCells],
 }
 
-/// What goes from the vertex to the fragment stage.
+/// Data from the vertex to the fragment stage.
 #[derive(Clone, Copy, Debug)]
 struct Varying {
     position: Vec4,

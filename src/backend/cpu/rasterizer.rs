@@ -5,9 +5,9 @@
 //! 1/w = Σ bᵢ (Olano and Greer 1997). It is in the triangle where no bᵢ is negative and 1/w is
 //! positive, on its front where v0·(v1 × v2) is positive. Arithmetic is in f64.
 //!
-//! Devices move corners to a grid of 1/256 pixel (at least 1/16 by the Vulkan specification), so
-//! pixels that close to an outline may go either way: callers shift the pixel centres by
-//! `offset` to find them.
+//! Devices snap corners to a grid of 1/256 pixel (at least 1/16 by the Vulkan specification), so
+//! pixels that close to an outline may go either way: callers shift the pixel centres by `offset`
+//! to detect them.
 
 use glam::DVec3;
 
@@ -43,7 +43,8 @@ impl<T: Copy> Image<T> {
         Image { width, pixels: vec![clear; count], depth: vec![0.0; count] }
     }
 
-    /// Draws one triangle, given in clip coordinates: `shade` changes the pixels that show it.
+    /// Draws one triangle, given in clip coordinates: `shade` changes the pixels where it is
+    /// visible.
     pub fn draw(
         &mut self,
         corners: [[f32; 4]; 3],

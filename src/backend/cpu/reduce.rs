@@ -2,8 +2,8 @@
 
 use crate::backend::gpu::layout::Reduction;
 
-/// The dense row, in slots, of hemicube `index`: for every pixel its weight goes to the slot of the
-/// item that it sees. `items` has lines of `reduction.stride` words.
+/// The dense row, in slots, of hemicube `index`: adds the weight of every pixel to the slot of its
+/// visible item. `items` has lines of `reduction.stride` words.
 pub fn reduce(
     items: &[u32],
     weights: &[u32],

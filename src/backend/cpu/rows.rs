@@ -1,8 +1,8 @@
-//! Form-factor rows from rays on the CPU: a second opinion, and the backend without a GPU.
+//! Form-factor rows from rays on the CPU: an independent check, and the backend without a GPU.
 //!
 //! ```text
-//! patch ─► n cosine-weighted rays from its centroid, turned by a hash of its id
-//!       ─► what each meets: an element, a back, nothing ─► sorted, counted ─► row of shares
+//! patch ─► n cosine-weighted rays from its centroid, rotated by a hash of its id
+//!       ─► item hit by each: element, back, nothing ─► sorted, counted ─► row of shares
 //! ```
 
 use std::sync::Arc;
@@ -25,8 +25,8 @@ use crate::visibility::ray_scene::{Hit, RayScene};
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid.
 ///
 /// Every ray carries the same share of the light, so a form factor is a count: for n rays the
-/// standard error of an entry F is at most √(F(1−F)/n) (independent rays; these are stratified and
-/// do better).
+/// standard error of an entry F is at most √(F(1−F)/n) (that of independent rays; stratified ones
+/// have less).
 ///
 /// Rows for patches that shoot little have fewer rays: see [`RayRows::with_full_share`].
 #[derive(Debug)]
@@ -39,34 +39,34 @@ pub struct RayRows {
     pub(crate) full_share: f64,
 }
 
-/// A batch has a row for so many elements at least, since what to shoot next is found by looking at
-/// all of these. With 16 rows for a million of them, that took 27 s of 43.
+/// Minimum number of elements per row of a batch, since the choice of the next shots visits all
+/// elements. With 16 rows for a million of them, that took 27 s of 43.
 const ELEMENTS_PER_ROW: usize = 4096;
 
 impl RayRows {
-    /// Share of the emitted flux from which on a patch gets all rays, unless set: half of that for
-    /// hemicubes, since N² rays are a third of the pixels of a hemicube with N along an edge. What
-    /// is dimmer gets fewer rays then, and the error of a whole bake grows by some 3 % of itself at
-    /// most (measured in three scenes).
+    /// Default share of the emitted flux from which a patch gets all rays: half of that for
+    /// hemicubes, since N² rays are a third of the pixels of a hemicube with N along an edge.
+    /// Dimmer patches get fewer rays, which increases the error of a whole bake by at most some 3 %
+    /// (measured in three scenes).
     pub const FULL_SHARE: f64 = 2e-3;
 
-    /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
+    /// `count` rays per row over the triangles of `mesh`, and fewer for patches that shoot little.
     ///
     /// # Errors
     /// [`crate::ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayRows, Error> {
         HemisphereSamples::new(count)?;
         let (rays, panes) = (RayScene::of_scene(mesh.scene()), Panes::of_scene(mesh.scene()));
-        // Fewer where each takes long.
+        // Fewer rows if each takes long.
         let few = ((1 << 20) / count).clamp(1, 16) as usize;
         let batch_len = few.max(mesh.element_count() / ELEMENTS_PER_ROW);
         Ok(RayRows { rays, panes, count, batch_len, full_share: RayRows::FULL_SHARE })
     }
 
     /// All rays for patches that shoot at least this share of the emitted flux, in [0, 1]; for
-    /// others a quarter or a sixteenth of them, but no less than 256 if there are as many, by what
-    /// is at stake: rays ∝ share^0.8 errs least for the time. [`RayRows::FULL_SHARE`] unless set;
-    /// with 0 all rows have all rays.
+    /// others a quarter or a sixteenth of them, but no less than 256 if `count` permits, by their
+    /// share: rays ∝ share^0.8 minimizes the error for the time. [`RayRows::FULL_SHARE`] by
+    /// default; with 0 all rows have all rays.
     pub fn with_full_share(self, full_share: f64) -> RayRows {
         RayRows { full_share, ..self }
     }
@@ -87,7 +87,7 @@ impl RayRows {
         row_of(&hits)
     }
 
-    /// The same in a scene with panes, with what passes them on the way to each item.
+    /// The same in a scene with panes, with their transmittance on the way to each item.
     fn row_through_panes(
         &self,
         mesh: &Mesh,
@@ -101,7 +101,7 @@ impl RayRows {
             let end = hit.map_or(f64::INFINITY, |hit| hit.distance);
             hits.push((item(mesh, hit), self.panes.transmittance(eye, direction, start..end)));
         });
-        // Those of one item stay in their order, so that their sum is the same on every run.
+        // Hits of one item stay in order, so that their sum is the same on every run.
         hits.sort_by_key(|&(item, _)| item);
         let items: Vec<u32> = hits.iter().map(|&(item, _)| item).collect();
         let row = row_of(&items);
@@ -118,12 +118,12 @@ impl RayRows {
     }
 }
 
-/// Turn of a patch's rays about its normal, in turns: a hash of its number.
+/// Rotation of a patch's rays about its normal, in turns: a hash of its number.
 pub(crate) fn rotation(patch: NodeId) -> f64 {
     f64::from(low_bias32(patch.0)) / 2f64.powi(32)
 }
 
-/// What a ray that ends at `hit` meets.
+/// The item of a ray that ends at `hit`.
 fn item(mesh: &Mesh, hit: Option<Hit>) -> u32 {
     match hit {
         None => OPEN,
@@ -132,14 +132,14 @@ fn item(mesh: &Mesh, hit: Option<Hit>) -> u32 {
     }
 }
 
-/// The row of rays that met these items, in ascending order.
+/// The row of rays that hit these items, in ascending order.
 fn row_of(hits: &[u32]) -> Row {
     row_of_counts(hits.chunk_by(|a, b| a == b).map(|run| (run[0], run.len() as u32)), hits.len())
 }
 
-/// The row of so many `rays` of which each of these items, in ascending order, was met by some.
+/// The row of `rays` rays by the number of hits of each item, in ascending order.
 pub(crate) fn row_of_counts(items: impl Iterator<Item = (u32, u32)>, rays: usize) -> Row {
-    // Ray k of the sorted ones owns the shares from k·TOTAL/n to (k+1)·TOTAL/n.
+    // Ray k in sorted order has the shares from k·TOTAL/n to (k+1)·TOTAL/n.
     let share_of_first = |k: u64| (k * u64::from(Row::TOTAL) / rays as u64) as u32;
     let mut row = Row::default();
     let (mut shares, mut counted) = (Apportion::default(), 0);
@@ -155,8 +155,8 @@ pub(crate) fn row_of_counts(items: impl Iterator<Item = (u32, u32)>, rays: usize
     row
 }
 
-/// Rays of a patch that shoots `weight` of the emitted flux: all `count` where it is `full_share`,
-/// a quarter or a sixteenth of them below, as [`RayRows::with_full_share`] has it.
+/// Number of rays of a patch that shoots `weight` of the emitted flux: all `count` from
+/// `full_share` on, a quarter or a sixteenth of them below, see [`RayRows::with_full_share`].
 pub(crate) fn rays_for_importance(count: u32, weight: f64, full_share: f64) -> u32 {
     let halvings = resolution_policy::halvings_for_importance(weight, full_share);
     let least = resolution_policy::MIN_HALVED_RESOLUTION.pow(2);
@@ -180,6 +180,6 @@ impl FormFactors for RayRows {
     }
 }
 
-/// What a ray meets that meets nothing, or a back; all else is an element.
+/// Items of a ray without a hit, and of one that hits a back; all others are elements.
 pub(crate) const OPEN: u32 = u32::MAX;
 pub(crate) const BACK: u32 = u32::MAX - 1;

@@ -1,5 +1,5 @@
-//! Twins of the shaders that cast rays, each named as its WGSL file is: the same functions over the
-//! same arrays, one ray after the other.
+//! Twins of the ray-casting shaders, named as the WGSL files: the same functions over the same
+//! arrays, one ray after the other.
 
 pub(in crate::backend) mod compact_rows;
 mod element;

@@ -1,4 +1,4 @@
-//! Choosing among the adapters of a machine.
+//! Choice among the adapters of a machine.
 
 use super::error::place;
 use super::limits::GpuLimits;
@@ -17,7 +17,7 @@ pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
     let backends = descriptor.backends;
     let instance = wgpu::Instance::new(descriptor);
     let mut found = pollster::block_on(instance.enumerate_adapters(backends));
-    // A stable sort: among equals, the order of the driver loader.
+    // A stable sort: ties keep the order of the driver loader.
     found.sort_by_key(|a| kind(a.get_info().device_type));
     let names: Vec<String> = found.iter().map(|a| a.get_info().name).collect();
     let matches = |a: &String| a.to_lowercase().contains(&wanted.to_lowercase());
@@ -33,7 +33,7 @@ pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
     Err(Error::new(ErrorKind::Device, "graphics adapter", found, remedy))
 }
 
-/// Opens a device with as much of `limits` as the adapter has, and timestamps where it can.
+/// Opens a device with `limits` as far as the adapter has them, and timestamps if available.
 pub fn open(
     adapter: &wgpu::Adapter,
     limits: &GpuLimits,
@@ -51,7 +51,7 @@ pub fn open(
     })
 }
 
-/// What wgpu knows of an adapter.
+/// Description of an adapter from wgpu.
 pub fn describe(info: wgpu::AdapterInfo) -> AdapterInfo {
     let driver = format!("{} {} ({:?})", info.driver, info.driver_info, info.backend);
     AdapterInfo { name: info.name, kind: kind(info.device_type), driver }

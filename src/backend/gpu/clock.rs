@@ -1,4 +1,4 @@
-//! Seconds that passes take on the device.
+//! Time of passes on the device.
 
 use super::device::Gpu;
 use super::memory::Memory;

@@ -1,4 +1,4 @@
-//! Dense rows on the device, made into entries there and read back as such.
+//! Dense rows, compacted to entries on the device and read back as such.
 //!
 //! ```text
 //! counts, dense: row × slot ─► compact_rows ─► entries, row by row ─► staging ─► read
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A row over a mesh of 100 000 elements takes 400 kB, its entries some 10 kB: the bus to the
-//! device is what limits rows that are read back dense.
+//! device limits the rate of rows that are read back dense.
 
 use super::device::Gpu;
 use super::layout::{ROW_ENTRIES_HEADER_BYTES, RowEntry, RowSettings};
@@ -16,12 +16,12 @@ use super::pipeline::bind_group;
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
 
-/// Room for the entries of a batch of rows.
+/// Buffers for the entries of a batch of rows.
 #[derive(Debug)]
 pub struct CompactedRows {
-    /// [`RowSettings`], for the passes that count too.
+    /// [`RowSettings`], also for the passes that count.
     pub settings: wgpu::Buffer,
-    /// Entries that there is room for.
+    /// Capacity in entries.
     pub entries: u32,
     pub(super) found: wgpu::Buffer,
     staging: wgpu::Buffer,
@@ -42,7 +42,7 @@ pub struct SubmittedRows {
 /// Bytes of entries that a batch has room for, or those of one row where these are more.
 const ENTRY_BYTES: u64 = 32 << 20;
 
-/// Entries that the first batch is expected to have: 2 MiB of them.
+/// Expected number of entries of the first batch: 2 MiB of them.
 const FIRST_ENTRIES: u64 = 65_536;
 
 impl CompactedRows {
@@ -195,7 +195,7 @@ pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, Str
     Ok(of_rows)
 }
 
-/// Bytes of so many entries with their header.
+/// Bytes of this number of entries with their header.
 fn bytes(entries: u64) -> u64 {
     ROW_ENTRIES_HEADER_BYTES + entries * size_of::<RowEntry>() as u64
 }

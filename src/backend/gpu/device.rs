@@ -1,12 +1,12 @@
-//! An open graphics device: errors of wgpu become errors of the crate, and waiting has an end.
+//! An open graphics device: errors of wgpu become errors of the crate, and waits time out.
 //!
 //! ```text
 //! with_error_scopes(work)      push scopes → work() → pop scopes → an error, or work's result
-//! retry_with_smaller_batches   make(batch), make(batch/2), … until there is memory for it
-//! wait                         poll until all submitted work is done; DEVICE_TIMEOUT at most
+//! retry_with_smaller_batches   make(batch), make(batch/2), … until it fits in memory
+//! wait                         poll until all submitted work is done; at most DEVICE_TIMEOUT
 //! ```
 //!
-//! A device that was lost stays lost: the reason is recorded once, and every later use gets it.
+//! A lost device stays lost: the reason is recorded once, and every later use returns it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
@@ -28,32 +28,32 @@ pub struct Gpu {
     adapter: AdapterInfo,
     assumed: AdapterKind,
     limits: GpuLimits,
-    /// Why the device is lost, or what went wrong outside of any error scope.
+    /// Why the device is lost, or an error outside of any error scope.
     lost: Arc<Mutex<Option<String>>>,
     budget: Arc<MemoryBudget>,
     pub(super) tracing: Arc<Tracing>,
 }
 
-/// A device that takes longer than this over a batch counts as lost. A batch takes a fraction of a
-/// second, on slow devices seconds; watchdogs of drivers give up earlier. Chosen by hand.
+/// Maximum time of a batch before the device counts as lost. A batch takes a fraction of a second,
+/// on slow devices seconds; watchdogs of drivers act earlier. Plain choice.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(120);
 
 impl Gpu {
-    /// Opens an adapter whose name contains `name` in any case, or the best there is: discrete
-    /// before integrated before virtual before software.
+    /// Opens an adapter whose name contains `name` in any case, or the best one: discrete before
+    /// integrated before virtual before software.
     ///
     /// Without a `name`, wgpu's environment variables choose: `WGPU_ADAPTER_NAME` and
     /// `WGPU_BACKEND` (`vulkan`, `metal`, `dx12`).
     ///
     /// # Errors
-    /// [`ErrorKind::Device`] when there is no such adapter; the message lists what there is, or
-    /// names the packages that bring one.
+    /// [`ErrorKind::Device`] when there is no such adapter; the message lists the available ones,
+    /// or names the packages that install one.
     pub fn new(name: Option<&str>) -> Result<Gpu, Error> {
         Gpu::within(name, &GpuLimits::MOST)
     }
 
-    /// As [`Gpu::new`], but as if the device could do no more than `limits`: to leave room for
-    /// other programs, or to see what becomes of a scene on a lesser device.
+    /// As [`Gpu::new`], but as if the device had at most `limits`: to leave memory for other
+    /// programs, or to test a scene on a lesser device.
     ///
     /// # Errors
     /// Those of [`Gpu::new`].
@@ -77,20 +77,20 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Uses a device and queue of the caller's, and no more than `limits` of it.
+    /// Uses a device and queue of the caller's, within `limits`.
     ///
-    /// No feature is required; with [`wgpu::Features::TIMESTAMP_QUERY`] the passes are timed one by
-    /// one ([`crate::Timings`]). The limits of [`wgpu::Limits::default`], WebGPU's, are enough;
-    /// larger buffers and textures allow larger scenes and resolutions.
+    /// No feature is required; with [`wgpu::Features::TIMESTAMP_QUERY`] the passes are timed
+    /// separately ([`crate::Timings`]). The limits of [`wgpu::Limits::default`], WebGPU's, are
+    /// sufficient; larger buffers and textures allow larger scenes and resolutions.
     ///
-    /// The caller's callbacks for uncaptured errors and for a lost device stay as they are. Errors
-    /// of this crate's own calls are caught in error scopes, which are those of the calling thread,
-    /// and returned; a lost device is noticed when results do not come back. All queued work is
-    /// waited for, the caller's included. [`Gpu::close`] destroys the device for the caller too.
+    /// The caller's callbacks for uncaptured errors and for a lost device are kept. Errors of this
+    /// crate's own calls are caught in error scopes, which belong to the calling thread, and
+    /// returned; a lost device is detected when results do not arrive. All queued work is waited
+    /// for, the caller's included. [`Gpu::close`] destroys the device for the caller too.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when the device was opened with limits too low for the passes; the
-    /// message names the limit and the least value.
+    /// message names the limit and its minimum.
     pub fn from_wgpu(
         device: wgpu::Device,
         queue: wgpu::Queue,
@@ -116,42 +116,41 @@ impl Gpu {
         }
     }
 
-    /// What the device runs on.
+    /// Description of the adapter.
     pub fn adapter(&self) -> &AdapterInfo {
         &self.adapter
     }
 
-    /// The same, with what makes rows and gathers light chosen as on an adapter of this `kind`: to
-    /// have a software device do what hardware does, which takes longer.
+    /// The same device, with row makers and gatherers chosen as on an adapter of this `kind`: lets
+    /// a software device run the methods of hardware, which takes longer.
     pub fn assuming(self, kind: AdapterKind) -> Gpu {
         Gpu { assumed: kind, ..self }
     }
 
-    /// The kind of adapter that choices are made for: its own, unless another is assumed.
+    /// The kind of adapter that choices are based on: its own, unless another is assumed.
     pub(crate) fn assumed_kind(&self) -> AdapterKind {
         self.assumed
     }
 
-    /// Gives the device back. All clones, and all that uses it, get [`ErrorKind::Device`] from now
-    /// on.
+    /// Destroys the device. All clones and users of it get [`ErrorKind::Device`] from now on.
     pub fn close(&self) {
         self.device.destroy();
     }
 
-    /// What may be used of the device: its own limits, or lower ones where such were asked for.
+    /// Usable limits of the device: its own, or lower requested ones.
     pub(super) fn limits(&self) -> GpuLimits {
         self.limits
     }
 
-    /// Takes buffers and textures from this device's budget.
+    /// Allocates buffers and textures within this device's budget.
     pub(super) fn memory(&self) -> Memory {
         let (device, queue) = (self.device.clone(), self.queue.clone());
         Memory::new(device, queue, self.adapter.name.clone(), self.budget.clone())
     }
 
-    /// Runs `work` and returns what goes wrong on the device meanwhile as an error: that it was
-    /// lost, else that it is out of memory, else that a use of it was not valid; each is likely to
-    /// cause the next. The device stays usable unless it was lost.
+    /// Runs `work` and returns an error of the device during it: in this order a loss, out of
+    /// memory, or a validation error; each is likely to cause the next. The device stays usable
+    /// unless it was lost.
     pub(super) fn with_error_scopes<T>(
         &self,
         work: impl FnOnce() -> Result<T, Error>,
@@ -172,7 +171,7 @@ impl Gpu {
         Err(self.device_error(kind, message(&error)).with_source(error))
     }
 
-    /// What `make` makes for the largest batch that there is memory for: `batch`, or a half, a
+    /// The result of `make` for the largest batch that fits in memory: `batch`, or a half, a
     /// quarter … of it.
     pub(super) fn retry_with_smaller_batches<T>(
         &self,
@@ -183,7 +182,7 @@ impl Gpu {
             match self.with_error_scopes(|| make(self.memory(), batch)) {
                 Err(e) if e.kind() == ErrorKind::Memory && batch > 1 => {
                     batch /= 2;
-                    // The failed attempt's memory is free once writes to it have gone through.
+                    // The memory of the failed attempt is freed once writes to it have completed.
                     self.with_error_scopes(|| {
                         self.queue.submit([]);
                         self.wait()
@@ -194,12 +193,12 @@ impl Gpu {
         }
     }
 
-    /// Waits until all that was submitted is done.
+    /// Waits until all submitted work is done.
     pub(super) fn wait(&self) -> Result<(), Error> {
         self.wait_for(None)
     }
 
-    /// Waits until this submission is done, and all before it; until all is, with none.
+    /// Waits until this submission and all before it are done; with `None`, until all are.
     pub(super) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<(), Error> {
         let poll = || {
             let timeout = Some(DEVICE_TIMEOUT);
@@ -207,7 +206,7 @@ impl Gpu {
             self.device.poll(wgpu::PollType::Wait { submission_index, timeout })
         };
         self.check()?;
-        // wgpu 30 panics when the device is lost while it is waited for.
+        // wgpu 30 panics when the device is lost during a wait.
         let waited = catch_unwind(AssertUnwindSafe(poll));
         self.check()?;
         let found = match waited {
@@ -216,7 +215,7 @@ impl Gpu {
                 format!("no answer for {} s", DEVICE_TIMEOUT.as_secs())
             }
             Ok(Err(e)) => {
-                // A device that was lost before the submission says so when it is polled again.
+                // A device that was lost before the submission reports it when it is polled again.
                 let poll = || self.device.poll(wgpu::PollType::Poll);
                 let _ = catch_unwind(AssertUnwindSafe(poll));
                 self.check()?;
@@ -228,7 +227,7 @@ impl Gpu {
         self.check()
     }
 
-    /// Gives the bytes that `submission` has copied to a mappable buffer to `read`. The caller
+    /// Calls `read` with the bytes that `submission` has copied to a mappable buffer. The caller
     /// unmaps it.
     pub(super) fn read_mapped<T>(
         &self,
@@ -253,12 +252,12 @@ impl Gpu {
         lost.map_or(Ok(()), |found| Err(self.device_error(ErrorKind::Device, found)))
     }
 
-    /// What went wrong on this device, and what may help.
+    /// An error of this device, with a remedy.
     pub(super) fn device_error(&self, kind: ErrorKind, found: String) -> Error {
         device_error(&self.adapter.name, kind, found)
     }
 
-    /// Results of this device that no working one gives.
+    /// An error for results that no working device returns.
     pub(super) fn invalid_result(&self, found: String) -> Error {
         invalid_result(&self.adapter.name, found)
     }
@@ -279,7 +278,7 @@ mod tests {
     use crate::form_factor::{FormFactors, Row};
     use crate::mesh::Mesh;
 
-    /// Memory that the host maps and shaders write does not exist.
+    /// Memory that is both mapped by the host and written by shaders does not exist.
     fn not_valid(gpu: &Gpu) -> Result<wgpu::Buffer, Error> {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::STORAGE;
         gpu.memory().buffer("odd", 16, usage)
@@ -341,7 +340,7 @@ mod tests {
         );
         assert_eq!(most(0, ErrorKind::Memory).unwrap_err().kind(), ErrorKind::Memory);
         assert_eq!(tried.borrow()[..], [16, 8, 4, 2, 1]);
-        // Less of what fails for other reasons is no better.
+        // A smaller batch does not help against other errors.
         assert!(most(3, ErrorKind::Device).is_err() && tried.borrow()[..] == [16]);
     }
 
@@ -361,7 +360,7 @@ mod tests {
         gpu.memory().buffer("second", 600, usage).unwrap();
     }
 
-    /// A device as a caller may have opened it, with these limits.
+    /// A device that a caller might have opened, with these limits.
     fn callers_device(limits: wgpu::Limits) -> (wgpu::Device, wgpu::Queue) {
         let adapter = adapters::choose(None).unwrap();
         let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };

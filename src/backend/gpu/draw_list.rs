@@ -1,5 +1,5 @@
-//! Triangles in chunks that lie close together, so that a face of a hemicube draws only those that
-//! can be in its view.
+//! Triangles in spatially compact chunks, so that a face of a hemicube draws only those that can be
+//! in its view.
 //!
 //! ```text
 //! drawing order   t7 t2 t9 t4 | t1 t0 t5 t8 | t3 t6 …      median splits of the longest extent
@@ -16,15 +16,15 @@ use crate::geometry::bvh::Bvh;
 use crate::hemicube::Face;
 use crate::scene::Scene;
 
-/// Triangles in a chunk at most: below this, testing a box costs more than drawing what is in it.
-/// Chosen by hand; no measurement kept.
+/// Maximum number of triangles in a chunk: below this, testing a box costs more than drawing its
+/// triangles. Plain choice; no recorded measurement.
 const MAX_TRIANGLES_PER_CHUNK: usize = 16;
 
-/// Triangles in a run from which on another begins: software devices handle a draw with anything to
-/// clip in time that grows with its square. Chosen by hand; no measurement kept.
+/// Number of triangles in a run from which another begins: on software devices the time of a draw
+/// with clipping grows with the square of its size. Plain choice; no recorded measurement.
 const MAX_TRIANGLES_PER_DRAW: usize = 128;
 
-/// An order of drawing, and the box around each run of it.
+/// A drawing order, and the bounding box of each chunk of it.
 #[derive(Debug)]
 pub struct DrawList {
     /// Triangle at each position of the drawing order.
@@ -42,7 +42,7 @@ struct Chunk {
 }
 
 impl DrawList {
-    /// Halves the triangles of `scene` at the median of their longest extent, again and again.
+    /// Halves the triangles of `scene` recursively at the median of their longest extent.
     pub fn new(scene: &Scene) -> DrawList {
         let middle = |t: usize| scene.corners(t).iter().sum::<DVec3>() / 3.0;
         let middles: Vec<DVec3> = (0..scene.triangles().len()).map(middle).collect();
@@ -65,7 +65,7 @@ impl DrawList {
         DrawList { order, position_of, chunks }
     }
 
-    /// Runs of the drawing order whose triangles can be seen by `face` from `eye`.
+    /// Runs of the drawing order whose triangles may be visible in `face` from `eye`.
     pub fn in_view(&self, eye: DVec3, face: &Face) -> Vec<Range<u32>> {
         let Face { right, up, forward, bottom } = *face;
         // Inward normals of the five planes through the eye that bound the view.
@@ -73,7 +73,7 @@ impl DrawList {
             [forward, forward + right, forward - right, forward - up, up - bottom * forward];
         let mut runs: Vec<Range<u32>> = vec![];
         for Chunk { positions, centre, half } in &self.chunks {
-            // The box's farthest point along a normal is behind the plane: so is all of it.
+            // If the box's farthest point along a normal is behind the plane, all of it is.
             let behind = |n: &DVec3| n.dot(centre - eye) + n.abs().dot(*half) < 0.0;
             if planes.iter().any(behind) {
                 continue;
@@ -89,7 +89,7 @@ impl DrawList {
     }
 }
 
-/// Sorts triangles along the axis on which their centroids, `middles`, reach furthest.
+/// Sorts triangles along the axis of the largest extent of their centroids, `middles`.
 fn halve(order: &mut [u32], middles: &[DVec3]) {
     let axis = Aabb::from_points(order.iter().map(|&t| middles[t as usize])).longest_axis();
     let along = |t: &u32| middles[*t as usize][axis];
@@ -149,7 +149,7 @@ mod tests {
                 assert!(!seen || runs.iter().any(|r| r.contains(&position)), "triangle {t}");
             }
         }
-        // Half the sphere is above the horizon; boxes of chunks reach over into other views.
+        // Half the sphere is above the horizon; boxes of chunks extend into other views.
         assert!(drawn < 3 * 1000, "{drawn} of 5000");
     }
 }

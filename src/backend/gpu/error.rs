@@ -1,9 +1,9 @@
-//! Failures of a graphics device in the crate's own error: place, what was found, remedy.
+//! Errors of a graphics device as errors of the crate: place, finding, remedy.
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
 
-/// What went wrong on the adapter of this name.
+/// An error of the adapter of this name.
 pub fn device_error(adapter: &str, kind: ErrorKind, found: String) -> Error {
     let remedy = match kind {
         ErrorKind::Memory => "use a smaller hemicube, fewer elements, or the CPU",
@@ -12,7 +12,7 @@ pub fn device_error(adapter: &str, kind: ErrorKind, found: String) -> Error {
     Error::new(kind, place(adapter), found, remedy)
 }
 
-/// Results that no working device gives.
+/// An error for results that no working device returns.
 pub fn invalid_result(adapter: &str, found: String) -> Error {
     let remedy = "update its driver, choose another adapter, or use the CPU";
     Error::new(ErrorKind::Device, place(adapter), format!("it answered {found}"), remedy)
@@ -38,11 +38,11 @@ pub fn message(error: &wgpu::Error) -> String {
     text
 }
 
-/// Checks that `scene` has nothing that hemicubes do not see: they would take clear panes for
-/// nothing at all, and holes for solid.
+/// Checks that `scene` has nothing that hemicubes do not support: they would ignore clear panes,
+/// and treat holes as solid.
 ///
 /// # Errors
-/// [`ErrorKind::Device`] where it has.
+/// [`ErrorKind::Device`] if it has.
 pub(crate) fn check_hemicubes_see(scene: &Scene) -> Result<(), Error> {
     let Some(hidden) = scene.hidden_from_hemicubes() else { return Ok(()) };
     let found = format!("{hidden}, which hemicubes do not see");

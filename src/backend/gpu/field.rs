@@ -1,4 +1,4 @@
-//! The light to be gathered on the device: quadtrees, and the radiosity at their elements' corners.
+//! The radiosity field on the device: quadtrees, and the radiosity at their elements' corners.
 //!
 //! ```text
 //! quadtrees[2 t], [2 t + 1]  first node and cells along the edge of the deepest level that the
@@ -24,8 +24,8 @@ use crate::scene::Rgb;
 pub struct FieldBuffers {
     /// Lattices, then nodes: [`INNER`] plus the first of four children, or an element.
     pub quadtrees: wgpu::Buffer,
-    /// Per element, the reflected radiosity at its three corners, per channel, one below the
-    /// other; [`ELEMENTS_A_LINE`] elements side by side.
+    /// Per element, the reflected radiosity at its three corners, per channel, in three lines;
+    /// [`ELEMENTS_A_LINE`] elements side by side.
     pub elements: wgpu::TextureView,
     _memory: Memory,
 }
@@ -48,7 +48,7 @@ impl FieldBuffers {
     }
 }
 
-/// A number that tells fields of one scene apart: it depends on all that is uploaded.
+/// A hash that identifies a field of a scene: of all uploaded data.
 pub fn key(field: &RadiosityField) -> u64 {
     /// Bytes are hashed in parts of this many items, on all cores.
     const PART: usize = 1 << 16;
@@ -84,8 +84,8 @@ pub fn element_texels(field: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4
     texels
 }
 
-/// Where each triangle's nodes at its deepest complete level are and how many cells lie along its
-/// edge, then all quadtrees' nodes as numbers, and once more those of these levels.
+/// Per triangle, the first node of its deepest complete level and the number of cells along its
+/// edge; then all quadtrees' nodes by number, and copies of those of these levels.
 pub fn quadtrees(mesh: &Mesh) -> Vec<u32> {
     let count = mesh.scene().triangles().len();
     let roots = 2 * count as u32;
@@ -103,7 +103,7 @@ pub fn quadtrees(mesh: &Mesh) -> Vec<u32> {
     for (t, level) in complete.into_iter().enumerate() {
         let first = words.len();
         let root = mesh.root(t);
-        // Most quadtrees of a scene of many triangles are one node.
+        // Most quadtrees of a scene with many triangles are a single node.
         if level == 0 {
             words.push(words[(roots + root.0) as usize]);
         } else {
@@ -123,11 +123,11 @@ pub fn quadtrees(mesh: &Mesh) -> Vec<u32> {
     words
 }
 
-/// Checks `field` against a scene of so many triangles.
+/// Checks `field` against a scene of `triangles` triangles.
 ///
 /// # Errors
-/// [`ErrorKind::Setting`] for a field of another scene, of corners that do not fit its mesh, or too
-/// large for the device.
+/// [`ErrorKind::Setting`] for a field of another scene, with corners that do not fit its mesh, or
+/// too large for the device.
 pub fn check(limits: GpuLimits, field: &RadiosityField, triangles: usize) -> Result<(), Error> {
     let RadiosityField { mesh, corners, reflected } = *field;
     let setting = |found: String, remedy: String| {
@@ -145,8 +145,8 @@ pub fn check(limits: GpuLimits, field: &RadiosityField, triangles: usize) -> Res
     if let Some(k) = corners.par_iter().flatten().find_any(|&&k| k as usize >= reflected.len()) {
         return setting(format!("corner value {k}"), format!("must be below {}", reflected.len()));
     }
-    // There are fewer than three nodes an element: less than 4/3 in trees and one in lattices; and
-    // two words a triangle, which is an element at least.
+    // There are fewer than three nodes per element: less than 4/3 in trees and one in lattices;
+    // plus two words per triangle, which has at least one element.
     let most = u64::from(limits.texture / 3 * ELEMENTS_A_LINE).min(limits.buffer / 20);
     if elements as u64 > most {
         return setting(format!("{elements} elements"), format!("this device holds {most}"));

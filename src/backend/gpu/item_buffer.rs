@@ -1,7 +1,7 @@
 //! The draw pass of rows: the scene's triangles over every face of a batch of hemicubes.
 //!
 //! ```text
-//! corners, triangles ──► vertex ──► rasterizer ──► fragment ──► one layer a hemicube, R32Uint
+//! corners, triangles ──► vertex ──► rasterizer ──► fragment ──► one layer per hemicube, R32Uint
 //! views (5 a hemicube) ──┘          depth test     item of      N wide:  top face    N lines
 //!                                                  the pixel             side +t     N/2
 //!                                                                        side −t     N/2
@@ -21,7 +21,7 @@ use super::shaders::ITEM_BUFFER_WGSL;
 use crate::error::Error;
 use crate::hemicube::Face;
 
-/// What it takes to draw the item buffers of a batch of hemicubes, whatever their resolution.
+/// The pipeline and buffers to draw the item buffers of a batch of hemicubes, at any resolution.
 #[derive(Debug)]
 pub struct ItemBuffer {
     pipeline: wgpu::RenderPipeline,
@@ -29,17 +29,17 @@ pub struct ItemBuffer {
     views: wgpu::Buffer,
 }
 
-/// One face of a hemicube, and the runs of the drawing order that it can see.
+/// One face of a hemicube, and the visible runs of the drawing order.
 pub struct View {
     pub face: FaceView,
     pub runs: Vec<Range<u32>>,
 }
 
 impl ItemBuffer {
-    /// What an item buffer is made of.
+    /// Texel format of an item buffer.
     pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-    /// For triangles in drawing order, three `corners` each; `batch` hemicubes.
+    /// Creates it for triangles in drawing order, three `corners` each, and `batch` hemicubes.
     pub fn new(
         memory: &Memory,
         corners: &[Corner],
@@ -61,7 +61,7 @@ impl ItemBuffer {
         Ok(ItemBuffer { pipeline, bindings, views })
     }
 
-    /// Records the drawing of the hemicubes that `views` (five each) look out from on the layers of
+    /// Records the drawing of the hemicubes with these `views` (five each) on the layers of
     /// `targets`, with timestamps before the first (query 0) and after the last (query 1).
     pub fn draw(
         &self,

@@ -1,19 +1,19 @@
-//! From what a pixel shows to the slot of the row that it counts for.
+//! Maps the item of a pixel to the slot of the row that it counts for.
 
 use super::layout::{BACK, FIRST_CELL, FIRST_ELEMENT, OPEN, TriangleCells};
 use crate::mesh::Mesh;
 
 /// Every triangle as a lattice of the finest cells in its quadtree. A pixel's item is OPEN, BACK or
-/// a cell; how the cells make up elements, of whatever depths, is known to this table alone.
+/// a cell; only this table maps cells to elements, of whatever depths.
 pub struct ItemTable {
-    /// Where each triangle's items start, and how many cells lie along its edge.
+    /// First item of each triangle, and number of cells along its edge.
     pub triangles: Vec<TriangleCells>,
     /// The row slot of each item.
     pub slots: Vec<u32>,
 }
 
 impl ItemTable {
-    /// How many items there are for `mesh`; known before the table is made.
+    /// Number of items for `mesh`; known before the table is made.
     pub fn count(mesh: &Mesh) -> u64 {
         let triangles = 0..mesh.scene().triangles().len();
         u64::from(FIRST_CELL) + triangles.map(|t| 1 << (2 * mesh.depth(t))).sum::<u64>()

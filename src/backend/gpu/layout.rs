@@ -42,7 +42,7 @@ pub struct FaceView {
     pub padding_2: u32,
 }
 
-/// Where a triangle's items start, and how many cells lie along its edge.
+/// First item of a triangle, and number of cells along its edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TriangleCells {
@@ -50,7 +50,7 @@ pub struct TriangleCells {
     pub side: u32,
 }
 
-/// What `reduce.wgsl` needs to know of a batch.
+/// Parameters of `reduce.wgsl` for a batch.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Reduction {
@@ -59,7 +59,7 @@ pub struct Reduction {
     pub stride: u32,
 }
 
-/// Two boxes of the hierarchy that rays descend, and what is in them.
+/// Two boxes of the hierarchy for rays, and their contents.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TraceNode {
@@ -73,7 +73,7 @@ pub struct TraceNode {
     pub padding_2: u32,
 }
 
-/// A triangle as rays meet it.
+/// A triangle for ray intersection.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedTriangle {
@@ -87,7 +87,7 @@ pub struct TracedTriangle {
     pub extent: f32,
 }
 
-/// What there is one of in a scene that rays are cast in.
+/// Scene-wide data for ray casting.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedSceneInfo {
@@ -113,7 +113,7 @@ pub struct TracedSceneInfo {
     pub padding_8: u32,
 }
 
-/// A light, or what a pane lets through.
+/// A light, or the transmittance of a pane.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedLight {
@@ -133,7 +133,7 @@ pub struct Lamp {
     pub end: f32,
 }
 
-/// A point that light is gathered at.
+/// A gather point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedPoint {
@@ -147,7 +147,7 @@ pub struct TracedPoint {
     pub padding: u32,
 }
 
-/// How many rays a gather casts.
+/// Numbers of rays of a gather.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct GatherSettings {
@@ -161,7 +161,7 @@ pub struct GatherSettings {
     pub padding: u32,
 }
 
-/// What was gathered at a point.
+/// The sample of a gather point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Sample {
@@ -175,7 +175,7 @@ pub struct Sample {
     pub shadow_rays: u32,
 }
 
-/// A patch that a row is made of.
+/// A patch whose row is computed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedPatch {
@@ -187,7 +187,7 @@ pub struct TracedPatch {
     pub rotation: f32,
 }
 
-/// What a row is made with.
+/// Parameters of rows.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RowSettings {
@@ -197,7 +197,7 @@ pub struct RowSettings {
     pub entries: u32,
 }
 
-/// A slot of a row that rays have met.
+/// A slot of a row with hits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RowEntry {
@@ -212,16 +212,16 @@ pub struct RowEntry {
 /// Bytes before the entries of `RowEntries`.
 pub const ROW_ENTRIES_HEADER_BYTES: u64 = 16;
 
-/// Bytes of a `PointState`, which the host never looks into.
+/// Bytes of a `PointState`, which the host does not read.
 pub const POINT_STATE_BYTES: u64 = 544;
 
 /// Bytes of the workgroup counts at the beginning of `Work`: those of rays, those of shadow rays.
 pub const WORK_HEADER_BYTES: u64 = 32;
 
-/// In place of a node or a triangle: none.
+/// Absent node or triangle.
 pub const NOTHING: u32 = u32::MAX;
 
-/// A leaf of the hierarchy: this, its triangles less one << 29, and the first of them.
+/// A leaf of the hierarchy: this, plus (number of its triangles − 1) << 29, plus the first of them.
 pub const LEAF: u32 = 1 << 31;
 
 /// Flags of a traced triangle.
@@ -237,14 +237,14 @@ pub const ELEMENTS_A_LINE: u32 = 2048;
 /// A node with children: this plus the first of the four. A leaf holds its element.
 pub const INNER: u32 = 1 << 31;
 
-/// What a pixel shows: nothing, the back of a triangle, or from here on a cell of a front. Slots
-/// of a row start alike: open, back, then the elements.
+/// Items of a pixel: nothing, the back of a triangle, or from here on a cell of a front. Slots of a
+/// row start alike: open, back, then the elements.
 pub const OPEN: u32 = 0;
 pub const BACK: u32 = 1;
 pub const FIRST_CELL: u32 = 2;
 pub const FIRST_ELEMENT: u32 = 2;
 
-/// Image lines that one thread of `reduce.wgsl` walks down, and threads in its workgroup.
+/// Image lines that one thread of `reduce.wgsl` processes, and threads in its workgroup.
 pub const STRIP: u32 = 16;
 pub const WORKGROUP: u32 = 64;
 
@@ -265,7 +265,7 @@ mod tests {
     use crate::scene::Sun;
     use crate::visibility::sah_tree::MAX_LEVELS;
 
-    /// All that cast rays, and [`COMPACT_ROWS_WGSL`].
+    /// All ray-casting shaders, and [`COMPACT_ROWS_WGSL`].
     const RAY_SHADERS: [&str; 6] = [
         RANK_LIGHTS_WGSL,
         HEMISPHERE_RAYS_WGSL,
@@ -277,7 +277,7 @@ mod tests {
 
     fn parsed(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source).expect("WGSL parses");
-        // Nothing beyond what every WebGPU device has.
+        // No capabilities beyond those of every WebGPU device.
         let none = naga::valid::Capabilities::empty();
         naga::valid::Validator::new(naga::valid::ValidationFlags::all(), none)
             .validate(&module)
@@ -292,7 +292,7 @@ mod tests {
         layout_if_there(module, name).unwrap_or_else(|| panic!("no struct {name}"))
     }
 
-    /// None where the shader does not have it.
+    /// `None` if the shader does not have it.
     fn layout_if_there(module: &naga::Module, name: &str) -> Option<Layout> {
         let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name))?;
         let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };
@@ -304,7 +304,7 @@ mod tests {
         Some((list, *span as usize))
     }
 
-    /// The value of a constant; none where the shader does not have it.
+    /// The value of a constant; `None` if the shader does not have it.
     fn constant_if_there(module: &naga::Module, name: &str) -> Option<naga::Literal> {
         let named = |c: &naga::Constant| c.name.as_deref() == Some(name);
         let (_, constant) = module.constants.iter().find(|(_, c)| named(c))?;
@@ -324,7 +324,7 @@ mod tests {
     macro_rules! rust_layout {
         ($t:ident { $($field:ident),* }) => {{
             let v = $t::default();
-            // Destructured without `..`, so that a new field cannot be forgotten here.
+            // Destructured without `..`, so that a new field causes a compile error here.
             let $t { $($field),* } = v;
             (
                 vec![$((
@@ -379,8 +379,8 @@ mod tests {
         assert_eq!(OPEN, 0);
     }
 
-    /// A struct that shaders which cast rays share with the host, by its name in WGSL: the same in
-    /// all that have it, and one has.
+    /// A struct shared by ray-casting shaders and the host, by its name in WGSL: at least one
+    /// shader has it, and all that have it agree.
     #[test]
     fn structs_of_ray_shaders_have_one_layout() {
         let modules = RAY_SHADERS.map(parsed);
@@ -532,7 +532,7 @@ mod tests {
             found.iter().for_each(|found| assert_eq!(*found, layout, "{name}"));
         }
         assert_eq!(size_of::<PointState>() as u64, POINT_STATE_BYTES);
-        // Lists start where their headers end.
+        // Lists start after their headers.
         let lists = [
             ("Work", "points", WORK_HEADER_BYTES),
             ("WorkRead", "points", WORK_HEADER_BYTES),
@@ -576,15 +576,16 @@ mod tests {
             assert!(!found.is_empty(), "no shader has {name}");
             found.iter().for_each(|&found| assert_eq!(found, naga::Literal::U32(value), "{name}"));
         }
-        // No sun's middle is hidden by a horizon that its disc is above.
+        // The middle of the sun is above the horizon if its disc is above.
         let sine = naga::Literal::F32(Sun::SINE as f32);
         assert_eq!(constant_if_there(&modules[3], "SINE_OF_SUN"), Some(sine));
-        // One node of each level waits on the stack, and what ends the walk.
+        // The stack holds one node of each level, and the end marker.
         assert!(constant(&modules[0], "STACK") >= MAX_LEVELS + 2);
-        // Of a light and the sun, of either half; the shaders have the numbers as they are.
+        // One of each light and the sun, for either half; the shaders have these numbers as
+        // literals.
         assert_eq!([SOURCES, size_of::<PointState>()], [9, 544]);
-        // A workgroup is one point's, a ray a lane; the host counts workgroups of as many. That of
-        // a row to be compacted is as large as any device allows.
+        // A workgroup serves one point, a lane one ray; the host counts workgroups of that size.
+        // The workgroup for compacting a row is as large as any device allows.
         for module in &modules {
             let lanes = match constant_if_there(module, "COMPACT_LANES") {
                 Some(lanes) => lanes,
@@ -598,7 +599,7 @@ mod tests {
         }
     }
 
-    /// So many bindings and so much memory of a workgroup as every WebGPU device has.
+    /// No more bindings and workgroup memory than every WebGPU device has.
     #[test]
     fn ray_shaders_keep_to_the_limits_of_webgpu() {
         for module in RAY_SHADERS.map(parsed) {

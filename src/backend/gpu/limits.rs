@@ -1,32 +1,32 @@
-//! How much of a device may be used, and how much of it the passes need.
+//! Usable limits of a device, and the requirements of the passes.
 
 use super::error::place;
 use super::traced_gather::MAX_POINTS;
 use crate::error::{Error, ErrorKind};
 
-/// The most that is asked of a device; what it cannot do anyway is not asked either.
+/// Maximum limits requested of a device, where it has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GpuLimits {
-    /// Bytes of device memory that buffers and textures may take, all together. Batches are made
-    /// smaller to stay within.
+    /// Total bytes of device memory for buffers and textures. Batches are made smaller to stay
+    /// within.
     pub memory: u64,
-    /// Bytes of one buffer. It bounds elements and triangles: a row takes 4 bytes an element.
+    /// Bytes of one buffer. It bounds elements and triangles: a row takes 4 bytes per element.
     pub buffer: u64,
-    /// Pixels along an edge of a texture. It bounds resolutions: a hemicube is three times as high
-    /// as its top face.
+    /// Pixels along an edge of a texture. It bounds resolutions: the item buffer of a hemicube is
+    /// three times as high as its top face.
     pub texture: u32,
     /// Layers of a texture, one for each hemicube of a batch.
     pub layers: u32,
 }
 
 impl GpuLimits {
-    /// All that there is.
+    /// No limits.
     pub const MOST: GpuLimits =
         GpuLimits { memory: u64::MAX, buffer: u64::MAX, texture: u32::MAX, layers: u32::MAX };
 
-    /// What to ask of an adapter that has so much.
+    /// The limits to request of an adapter with these `available` ones.
     pub(super) fn requested(&self, available: &wgpu::Limits) -> wgpu::Limits {
-        // Those of WebGPU, but for textures, of which adapters without it have less.
+        // Those of WebGPU, except for textures, of which adapters without it support less.
         let least = wgpu::Limits {
             max_storage_buffers_per_shader_stage: 8,
             ..wgpu::Limits::downlevel_defaults()
@@ -53,7 +53,7 @@ impl GpuLimits {
     }
 }
 
-/// Checks that a device on the named adapter was opened with enough for every pass.
+/// Checks that a device on the named adapter was opened with sufficient limits for every pass.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] with the first limit that is too low.

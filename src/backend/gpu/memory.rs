@@ -1,4 +1,4 @@
-//! Device memory: every buffer and texture is created here, and counted against one budget.
+//! Device memory: creates every buffer and texture, and counts them against one budget.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,7 +9,7 @@ use super::error::device_error;
 use super::layout::TEXELS_A_LINE;
 use crate::error::{Error, ErrorKind};
 
-/// Bytes that all users of a device may take together, and those taken.
+/// Total byte limit for all users of a device, and bytes allocated.
 #[derive(Debug)]
 pub struct MemoryBudget {
     limit: u64,
@@ -17,12 +17,12 @@ pub struct MemoryBudget {
 }
 
 impl MemoryBudget {
-    /// `limit` bytes, none of them taken.
+    /// A budget of `limit` bytes, none allocated.
     pub fn new(limit: u64) -> MemoryBudget {
         MemoryBudget { limit, taken: AtomicU64::new(0) }
     }
 
-    /// Takes `bytes`, or says how many are taken where that is more than is left.
+    /// Allocates `bytes`; the error is the number allocated where that exceeds the limit.
     fn take(&self, bytes: u64) -> Result<(), u64> {
         let add = |taken: u64| taken.checked_add(bytes).filter(|sum| *sum <= self.limit);
         self.taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).map(|_| ())
@@ -46,7 +46,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Nothing yet.
+    /// Without buffers or textures.
     pub fn new(
         device: wgpu::Device,
         queue: wgpu::Queue,
@@ -59,7 +59,7 @@ impl Memory {
     /// A buffer of `bytes`.
     ///
     /// # Errors
-    /// [`ErrorKind::Memory`] when that is more than is left.
+    /// [`ErrorKind::Memory`] when that exceeds the remaining budget.
     pub fn buffer(
         &self,
         label: &str,
@@ -91,7 +91,7 @@ impl Memory {
         contents: &[u8],
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer, Error> {
-        // Not `create_buffer_init`, which panics where there is no memory.
+        // Not `create_buffer_init`, which panics without memory.
         let bytes = contents.len() as u64;
         let buffer = self.buffer(label, bytes, usage | wgpu::BufferUsages::COPY_DST)?;
         self.queue.write_buffer(&buffer, 0, contents);
@@ -101,7 +101,7 @@ impl Memory {
     /// A texture of one mip level: width, height and layers.
     ///
     /// # Errors
-    /// [`ErrorKind::Memory`] when that is more than is left.
+    /// [`ErrorKind::Memory`] when that exceeds the remaining budget.
     pub fn texture(
         &self,
         label: &str,
@@ -124,13 +124,13 @@ impl Memory {
         }))
     }
 
-    /// A texture that shaders read as an array of any length, [`TEXELS_A_LINE`] a line.
+    /// A texture that shaders read as an array of any length, [`TEXELS_A_LINE`] per line.
     pub fn lines(&self, label: &str, texels: &[[f32; 4]]) -> Result<wgpu::TextureView, Error> {
         let (padded, size) = padded_to_lines(texels);
         self.texels(label, &padded, size)
     }
 
-    /// The same of words.
+    /// The same for words.
     pub fn words(&self, label: &str, words: &[u32]) -> Result<wgpu::TextureView, Error> {
         let (padded, size) = padded_to_lines(words);
         self.texels_of(label, &padded, size, wgpu::TextureFormat::R32Uint)
@@ -139,7 +139,7 @@ impl Memory {
     /// A texture of these texels, line by line, for shaders to read: width and height.
     ///
     /// # Errors
-    /// [`ErrorKind::Memory`] when that is more than is left.
+    /// [`ErrorKind::Memory`] when that exceeds the remaining budget.
     pub fn texels(
         &self,
         label: &str,
@@ -179,7 +179,7 @@ impl Memory {
     }
 }
 
-/// Texels in whole lines, at least one, and how many columns and lines these are.
+/// Texels padded to whole lines, at least one, and the number of columns and lines.
 fn padded_to_lines<T: Pod>(texels: &[T]) -> (Vec<T>, [u32; 2]) {
     let line = TEXELS_A_LINE as usize;
     let width = texels.len().clamp(1, line);

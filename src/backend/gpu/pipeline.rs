@@ -1,4 +1,4 @@
-//! Shader modules, pipelines and bind groups, made one way for all passes.
+//! Shader modules, pipelines and bind groups for all passes.
 
 /// The module of a WGSL source.
 pub fn shader(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderModule {
@@ -8,7 +8,7 @@ pub fn shader(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderM
     })
 }
 
-/// A compute pipeline of entry point `entry_point`, its layout as the shader has it.
+/// A compute pipeline of entry point `entry_point`, with the layout of the shader.
 pub fn compute(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
@@ -24,8 +24,8 @@ pub fn compute(
     })
 }
 
-/// A pipeline that draws triangles: entry point `vertex`, then `fragment`, where the nearest is in
-/// front, be it a front or a back. Depth is reversed: nearer is greater.
+/// A pipeline that draws triangles: entry point `vertex`, then `fragment`; the nearest triangle is
+/// visible, front or back. Depth is reversed: nearer is greater.
 pub fn draw(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! layers of R32Uint ──copy──► items (lines padded to `stride` words)
-//! items, weights, slot of each item ──► reduce ──► rows: slots words a hemicube
+//! items, weights, slot of each item ──► reduce ──► rows: slots words per hemicube
 //!                                                        [open, back, element 0, element 1, …]
 //! ```
 //!
-//! A thread adds up a strip of [`STRIP`] pixels of one column; sums meet in integer atomics, so
-//! that their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
+//! A thread adds up a strip of [`STRIP`] pixels of one column; the sums are added by integer
+//! atomics, so that their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
 use super::layout::{Reduction, STRIP, WORKGROUP};
 use super::memory::Memory;
@@ -17,28 +17,28 @@ use super::shaders::REDUCE_WGSL;
 use crate::error::Error;
 use crate::hemicube;
 
-/// The reduction of a batch of hemicubes, whatever their resolution.
+/// The reduction of a batch of hemicubes, at any resolution.
 #[derive(Debug)]
 pub struct Reduce {
     pipeline: wgpu::ComputePipeline,
     /// The row slot of each item.
     slot_of_item: wgpu::Buffer,
-    /// The item buffers once more, as plain memory: reading them as a texture costs more than the
-    /// copy does.
+    /// Copies of the item buffers in a plain buffer: reading them as a texture costs more than the
+    /// copy.
     items: wgpu::Buffer,
     /// Dense rows of the batch, `slots` words each.
     pub rows: wgpu::Buffer,
     slots: u32,
 }
 
-/// Hemicubes that are reduced together.
+/// Dimensions of a batch of hemicubes.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchSize {
-    /// Pixels along an edge of the top face, at most.
+    /// Maximum number of pixels along an edge of the top face.
     pub resolution: u32,
-    /// Words of a row: what meets nothing, what meets backs, then one an element.
+    /// Words of a row: open, backs, then one per element.
     pub slots: u32,
-    /// Hemicubes, at most.
+    /// Maximum number of hemicubes.
     pub hemicubes: u32,
 }
 
@@ -55,7 +55,7 @@ impl Reduce {
         let slot_of_item = memory.storage("slots", bytemuck::cast_slice(slot_of_item))?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
-        // Zero at first, and after each batch.
+        // Zero initially and after each batch.
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
         let module = pipeline::shader(device, "reduce.wgsl", REDUCE_WGSL);
         let pipeline = pipeline::compute(device, &module, "reduce");
@@ -64,8 +64,7 @@ impl Reduce {
         Ok(Reduce { pipeline, slot_of_item, items, rows, slots })
     }
 
-    /// What the pass reads and writes for hemicubes of `resolution`, at most the one that this was
-    /// made for.
+    /// Bindings of the pass for hemicubes of `resolution`, at most the one that this was made for.
     pub fn bindings(&self, memory: &Memory, resolution: u32) -> Result<wgpu::BindGroup, Error> {
         let weights = hemicube::weights(resolution)?;
         let weights = memory.storage("weights", bytemuck::cast_slice(&weights))?;
@@ -79,7 +78,7 @@ impl Reduce {
     }
 
     /// Records the reduction of the first `count` hemicubes on `targets`, with the bindings for
-    /// their resolution and a timestamp after it (query 2). It adds to rows that are 0 before.
+    /// their resolution and a timestamp after it (query 2). Rows must be 0 before.
     pub fn reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -104,8 +103,7 @@ impl Reduce {
     }
 }
 
-/// Words from one line of an item buffer in memory to the next: lines start at multiples of 256
-/// bytes.
+/// Words per line of an item buffer in memory, a multiple of 256 bytes.
 pub fn stride(resolution: u32) -> u32 {
     resolution.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4)
 }

@@ -1,4 +1,5 @@
-//! What is drawn on: a layer a hemicube, so that its pixels do not depend on its index in a batch.
+//! Render targets: one layer per hemicube, so that its pixels do not depend on its index in a
+//! batch.
 //!
 //! ```text
 //! texture  ┌ layer 0 ┐ ┌ layer 1 ┐ … ┌ layer batch−1 ┐
@@ -51,7 +52,7 @@ impl RenderTargets {
         queries: Option<&wgpu::QuerySet>,
     ) -> wgpu::RenderPass<'e> {
         let (first, last) = (k == 0, k + 1 == count);
-        // wgpu refuses a set of timestamps that writes none.
+        // wgpu rejects a set of timestamps without writes.
         let queries = queries.filter(|_| first || last);
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("layer"),

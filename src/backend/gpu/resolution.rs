@@ -1,4 +1,4 @@
-//! What drawing and reducing need for each resolution; all else the resolutions share.
+//! Data of drawing and reducing specific to a resolution; all else is shared between resolutions.
 
 use super::item_buffer::ItemBuffer;
 use super::memory::Memory;
@@ -13,14 +13,15 @@ pub struct Resolution {
     /// Pixels along an edge of the top face.
     pub pixels: u32,
     pub targets: RenderTargets,
-    /// What `reduce` reads and writes.
+    /// Bindings of `reduce`.
     pub bindings: wgpu::BindGroup,
     /// Hemicubes drawn so far.
     pub drawn: u64,
 }
 
 impl Resolution {
-    /// For `batch` hemicubes each: first `resolution`, then what it is halved to for little light.
+    /// For `batch` hemicubes each: first `resolution`, then its halvings for patches with little
+    /// light.
     pub fn halved(
         memory: &Memory,
         reduce: &Reduce,

@@ -1,7 +1,7 @@
 //! Form-factor rows from hemicubes: batches drawn, reduced, compacted and read back.
 //!
 //! ```text
-//! patches ─► views (frame, turned by a hash of the patch; 5 faces) ─► item buffer ─► reduce
+//! patches ─► views (frame, rotated by a hash of patch id; 5 faces) ─► item buffer ─► reduce
 //!                                                                                      │
 //! rows ◄─ mean over rotations ◄─ sum checked ◄─ readback of entries ◄─ compact ◄───────┘
 //! ```
@@ -39,10 +39,10 @@ use crate::visibility::offset;
 
 /// Makes form-factor rows with hemicubes (Cohen and Greenberg 1985) on a graphics device.
 ///
-/// The scene's own triangles are drawn over the five faces of a hemicube at a patch's centroid; a
-/// pixel sees a triangle, and the element is found from the barycentric position there. A row is
+/// The scene's own triangles are drawn over the five faces of a hemicube at a patch's centroid; the
+/// element of a pixel is computed from the barycentric position on its visible triangle. A row is
 /// the sum of exact pixel weights: its error is that of pixels that straddle a border between
-/// elements, and of seeing the patch from one point.
+/// elements, and of the single viewpoint.
 ///
 /// Rows for patches that shoot little are made at a half or a quarter of the resolution: see
 /// [`HemicubeRows::with_full_share`].
@@ -53,30 +53,30 @@ pub struct HemicubeRows {
     batches: Batches,
     coordinates: SplitFloat,
     slots: u32,
-    /// Rows that are best asked for at once, however many hemicubes there is memory for: it decides
-    /// the order of shots.
+    /// Preferred number of rows per request, independent of the available memory, since it
+    /// determines the order of shots.
     preferred_batch: u32,
     rotations: NonZeroU32,
     pub(crate) full_share: f64,
     timings: Timings,
 }
 
-/// What draws hemicubes, a batch at a time.
+/// Pipelines and buffers to draw hemicubes, a batch at a time.
 #[derive(Debug)]
 struct Batches {
     item_buffer: ItemBuffer,
     reduce: Reduce,
-    /// The full resolution, then what it is halved to.
+    /// The full resolution, then its halvings.
     resolutions: Vec<Resolution>,
     compacted: CompactedRows,
     clock: Option<Clock>,
-    /// Hemicubes at once, at most.
+    /// Maximum number of hemicubes in a batch.
     max_hemicubes: u32,
     _memory: Memory,
 }
 
-/// Item buffers of a batch take at most this many bytes, if more than one: a software device draws
-/// that much in a fraction of a second.
+/// Maximum size of the item buffers of a batch of more than one, bytes: a software device draws
+/// that in a fraction of a second.
 const BATCH_BYTES: u64 = 32 << 20;
 
 /// Hemicubes of a batch on a software device, at most: it is as fast with so few. Chosen by hand;
@@ -84,9 +84,9 @@ const BATCH_BYTES: u64 = 32 << 20;
 const MAX_SOFTWARE_BATCH: u32 = 16;
 
 impl HemicubeRows {
-    /// Share of the emitted flux from which on a patch gets the full resolution, unless set. With
-    /// 128 pixels the error of a whole bake grows by 1 % of itself, at most by 3 %, over full
-    /// resolution for all, and the time that rows take falls by a third (measured in three scenes).
+    /// Default share of the emitted flux from which a patch gets the full resolution. With 128
+    /// pixels the error of a whole bake increases by 1 %, at most by 3 %, over full resolution for
+    /// all, and the time of rows falls by a third (measured in three scenes).
     pub const FULL_SHARE: f64 = 4e-3;
 
     /// Hemicubes with a top face of `resolution` × `resolution` pixels over `mesh`, and fewer
@@ -148,22 +148,21 @@ impl HemicubeRows {
         })
     }
 
-    /// A row from this many hemicubes at the patch's centroid, each turned a further
-    /// 90°/`rotations` about the normal, and their mean taken; one unless set.
+    /// Computes a row as the mean of this number of hemicubes at the patch's centroid, each rotated
+    /// a further 90°/`rotations` about the normal; one by default.
     ///
     /// This is for the aliasing assumption of Baum, Rushmeier and Winget (1989): a pixel is in an
-    /// element or not, by its centre. Pixels that straddle a border err independently from one turn
-    /// to the next, so the error of an entry falls with the square root of `rotations`, and the
-    /// time grows in proportion to them. What is off because the patch is seen from one point
-    /// stays.
+    /// element or not, by its centre. Errors of pixels that straddle a border are independent
+    /// between rotations, so the error of an entry falls with the square root of `rotations`, and
+    /// the time grows in proportion to them. The error due to the single viewpoint remains.
     pub fn with_rotations(self, rotations: NonZeroU32) -> HemicubeRows {
         HemicubeRows { rotations, ..self }
     }
 
     /// Full resolution for patches that shoot at least this share of the emitted flux, in [0, 1];
-    /// for others it is halved once or twice, but to no less than 16 pixels along an edge, by what
-    /// is at stake: resolution ∝ share^0.4 errs least for the time. [`HemicubeRows::FULL_SHARE`]
-    /// unless set; with 0 all rows are at full resolution.
+    /// for others it is halved once or twice, but to no less than 16 pixels along an edge, by their
+    /// share: resolution ∝ share^0.4 minimizes the error for the time. [`HemicubeRows::FULL_SHARE`]
+    /// by default; with 0 all rows are at full resolution.
     pub fn with_full_share(self, full_share: f64) -> HemicubeRows {
         HemicubeRows { full_share, ..self }
     }
@@ -173,18 +172,18 @@ impl HemicubeRows {
         self.timings
     }
 
-    /// Hemicubes drawn so far, each rotation of one counted.
+    /// Hemicubes drawn so far, each rotation counted.
     pub fn drawn(&self) -> u64 {
         self.batches.resolutions.iter().map(|r| r.drawn).sum()
     }
 
-    /// Hemicubes drawn so far at each resolution: pixels along an edge of the top face, and how
-    /// many; the full one first, then what it is halved to.
+    /// Hemicubes drawn so far at each resolution: pixels along an edge of the top face, and number;
+    /// the full one first, then its halvings.
     pub fn drawn_by_resolution(&self) -> Vec<(u32, u64)> {
         self.batches.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
     }
 
-    /// The faces of the hemicube over `patch`, turned by `angle` (radians).
+    /// The faces of the hemicube over `patch`, rotated by `angle` (radians).
     fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), angle);
         let near = self.coordinates.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
@@ -319,8 +318,8 @@ impl FormFactors for HemicubeRows {
     }
 }
 
-/// Turn of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours do
-/// not repeat one another's pixel pattern and every run turns alike.
+/// Rotation of a patch's hemicube about its normal, radians: a hash of its id, so that neighbours
+/// do not repeat one another's pixel pattern and every run has the same.
 fn rotation(patch: NodeId) -> f64 {
     unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
 }

@@ -1,6 +1,6 @@
-//! Sources of the shaders; what two of them share stands once, in `shaders/shared`.
+//! Sources of the shaders; shared parts are in `shaders/shared`.
 
-/// Shaders begin with what they share.
+/// Shaders begin with their shared parts.
 macro_rules! shader {
     ($file:literal, $($shared:literal),*) => {
         concat!(
@@ -13,7 +13,7 @@ macro_rules! shader {
 pub const ITEM_BUFFER_WGSL: &str = shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
 pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
 
-/// Shaders that cast rays begin with how these meet the scene.
+/// Ray-casting shaders begin with ray–scene intersection.
 macro_rules! ray_shader {
     ($file:literal $(, $shared:literal)*) => {
         shader!(

@@ -1,4 +1,4 @@
-//! What the tests that compare shaders with their twins share: scenes, reading back, pictures.
+//! Helpers of the tests that compare shaders with their twins: scenes, reading back, pictures.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::scene::{Material, Rgb, Scene, Sky, SkyDistribution, Specular, Sun, Tr
 
 /// Shifts of pixel centres, pixels: none, then the other points of a grid of ±1/128 in steps of
 /// 1/256. Devices round corners of triangles to a grid of 1/256 pixel, and edge functions in 32
-/// bits add less than that again: what a device draws at a pixel is what the twin draws at one of
+/// bits add less than that again: the item of a device at a pixel is that of the twin at one of
 /// these points, or between them.
 pub fn offsets() -> Vec<[f64; 2]> {
     let steps = || (-2..=2).map(|k| f64::from(k) / 256.0);
@@ -22,7 +22,7 @@ pub fn offsets() -> Vec<[f64; 2]> {
     std::iter::once([0.0; 2]).chain(grid.filter(|o| *o != [0.0; 2])).collect()
 }
 
-/// The device; tests that need one are ignored where RADIOSITY_NO_GPU says that none is there.
+/// The device; tests that need one are ignored if RADIOSITY_NO_GPU is set.
 pub fn gpu() -> Gpu {
     Gpu::new(None).expect("a graphics adapter, or RADIOSITY_NO_GPU set")
 }
@@ -61,9 +61,9 @@ pub fn textured_scene() -> Mesh {
     mesh.with_scene(scene.unwrap()).unwrap()
 }
 
-/// A floor in quadtrees of uneven depth, and around it: a ceiling, a wall that reaches below the
-/// horizon and behind the eye, a triangle that shows its back, one that has a front on either
-/// side, and two lights with something in front of the first.
+/// A floor in quadtrees of uneven depth, and around it: a ceiling, a wall that extends below the
+/// horizon and behind the eye, a triangle that shows its back, one that has a front on either side,
+/// and two lights with something in front of the first.
 pub fn scene() -> Mesh {
     let triangles = [
         ([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0),
@@ -96,7 +96,7 @@ pub fn scene() -> Mesh {
     mesh.split(&split).unwrap()
 }
 
-/// Scenes with all that rays may meet, by name.
+/// Scenes with all kinds of objects that rays may hit, by name.
 pub fn traced_scenes() -> Vec<(&'static str, Mesh)> {
     vec![
         ("quadtrees", scene()),
@@ -110,7 +110,7 @@ pub fn traced_scenes() -> Vec<(&'static str, Mesh)> {
     ]
 }
 
-/// The scene under a sky that differs by direction, with a sun.
+/// The scene under a sky that varies with direction, with a sun.
 pub fn under_sky_and_sun() -> Mesh {
     let mesh = scene();
     let distribution = SkyDistribution::cie(12).unwrap();
@@ -155,7 +155,7 @@ fn glass(transmittance: [f64; 3]) -> Material {
     Material { specular, ..Material::grey("glass", 0.0) }
 }
 
-/// Triangles of quadrilaterals, each of a material of its own.
+/// Triangles of quadrilaterals, each with its own material.
 struct Parts {
     positions: Vec<DVec3>,
     triangles: Vec<Triangle>,
@@ -190,7 +190,7 @@ impl Parts {
 }
 
 /// A room that is open to one side, to a sun low in the sky, with a lamp above two tinted panes,
-/// which are wider than the room, and a third before the open side.
+/// which are wider than the room, and a third in front of the open side.
 fn room_with_panes() -> Mesh {
     let mut parts: Vec<(Quad, Material)> =
         walls().map(|wall| (wall, Material::grey("wall", 0.5))).to_vec();
@@ -206,8 +206,8 @@ fn room_with_panes() -> Mesh {
     Parts::new(&parts).mesh(sky, 0.4)
 }
 
-/// Above a floor a sheet whose mask repeats, below a lamp with holes whose mask ends at its border;
-/// a second lamp shines through the sheet alone.
+/// A sheet above a floor whose mask repeats, below a lamp with holes whose mask ends at its border;
+/// a second lamp illuminates through the sheet only.
 fn sheets_with_holes() -> Mesh {
     let parts = Parts::new(&[
         (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5)),
@@ -237,7 +237,7 @@ fn sheets_with_holes() -> Mesh {
 
 /// A floor under lights that fill much of its sky, one of them with a fold, so that one part of it
 /// hides another; a small light with a fold, one with two parts above one another, an ordinary one,
-/// one that is so dim that it does not count, and a block in between.
+/// one that is too dim to be sampled, and a block in between.
 fn wide_lights() -> Mesh {
     let mut parts = Parts::new(&[
         (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5)),
@@ -247,7 +247,7 @@ fn wide_lights() -> Mesh {
         (facing_down([2.2, 2.4], [0.2, 0.5], 0.8), emitting([5.0, 1.0, 2.0])),
         (facing_down([-0.9, -0.8], [1.5, 1.6], 0.5), emitting([4e-3, 3e-3, 2e-3])),
     ]);
-    // Along the line from q to r two triangles meet whose fronts look at each other.
+    // Along the line from q to r two triangles share an edge, with their fronts facing each other.
     let mut folded = |q: [f64; 3], r: [f64; 3], ends: [[f64; 3]; 2], exitance| {
         parts.add(&[[r, q, ends[0]], [q, r, ends[1]]], emitting(exitance));
     };
@@ -263,13 +263,13 @@ fn wide_lights() -> Mesh {
         [[-0.7, 0.6, 0.75], [-0.4, 0.6, 0.75]],
         [4.0, 4.5, 6.0],
     );
-    // Two that face down and share a corner: the lower one is before much of the upper one.
+    // Two that face down and share a corner: the lower one hides much of the upper one.
     let (a, b, c) = ([-0.6, 1.1, 0.9], [-0.6, 1.4, 0.9], [-0.2, 1.2, 0.9]);
     parts.add(&[[a, b, c], [a, [-0.5, 1.5, 0.75], [-0.1, 1.1, 0.75]]], emitting([3.0, 2.0, 4.0]));
     parts.mesh(Sky::uniform(Rgb::new(0.2, 0.1, 0.3)), 0.9)
 }
 
-/// A floor, and a lamp in the plane of a ceiling that goes on behind it.
+/// A floor, and a lamp in the plane of a ceiling that continues behind it.
 pub fn lamp_within_ceiling() -> Mesh {
     let x = [0.0, 1.0];
     let parts = [
@@ -280,8 +280,8 @@ pub fn lamp_within_ceiling() -> Mesh {
     Parts::new(&parts).mesh(Sky::default(), 0.3)
 }
 
-/// More lights than a workgroup has lanes above a floor, two of them in the same place, and a pane
-/// over some of the floor.
+/// More lights than a workgroup has lanes above a floor, two of them coinciding, and a pane over
+/// some of the floor.
 fn many_lights() -> Mesh {
     let floor = (facing_up([0.0, 2.0], [0.0, 2.0], 0.0), Material::grey("floor", 0.5));
     let mut parts = Parts::new(&[floor]);
@@ -300,7 +300,7 @@ fn many_lights() -> Mesh {
     parts.mesh(Sky::default(), 0.8)
 }
 
-/// A room with a lamp and a table leaf that is there once for each side, in one place.
+/// A room with a lamp and a table top that exists once for each side, at the same position.
 pub fn room_with_doubled_leaf() -> Mesh {
     let mut parts: Vec<(Quad, Material)> =
         walls().map(|wall| (wall, Material::grey("wall", 0.5))).to_vec();
@@ -312,7 +312,7 @@ pub fn room_with_doubled_leaf() -> Mesh {
     Parts::new(&parts).mesh(Sky::default(), 0.5)
 }
 
-/// `count` places just above the elements of `mesh`, spread over all of these.
+/// `count` points just above the elements of `mesh`, distributed over all of these.
 pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
     let random = |k: usize| unit_interval(split_mix64_nth(k as u64));
     let place = |k: usize| {
@@ -327,7 +327,7 @@ pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
     (0..count).map(place).collect()
 }
 
-/// Places on the sides of all triangles of `mesh`'s scene, `count` on each.
+/// Points on the sides of all triangles of `mesh`'s scene, `count` on each.
 pub fn on_sides(mesh: &Mesh, count: usize) -> Vec<DVec3> {
     let scene = mesh.scene();
     let sides = (0..scene.triangles().len()).flat_map(|t| {
@@ -338,7 +338,7 @@ pub fn on_sides(mesh: &Mesh, count: usize) -> Vec<DVec3> {
     sides.flat_map(|(a, b)| (0..count).map(move |k| a.lerp(b, share(k)))).collect()
 }
 
-/// Radiosity at each corner of each element of `mesh`: corners, and the values there.
+/// Radiosity at each corner of each element of `mesh`: indices of corners, and their values.
 pub fn random_radiosity(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<Rgb>) {
     let random = |k: u64| unit_interval(split_mix64_nth(k));
     let corners: Vec<[u32; 3]> =
@@ -349,11 +349,11 @@ pub fn random_radiosity(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<Rgb>) {
     (corners, values)
 }
 
-/// Directions across `direction` and places about an origin that rounding may turn a ray to, and
-/// none: a ray is what the twin casts along one of these, or between them.
+/// Deviations across `direction` and of an origin that rounding may cause, and none: a ray of the
+/// device is that of the twin for one of these, or between them.
 ///
-/// Directions: devices met compute sines and cosines to 2⁻²⁰, and what else there is of rounding in
-/// a direction, some ten of 2⁻²⁴, is less. Origins: a test of a triangle rounds differences of
+/// Directions: the tested devices compute sines and cosines to 2⁻²⁰, and all other rounding of a
+/// direction, some ten of 2⁻²⁴, is less. Origins: a triangle test rounds differences of
 /// coordinates, which are below 2 in units of the scene's size, some four times by 2⁻²⁴ of that.
 pub fn shifts() -> Vec<(Vec2, Vec3)> {
     let steps = [-1.0, 0.0, 1.0];
@@ -420,8 +420,8 @@ fn read(
     staging.slice(..).get_mapped_range().unwrap().to_vec()
 }
 
-/// Two images of symbols side by side, the device's and the twin's, and where they differ; of wide
-/// ones the lines that do.
+/// Two images of symbols side by side, the device's and the twin's, and where they differ; for wide
+/// ones only the lines that do.
 pub fn picture(width: usize, device: &[char], twin: &[char], wrong: &[bool]) -> String {
     let mut text = format!("{:w$}  {:w$}  differs\n", "device", "twin", w = width);
     for y in 0..device.len() / width {
@@ -437,7 +437,7 @@ pub fn picture(width: usize, device: &[char], twin: &[char], wrong: &[bool]) -> 
     text
 }
 
-/// A symbol for an item: `.` for nothing, `#` for a back, then digits and letters, again and again.
+/// A symbol for an item: `.` for nothing, `#` for a back, then digits and letters, repeatedly.
 pub fn symbol(item: u32) -> char {
     const CELLS: &[u8; 62] = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
     match item {

@@ -6,9 +6,9 @@
 //!                                                         └────┘ more rays, where halves disagree
 //! ```
 //!
-//! What is summed is what [`RayGather`](crate::backend::cpu::RayGather) sums, in 32 bits. Lists of
-//! the points that need more rays are made on the device: the host waits for samples alone.
-//! Luminaires are looked for by rays on the CPU.
+//! The sums are those of [`RayGather`](crate::backend::cpu::RayGather), in 32 bits. Lists of the
+//! points that need more rays are made on the device: the host waits for samples only. Rays to
+//! luminaires are cast on the CPU.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};
@@ -40,15 +40,15 @@ use crate::visibility::ray_scene::RayScene;
 /// Gathers by casting cosine-distributed rays on a graphics device, in compute passes.
 ///
 /// Every ray carries the same share of the hemisphere. A light's irradiance is its closed form
-/// times the share of it that is visible: by rays to points on it or, where it fills much of the
-/// hemisphere, by the rays over that.
+/// times its visible share: by rays to points on it or, where it fills much of the hemisphere, by
+/// the rays over that.
 #[derive(Debug)]
 pub struct TracedGather {
     gpu: Gpu,
     lights: Arc<Lights>,
     scene: Arc<TracedScene>,
     rotations: CellRotation,
-    /// What rays to luminaires meet and pass; none without luminaires.
+    /// Surfaces and panes for rays to luminaires; `None` without luminaires.
     sight: Option<(Arc<RayScene>, Panes)>,
     triangles: usize,
     min_rays: u32,
@@ -61,20 +61,20 @@ pub struct TracedGather {
     seconds: f64,
 }
 
-/// Buffers of the batches under way: kept with the device, for all gatherers one after the other.
+/// Buffers of the batches in flight: stored with the device, for all gatherers in turn.
 #[derive(Debug)]
 pub struct Slots {
-    /// The first half of `Work` with no points in its lists.
+    /// Initial contents of the first half of `Work`, with empty lists.
     no_work: wgpu::Buffer,
     slots: Vec<Slot>,
-    /// Points of a batch, at most.
+    /// Maximum number of points of a batch.
     points: u32,
-    /// Passes that cast rays of one half, at most.
+    /// Maximum number of passes that cast rays of one half.
     passes: u32,
     _memory: Memory,
 }
 
-/// Buffers of a batch, used again once its samples are read.
+/// Buffers of a batch, reused once its samples are read.
 #[derive(Debug)]
 struct Slot {
     points: wgpu::Buffer,
@@ -82,34 +82,34 @@ struct Slot {
     samples: wgpu::Buffer,
     work: wgpu::Buffer,
     staging: wgpu::Buffer,
-    /// By the number of passes before that have cast rays of the same half.
+    /// One per preceding pass that cast rays of the same half.
     settings: Vec<wgpu::Buffer>,
 }
 
-/// A batch under way.
+/// A batch in flight.
 struct InFlight {
     slot: usize,
     points: usize,
     submission: wgpu::SubmissionIndex,
 }
 
-/// Batches under way at once: one is read while one runs and one is ready. With two the device
+/// Number of batches in flight: one is read while one runs and one is ready. With two the device
 /// waits for the host between batches.
 const IN_FLIGHT: usize = 3;
 
-/// Rays of a point that one pass casts at most, 64 a lane: lavapipe (Mesa 22.3) leaves all loops of
-/// an invocation after 65 535 rounds in total, and a ray takes some hundred.
+/// Maximum number of rays of a point in one pass, 64 per lane: lavapipe (Mesa 22.3) leaves all
+/// loops of an invocation after 65 535 iterations in total, and a ray takes some hundred.
 const PASS_RAYS: u32 = 4096;
 
-/// Points of a batch at most: beyond that an H200 gets no faster.
+/// Maximum number of points of a batch: an H200 gets no faster beyond that.
 pub const MAX_POINTS: u32 = 32_768;
 
-/// Seconds that one dispatch may take: drivers end those of seconds, and a desktop stands still
+/// Maximum seconds of one dispatch: drivers abort those of seconds, and a desktop freezes
 /// meanwhile.
 const DISPATCH_SECONDS: f64 = 0.02;
 
 impl TracedGather {
-    /// About `count` rays a point over the triangles of `mesh`'s scene: the nearest power of two.
+    /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰, or for a scene that does not fit the
@@ -166,7 +166,7 @@ impl TracedGather {
         self.rays
     }
 
-    /// Seconds that gathers took so far, as the host sees it.
+    /// Seconds of gathers so far, measured on the host.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
@@ -187,7 +187,7 @@ impl TracedGather {
         }
     }
 
-    /// What comes straight from luminaires, W/m².
+    /// Direct irradiance from luminaires, W/m².
     fn luminaires(&self, point: &GatherPoint) -> Rgb {
         let Some((rays, panes)) = &self.sight else { return Rgb::ZERO };
         let (luminaires, rotations) = (self.lights.scene().luminaires(), &self.rotations);
@@ -217,7 +217,7 @@ impl TracedGather {
         if is_sound { Ok(sample) } else { Err(format!("{sample:?}")) }
     }
 
-    /// Points of one batch: as many as a dispatch may take time for, and no more than `most`.
+    /// Number of points of one batch: limited by the time of a dispatch, and at most `most`.
     fn batch_len(&self, most: u32) -> u32 {
         let per_ray = match (self.gpu.adapter().kind, self.rays) {
             (AdapterKind::Cpu, 0) => 1e-6,
@@ -228,7 +228,7 @@ impl TracedGather {
         ((DISPATCH_SECONDS / seconds) as u32).max(64).min(most)
     }
 
-    /// The samples of `points`, in batches of no more than `most`.
+    /// The samples of `points`, in batches of at most `most`.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,
@@ -238,10 +238,10 @@ impl TracedGather {
         let gpu = self.gpu.clone();
         let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let len = (self.batch_len(most) as usize).min(points.len());
-        // Of all rays of the first pass, or of the last doubling.
+        // For all rays of the first pass, or of the last doubling.
         let passes = self.min_rays.max(self.max_rays / 2).div_ceil(PASS_RAYS);
         let has_room = |slots: &Slots| slots.points as usize >= len && slots.passes >= passes;
-        // Taken, so that a batch that fails leaves none that is half done.
+        // Taken out, so that a failing batch leaves no unfinished slots.
         let slots = match kept.take().filter(has_room) {
             Some(slots) => slots,
             None => Slots::new(gpu.memory(), (len as u32).next_power_of_two(), passes)?,
@@ -266,7 +266,7 @@ impl TracedGather {
         Ok(out)
     }
 
-    /// Starts a batch.
+    /// Submits a batch.
     fn submit(
         &self,
         slots: &Slots,
@@ -318,7 +318,7 @@ impl TracedGather {
         settle(&mut encoder);
         let doublings = (self.max_rays / self.min_rays).ilog2();
         for round in 0..if has_lights { 2 * doublings } else { doublings } {
-            // Each half is as large as all that there was before: no more than this.
+            // The second half has the same number of rays as all before it: at most this.
             let rays = self.min_rays << round.min(doublings - 1);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             for k in 0..passes(rays) {
@@ -362,7 +362,7 @@ impl TracedGather {
         Ok(())
     }
 
-    /// Buffers of a slot as the passes bind them.
+    /// Bind groups of a slot for all passes.
     fn bind(&self, slot: &Slot, field: &FieldBuffers) -> Bound {
         let (device, scene) = (&self.gpu.device, &*self.scene);
         let pipelines = self.gpu.gather_pipelines();
@@ -437,7 +437,7 @@ struct Bound {
 
 struct BoundPass {
     groups: Vec<(u32, wgpu::BindGroup)>,
-    /// Group 1, by the number of passes before that have cast rays of the same half.
+    /// Group 1, one per preceding pass that cast rays of the same half.
     batches: Vec<wgpu::BindGroup>,
 }
 
@@ -491,7 +491,7 @@ impl Slots {
     }
 }
 
-/// Checks that textures of a device may be as wide as those that are read as arrays.
+/// Checks that a device supports the width of textures that are read as arrays.
 pub fn check_textures(texture: u32) -> Result<(), Error> {
     if texture >= TEXELS_A_LINE {
         return Ok(());
@@ -501,9 +501,9 @@ pub fn check_textures(texture: u32) -> Result<(), Error> {
     Err(Error::new(ErrorKind::Setting, "graphics device", found, remedy))
 }
 
-/// The directions of `samples`, ray by ray. Those that are cast together, the first half of
-/// `min_rays`, the second, as many again and so on, are in the order of a Z-curve over azimuth and
-/// elevation, so that neighbouring lanes meet much the same.
+/// The directions of `samples`, ray by ray. Those that are cast together (the first half of
+/// `min_rays`, the second, then each doubling) are in the order of a Z-curve over azimuth and
+/// elevation, so that neighbouring lanes have similar hits.
 fn ordered_directions(samples: &HemisphereSamples, min_rays: u32) -> Vec<[f32; 4]> {
     let mut directions: Vec<[f32; 4]> =
         samples.local().iter().map(|&[x, y, z]| [x as f32, y as f32, z as f32, 0.0]).collect();
@@ -520,7 +520,7 @@ fn ordered_directions(samples: &HemisphereSamples, min_rays: u32) -> Vec<[f32; 4
     directions
 }
 
-/// 16 bits, a zero before each.
+/// 16 bits, each preceded by a zero bit.
 fn interleaved(bits: u32) -> u32 {
     let mut x = bits & 0xffff;
     for (shift, mask) in [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
@@ -546,7 +546,7 @@ impl Gather for TracedGather {
                 self.gather_all(&field, &traced, most)
             });
             match samples {
-                // Smaller batches make room for the light.
+                // Smaller batches leave memory for the field.
                 Err(e) if e.kind() == ErrorKind::Memory && most > 1 => {
                     most /= 2;
                     gpu.forget_slots()?;

@@ -2,9 +2,9 @@
 //! compacted there.
 //!
 //! ```text
-//! patches ─► a ray a lane ─► counts, dense: patch × slot ─► entries, row by row ─► readback
-//!                                                 ▲  zeros  │
-//!                                                 └─────────┘
+//! patches ─► a ray per lane ─► counts, dense: patch × slot ─► entries, row by row ─► readback
+//!                                                   ▲  zeros  │
+//!                                                   └─────────┘
 //! ```
 
 use std::sync::Arc;
@@ -29,7 +29,7 @@ use crate::scene::Rgb;
 use crate::visibility::offset;
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid on a graphics
-/// device: the rows of [`RayRows`](crate::RayRows), but for rays that rounding moves.
+/// device: the rows of [`RayRows`](crate::RayRows), except for rays that rounding deflects.
 ///
 /// Every ray carries the same share of the light, so a form factor is a count: for n rays the
 /// standard error of an entry F is at most √(F(1−F)/n).
@@ -38,7 +38,7 @@ pub struct TracedRows {
     gpu: Gpu,
     scene: Arc<TracedScene>,
     count: u32,
-    /// Directions by number of rays: all, and the fewer ones asked for so far.
+    /// Directions by number of rays: all, and the smaller numbers requested so far.
     directions: Vec<(u32, wgpu::TextureView)>,
     buffers: Buffers,
     has_panes: bool,
@@ -61,7 +61,7 @@ struct Buffers {
 const COUNT_BYTES: u64 = 128 << 20;
 
 impl TracedRows {
-    /// `count` rays a row over the triangles of `mesh`, and fewer for patches that shoot little.
+    /// `count` rays per row over the triangles of `mesh`, and fewer for patches that shoot little.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰, [`ErrorKind::Memory`] when a row does
@@ -150,8 +150,8 @@ impl TracedRows {
         rows.transpose().map_err(|found| gpu.invalid_result(found))
     }
 
-    /// What `read` makes of the entries of all rows, row by row in any order, slots ascending; none
-    /// where there is no room for them.
+    /// The result of `read` for the entries of all rows, row by row in any order, slots ascending;
+    /// `None` if they exceed the capacity.
     fn entries<T>(
         &mut self,
         patches: &[TracedPatch],
@@ -220,7 +220,7 @@ fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
         let sum = Rgb::from_array(e.passed.map(f64::from));
         (sum / (unit * f64::from(e.count))).min(Rgb::ONE)
     };
-    // A ray that nothing dims adds the whole unit.
+    // An unattenuated ray adds the whole unit.
     let is_clear = |e: &RowEntry| e.passed == [e.count * unit as u32; 3];
     if !has_panes || entries.iter().all(is_clear) {
         return row;
@@ -235,12 +235,12 @@ fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
     Row { passed, ..row }
 }
 
-/// What a ray counts in sums of what panes let through: all rays together stay within 32 bits.
+/// The value of a ray in sums of transmittances: the sum over all rays fits in 32 bits.
 fn passed_unit(rays: u32) -> f64 {
     f64::from((u32::MAX / rays).min(1 << 16))
 }
 
-/// What `row_of_counts` calls a slot.
+/// The item in `row_of_counts` of a slot.
 fn item(slot: u32) -> u32 {
     match slot {
         OPEN => cpu::OPEN,
@@ -268,7 +268,7 @@ impl Buffers {
                 patches * size_of::<TracedPatch>() as u64,
                 storage,
             )?,
-            // Zero at first, and after each batch.
+            // Zero initially and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
             compacted: CompactedRows::new(&memory, gpu.limits().buffer, batch_size)?,
             patches_at_once,

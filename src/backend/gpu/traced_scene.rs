@@ -1,10 +1,10 @@
-//! A scene on the device as rays meet it: hierarchy, triangles, lights, sky, panes and masks.
+//! A scene for rays on the device: hierarchy, triangles, lights, sky, panes and masks.
 //!
 //! ```text
-//! nodes      [hierarchy of what blocks light][hierarchy of clear panes]
-//! triangles  [those in the first's order][those in the second's][lamps that nothing meets]
-//! lights     [lights of the scene][a row for each pane: what it lets through]
-//! lamps      triangles of each light, and the share of its area up to their ends
+//! nodes      [hierarchy of blockers of light][hierarchy of clear panes]
+//! triangles  [in the order of the first][of the second][lamps that no ray hits]
+//! lights     [lights of the scene][a row for each pane: its transmittance]
+//! lamps      triangles of each light, and cumulative shares of its area
 //! ```
 
 use std::f64::consts::PI;
@@ -24,11 +24,11 @@ use crate::scene::{Rgb, Scene, SkyMap, Sun};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
-/// What rays meet, in buffers of the device.
+/// Scene data for rays, in buffers of the device.
 #[derive(Debug)]
 pub struct TracedScene {
     pub coordinates: SplitFloat,
-    /// Unit of light on the device, W/m²: a power of two, so that dividing by it rounds nothing.
+    /// Unit of light on the device, W/m²: a power of two, so that dividing by it does not round.
     pub radiance_unit: f64,
     pub nodes: wgpu::Buffer,
     pub triangles: wgpu::Buffer,
@@ -76,7 +76,7 @@ impl TracedScene {
         })
     }
 
-    /// What `shared/trace.wgsl` binds to group 0.
+    /// Bindings of group 0 in `shared/trace.wgsl`.
     pub fn geometry(&self) -> [(u32, wgpu::BindingResource<'_>); 5] {
         [
             (0, self.nodes.as_entire_binding()),
@@ -137,7 +137,7 @@ impl TracedArrays {
         arrays.triangles = triangles;
         arrays.add_lights(lights, blocking);
         arrays.add_light_from_outside(scene);
-        // A buffer has a size, whether anything looks into it or not.
+        // A buffer must not be empty, even if unused.
         let TracedArrays { triangles, lights, lamps, .. } = &mut arrays;
         triangles.resize(triangles.len().max(1), Zeroable::zeroed());
         lights.resize(lights.len().max(1), Zeroable::zeroed());
@@ -148,7 +148,7 @@ impl TracedArrays {
     /// The nodes of a hierarchy whose triangles begin at `first_triangle`.
     fn add_nodes(&mut self, rays: &RayScene, first_triangle: usize) {
         let tree = rays.tree();
-        // Inner nodes alone have a place of their own: leaves are numbers in their parents.
+        // Only inner nodes are stored: leaves are encoded in their parents.
         let mut place = vec![u32::MAX; tree.nodes.len()];
         let mut next = self.nodes.len() as u32;
         for (k, node) in tree.nodes.iter().enumerate() {
@@ -181,7 +181,7 @@ impl TracedArrays {
             }
         }
         if nodes.is_empty() {
-            // The root is a leaf, or nothing is there.
+            // The root is a leaf, or there are no triangles.
             let root = match tree.order.is_empty() {
                 true => (NOWHERE, LEAF),
                 false => (bounds(0), child(0)),
@@ -248,7 +248,7 @@ impl TracedArrays {
         }
     }
 
-    /// Adds the masks of cut-outs; says of each triangle whether it has one.
+    /// Adds the masks of cut-outs; returns whether each triangle has one.
     fn add_masks(&mut self, scene: &Scene) -> Vec<bool> {
         if !scene.has_cut_outs() {
             return vec![];
@@ -272,7 +272,8 @@ impl TracedArrays {
             }
             let size = mask.texture.size();
             let whole = DVec2::new(size[0].into(), size[1].into());
-            // From the tile of the first corner on, so that few digits are lost far out.
+            // Relative to the tile of the first corner, so that few digits are lost far from the
+            // origin.
             let tile =
                 if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
             let [a, b, c] = corners.map(|place| (place - tile).as_vec2());
@@ -286,7 +287,7 @@ impl TracedArrays {
     }
 }
 
-/// A box that no ray meets: a point beyond the farthest end.
+/// A box that no ray hits: a point beyond the farthest end.
 const NOWHERE: [[f32; 3]; 2] = [[1e31; 3]; 2];
 
 fn pair((a, child_a): ([[f32; 3]; 2], u32), (b, child_b): ([[f32; 3]; 2], u32)) -> TraceNode {
@@ -307,18 +308,18 @@ fn sky_texels(map: &SkyMap, radiance_unit: f64) -> Vec<[f32; 4]> {
     map.pieces().iter().map(texel).collect()
 }
 
-/// Margin of boxes, in units of the scene's size: four roundings of a coordinate, which is half of
-/// that at most. That of the hierarchy itself is for its own unit.
+/// Margin of boxes, in units of the scene's size: four roundings of a coordinate, which is at most
+/// half of that. The margin of the hierarchy itself is in its own unit.
 const BOX_MARGIN: f32 = 2.4e-7;
 
 impl SplitFloat {
-    /// A box as rays meet it, wider than it is.
+    /// A box for rays, with the margin.
     fn widened(&self, [low, high]: [DVec3; 2]) -> [[f32; 3]; 2] {
         let [low, high] = [low, high].map(|p| Vec3A::from_array(self.parts(p)[0]));
         [(low - BOX_MARGIN).to_array(), (high + BOX_MARGIN).to_array()]
     }
 
-    /// Triangle `t` of `scene`, of this light.
+    /// Triangle `t` of `scene`, which belongs to this light.
     fn traced(&self, scene: &Scene, t: usize, light: u32) -> TracedTriangle {
         let [a, b, c] = scene.corners(t);
         let [corner, corner_low] = self.parts(a);

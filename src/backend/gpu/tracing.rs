@@ -1,5 +1,4 @@
-//! What casting rays on a device takes, made once for a device: pipelines, and the scene and light
-//! that were used last.
+//! Ray-casting resources, created once per device: pipelines, and the most recent scene and fields.
 
 use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
@@ -18,17 +17,17 @@ use crate::gather::RadiosityField;
 use crate::gather::lights::Lights;
 use crate::scene::Scene;
 
-/// Fields that are kept on a device: what vertices gather from, and what they have gathered, which
-/// an estimate of the error compares.
+/// Number of fields stored on a device: the field that vertices gather from, and the gathered one,
+/// which an estimate of the error compares.
 const FIELDS: usize = 2;
 
-/// Kept with a device, for all that cast rays on it.
+/// Stored with a device, for all users that cast rays on it.
 #[derive(Debug, Default)]
 pub struct Tracing {
     gather: OnceLock<GatherPipelines>,
     rows: OnceLock<RowPipelines>,
     scene: Mutex<Option<(Weak<Scene>, Arc<TracedScene>)>>,
-    /// The one used last at the end.
+    /// The most recent one at the end.
     fields: Mutex<Vec<KeptField>>,
     pub slots: Mutex<Option<Slots>>,
 }
@@ -71,7 +70,7 @@ impl GatherPipelines {
             (&lights, "more_light_rays"),
             (&settle, "settle"),
         ];
-        // Not by the pool: a thread of it may be waiting for them.
+        // Not in the thread pool: one of its threads may be waiting for them.
         let compiled = std::thread::scope(|scope| {
             entries
                 .map(|(module, entry_point)| {
@@ -123,17 +122,17 @@ impl RowPipelines {
 }
 
 impl Gpu {
-    /// Gives the memory of batches back to the device.
+    /// Frees the memory of batches on the device.
     pub(super) fn forget_slots(&self) -> Result<(), Error> {
         *self.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        // It is free once writes to it have gone through.
+        // It is freed once writes to it have completed.
         self.with_error_scopes(|| {
             self.queue.submit([]);
             self.wait()
         })
     }
 
-    /// Starts to compile all passes of rays, so that they are there when the scene is read.
+    /// Starts to compile all passes of rays, so that they are ready when the scene is loaded.
     pub(super) fn compile_ahead(&self) {
         let gpu = self.clone();
         std::thread::spawn(move || {
@@ -152,7 +151,7 @@ impl Gpu {
         self.tracing.gather.get_or_init(|| GatherPipelines::new(&self.device))
     }
 
-    /// The scene of `lights` on the device: uploaded unless it is the one before.
+    /// The scene of `lights` on the device: uploaded unless it is the previous one.
     pub(super) fn traced_scene(
         &self,
         scene: &Arc<Scene>,
@@ -172,7 +171,7 @@ impl Gpu {
         Ok(traced)
     }
 
-    /// `field` on the device: uploaded unless it is one of those before.
+    /// `field` on the device: uploaded unless it is stored.
     pub(super) fn field_buffers(
         &self,
         scene: &Arc<TracedScene>,
@@ -190,7 +189,7 @@ impl Gpu {
                 }
                 let new = || FieldBuffers::new(self.memory(), field, scene.radiance_unit);
                 Arc::new(new().or_else(|e| match e.kind() {
-                    // The others make room.
+                    // The other fields are freed.
                     ErrorKind::Memory if !kept.is_empty() => {
                         kept.clear();
                         new()

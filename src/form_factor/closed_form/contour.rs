@@ -4,8 +4,8 @@
 //!
 //! - perpendicular edges add nothing;
 //! - parallel edges have an elementary twofold antiderivative, taken at the four pairs of ends;
-//! - of others, the inner integral is elementary, the outer is left to tanh–sinh quadrature between
-//!   the places where the inner one is singular or nearly so.
+//! - for others, the inner integral is elementary, the outer is computed by tanh–sinh quadrature
+//!   between the points where the inner one is singular or nearly so.
 
 use std::f64::consts::TAU;
 
@@ -15,12 +15,12 @@ use super::edge::{Edge, edges};
 use super::face::Face;
 use crate::geometry::quadrature::tanh_sinh;
 
-/// Edges whose angle differs from 0 or 90 degrees by no more than this (radians) are parallel or
-/// perpendicular: directions carry rounding of a few 1e-16, and what is lost is 1e-14 of a term.
+/// Maximum deviation of an angle from 0 or 90 degrees (radians) at which edges count as parallel or
+/// perpendicular: directions carry rounding of a few 1e-16, and the error is 1e-14 of a term.
 const ANGLE_TOLERANCE: f64 = 1e-14;
 
 /// A₁F₁₂ as a double contour integral, in units of the size of the pair: a constant added to ln r
-/// adds nothing to the whole, and in these units the logarithms themselves are small.
+/// adds nothing to the total, and in these units the logarithms are small.
 pub(super) fn contour_integral(p: &Face, q: &Face) -> f64 {
     let unit = p.radius + q.radius + p.centre.distance(q.centre);
     let outline = |face: &Face| -> Vec<DVec3> {
@@ -31,7 +31,7 @@ pub(super) fn contour_integral(p: &Face, q: &Face) -> f64 {
     unit * unit * pairs.sum::<f64>() / TAU
 }
 
-/// ∫∫ (1 + ln r) dx·dx′ over two edges. The 1 drops out of the whole and shortens the terms.
+/// ∫∫ (1 + ln r) dx·dx′ over two edges. The 1 cancels in the total and shortens the terms.
 fn edge_pair(a: Edge, b: Edge) -> f64 {
     let cosine = a.direction.dot(b.direction);
     let sine = a.direction.cross(b.direction).length();
@@ -63,9 +63,9 @@ fn parallel_edges(a: Edge, b: Edge) -> f64 {
 
 /// ∫∫ (1 + ln r) dt dt′ over two edges that are not parallel: along `b` in closed form, along `a`
 /// by quadrature, cut where the integrand is singular or nearly so: beside the ends of `b`, and
-/// where the lines come closest. Such a place is off the edge by some imaginary length, and cut at
-/// only if that is less than the edge's length; it then sits at the ends of intervals, which
-/// tanh–sinh quadrature bears.
+/// where the lines come closest. Such a point is off the edge by some imaginary length, and used
+/// for a cut only if that is less than the edge's length; it is then at the end of intervals, where
+/// tanh–sinh quadrature tolerates singularities.
 fn skew_edges(a: Edge, b: Edge) -> f64 {
     let beside = |end: DVec3| {
         let ray = end - a.start;

@@ -9,12 +9,12 @@ use super::lambert::lambert;
 use crate::geometry::polygon::{clip, fan, max_distance};
 use crate::geometry::quadrature::{collapsed_point, gauss_legendre_for_gap};
 
-/// Lambert's formula loses the ratio of distance to size in digits. From a gap of so many radii,
-/// cubature, in which nothing cancels, replaces it. At the switch the relative error of the formula
+/// Gap in radii above which cubature replaces Lambert's formula, which loses the ratio of distance
+/// to size in digits; in cubature nothing cancels. At the switch the relative error of the formula
 /// is 64 · 2e-16 times a few.
 const MAX_LAMBERT_GAP: f64 = 64.0;
 
-/// A convex plane polygon with its unit normal and a sphere around it.
+/// A convex planar polygon with its unit normal and a sphere around it.
 pub(super) struct Face {
     pub corners: Vec<DVec3>,
     pub normal: DVec3,
@@ -25,16 +25,16 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// The face with these corners and this unit normal; none if it has fewer than three corners or
-    /// no extent.
+    /// The face with these corners and this unit normal; `None` if it has fewer than three corners
+    /// or no extent.
     pub fn new(corners: Vec<DVec3>, normal: DVec3) -> Option<Face> {
         let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let radius = max_distance(&corners, centre);
         (corners.len() > 2 && radius > 0.0).then_some(Face { corners, normal, centre, radius })
     }
 
-    /// Form factor from a surface element at `point` with unit `normal` that has all of this face
-    /// before it and is before it.
+    /// Form factor from a surface element at `point` with unit `normal`, where the element and this
+    /// face are entirely in front of each other.
     pub fn factor_from(&self, point: DVec3, normal: DVec3) -> f64 {
         let gap = point.distance(self.centre) - self.radius;
         if gap < MAX_LAMBERT_GAP * self.radius {
@@ -65,7 +65,7 @@ impl Face {
         sum
     }
 
-    /// Both parts of a cut through the centre, square to the longest edge.
+    /// Both parts of a cut through the centre, perpendicular to the longest edge.
     pub fn halves(&self) -> impl Iterator<Item = Face> {
         let longest = edges(&self.corners).max_by(|a, b| a.length.total_cmp(&b.length));
         let axis = longest.map_or(DVec3::ZERO, |edge| edge.direction);

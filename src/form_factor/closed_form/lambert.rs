@@ -1,4 +1,4 @@
-//! Lambert's formula: what a surface element gives to a polygon, as a sum over edges.
+//! Lambert's formula: form factor from a surface element to a polygon, as a sum over edges.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::edge::{Edge, edges};
 
-/// Lambert's formula for a polygon that is all above the horizon of the surface element at `point`
+/// Lambert's formula for a polygon entirely above the horizon of the surface element at `point`
 /// with unit `normal`; negative if the element is behind the polygon.
 pub(crate) fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let along_normal = |edge: Edge| {

@@ -8,15 +8,15 @@ use crate::geometry::polygon::{PLANE_TOLERANCE, area_vector, clip, max_distance}
 /// Form factor from a surface element at `point` with unit `normal` to the front of `polygon`: the
 /// share of the light leaving the element that arrives there.
 ///
-/// What lies below the element's horizon is clipped off. The factor is 0 where the element is
-/// behind the polygon's plane, and also in that plane (within 1e-13 of its distance to the farthest
-/// corner), even on the polygon's own rim: from there it is seen edge on.
+/// The part below the element's horizon is clipped off. The factor is 0 where the element is behind
+/// the polygon's plane, and also in that plane (within 1e-13 of its distance to the farthest
+/// corner), even on the polygon's own boundary: from there it is seen edge on.
 ///
-/// Lambert's formula, F = 1/(2π) Σ Γᵢ·n, Γᵢ as long as the angle that edge i subtends and
-/// perpendicular to the plane of edge and point (J. H. Lambert, Photometria, 1760; D. R. Baum,
-/// H. E. Rushmeier, J. M. Winget, "Improving radiosity solutions through the use of analytically
-/// determined form-factors", SIGGRAPH 1989). Beyond 64 radii of the polygon, Gauss cubature of
-/// cos θ cos θ′ / (π r²). Relative error below 1e-12 away from grazing angles, at any distance;
+/// Lambert's formula, F = 1/(2π) Σ Γᵢ·n, Γᵢ with the angle that edge i subtends as its length and
+/// perpendicular to the plane of edge and point (J. H. Lambert, Photometria, 1760; D. R. Baum, H.
+/// E. Rushmeier, J. M. Winget, "Improving radiosity solutions through the use of analytically
+/// determined form-factors", SIGGRAPH 1989). Beyond 64 radii of the polygon, Gauss cubature of cos
+/// θ cos θ′ / (π r²). Relative error below 1e-12 away from grazing angles, at any distance;
 /// absolute below 1e-14 always.
 pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let facing = area_vector(polygon).normalize_or_zero();

@@ -1,4 +1,4 @@
-//! Closed forms against catalogues, expansions, brute force and themselves.
+//! Closed forms against catalogues, series expansions, brute force and each other.
 
 use std::array::from_fn;
 use std::f64::consts::PI;
@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use super::*;
 
-/// What rounding may do to a contour integral of two rectangles: 16 pairs of edges, four terms
-/// of at most about 1 each in squares of the pair's size S, each rounded to 2e-16, over 2πA₁;
-/// S² is up to 45 A₁ here: 16 · 4 · 2e-16 · 45 / 2π = 9e-14.
+/// Rounding error of a contour integral of two rectangles: 16 pairs of edges, four terms of at most
+/// about 1 each in squares of the pair's size S, each rounded to 2e-16, over 2πA₁; S² is up to 45
+/// A₁ here: 16 · 4 · 2e-16 · 45 / 2π = 9e-14.
 const ROUNDING: f64 = 1e-13;
 
 fn close(found: f64, right: f64, error: f64) {
@@ -91,7 +91,7 @@ fn a_point_sees_what_is_before_both_planes() {
     let see = |normal, polygon: &[DVec3]| point_to_polygon(DVec3::ZERO, normal, polygon);
     close(see(DVec3::Z, &window), 4.0 / PI * part * part.atan(), 1e-15);
     assert_eq!(see(-DVec3::Z, &window), 0.0);
-    // The side of a hemicube, and the same side drawn on below the horizon.
+    // The side of a hemicube, and the same side extended below the horizon.
     for depth in [0.0, 1.0, 7.0] {
         let side = plate([1.0, -1.0, -depth], [0.0, 0.0, 1.0 + depth], [0.0, 2.0, 0.0]);
         close(see(DVec3::Z, &side), 0.11146839400510702, 1e-15);
@@ -126,8 +126,8 @@ fn crossing_planes_match_brute_force() {
     // The lid's plane 3.98 x − 0.2 y + z = 3.67 cuts the floor near x = 1; the lid dips below it.
     let floor = plate([0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
     let lid = plate([1.5, 1.5, -2.0], [0.0, 1.0, 0.2], [-1.0, 0.1, 4.0]);
-    // Midpoint sums over the part of the floor before the lid, from the cut on to x = 2: errors
-    // fall as n⁻², so that half as many steps differ by three times the error.
+    // Midpoint sums over the part of the floor in front of the lid, from the cut on to x = 2:
+    // errors fall as n⁻², so that half the number of steps differs by three times the error.
     let midpoint = |n: u32| -> f64 {
         let step = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
         let row = |y: f64| -> f64 {
@@ -150,7 +150,7 @@ fn reciprocal_additive_and_free_of_scale() {
     assert!(there > 0.01);
     let flow = there * polygon_area(&small);
     close(flow, back * polygon_area(&large), ROUNDING * flow);
-    // Cut where an edge of the other one's meets it, off any corner.
+    // Cut at the intersection with an edge of the other, off any corner.
     let middle = large[1].lerp(large[2], 0.4);
     let parts = [[large[0], large[1], middle], [large[0], middle, large[2]]];
     close(parts.map(|to| polygon_to_polygon(&small, &to)).iter().sum(), there, ROUNDING);

@@ -7,9 +7,9 @@ use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::scene::Scene;
 
-/// Per triangle of `scene`, whether it is one of a surface that is closed, wound alike so that its
-/// fronts look inwards, and as large as the scene. Light from outside has no business in there: the
-/// walls of a room without a lamp are dark, and no body in the open that is wound inside out.
+/// Per triangle of `scene`, whether it belongs to a surface that is closed, consistently wound with
+/// its fronts inwards, and as large as the scene. Light from outside does not matter in there: the
+/// walls of a room without a lamp are dark; it is not a body in the open that is wound inside out.
 pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
     let count = scene.triangles().len();
     let (mut surfaces, mut is_open) = (UnionFind::new(count), vec![false; count]);
@@ -40,12 +40,12 @@ pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
     is_room
 }
 
-/// Triangles that continue one another.
+/// Connected triangles.
 #[derive(Default)]
 struct Surface {
     triangles: Vec<usize>,
-    /// Whether it has a side that no other triangle, or more than one, or one wound otherwise has.
+    /// Whether it has an edge that is not shared by exactly two consistently wound triangles.
     is_open: bool,
-    /// Six times the volume that it encloses, if it is closed: negative, where fronts look inwards.
+    /// Six times the enclosed volume, if it is closed: negative where fronts face inwards.
     volume: f64,
 }

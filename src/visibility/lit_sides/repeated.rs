@@ -1,4 +1,4 @@
-//! Triangles that a file gives more than once.
+//! Duplicate triangles of a file.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -7,7 +7,7 @@ use crate::geometry::weld::Weld;
 use crate::scene::{Rgb, Scene, Sides};
 
 /// Per triangle, whether it is translucent or one of [`Sides::Auto`], with the same three
-/// positions, material, group and texture coordinates as one before it; and the same way round, if
+/// positions, material, group and texture coordinates as an earlier one; and the same winding, if
 /// it emits.
 pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
     let (all_corners, _) = scene.welded_corners();
@@ -31,7 +31,7 @@ pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
     (0..scene.triangles().len()).map(&mut is_repeated).collect()
 }
 
-/// Of each of `lamps`, the first other one with the same corners the other way round, if any.
+/// For each of `lamps`, the first other one with the same corners in the opposite winding, if any.
 pub fn lamps_of_other_sides(scene: &Scene, lamps: &[usize]) -> FxHashMap<usize, usize> {
     let mut weld = Weld::default();
     let mut key = |&t: &usize| (t, sorted(scene.corners(t).map(|p| weld.number(p))));
@@ -46,17 +46,16 @@ pub fn lamps_of_other_sides(scene: &Scene, lamps: &[usize]) -> FxHashMap<usize, 
     keys.into_iter().filter_map(other).collect()
 }
 
-/// Three different numbers in ascending order, and whether that is the way round that they were
-/// given in.
+/// Three different numbers in ascending order, and whether they were given in that cyclic order.
 fn sorted(mut corners: [u32; 3]) -> ([u32; 3], bool) {
     let [a, b, c] = corners;
-    // Of the three steps around, two go up in ascending order, and one in descending.
+    // Of the three steps around, two ascend in ascending order, and one in descending.
     let ascends = !((a < b) ^ (b < c) ^ (c < a));
     corners.sort_unstable();
     (corners, ascends)
 }
 
-/// Whether these are the same, bit by bit: places without texture coordinates are no numbers.
+/// Whether both are equal bit by bit; missing texture coordinates are NaN.
 fn same(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> bool {
     a.map(|a| a.map(f64::to_bits)) == b.map(|b| b.map(f64::to_bits))
 }

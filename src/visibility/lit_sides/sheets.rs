@@ -1,4 +1,4 @@
-//! Sheets: sides of triangles that continue one another.
+//! Sheets: connected sides of triangles.
 
 use fastrand::Rng;
 use rayon::prelude::*;
@@ -7,25 +7,25 @@ use crate::geometry::union_find::UnionFind;
 use crate::sampling::hash::split_mix64;
 use crate::scene::Scene;
 
-/// A side of a triangle: twice its number, and one more for its back.
+/// A side of a triangle: twice its index, plus one for its back.
 pub type SideIndex = usize;
 
-/// Places on each side of a triangle, at least: enough to object to its sheet where most places of
-/// that say the same. Chosen by hand, as are the numbers below.
+/// Minimum number of points on each side of a triangle: enough to overrule the result of its sheet
+/// if most points of that agree. Plain choice, as are the numbers below.
 const PLACES: f64 = 4.0;
 
-/// And for large triangles: so many over all area, on one side.
+/// For large triangles: number of points in proportion to area, over all triangles, on one side.
 const PLACES_OVER_ALL: f64 = 2048.0;
 
-/// And where sheets are few, so many on each, or their part of so many on all.
+/// For few sheets: maximum number of points per sheet, and total number over all sheets.
 const PLACES_OF_SHEET: f64 = 128.0;
 const PLACES_OF_SHEETS: f64 = 16384.0;
 
 /// The sheets of a scene.
 pub struct Sheets {
-    /// Per side, the first one of its sheet.
+    /// Per side, the first side of its sheet.
     first: Vec<SideIndex>,
-    /// Per side, the places on it that are asked.
+    /// Per side, the number of sample points on it.
     places: Vec<usize>,
 }
 
@@ -46,7 +46,8 @@ impl Sheets {
         Sheets { first, places }
     }
 
-    /// What `find` finds from places on each of `sides`, by random numbers of its own.
+    /// Calls `find` for the sample points on each of `sides`, with a random sequence of its own per
+    /// side.
     pub fn ask(
         &self,
         sides: &[SideIndex],
@@ -75,45 +76,45 @@ impl Sheets {
     }
 }
 
-/// What was found from places on sides.
+/// Results of the sample points on sides.
 pub struct Answers<'a> {
     sheets: &'a Sheets,
-    /// Per side; nothing from those that were not asked.
+    /// Per side; empty for sides that were not sampled.
     of_sides: Vec<Found>,
-    /// By the first side of each.
+    /// By the first side of each sheet.
     of_sheets: Vec<Found>,
 }
 
 impl Answers<'_> {
-    /// From a side that was asked.
+    /// The result of a side that was sampled.
     pub fn of(&self, side: SideIndex) -> Found {
         self.of_sides[side]
     }
 
-    /// From those of its sheet that were asked.
+    /// The result of the sampled sides of its sheet.
     pub fn of_sheet(&self, side: SideIndex) -> Found {
         self.of_sheets[self.sheets.first[side]]
     }
 }
 
-/// What was found from some places.
+/// Results at some points.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
-    /// Places.
+    /// Number of points.
     pub places: f64,
-    /// Those from which anything was found.
+    /// Number of points with a value.
     pub hits: f64,
-    /// The sum of it.
+    /// Sum of the values.
     sum: f64,
 }
 
 impl Found {
-    /// Share of the places from which anything was found.
+    /// Share of the points with a value.
     pub fn share(self) -> f64 {
         self.hits / self.places
     }
 
-    /// Mean of what was found, nothing counted as 0.
+    /// Mean value; points without one count as 0.
     pub fn mean(self) -> f64 {
         self.sum / self.places
     }
@@ -126,7 +127,8 @@ fn first_sides(scene: &Scene) -> Vec<SideIndex> {
     for triangles in triangles_at_edges(scene).chunk_by(is_at_one_edge) {
         let &[(_, t, forward), (_, s, also_forward)] = triangles else { continue };
         if scene.triangles()[t].group == scene.triangles()[s].group {
-            // Wound alike, one runs forward along what they share, and the other back.
+            // With consistent winding, the triangles run along the shared edge in opposite
+            // directions.
             let across = usize::from(forward == also_forward);
             sheets.join(2 * t, 2 * s + across);
             sheets.join(2 * t + 1, 2 * s + 1 - across);
@@ -139,7 +141,7 @@ fn first_sides(scene: &Scene) -> Vec<SideIndex> {
 /// and whether it runs along the edge from the lower to the higher.
 pub type TriangleAtEdge = ([u32; 2], usize, bool);
 
-/// All triangles of `scene` at their edges, those at one edge side by side.
+/// All edges of the triangles of `scene`, sorted by edge.
 pub fn triangles_at_edges(scene: &Scene) -> Vec<TriangleAtEdge> {
     let at_edges = |(t, [a, b, c]): (usize, [u32; 3])| {
         [(a, b), (b, c), (c, a)].map(|(a, b)| ([a.min(b), a.max(b)], t, a < b))

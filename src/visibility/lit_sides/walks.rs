@@ -1,4 +1,4 @@
-//! Walks from sides of triangles to the light.
+//! Random walks from sides of triangles to the light.
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
@@ -18,53 +18,53 @@ use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// Surfaces that a walk meets at most. Through a door of a thirtieth of a room's area four in ten
-/// get out within so many. Chosen by hand.
+/// Maximum number of bounces of a walk. Through a door of a thirtieth of a room's area 40 % of the
+/// walks get out within this number. Plain choice.
 const MAX_BOUNCES: usize = 16;
 
-/// A lamp shines from its back if rays from there get so many times as far as from its front.
-/// Lamps right below a ceiling and bulbs wound inside out are far above; one that is made to light
-/// a ceiling, a tenth of the room below it, is not; rays that meet a lamp light nothing, as those
-/// within a body that shines all around. Chosen by hand.
+/// Ratio of the mean free path at the back of a lamp to that at its front above which the lamp
+/// emits from its back. Lamps right below a ceiling and bulbs wound inside out are far above; a
+/// lamp that lights a ceiling, with the room below it ten times as high as the gap, is not. Rays
+/// that hit a lamp do not count, such as those within a body that emits all around. Plain choice.
 const FURTHER: f64 = 16.0;
 
-/// Below this cosine rounding decides whether a lamp in a place's own plane is seen.
+/// Below this cosine rounding decides whether a lamp in a point's own plane is visible.
 const GRAZES: f64 = 1e-10;
 
-/// Surfaces lie in one place up to this share of the square root of a triangle's area, as for
-/// covered backs, where they face alike by this cosine.
+/// Maximum distance of coinciding surfaces, as a share of the square root of a triangle's area, as
+/// for covered backs; minimum cosine between their normals.
 const SAME_PLACE: f64 = 1e-4;
 const ALIKE: f64 = 0.999;
 
-/// Points of a triangle at which one is looked for that is in no hole. Chosen by hand.
+/// Maximum number of points of a triangle tried to find one outside of holes. Plain choice.
 const MAX_TRIES: usize = 1000;
 
-/// What walks meet.
+/// The scene that walks traverse.
 pub struct Walks<'a> {
     scene: &'a Scene,
-    /// Of each material.
+    /// One per material.
     sides: &'a [Sides],
     rays: Arc<RayScene>,
     panes: Panes,
     normals: Vec<DVec3>,
     /// Triangles that emit.
     lamps: Vec<usize>,
-    /// Whether they do so on their backs.
+    /// Whether they emit from their backs.
     shining_backs: FxHashMap<usize, bool>,
-    /// Of lamps that the file has once for each side, the other one.
+    /// Of lamps that the file has once for each side, the other triangle.
     other_sides: FxHashMap<usize, usize>,
-    /// Of each lamp, in units of `brightest` times area.
+    /// Power of each lamp, in units of `brightest` times area.
     powers: AreaSampler,
-    /// Exitance of the brightest, W/m² summed over the channels.
+    /// Exitance of the brightest lamp, W/m² summed over the channels.
     brightest: f64,
     /// Flux of each luminaire, W summed over the channels.
     fluxes: AreaSampler,
-    /// Surfaces within this distance of each other are in one place, scene unit.
+    /// Surfaces within this distance of each other coincide, scene unit.
     contact: f64,
 }
 
 impl<'a> Walks<'a> {
-    /// In `scene`, whose materials have these `sides`.
+    /// Prepares walks in `scene`, whose materials have these `sides`.
     pub fn new(scene: &'a Scene, sides: &'a [Sides], sheets: &Sheets) -> Walks<'a> {
         let count = scene.triangles().len();
         let exitance = |&t: &usize| scene.exitance(t).element_sum();
@@ -90,32 +90,32 @@ impl<'a> Walks<'a> {
         walks
     }
 
-    /// Whether there is any light.
+    /// Whether the scene has any light.
     pub fn has_light(&self) -> bool {
         !self.lamps.is_empty() || self.scene.has_light_of_no_surface()
     }
 
-    /// What the surface of triangle `t` does on its sides.
+    /// The [`Sides`] of the surface of triangle `t`.
     pub fn sides_of(&self, t: usize) -> Sides {
-        // Where the file has a surface for each side, each has its own.
+        // Where the file has one surface per side, each has its own front.
         if self.scene.is_back_covered(t) {
             return Sides::Front;
         }
         self.sides_of_material(t)
     }
 
-    /// What the material of triangle `t` asks for, wherever the triangle lies.
+    /// The [`Sides`] of the material of triangle `t`, regardless of its position.
     fn sides_of_material(&self, t: usize) -> Sides {
         self.sides[self.scene.triangles()[t].material as usize]
     }
 
-    /// Of a lamp, whether it shines from its back.
+    /// Whether lamp `t` emits from its back; `None` if it is no lamp.
     pub fn shines_from_back(&self, t: usize) -> Option<bool> {
         self.shining_backs.get(&t).copied()
     }
 
-    /// Of a lamp that the file has once for each side, whether the other one is enough: light from
-    /// there gets much further.
+    /// Whether lamp `t` is one of a pair of opposite sides of which the other suffices: light from
+    /// there reaches much further.
     pub fn is_inner_side_of_lamp(&self, t: usize) -> bool {
         self.other_sides.contains_key(&t) && self.shines_from_back(t) == Some(true)
     }
@@ -132,15 +132,15 @@ impl<'a> Walks<'a> {
             let other = self.other_sides.get(&t);
             let both = [2 * t, other.map_or(2 * t + 1, |other| 2 * other)];
             let [front, back] = both.map(|side| free.of_sheet(side).mean());
-            // The other one covers its back.
+            // The back of the lamp is covered by the other one.
             let asked = if other.is_some() { self.sides_of_material(t) } else { self.sides_of(t) };
             (t, asked == Sides::Auto && back > FURTHER * front)
         };
         self.lamps.iter().map(shines_from_back).collect()
     }
 
-    /// About the irradiance at a place on a side, W/m² summed over the channels, that a walk from
-    /// there finds at the first light that it meets; none if it meets none.
+    /// Estimated irradiance at a point on a side, W/m² summed over the channels, from the first
+    /// light that a walk from there reaches; `None` if it reaches none.
     pub fn walk_to_light(&self, mut at: DVec3, mut side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let mut throughput = 1.0;
         for _ in 0..MAX_BOUNCES {
@@ -177,15 +177,15 @@ impl<'a> Walks<'a> {
         None
     }
 
-    /// A place on `side`; none at a back where a front lies before it.
+    /// A random point on `side`; `None` at a back covered by a front.
     pub fn random_start(&self, side: SideIndex, rng: &mut Rng) -> Option<DVec3> {
         let at = self.random_point(side / 2, rng);
         let hidden = side % 2 == 1 && self.front_before(at, side).is_some();
         (!hidden).then_some(at)
     }
 
-    /// The triangle whose front lies in one place with a back, `side`, and looks the same way: it
-    /// is that which light meets.
+    /// The triangle whose front coincides with a back, `side`, and faces the same way: light hits
+    /// that one.
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
         let reach = (SAME_PLACE * self.scene.area(t).sqrt()).max(self.contact);
@@ -207,7 +207,7 @@ impl<'a> Walks<'a> {
         if side.is_multiple_of(2) { front } else { -front }
     }
 
-    /// A direction from a side, dense as the cosine.
+    /// A cosine-distributed direction from a side.
     fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
         let (normal, turn) = (self.normal(side), TAU * rng.f64());
         let (tangent, bitangent) = normal.any_orthonormal_pair();
@@ -216,13 +216,13 @@ impl<'a> Walks<'a> {
         square.sqrt() * across + (1.0 - square).sqrt() * normal
     }
 
-    /// Where a ray from a place on a side ends, and on which side.
+    /// The hit of a ray from a point on a side, and the side that it hits.
     fn next(&self, at: DVec3, side: SideIndex, direction: DVec3) -> Option<(DVec3, SideIndex)> {
         let hit = self.rays.closest_hit(at, direction, self.contact, Some(side / 2))?;
         Some((at + hit.distance * direction, 2 * hit.triangle + usize::from(!hit.front)))
     }
 
-    /// Irradiance at a place on a side from the sun; none if it is not seen.
+    /// Irradiance at a point on a side from the sun; `None` if it is not visible.
     fn irradiance_of_sun(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let sun = self.scene.sky().sun()?;
         let direction = sun.towards([rng.f64(), rng.f64()]);
@@ -234,7 +234,8 @@ impl<'a> Walks<'a> {
         is_seen.then(|| irradiance() * self.passed(at, direction, f64::INFINITY))
     }
 
-    /// Irradiance at a place on a side from a luminaire, chosen by flux; none if it is not seen.
+    /// Irradiance at a point on a side from a luminaire, sampled by flux; `None` if it is not
+    /// visible.
     fn irradiance_of_luminaire(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let total = self.fluxes.total_area();
         if total == 0.0 {
@@ -254,13 +255,13 @@ impl<'a> Walks<'a> {
         Some(irradiance * share * self.passed(at, direction, distance))
     }
 
-    /// The share that clear panes let through, in the mean over the channels.
+    /// Transmittance of clear panes on the way, mean over the channels.
     fn passed(&self, at: DVec3, direction: DVec3, distance: f64) -> f64 {
         let reach = self.contact..distance - self.contact;
         self.panes.transmittance(at, direction, reach).element_sum() / 3.0
     }
 
-    /// Irradiance at a place on a side from a lamp, chosen by its power; none if it is not seen.
+    /// Irradiance at a point on a side from a lamp, sampled by power; `None` if it is not visible.
     fn irradiance_of_lamp(&self, at: DVec3, side: SideIndex, rng: &mut Rng) -> Option<f64> {
         if self.lamps.is_empty() {
             return None;
@@ -270,7 +271,7 @@ impl<'a> Walks<'a> {
         let (direction, distance) = to.normalize_and_length();
         let cosine = self.normal(side).dot(direction);
         let facing = -self.normal(2 * lamp + usize::from(self.shining_backs[&lamp])).dot(direction);
-        // Written so that NaN, of a lamp that is met, sees nothing.
+        // Negated, so that NaN, for a point on the lamp, counts as not visible.
         if !(cosine > GRAZES && facing > GRAZES) {
             return None;
         }
@@ -278,15 +279,16 @@ impl<'a> Walks<'a> {
         let blocked = self.rays.occluded(at, direction, between, |hit| {
             hit.triangle != side / 2 && hit.triangle != lamp
         });
-        // The power of all lamps as seen from there, but not more than the lamp sends near by.
+        // The power of all lamps as seen from there, but not more than the lamp sends to near
+        // points.
         let power = self.powers.total_area() * self.brightest;
         let far = power * cosine * facing / (PI * distance * distance);
         let near = power / self.scene.area(lamp);
         (!blocked).then(|| far.min(near) * self.passed(at, direction, distance))
     }
 
-    /// A point of a triangle, uniform over its solid area; in a hole where next to nothing is
-    /// solid.
+    /// A random point of a triangle, uniform over its solid area; possibly in a hole where almost
+    /// nothing is solid.
     pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
         let [a, b, c] = self.scene.corners(t);
         let place = fold_to_triangle([rng.f64(), rng.f64()]);

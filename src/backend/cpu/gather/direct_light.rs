@@ -1,7 +1,7 @@
-//! What comes straight from lights and the sun: by rays to points on them.
+//! Direct light from lights and the sun, by rays to points on them.
 //!
-//! A light's irradiance is its closed form times the share of it that rays find visible, weighted
-//! by their form factors.
+//! A light's irradiance is its closed form times its visible share by rays, weighted by form
+//! factors.
 
 use std::ops::Range;
 
@@ -19,24 +19,24 @@ use crate::scene::{Rgb, Sun};
 use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 
-/// The lights that rays are sent to from one point, and the sun.
+/// The lights and the sun that rays are sent to from one point.
 pub(super) struct DirectLight<'a> {
     gather: &'a RayGather,
     point: &'a GatherPoint,
     /// Each with its unoccluded form factor.
     lights: Vec<(u32, f64)>,
-    /// Those that rays over the hemisphere know better.
+    /// Lights for which rays over the hemisphere are more accurate.
     wide: Vec<WideLight>,
     sun: Option<&'a Sun>,
     rotation: f64,
 }
 
-/// Cosine of the largest angle between the mean direction to a light and any direction to it, for
-/// points on it to sample it well: 60°. Chosen by hand.
+/// Minimum cosine of the angle between the mean direction to a light and any direction to it, for
+/// points on it to sample it well: 60°. Plain choice.
 const MIN_AXIS_COSINE: f64 = 0.5;
 
-/// Whether what of a light is above the horizon of `point` lies within a cone around the mean
-/// direction there; false where nothing is.
+/// Whether the part of a light above the horizon of `point` is within a cone around its mean
+/// direction; false if there is none.
 fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
     let mut directions = vec![];
     for corners in triangles {
@@ -51,7 +51,7 @@ fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3
     axis.is_some_and(is_within)
 }
 
-/// What rays of a range found of each light and of the sun.
+/// Results of a range of rays for each light and the sun.
 pub(super) struct ShadowRays<'a> {
     light: &'a DirectLight<'a>,
     lights: Vec<Visible>,
@@ -60,9 +60,9 @@ pub(super) struct ShadowRays<'a> {
 }
 
 impl<'a> DirectLight<'a> {
-    /// A light that reaches far around `point` is sampled better by rays over the hemisphere than
-    /// by points spread over its area: those with a closed form are [`WideLight`]s, and the others
-    /// like any surface.
+    /// A light that subtends a large angle at `point` is sampled better by rays over the hemisphere
+    /// than by points spread over its area: those with a closed form are [`WideLight`]s, and the
+    /// others are treated like any surface.
     pub fn new(gather: &'a RayGather, point: &'a GatherPoint) -> DirectLight<'a> {
         let scene = gather.lights.scene();
         let mut lights = gather.lights.importance_ranked(point);
@@ -89,13 +89,13 @@ impl<'a> DirectLight<'a> {
         &self.lights
     }
 
-    /// Those that rays over the hemisphere see for themselves.
+    /// The lights sampled by rays over the hemisphere.
     pub fn wide(&self) -> &[WideLight] {
         &self.wide
     }
 
-    /// Counts a ray over the hemisphere in what is `visible` of each wide light: in a `direction`,
-    /// with what it meets first, if anything, and what panes let through up to a distance.
+    /// Counts a ray over the hemisphere in the `visible` sums of each wide light: in a `direction`,
+    /// with its first hit, if any, and the transmittance of panes up to a distance.
     pub fn add_to_wide(
         &self,
         visible: &mut [Visible],
@@ -110,12 +110,12 @@ impl<'a> DirectLight<'a> {
         }
     }
 
-    /// Whether what comes straight from `light` is counted apart from what surfaces reflect.
+    /// Whether the direct light of `light` is counted separately from reflected light.
     pub fn knows(&self, light: u32) -> bool {
         self.lights.iter().any(|&(k, _)| k == light) || self.wide.iter().any(|w| w.light == light)
     }
 
-    /// What the rays of `range` find.
+    /// Results of the rays of `range`.
     pub fn found(&self, range: Range<u32>) -> ShadowRays<'_> {
         let visible = |&(light, _): &(u32, f64)| self.rays_to(light, range.clone());
         let sun = |sun: &Sun| self.rays_to_sun(sun, range.clone());
@@ -126,8 +126,8 @@ impl<'a> DirectLight<'a> {
         }
     }
 
-    /// The cosines at the point of points spread over the sun: of those of `range` that are seen,
-    /// and of all above the horizon.
+    /// Sums of cosines at the point, over points of `range` spread over the sun: of the visible
+    /// ones, and of all above the horizon.
     pub fn rays_to_sun(&self, sun: &Sun, range: Range<u32>) -> Visible {
         let (gather, point) = (self.gather, self.point);
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
@@ -146,14 +146,14 @@ impl<'a> DirectLight<'a> {
         out
     }
 
-    /// The form factor from the point to what is visible of a light, and to all of it as if nothing
-    /// were in between, both by the same points on it: those of `range`.
+    /// Form factors from the point to the visible part of a light, and to all of it unoccluded,
+    /// both by the same points on it: those of `range`.
     pub fn rays_to(&self, light: u32, range: Range<u32>) -> Visible {
         let (gather, point) = (self.gather, self.point);
         let (lights, scene) = (&gather.lights, gather.lights.scene());
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        // Both coordinates are rotated: where only a strip of the light is seen, points that are
-        // the same for all places would be off in the same direction everywhere.
+        // Both coordinates are rotated: where only a strip of the light is visible, the same points
+        // everywhere would cause an error in the same direction everywhere.
         let second_rotation = second_rotation(self.rotation);
         for i in range {
             let [x, y] = sobol_02_point(i);
@@ -164,7 +164,7 @@ impl<'a> DirectLight<'a> {
                 continue;
             }
             out.all += factor;
-            // What is met first may be another part of the light, which is as good.
+            // A first hit on another part of the light counts as visible.
             let near = point.near / to.length();
             let other = |h: &Hit| !(lights.of_triangle[h.triangle] == light && h.front);
             let reach = near..1.0 - offset::SEGMENT_END;
@@ -202,7 +202,7 @@ impl Found for ShadowRays<'_> {
         irradiance
     }
 
-    /// 0: what is hidden of a light is known by as many rays as are sent to it.
+    /// 0: all rays to a light contribute to its occlusion.
     fn largest(&self) -> f64 {
         0.0
     }

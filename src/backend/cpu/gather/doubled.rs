@@ -1,29 +1,29 @@
-//! Rays that are doubled until they agree.
+//! Doubles the number of rays until halves of them agree.
 //!
 //! ```text
 //! error = max(|E_first − E_second|, c_max / n) / 2
 //! ```
 //!
-//! E_first and E_second being by the two halves of the rays, and c_max the largest contribution of
-//! one ray: both halves may miss the same small source.
+//! E_first and E_second are the irradiances of the two halves of the rays, and c_max the largest
+//! contribution of one ray: both halves may miss the same small source.
 
 use std::ops::Range;
 
 use crate::scene::Rgb;
 
-/// What some rays found.
+/// Sums over some rays.
 pub(super) trait Found {
-    /// Adds what other rays found.
+    /// Adds the sums over other rays.
     fn add(&mut self, other: &Self);
 
-    /// The irradiance by it, where it is that of `count` rays.
+    /// The irradiance, if these are `count` rays.
     fn mean(&self, count: u32) -> Rgb;
 
     /// The largest contribution of one ray.
     fn largest(&self) -> f64;
 }
 
-/// What rays found, and how to cast more.
+/// Sums over rays, and the function that casts more.
 pub(super) struct Doubled<F, T> {
     found: F,
     trace: T,
@@ -33,7 +33,8 @@ pub(super) struct Doubled<F, T> {
 }
 
 impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
-    /// By as many rays as the first of `limits`, up to the second; `trace` casts those of a range.
+    /// Starts with the first of `limits`; the second is the maximum. `trace` casts the rays of a
+    /// range.
     pub fn new([min, max]: [u32; 2], trace: T) -> Doubled<F, T> {
         let found = trace(0..min / 2);
         let mut doubled = Doubled { found, trace, count: min / 2, max, error: f64::INFINITY };
@@ -41,7 +42,7 @@ impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
         doubled
     }
 
-    /// Casts as many rays again; false where there are no more.
+    /// Doubles the number of rays; false at the maximum.
     pub fn double(&mut self) -> bool {
         let has_more = self.count < self.max;
         if has_more {
@@ -64,7 +65,7 @@ impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
         self.found.mean(self.count)
     }
 
-    /// What it may be off by.
+    /// Estimated error of the mean.
     pub fn error(&self) -> f64 {
         self.error
     }

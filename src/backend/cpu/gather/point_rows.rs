@@ -1,4 +1,4 @@
-//! Rows of points by the rays of a gather.
+//! Rows of points from the rays of a gather.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ impl PointRows for RayGather {
         let light = DirectLight::new(self, point);
         let count = (self.min_rays / parts.max(1)).max(1);
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
-        // All parts alike: what luminaires send is without noise, or nearly.
+        // The same for all parts: the light of luminaires has almost no noise.
         let luminaires = self.luminaires().unscaled(point);
         let row = |range| PointRow {
             luminaires: luminaires.clone(),
@@ -57,8 +57,8 @@ impl RayGather {
         row
     }
 
-    /// The same without entries for the sun and the lights of `direct` that rays are sent to. Where
-    /// there is no `direct`, lights are like any surface.
+    /// The same without entries for the sun and the lights that `direct` sends rays to. Without
+    /// `direct`, lights are treated like any surface.
     fn row_of_surfaces(
         &self,
         mesh: &Mesh,

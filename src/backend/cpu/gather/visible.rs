@@ -1,4 +1,4 @@
-//! How much of a light is visible: by points on it, or by rays towards it.
+//! Visible share of a light: by points on it, or by rays towards it.
 
 use std::f64::consts::PI;
 
@@ -8,26 +8,27 @@ use crate::gather::GatherPoint;
 use crate::gather::lights::Light;
 use crate::scene::{Rgb, Scene};
 
-/// Sums of form factors over points on a light, or of rays towards it: each counts as much.
+/// Sums of form factors over points on a light, or over rays towards it, all with equal weight.
 #[derive(Debug, Default)]
 pub(super) struct Visible {
     pub points: f64,
-    /// To those that are visible; per channel, what panes let through.
+    /// Of those that are visible; times the transmittance of panes, per channel.
     pub seen: Rgb,
-    /// To all that are above the horizon and face the point.
+    /// Of all that are above the horizon and face the point.
     pub all: f64,
 }
 
 /// A point on a light.
 pub(super) struct PointOn {
-    /// From the point that gathers, scene unit.
+    /// Vector from the gathering point, scene unit.
     pub to: DVec3,
-    /// The form factor of all of the light, by this point; 0 behind it or below the horizon.
+    /// The form factor of all of the light, estimated from this point; 0 behind it or below the
+    /// horizon.
     pub factor: f64,
     pub is_hole: bool,
 }
 
-/// The point of `light` at a place in the unit square, spread evenly over its area.
+/// The point of `light` for a point in the unit square, uniform over its area.
 pub(super) fn point_on(
     light: &Light,
     scene: &Scene,
@@ -51,8 +52,8 @@ pub(super) fn point_on(
 }
 
 impl Visible {
-    /// What one unit of `seen` counts: a share of the form factor of all of the light where that is
-    /// known by closed form, else of the points.
+    /// The value of one unit of `seen`: a share of the form factor of all of the light where that
+    /// is known in closed form, else of the points.
     pub fn share_of(&self, unoccluded: Option<f64>) -> f64 {
         match unoccluded {
             Some(factor) => factor / self.all.max(1e-300),

@@ -1,15 +1,15 @@
-//! A light that fills much of the hemisphere: rays over it tell how much of it is visible.
+//! A light that fills much of the hemisphere: its visible share is estimated by rays over that.
 //!
 //! ```text
 //!    ════════════ light ════════════      share of it that is visible
-//!      │  ╲    ╱ ▄▄▄▄                       = rays that meet it / rays towards it
-//!      │    ╲╱   ████  what hides it        = 3/4
+//!      │  ╲    ╱ ▄▄▄▄                       = rays that hit it / rays towards it
+//!      │    ╲╱   ████  blocker              = 3/4
 //!      ╲  ╱ ╲ │
 //!        ● point                          irradiance = closed form × that share
 //! ```
 //!
-//! Rays towards it are of equal weight, and points spread over its area are not: those right above
-//! count for most of a sky that reaches to the horizon, and are few.
+//! Rays towards it have equal weight, unlike points spread over its area: of a sky that reaches to
+//! the horizon, the few points right above have most of the weight.
 
 use glam::DVec3;
 
@@ -20,24 +20,24 @@ use crate::scene::{Rgb, Scene};
 
 use super::visible::{Visible, point_on};
 
-/// A light as seen from a point.
+/// A light seen from a point.
 pub(super) struct WideLight {
     pub light: u32,
-    /// Form factor from the point to all of it, as if nothing were in between.
+    /// Unoccluded form factor from the point to all of it.
     unoccluded: f64,
     exitance: Rgb,
     /// Inward normals of the pyramids from the point to its triangles.
     pyramids: Vec<[DVec3; 3]>,
 }
 
-/// Points by which their weights are compared. Chosen by hand.
+/// Number of points by which their weights are compared. Plain choice.
 const POINTS: u32 = 32;
 
-/// Rays towards a light, at least: with fewer, none of them may be.
+/// Minimum expected number of rays towards a light: with fewer there may be none.
 const LEAST_RAYS: f64 = 8.0;
 
 impl WideLight {
-    /// `light`, whose number and unoccluded form factor are given, from `point`.
+    /// The light `light` with this number and unoccluded form factor, seen from `point`.
     pub fn new(
         light: &Light,
         (number, unoccluded): (u32, f64),
@@ -47,17 +47,17 @@ impl WideLight {
         let pyramid = |&t: &u32| {
             let [a, b, c] = scene.corners(t as usize).map(|corner| corner - point.position);
             let (ab, bc, ca) = (b.cross(a), c.cross(b), a.cross(c));
-            // Seen from behind it sends nothing.
+            // It emits nothing backwards.
             (a.dot(bc) > 0.0).then_some([ab, bc, ca])
         };
         let pyramids = light.triangles.iter().filter_map(pyramid).collect();
         WideLight { light: number, unoccluded, exitance: light.exitance, pyramids }
     }
 
-    /// Whether rays over the hemisphere know better how much of a `light` with this `unoccluded`
-    /// form factor is visible from `point` than one ray to a point on it for each `rays_a_point` of
-    /// them: whether more of these, of which there are `rays`, go there than such points are worth.
-    /// n points of weights w are worth (Σ w)² / Σ w² of equal weight (Kish 1965, section 11.7).
+    /// Whether rays over the hemisphere estimate the visible share of `light` from `point` better
+    /// than points on it, one for each `rays_a_point` of these rays: whether the number of `rays`
+    /// towards it exceeds the effective number of such points. n points of weights w have the
+    /// effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     pub fn is_wide(
         light: &Light,
         unoccluded: f64,
@@ -75,14 +75,14 @@ impl WideLight {
         unoccluded * f64::from(rays_a_point) > worth
     }
 
-    /// Whether the light lies in a `direction` above the horizon, behind whatever hides it.
+    /// Whether the light, occluded or not, lies in a `direction` above the horizon.
     fn is_towards(&self, direction: DVec3) -> bool {
         let is_inside = |normals: &[DVec3; 3]| normals.iter().all(|n| n.dot(direction) >= 0.0);
         self.pyramids.iter().any(is_inside)
     }
 
-    /// Counts a ray in a `direction` above the horizon in what is `visible`: with what panes let
-    /// through of it, if it meets the light.
+    /// Counts a ray in a `direction` above the horizon in the `visible` sums: with the
+    /// transmittance `passed` of panes, if it hits the light.
     pub fn add_ray(&self, direction: DVec3, passed: Option<Rgb>, visible: &mut Visible) {
         if passed.is_some() || self.is_towards(direction) {
             visible.all += 1.0;
@@ -90,12 +90,12 @@ impl WideLight {
         visible.seen += passed.unwrap_or(Rgb::ZERO);
     }
 
-    /// The form factor to what rays found `visible` of it, per channel.
+    /// The form factor to the `visible` part, per channel.
     pub fn form_factor(&self, visible: &Visible) -> Rgb {
         visible.seen * visible.share_of(Some(self.unoccluded))
     }
 
-    /// Its irradiance where rays found this much of it `visible`.
+    /// Its irradiance for this `visible` part.
     pub fn irradiance(&self, visible: &Visible) -> Rgb {
         self.exitance * self.form_factor(visible)
     }

@@ -1,9 +1,9 @@
-//! Twin of `shaders/compact_rows.wgsl`: the slots of rows that any ray has met.
+//! Twin of `shaders/compact_rows.wgsl`: the slots of rows that any ray has hit.
 
 use crate::backend::gpu::layout::{RowEntry, RowSettings};
 
-/// The entries of all rows in `counts`, one after the other, each of four rows where there are
-/// panes; their slots are left at zero.
+/// The entries of all rows in `counts`, in order; with panes a row takes four rows of counts. Their
+/// slots are reset to zero.
 pub fn compact_rows(counts: &mut [u32], settings: &RowSettings, has_panes: bool) -> Vec<RowEntry> {
     let slots = settings.slots as usize;
     let rows = if has_panes { 4 } else { 1 };

@@ -12,8 +12,8 @@ pub struct InElement {
     pub weights: Vec2,
 }
 
-/// Found in a lattice of nodes, then by descent; `weights` are those of the triangle's second and
-/// third corner.
+/// Looked up in a lattice of nodes, then by descent; `weights` are those of the triangle's second
+/// and third corner.
 pub fn element_at(quadtrees: &[u32], triangle: u32, weights: Vec2) -> InElement {
     let first = quadtrees[2 * triangle as usize];
     let side = quadtrees[2 * triangle as usize + 1];
@@ -41,7 +41,7 @@ pub fn element_at(quadtrees: &[u32], triangle: u32, weights: Vec2) -> InElement 
     InElement { element: node, weights: p }
 }
 
-/// Linear between three corners.
+/// Linear interpolation between three corners.
 pub fn between([a, b, c]: [Vec3; 3], weights: Vec2) -> Vec3 {
     a + (b - a) * weights.x + (c - a) * weights.y
 }

@@ -1,18 +1,17 @@
-//! Twin of `shaders/shared/gather_state.wgsl`: what a gather knows of each of its points between
-//! passes.
+//! Twin of `shaders/shared/gather_state.wgsl`: the state of each point of a gather between passes.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 
-/// A workgroup, of one point.
+/// Size of a workgroup; each serves one point.
 pub const LANES: u32 = 64;
 
-/// Lights and the sun.
+/// Number of lights and the sun.
 pub const SOURCES: usize = MAX_EXPLICIT_LIGHTS + 1;
 
-/// The sun's place in `visible`.
+/// Index of the sun in `visible`.
 pub const SUN: usize = MAX_EXPLICIT_LIGHTS;
 
 pub const RAYS_PER_SHADOW_RAY: u32 = 4;
@@ -21,19 +20,19 @@ pub const RAYS_PER_SHADOW_RAY: u32 = 4;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RaySums {
-    /// What surfaces reflect and the sky sends, but for lights sampled apart.
+    /// Light reflected by surfaces and from the sky, except for lights sampled separately.
     pub light: [f32; 3],
     pub escaped: f32,
     /// Exitance of the other lights.
     pub lamps: [f32; 3],
     pub back: f32,
     pub inverse_distance: f32,
-    /// The largest of `light` by one ray: a length over the channels.
+    /// The largest contribution of one ray to `light`: its length over the channels.
     pub largest: f32,
     pub padding: [f32; 2],
 }
 
-/// Of places on a light, or of rays towards it: form factors of those that are seen, and of all.
+/// Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Visible {
@@ -45,9 +44,9 @@ pub struct Visible {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RankedLight {
     pub light: u32,
-    /// Form factor to all of it as if nothing were in between.
+    /// Unoccluded form factor to all of it.
     pub factor: f32,
-    /// Rays over the hemisphere tell how much of it is seen.
+    /// Whether rays over the hemisphere estimate its visible share.
     pub is_wide: u32,
     pub padding: u32,
 }
@@ -55,17 +54,17 @@ pub struct RankedLight {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointState {
-    /// The first half, or what was before; the second half.
+    /// The first half, or all earlier rays; the second half.
     pub rays: [RaySums; 2],
     pub lights: [RankedLight; MAX_EXPLICIT_LIGHTS],
-    /// By light and sun, of the first half; of the second.
+    /// By light and sun, for the first half; for the second.
     pub visible: [Visible; 2 * SOURCES],
     pub light_count: u32,
-    /// Rays over the hemisphere.
+    /// Number of rays over the hemisphere.
     pub ray_count: u32,
-    /// Rays to each light.
+    /// Number of rays to each light.
     pub shadow_count: u32,
-    /// 1: rays were doubled; 2: rays to lights were; 3: these are the first of both.
+    /// 1: rays were doubled; 2: rays to lights were doubled; 3: these are the first of both.
     pub pending: u32,
     pub ray_error: f32,
     pub shadow_error: f32,
@@ -73,7 +72,7 @@ pub struct PointState {
 }
 
 impl PointState {
-    /// The lights that rays are cast to, or that rays over the hemisphere look for.
+    /// The lights that rays are cast to, or that are sampled by rays over the hemisphere.
     pub fn ranked(&self) -> &[RankedLight] {
         &self.lights[..self.light_count as usize]
     }

@@ -11,17 +11,17 @@ use crate::backend::gpu::layout::{GatherSettings, NOTHING, TracedLight, TracedPo
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
 
-/// What the shader is bound to.
+/// Bindings of the shader.
 #[derive(Clone, Copy, Debug)]
 pub struct HemisphereRays<'a> {
     pub scene: &'a TracedArrays,
     pub quadtrees: &'a [u32],
     pub elements: &'a [[f32; 4]],
-    /// Along two tangents and the normal, ray by ray.
+    /// Coordinates along two tangents and the normal, ray by ray.
     pub directions: &'a [[f32; 4]],
 }
 
-/// What rays find, wide lights by their places among those of the point.
+/// Results of rays, for wide lights by their index among those of the point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Found {
@@ -39,9 +39,9 @@ impl Found {
     }
 }
 
-/// Rays of a pass over a point in `state` that has cast `total` of them before: the first time all
-/// of them, in two halves; then as many again, which are the second half. Where they start, where
-/// the second half does and where they end.
+/// Range of rays of a pass over a point in `state` that has cast `total` of them before: in the
+/// first pass all of them, in two halves; then the same number again, as the second half. Start,
+/// start of the second half, and end.
 pub fn range(total: u32, state: &PointState, settings: &GatherSettings) -> [u32; 3] {
     let [start, middle, end] =
         if state.pending == 3 { [0, total / 2, total] } else { [total, total, 2 * total] };
@@ -94,7 +94,7 @@ impl HemisphereRays<'_> {
         turned(local, point.normal.into(), point.rotation)
     }
 
-    /// What one ray finds.
+    /// The result of one ray.
     pub fn cast_ray(&self, point: &TracedPoint, direction: Vec3, state: &PointState) -> Found {
         let scene = self.scene;
         let ray = ray_from(point, direction);
@@ -144,7 +144,7 @@ impl HemisphereRays<'_> {
     }
 }
 
-/// Light that the sky sends along a direction, as the radiosity of a surface.
+/// Light from the sky along a direction, as the radiosity of a surface.
 pub fn from_sky(scene: &TracedArrays, direction: Vec3) -> Vec3 {
     let info = &scene.info;
     if info.sky_side == 0 {
@@ -162,7 +162,7 @@ pub fn from_sky(scene: &TracedArrays, direction: Vec3) -> Vec3 {
     Vec4::from(scene.sky[((square + line) * info.sky_side + column) as usize]).truncate()
 }
 
-/// Whether a light lies along the ray, behind whatever hides it.
+/// Whether a light, occluded or not, lies along the ray.
 fn is_towards(scene: &TracedArrays, ray: &Ray, light: &TracedLight) -> bool {
     let lamps = &scene.lamps[light.first as usize..(light.first + light.count) as usize];
     lamps.iter().any(|lamp| {

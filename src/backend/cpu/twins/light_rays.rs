@@ -1,4 +1,4 @@
-//! Twin of `shaders/light_rays.wgsl`: rays from points to places on lights and on the sun.
+//! Twin of `shaders/light_rays.wgsl`: rays from points to points on lights and on the sun.
 
 use std::f32::consts::PI;
 
@@ -34,14 +34,14 @@ pub fn cast_rays(
     }
 }
 
-/// Places in `visible` of the lights and the sun that rays are cast to.
+/// Indices in `visible` of the lights and the sun that rays are cast to.
 pub fn sources(scene: &TracedArrays, state: &PointState) -> Vec<usize> {
     let lights = state.ranked().iter().enumerate().filter(|(_, ranked)| ranked.is_wide == 0);
     let sun = (scene.info.has_sun != 0).then_some(SUN);
     lights.map(|(k, _)| k).chain(sun).collect()
 }
 
-/// Of one place, in the unit square, on a light or the sun: what is seen, and all of it.
+/// Visible and total form factor of one point on a light or the sun, given in the unit square.
 pub fn cast_ray(
     scene: &TracedArrays,
     point: &TracedPoint,
@@ -62,7 +62,7 @@ pub fn cast_ray(
     seen.extend(to.factor)
 }
 
-/// The direction to a place on the sun.
+/// The direction to a point on the sun.
 pub fn towards_sun(scene: &TracedArrays, at: Vec2) -> Vec3 {
     let info = &scene.info;
     let [middle, right, up] = [info.sun_middle, info.sun_right, info.sun_up].map(Vec3::from);
@@ -70,7 +70,7 @@ pub fn towards_sun(scene: &TracedArrays, at: Vec2) -> Vec3 {
     (middle + (right * cosine + up * sine) * at.x.sqrt()).normalize()
 }
 
-/// What is seen of the sun in a direction, and all of it.
+/// Visible and total cosine of the sun in a direction.
 pub fn to_sun(scene: &TracedArrays, point: &TracedPoint, direction: Vec3) -> Vec4 {
     let cosine = Vec3::from(point.normal).dot(direction);
     if cosine <= 0.0 {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/shared/lights.wgsl`: places on lights, and what clear panes let through.
+//! Twin of `shaders/shared/lights.wgsl`: points on lights, and the transmittance of clear panes.
 
 use std::f32::consts::PI;
 
@@ -8,10 +8,10 @@ use super::trace::{Ray, is_solid, meet, walk};
 use crate::backend::gpu::layout::{HAS_HOLES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
-/// Of no triangle: what hides the sun is whatever is met.
+/// Light of no triangle: the sun is hidden by any hit.
 pub const ANY_LIGHT: u32 = 0xffff_fffe;
 
-/// What clear panes between the ray's near distance and `end` let through.
+/// Transmittance of clear panes between the ray's near distance and `end`.
 pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
     let mut share = Vec3::ONE;
     if scene.info.panes == NOTHING {
@@ -46,36 +46,36 @@ pub fn sobol(k: u32) -> Vec2 {
         remaining >>= 1;
         column ^= column >> 1;
     }
-    // 24 bits are what a number has; the middle of the cell is half of the last.
+    // A float has 24 bits; the offset to the middle of the cell is half of the last.
     let unit = |bits: u32| ((bits >> 8) as f32 + 0.5) * 2f32.powi(-24);
     Vec2::new(unit(k.reverse_bits()), unit(bits))
 }
 
-/// The same for sample `k` of a point: both coordinates are rotated.
+/// The same for sample `k` of a point, with both coordinates rotated.
 pub fn rotated_sobol(k: u32, point: &TracedPoint) -> Vec2 {
     let at = sobol(k) + Vec2::new(point.second_rotation, point.rotation);
     at - at.floor()
 }
 
-/// From a point to a place on a light.
+/// A ray from a point to a point on a light.
 #[derive(Clone, Copy, Debug)]
 pub struct ToLight {
     pub ray: Ray,
     pub distance: f32,
-    /// The form factor of all of the light by this place; 0 where its own plane or the horizon
-    /// hides it.
+    /// The form factor of all of the light, estimated from this point; 0 where its own plane or the
+    /// horizon hides it.
     pub factor: f32,
     pub is_solid: bool,
 }
 
-/// The place `at`, in the unit square, on a light: spread evenly over its area.
+/// The ray to the point `at` of the unit square on a light: uniform over its area.
 pub fn to_light(
     scene: &TracedArrays,
     light: &TracedLight,
     point: &TracedPoint,
     at: Vec2,
 ) -> ToLight {
-    // The first triangle that ends behind the place; the last, if rounding leaves none.
+    // The first triangle that ends beyond the point; the last, if rounding leaves none.
     let (first, last) = (light.first as usize, (light.first + light.count - 1) as usize);
     let low = (first..last).find(|&k| scene.lamps[k].end > at.x).unwrap_or(last);
     let start = if low > first { scene.lamps[low - 1].end } else { 0.0 };
@@ -102,7 +102,7 @@ pub fn to_light(
     }
 }
 
-/// From a point to a corner, both in two parts.
+/// Vector from a point to a corner, both in two parts.
 pub fn from_point(point: &TracedPoint, corner: [f32; 3], corner_low: [f32; 3]) -> Vec3 {
     (Vec3::from(corner) - Vec3::from(point.position))
         + (Vec3::from(corner_low) - Vec3::from(point.position_low))

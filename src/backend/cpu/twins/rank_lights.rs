@@ -1,4 +1,4 @@
-//! Twin of `shaders/rank_lights.wgsl`: which lights are worth rays of their own from a point.
+//! Twin of `shaders/rank_lights.wgsl`: selects the lights that are sampled separately from a point.
 
 use std::f32::consts::PI;
 
@@ -10,28 +10,28 @@ use crate::backend::gpu::layout::{GatherSettings, TracedLight, TracedPoint, Trac
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 
-/// Lights below this share of the unoccluded irradiance of all are not sampled apart.
+/// Lights below this share of the total unoccluded irradiance are not sampled separately.
 pub const MIN_IRRADIANCE_SHARE: f32 = 1e-3;
 
-/// Points by which it is found how even a light looks; rays that it takes to see a light, at least.
+/// Number of points for the evenness of a light; minimum expected number of rays that hit a light.
 const EVENNESS_POINTS: u32 = 32;
 const LEAST_RAYS: f32 = 8.0;
 
-/// n · Γ of one side of a polygon as seen from the origin: its angle, and the way of its plane.
+/// n · Γ of one side of a polygon seen from the origin: its angle times the cosine of its plane.
 pub fn side(a: Vec3, b: Vec3, normal: Vec3) -> f32 {
     let across = a.cross(b - a);
     let sine = across.length();
     sine.atan2(a.dot(b)) * normal.dot(across) / sine.max(1e-37)
 }
 
-/// What a point sees of a triangle that faces it.
+/// The part of a triangle visible from a point that it faces.
 #[derive(Debug)]
 pub enum Seen {
     /// It is turned away.
     Back,
-    /// It is so small that it counts by its middle: its form factor.
+    /// It is so small that its middle represents it: its form factor.
     Small(f32),
-    /// Its corners, cut at the horizon.
+    /// Its corners, clipped at the horizon.
     Cut(Vec<Vec3>),
 }
 
@@ -63,7 +63,7 @@ pub fn seen(t: &TracedTriangle, point: &TracedPoint) -> Seen {
     Seen::Cut(cut)
 }
 
-/// The form factor from a point to a triangle that faces it: Lambert's formula, of the part above
+/// The form factor from a point to a triangle that faces it: Lambert's formula for the part above
 /// the horizon (Baum, Rushmeier and Winget 1989, eq. 8).
 pub fn to_triangle(t: &TracedTriangle, point: &TracedPoint) -> f32 {
     match seen(t, point) {
@@ -73,7 +73,7 @@ pub fn to_triangle(t: &TracedTriangle, point: &TracedPoint) -> f32 {
             let next = corners.iter().cycle().skip(1);
             let normal = point.normal.into();
             let sum: f32 = corners.iter().zip(next).map(|(&a, &b)| side(a, b, normal)).sum();
-            // Fronts are seen clockwise.
+            // Fronts are clockwise as seen from the point.
             (-sum / (2.0 * PI)).max(0.0)
         }
     }
@@ -98,7 +98,7 @@ pub fn irradiance_of(light: &TracedLight, factor: f32) -> f32 {
     factor * Vec3::from(light.exitance).max_element()
 }
 
-/// The state of a point that has cast no ray.
+/// The state of a point before the first ray.
 pub fn rank_lights(
     scene: &TracedArrays,
     point: &TracedPoint,
@@ -111,7 +111,7 @@ pub fn rank_lights(
         let factor = factor_of(scene, light, point);
         let irradiance = irradiance_of(light, factor);
         all_irradiance += irradiance;
-        // Of equals the lower number comes first.
+        // Ties are ordered by number.
         if irradiance > 0.0 {
             let at = ranked.iter().take_while(|other| other.1 >= irradiance).count();
             let light = RankedLight { light: number, factor, ..Default::default() };
@@ -129,7 +129,7 @@ pub fn rank_lights(
     for (mut of_light, _) in ranked {
         let light = &lights[of_light.light as usize];
         of_light.is_wide = is_wide(scene, light, point, of_light.factor, settings).into();
-        // A wide light without a closed form is a surface like any other.
+        // A wide light without a closed form is treated like any surface.
         if of_light.is_wide == 0 || light.is_convex != 0 {
             state.lights[state.light_count as usize] = of_light;
             state.light_count += 1;
@@ -138,7 +138,7 @@ pub fn rank_lights(
     state
 }
 
-/// Whether rays over the hemisphere tell better how much of a light is seen than rays to it.
+/// Whether rays over the hemisphere estimate a light's visible share better than rays to it.
 fn is_wide(
     scene: &TracedArrays,
     light: &TracedLight,
@@ -152,7 +152,7 @@ fn is_wide(
         weights[lane as usize] = Vec2::new(weight, weight * weight).extend(0.0).extend(0.0);
     }
     let sum = added_up(weights);
-    // Points of weights w are worth (Σ w)² / Σ w² of equal weight (Kish 1965, section 11.7).
+    // Points of weights w have the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     let worth = sum.x * sum.x / (sum.y * EVENNESS_POINTS as f32).max(1e-37);
     settings.min_rays as f32 * factor >= LEAST_RAYS && factor * RAYS_PER_SHADOW_RAY as f32 > worth
 }

@@ -1,5 +1,5 @@
-//! Twin of `shaders/row_rays.wgsl`: cosine-distributed rays from patches, and how many meet each
-//! element.
+//! Twin of `shaders/row_rays.wgsl`: cosine-distributed rays from patches, and the number that hits
+//! each element.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -9,18 +9,18 @@ use super::trace::{FAR, Hit, Ray, nearest_but, turned};
 use crate::backend::gpu::layout::{BACK, FIRST_ELEMENT, NOTHING, OPEN, RowSettings, TracedPatch};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
-/// What the shader is bound to.
+/// Bindings of the shader.
 #[derive(Clone, Copy, Debug)]
 pub struct RowRays<'a> {
     pub scene: &'a TracedArrays,
     pub quadtrees: &'a [u32],
-    /// Along two tangents and the normal, ray by ray.
+    /// Coordinates along two tangents and the normal, ray by ray.
     pub directions: &'a [[f32; 4]],
 }
 
 impl RowRays<'_> {
-    /// Of each slot of a patch the rays that meet it; where there are panes, then what these let
-    /// through, a row a channel.
+    /// Number of rays that hit each slot of a patch; with panes, followed by the sums of
+    /// transmittances, one row per channel.
     pub fn row_rays(&self, patch: &TracedPatch, settings: &RowSettings) -> Vec<u32> {
         let slots = settings.slots as usize;
         let rows = if self.scene.info.panes == NOTHING { 1 } else { 4 };
@@ -41,14 +41,14 @@ impl RowRays<'_> {
         turned(local, patch.normal.into(), patch.rotation)
     }
 
-    /// A ray, and what it meets.
+    /// A ray, and its hit.
     pub fn met(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
         let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
         let ray = Ray { origin, origin_low, direction, near: patch.near };
         (ray, nearest_but(self.scene, &ray, patch.own_triangle))
     }
 
-    /// The slot that a ray meets, and what passes panes on the way.
+    /// The slot that a ray hits, and the transmittance of panes on the way.
     pub fn cast_ray(&self, patch: &TracedPatch, direction: Vec3) -> (u32, Vec3) {
         let scene = self.scene;
         let (ray, hit) = self.met(patch, direction);
@@ -66,7 +66,7 @@ impl RowRays<'_> {
     }
 }
 
-/// What a ray counts in the sums of a channel of which panes let this share through.
+/// The value added to the sums of a channel for a ray with transmittance `share`.
 pub fn amount(share: f32, settings: &RowSettings) -> u32 {
     (share * settings.unit + 0.5) as u32
 }

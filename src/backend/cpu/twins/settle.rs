@@ -1,4 +1,4 @@
-//! Twin of `shaders/settle.wgsl`: what the rays of a point amount to, and whether it casts more.
+//! Twin of `shaders/settle.wgsl`: evaluates the rays of a point, and decides whether it casts more.
 
 use glam::{Vec2, Vec3};
 
@@ -8,20 +8,20 @@ use crate::backend::gpu::traced_scene::TracedArrays;
 
 pub const SINE_OF_SUN: f32 = 0.004_652_4;
 
-/// By light and sun.
+/// Visibilities by light and sun.
 type Visibilities = [Visible; SOURCES];
 
-/// What a point gathers, and what of it is only needed to tell how near decisions are.
+/// The sample of a point, and values that only tests need, to judge how close decisions are.
 #[derive(Clone, Copy, Debug)]
 pub struct Settled {
     pub sample: Sample,
     pub ray_error: f32,
     pub shadow_error: f32,
-    /// Noise that is allowed.
+    /// Allowed noise.
     pub allowed: f32,
 }
 
-/// The irradiance that lights of one kind send, by what is visible of each.
+/// The irradiance of the lights of one kind, by the visible part of each.
 fn of_lights(
     scene: &TracedArrays,
     state: &PointState,
@@ -66,8 +66,8 @@ fn of_sun(scene: &TracedArrays, normal: Vec3, sun: &Visible, points: f32) -> Vec
     }
 }
 
-/// Settles a point, unless it has been. Its `pending` is what it casts next: nothing, rays over the
-/// hemisphere, or rays to lights.
+/// Evaluates a point, unless it is finished. Its new `pending` selects what it casts next: nothing,
+/// rays over the hemisphere, or rays to lights.
 pub fn settle(
     scene: &TracedArrays,
     point: &TracedPoint,

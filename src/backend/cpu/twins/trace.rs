@@ -1,4 +1,4 @@
-//! Twin of `shaders/shared/trace.wgsl`: rays against triangles.
+//! Twin of `shaders/shared/trace.wgsl`: ray–triangle intersection.
 
 use std::f32::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::backend::gpu::traced_scene::TracedArrays;
 
 pub const FAR: f32 = 1e30;
 
-/// A bound of rounding in the test of a triangle, some eight roundings of 2⁻²⁴ each.
+/// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
 const ROUNDING: f32 = 5e-7;
 
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct Ray {
     pub origin_low: Vec3,
     /// Unit length.
     pub direction: Vec3,
-    /// Nothing nearer is met.
+    /// Minimum distance of hits.
     pub near: f32,
 }
 
@@ -28,14 +28,14 @@ pub struct Hit {
     /// Weights of the second and third corner.
     pub u: f32,
     pub v: f32,
-    /// Its place in the triangles, or [`NOTHING`].
+    /// Its index in the triangles, or [`NOTHING`].
     pub triangle: u32,
     pub front: bool,
-    /// What rounding may have done to the distance.
+    /// Bound of the rounding error of the distance.
     pub off: f32,
 }
 
-/// Where triangle `k` is met, no farther than `end`; `slack` widens it by the rounding of that.
+/// The hit of triangle `k`, no farther than `end`; `slack` scales a margin for rounding.
 pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hit {
     let t = &scene.triangles[k as usize];
     let [corner, low, edge_u, edge_v] =
@@ -58,7 +58,7 @@ pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hi
         && distance <= end
         && (facing > 0.0 || t.flags & BACK_IS_COVERED == 0);
     let u = u.clamp(0.0, 1.0);
-    // Not `clamp`, which panics where the ray is in the triangle's plane and u is no number.
+    // Not `clamp`, which panics where the ray is in the triangle's plane and u is NaN.
     let v = v.max(0.0).min(1.0 - u);
     let is_there = is_met && (t.flags & HAS_HOLES == 0 || is_solid(scene, t.index, u, v));
     let triangle = if is_there { k } else { NOTHING };
@@ -83,13 +83,13 @@ pub fn is_solid(scene: &TracedArrays, index: u32, u: f32, v: f32) -> bool {
     bits >> (texel % 32) & 1 != 0
 }
 
-/// Components of a direction, none so small that its inverse is infinite.
+/// Inverse of a direction, with a lower bound on its components, so that it is finite.
 fn inverse_of(direction: Vec3) -> Vec3 {
     let least = Vec3::select(direction.cmpge(Vec3::ZERO), Vec3::splat(1e-20), Vec3::splat(-1e-20));
     1.0 / Vec3::select(direction.abs().cmplt(Vec3::splat(1e-20)), least, direction)
 }
 
-/// The child of node `k` to be entered next, the other one on the stack; none if none is met.
+/// The child of node `k` to be entered next, the other one on the stack; `None` if none is hit.
 fn enter(
     scene: &TracedArrays,
     k: u32,
@@ -122,8 +122,8 @@ fn enter(
     }
 }
 
-/// Depth first, the triangles of the leaves below `root` that the ray enters before an end; each
-/// visit says where the end is from there on, or none to stop.
+/// Visits depth first the triangles of the leaves below `root` that the ray enters before its end;
+/// each visit returns the new end, or `None` to stop.
 pub fn walk(
     scene: &TracedArrays,
     root: u32,
@@ -148,8 +148,8 @@ pub fn walk(
     }
 }
 
-/// A direction given along two tangents and the normal, which turn about that: the tangents of Duff
-/// et al. 2017, "Building an orthonormal basis, revisited".
+/// Converts a direction from two tangents and the normal, rotated about the latter: the tangents of
+/// Duff et al. 2017, "Building an orthonormal basis, revisited".
 pub fn turned(local: Vec3, n: Vec3, turns: f32) -> Vec3 {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
@@ -162,7 +162,7 @@ pub fn turned(local: Vec3, n: Vec3, turns: f32) -> Vec3 {
     (x * local.x + y * local.y + n * local.z).normalize()
 }
 
-/// The nearest triangle that the ray meets; of equals the one with the lower number.
+/// The nearest hit of the ray; ties are ordered by triangle number.
 pub fn nearest(scene: &TracedArrays, ray: &Ray) -> Hit {
     nearest_but(scene, ray, NOTHING)
 }
@@ -185,7 +185,7 @@ pub fn nearest_but(scene: &TracedArrays, ray: &Ray, own: u32) -> Hit {
     best
 }
 
-/// Whether anything before `end` hides what is there; fronts of the light `but` do not.
+/// Whether anything before `end` occludes it; fronts of the light `but` do not.
 pub fn is_hidden(scene: &TracedArrays, ray: &Ray, end: f32, but: u32) -> bool {
     let mut hidden = false;
     walk(scene, 0, ray, end, |k| {

@@ -1,4 +1,4 @@
-//! Faces, depth and the check of rows.
+//! Faces, depth and the validation of rows.
 
 use glam::DVec3;
 
@@ -12,8 +12,8 @@ fn items(h: &HemicubeRows) -> Vec<u32> {
     read_texture(&h.gpu, &h.batches.resolutions[0].targets.texture, 0)
 }
 
-/// A patch at the origin that faces +z, and small triangles around each given centre, facing
-/// the origin or away from it.
+/// A patch at the origin that faces +z, and small triangles around each given centre, facing the
+/// origin or away from it.
 fn around_origin(centres: &[(DVec3, bool)]) -> Mesh {
     let mut corners = vec![[DVec3::X, DVec3::Y, -DVec3::X - DVec3::Y].map(|p| p * 0.01)];
     for &(centre, front) in centres {
@@ -69,7 +69,7 @@ fn nearer_of_two_is_seen() {
             &HemicubeRows::new(&gpu, &mesh, 64).unwrap().rows(&mesh, &[NodeId(0)], 1.0).unwrap()[0];
         let share =
             |k: u32| row.entries.iter().find(|e| e.element == k).map_or(0, |e| u64::from(e.share));
-        // The far one looks out by the pixels of the outline at most.
+        // The far one is visible at most by the pixels of the outline.
         assert!(share(near) > 10 * share(far), "{} {}", share(near), share(far));
     }
 }

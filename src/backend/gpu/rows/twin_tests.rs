@@ -1,4 +1,4 @@
-//! `item_buffer.wgsl` and `reduce.wgsl` against their twins, as hemicubes are really drawn.
+//! `item_buffer.wgsl` and `reduce.wgsl` against their twins, with actual hemicubes.
 
 use super::*;
 use crate::backend::cpu::{item_buffer, reduce};
@@ -8,14 +8,14 @@ use crate::backend::gpu::test_support::{
     gpu, offsets, picture, read_buffer, read_texture, scene, symbol,
 };
 
-/// Each pixel shows what the twin shows there, or within 1/128 pixel of there; see [`offsets`].
+/// Each pixel has the twin's item there, or within 1/128 pixel of there; see [`offsets`].
 fn compare_items(n: u32, device: &[u32], twins: &[Vec<u32>], what: &str) {
     let wrong: Vec<bool> =
         (0..device.len()).map(|k| twins.iter().all(|twin| twin[k] != device[k])).collect();
     let [a, b] = [device, &twins[0]].map(|i| i.iter().map(|&i| symbol(i)).collect::<Vec<_>>());
     let wrongs = wrong.iter().filter(|w| **w).count();
     assert!(wrongs == 0, "{what}: {wrongs} pixels\n{}", picture(n as usize, &a, &b, &wrong));
-    // The rule is worth something only where few pixels are near an outline.
+    // The test is only significant if few pixels are near an outline.
     let unsure = (0..device.len()).filter(|&k| twins.iter().any(|t| t[k] != twins[0][k])).count();
     assert!(unsure * 5 < device.len(), "{what}: {unsure} of {} pixels may be two", device.len());
 }

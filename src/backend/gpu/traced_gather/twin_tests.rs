@@ -1,5 +1,5 @@
 //! `rank_lights.wgsl`, `hemisphere_rays.wgsl`, `light_rays.wgsl` and `settle.wgsl` against their
-//! twins, pass by pass; and the same bits however points are handed over.
+//! twins, pass by pass; and the same bits for any division of points into calls.
 
 use std::f32::consts::PI;
 
@@ -25,10 +25,10 @@ use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::visibility::ray_scene::Hit;
 
-/// A rounding of 32-bit numbers, as a share.
+/// Relative rounding error of 32-bit numbers.
 const ROUNDING: f64 = f32::EPSILON as f64 / 2.0;
 
-/// A gather whose passes are run one at a time, and what the twins read.
+/// A gather whose passes are run one at a time, and the inputs of the twins.
 struct Passes {
     gpu: Gpu,
     gather: TracedGather,
@@ -41,23 +41,23 @@ struct Passes {
     points: Vec<TracedPoint>,
 }
 
-/// Workgroups of a pass.
+/// Number of workgroups of a pass.
 #[derive(Clone, Copy, Debug)]
 enum Groups {
     Count(u32),
-    /// As many as the work list of rays, or of rays to lights, has points.
+    /// The number of points in the work list of rays, or of rays to lights.
     Rays,
     ShadowRays,
 }
 
 impl Passes {
-    /// `count` places of `mesh`, with `rays` rays each at first and 16 times as many in the end.
+    /// `count` points of `mesh`, with initially `rays` rays each and finally 16 times that.
     fn new(mesh: &Mesh, count: usize, rays: u32) -> Passes {
         let gpu = gpu();
         let gather = TracedGather::with_noise(&gpu, mesh, rays, (1e-6, 0.0)).unwrap();
         let mut slots = Slots::new(gpu.memory(), count as u32, 1).unwrap();
         let mut slot = slots.slots.remove(0);
-        // Buffers that are read and written here.
+        // Buffers that the tests read and write.
         let buffer = |bytes: u64, usage| {
             use wgpu::BufferUsages as Usage;
             let usage = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST | usage;
@@ -94,8 +94,8 @@ impl Passes {
         }
     }
 
-    /// Rays of a half from `first` on, `pass_rays` at most; so little noise that all that may be
-    /// doubled is.
+    /// Rays of a half from `first` on, at most `pass_rays`; the allowed noise is so low that all
+    /// that may be doubled is.
     fn settings(&self, first: u32, pass_rays: u32) -> GatherSettings {
         let TracedGather { min_rays, max_rays, .. } = self.gather;
         let points = self.points.len() as u32;
@@ -132,7 +132,7 @@ impl Passes {
         read_buffer(&self.gpu, &self.slot.states)
     }
 
-    /// Runs `settle`: states and samples of all points, then those that it lists.
+    /// Runs `settle`: returns states and samples of all points, and the points that it lists.
     fn settle(&self, settings: &GatherSettings) -> (Vec<PointState>, Vec<Sample>, [Vec<u32>; 2]) {
         let slot = &self.slot;
         let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
@@ -153,7 +153,7 @@ impl Passes {
     }
 }
 
-/// Checks `found` against `expected`, off by `width` and by so many roundings of it at most.
+/// Checks that `found` deviates from `expected` by at most `width` and `roundings` roundings of it.
 fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl Fn() -> String) {
     let off = (f64::from(found) - f64::from(expected)).abs();
     let most = width + roundings * ROUNDING * f64::from(expected).abs();
@@ -163,11 +163,12 @@ fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl F
 // ---------------------------------------------------------------------------------------------
 // Exact rays.
 
-/// The nearest hits of the twin are those of exact rays along the same directions, but for rays so
-/// near an edge that rounding decides: exact rays turned by 2⁻²⁰ meet what the twin does, or where
-/// it meets a side, something as far off. Distances are as near as a hit says. So it is with rays
-/// to the sides of triangles, for which rounding often decides; the twin's triangles are wider than
-/// they are there, by more the longer and thinner they are: by 2⁻¹⁷ at most here.
+/// The nearest hits of the twin are those of exact rays along the same directions, except for rays
+/// so near an edge that rounding decides: exact rays deflected by 2⁻²⁰ have the twin's hit, or
+/// where it hits a side, a hit at the same distance. Distances are within the error bound of the
+/// hit. The same holds for rays to the sides of triangles, for which rounding often decides; the
+/// twin's triangles are widened there, by more the longer and thinner they are: by at most 2⁻¹⁷
+/// here.
 #[test]
 fn twin_meets_what_exact_rays_meet() {
     let mut at_sides = 0;
@@ -201,8 +202,8 @@ fn twin_meets_what_exact_rays_meet() {
     assert!(at_sides > 0);
 }
 
-/// Whether the twin meets something else than an exact ray, which has to meet it where it is turned
-/// by `apart` times 2⁻²⁰.
+/// Whether the twin's hit differs from that of an exact ray; then an exact ray deflected by `apart`
+/// times 2⁻²⁰ must have it.
 fn differs(
     what: &str,
     (arrays, exact): (&TracedArrays, &RayScene),
@@ -220,7 +221,7 @@ fn differs(
         .then(|| (arrays.triangles[hit.triangle as usize].index as usize, hit.front));
     let is_same = |h: Option<Hit>| h.map(|h| (h.triangle, h.front)) == found;
     let is_as_far = |truth: &Hit| {
-        // The direction is of unit length but for a rounding.
+        // The direction is of unit length up to a rounding.
         let most = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
         (f64::from(hit.distance) * unit - truth.distance).abs() <= most
     };
@@ -231,8 +232,8 @@ fn differs(
     let turned =
         shifts().into_iter().map(|(across, _)| along(turned_by(direction, apart * across)));
     let turned: Vec<Option<Hit>> = turned.collect();
-    // Of two triangles that share a side, one may be met only there: exact rays meet the other, as
-    // far off but for what a turn moves it at a cosine of 2⁻⁷ or more.
+    // Of two triangles that share a side, one may be hit only there: exact rays hit the other, at
+    // the same distance up to the change by a deflection at a cosine of 2⁻⁷ or more.
     let is_on_side = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) <= apart * 2f32.powi(-20);
     let moved = f64::from(apart) * 2f64.powi(-13);
     let is_near = |h: &Hit| (f64::from(hit.distance) * unit / h.distance - 1.0).abs() <= moved;
@@ -242,7 +243,7 @@ fn differs(
     true
 }
 
-/// A point as the device gets it, but for its rotation.
+/// The device's form of a point, without its rotation.
 fn traced(arrays: &TracedArrays, place: &GatherPoint) -> TracedPoint {
     let [position, position_low] = arrays.coordinates.parts(place.position);
     TracedPoint {
@@ -254,8 +255,8 @@ fn traced(arrays: &TracedArrays, place: &GatherPoint) -> TracedPoint {
     }
 }
 
-/// Form factors to lights are those of the closed form in 64 bits: off by 3e-5 where it cancels
-/// most, in a triangle of 5e-3 of its distance, and by the lights' own terms.
+/// Form factors to lights equal the closed form in 64 bits: the error is 3e-5 where it cancels
+/// most, for a triangle of 5e-3 of its distance, and that of the lights' own terms.
 #[test]
 fn twin_ranks_lights_as_closed_forms_do() {
     for (name, mesh) in traced_scenes() {
@@ -265,8 +266,8 @@ fn twin_ranks_lights_as_closed_forms_do() {
             let point = traced(&arrays, &place);
             for (number, truth) in lights.importance_ranked(&place) {
                 let found = factor_of(&arrays, &arrays.lights[number as usize], &point);
-                // Near the horizon what is seen of a light is a sliver, good to a few roundings of
-                // the whole.
+                // Near the horizon the visible part of a light is a sliver, with an error of a few
+                // roundings of the whole.
                 let most = 1e-4 * truth + 16.0 * ROUNDING;
                 assert!(
                     (f64::from(found) - truth).abs() <= most,
@@ -288,20 +289,20 @@ fn gather_passes_equal_their_twins() {
         compare(name, &Passes::new(&mesh, 7, 256), &mut met);
     }
     println!("{met:?}");
-    // All that there is to compare has been there.
+    // All cases to compare have occurred.
     assert!(met.wide > 0 && met.folded > 0 && met.full > 0 && met.escaped > 0.0);
     assert!(met.back > 0.0 && met.lamps > 0.0 && met.dim > 0 && met.rounds >= 6);
 }
 
-/// What the scenes have shown.
+/// Cases that occurred in the scenes.
 #[derive(Debug, Default)]
 struct Met {
-    /// Lights that rays over the hemisphere look for, those that are not convex, points with as
-    /// many lights as are sampled apart.
+    /// Numbers of lights that rays over the hemisphere sample, of those that are not convex, and of
+    /// points with the maximum number of lights sampled separately.
     wide: usize,
     folded: usize,
     full: usize,
-    /// Lights that are left out since they are dim.
+    /// Lights that are omitted because they are dim.
     dim: usize,
     escaped: f32,
     back: f32,
@@ -372,7 +373,7 @@ fn compare(name: &str, passes: &Passes, met: &mut Met) {
         round += 1;
         met.rounds = met.rounds.max(round);
     }
-    // All have cast as many rays as they may, unless these agree.
+    // All have cast the maximum number of rays, unless these agree.
     let most = passes.gather.max_rays;
     let settled = passes.settle(&passes.whole()).1;
     assert!(settled.iter().all(|s| s.rays == most || s.noise < 1e-5), "{name}: {settled:?}");
@@ -381,7 +382,7 @@ fn compare(name: &str, passes: &Passes, met: &mut Met) {
 // ---------------------------------------------------------------------------------------------
 // Lights.
 
-/// Lights are the same, in the same order but where they send the same within rounding.
+/// Lights are the same, in the same order up to rounding of their irradiance.
 fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut Met) {
     let arrays = &passes.arrays;
     for (p, (point, state)) in passes.points.iter().zip(device).enumerate() {
@@ -406,7 +407,7 @@ fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut M
             met.wide += a.is_wide as usize;
             met.folded += usize::from(light.is_convex == 0);
         }
-        // Of lights that send the same the lower number comes first.
+        // Ties are ordered by number.
         for pair in state.ranked().windows(2) {
             let sent =
                 |k: usize| irradiance_of(&arrays.lights[pair[k].light as usize], pair[k].factor);
@@ -425,9 +426,10 @@ fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut M
     }
 }
 
-/// What a device may be off in the form factor of a light. Each side of a polygon is an angle times
-/// a cosine: lavapipe's arc tangent is off by 2.1e-5 of itself, and by less where it is large; the
-/// rest of it is some 20 roundings. What counts by its middle has no more of these.
+/// Maximum error of the form factor of a light on a device. Each side of a polygon is an angle
+/// times a cosine: lavapipe's arc tangent has a relative error of 2.1e-5, and less for large
+/// angles; the rest is some 20 roundings. A triangle represented by its middle has no more of
+/// these.
 fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint) -> f64 {
     let share = 2.1e-5 + 20.0 * ROUNDING;
     let of_triangle = |t| match seen(t, point) {
@@ -447,7 +449,7 @@ fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint)
 // ---------------------------------------------------------------------------------------------
 // Rays over the hemisphere.
 
-/// Numbers of [`Found`], and which of them is the largest ray.
+/// Number of values in [`Found`], and the index of the largest ray.
 const NUMBERS: usize = size_of::<Found>() / 4;
 const LARGEST: usize = 9;
 
@@ -455,10 +457,10 @@ fn numbers(found: &Found) -> [f32; NUMBERS] {
     bytemuck::cast(*found)
 }
 
-/// Between what a ray may find.
+/// Range of the possible results of rays.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
-    /// Most less least of each number, of all rays; of the largest ray least and most.
+    /// Width of the range of each value, over all rays; for the largest ray minimum and maximum.
     widths: [f64; NUMBERS],
     largest: [f32; 2],
     unsure: usize,
@@ -468,7 +470,7 @@ struct Spread {
 impl Spread {
     const NONE: Spread = Spread { widths: [0.0; NUMBERS], largest: [0.0; 2], unsure: 0, rays: 0 };
 
-    /// One ray more, which may find any of these.
+    /// Adds one ray, whose result is within the range of these.
     fn add(&mut self, found: &[[f32; NUMBERS]]) {
         let mut low = found[0];
         let mut high = found[0];
@@ -490,8 +492,8 @@ impl Spread {
     }
 }
 
-/// Sums over rays are those of the twin, but for what the rays that rounding may turn aside find:
-/// see [`shifts`].
+/// Sums over rays are those of the twin, except for the rays that rounding may deflect: see
+/// [`shifts`].
 fn compare_rays(
     what: &str,
     passes: &Passes,
@@ -522,7 +524,7 @@ fn compare_rays(
             spreads[usize::from(k >= middle)].add(&found.collect::<Vec<_>>());
         }
         for (half, spread) in spreads.iter().enumerate() {
-            // A lane adds up its rays, then 64 lanes are; a term takes some 40 operations.
+            // A lane adds up its rays, then 64 lanes are added; a term takes some 40 operations.
             let roundings = spread.rays as f64 / 64.0 + 6.0 + 40.0;
             let of = |state: &PointState| {
                 let mut found = Found { sums: state.rays[half], ..Default::default() };
@@ -542,9 +544,9 @@ fn compare_rays(
                 largest >= low - slack && largest <= high + slack,
                 "{what}, half {half}: largest {largest}, not {low} to {high}"
             );
-            // The rule is worth something only where few rays are near an edge: some hundred sides
-            // a radian long, and as many lines between elements, are in 2e-4 of the hemisphere, and
-            // those between pieces of a sky, 2⁻⁹ apart, in 2⁻¹⁰ of it.
+            // The test is only significant if few rays are near an edge: some hundred sides a
+            // radian long, and the same number of lines between elements, cover 2e-4 of the
+            // hemisphere, and those between pieces of a sky, 2⁻⁹ apart, 2⁻¹⁰ of it.
             assert!(
                 spread.unsure <= 2 + spread.rays / 100,
                 "{what}: {} of {} rays are unsure",
@@ -566,8 +568,8 @@ fn compare_rays(
 // ---------------------------------------------------------------------------------------------
 // Rays to lights.
 
-/// As much of each light is seen as the twin sees, but for rays that rounding may turn aside, or to
-/// another texel of a mask.
+/// The visible part of each light is that of the twin, except for rays that rounding may deflect,
+/// or move to another texel of a mask.
 fn compare_shadow_rays(
     what: &str,
     passes: &Passes,
@@ -592,8 +594,8 @@ fn compare_shadow_rays(
             let (mut unsure, mut rays) = (0, [0u32; 2]);
             for i in from..to {
                 let at = rotated_sobol(i, point);
-                // Places move as directions do: a light is no wider than the hemisphere. The sun's
-                // are turned, since it is far smaller.
+                // Points move as directions do: a light is no wider than the hemisphere. Those of
+                // the sun are rotated, since it is far smaller.
                 let found = shifts.iter().map(|&(across, origin)| {
                     let low = (Vec3::from(point.position_low) + origin).to_array();
                     let shifted = TracedPoint { position_low: low, ..*point };
@@ -625,8 +627,9 @@ fn compare_shadow_rays(
                     check(found, expected, (width, roundings), name);
                 }
             }
-            // A place is near an outline, or a side of a texel, as seldom as a ray is; near the
-            // horizon and a light's own plane a factor is small, and may be off by much of itself.
+            // A point is near an outline, or a side of a texel, as rarely as a ray is; near the
+            // horizon and a light's own plane a factor is small, and may have a large relative
+            // error.
             let all = rays[0] + rays[1];
             assert!(unsure <= 2 + all / 50, "{what}, light {source}: {unsure} of {all} are unsure");
         }
@@ -642,7 +645,7 @@ fn compare_shadow_rays(
     (0..passes.points.len()).into_par_iter().for_each(compare);
 }
 
-/// What lies in a light's own plane does not hide it, whichever of both rounding puts first.
+/// Objects in a light's own plane do not hide it, whichever of both rounding puts first.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn rays_to_lights_end_at_their_plane() {
@@ -666,7 +669,7 @@ fn rays_to_lights_end_at_their_plane() {
 // ---------------------------------------------------------------------------------------------
 // What rays amount to.
 
-/// Samples within rounding, the same decisions, and what is added up bit for bit.
+/// Samples within rounding, the same decisions, and the same bits of sums.
 fn compare_settled(
     what: &str,
     passes: &Passes,
@@ -683,7 +686,7 @@ fn compare_settled(
             continue;
         };
         compare_samples(&what, &samples[p], &settled);
-        // Errors are differences of means, which are some 40 roundings off.
+        // Errors are differences of means, which have an error of some 40 roundings.
         let of_means = |mean: [f32; 3]| Vec3::from(mean).length();
         let slack = 160.0 * ROUNDING as f32 * of_means(settled.sample.irradiance);
         let Settled { ray_error, shadow_error, allowed, .. } = settled;
@@ -707,8 +710,8 @@ fn compare_settled(
     }
 }
 
-/// All that is summed is positive: some 40 roundings of the sum, which is as long as any channel;
-/// the noise is a difference of halves, either of which may be twice their mean.
+/// All terms are positive: some 40 roundings of the sum, which is as long as any channel; the noise
+/// is a difference of halves, either of which may be twice their mean.
 fn compare_samples(what: &str, found: &Sample, settled: &Settled) {
     let expected = &settled.sample;
     let whole = f64::from(Vec3::from(expected.irradiance).length());
@@ -726,13 +729,14 @@ fn compare_samples(what: &str, found: &Sample, settled: &Settled) {
         (found.inverse_distance, expected.inverse_distance),
     ];
     for (found, expected) in shares {
-        // A sum and a division, which are off by three roundings.
+        // A sum and a division, with an error of three roundings.
         check(found, expected, (0.0, 8.0), || format!("{what}, share"));
     }
     assert_eq!([found.rays, found.shadow_rays], [expected.rays, expected.shadow_rays], "{what}");
 }
 
-/// States of all kinds, in several workgroups: with so much noise that many points have enough.
+/// States of all kinds, in several workgroups: with an allowed noise so high that many points
+/// finish.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn settle_equals_its_twin_from_any_state() {
@@ -754,7 +758,7 @@ fn settle_equals_its_twin_from_any_state() {
     assert!(decided.iter().all(|&count| count > 50), "{decided:?}");
 }
 
-/// A state that rays may leave: halves that are much alike.
+/// A state that rays may leave, with similar halves.
 fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
     let mut next = 1000 * seed;
     let mut random = || {
@@ -803,7 +807,7 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
 // ---------------------------------------------------------------------------------------------
 // The same bits.
 
-/// Gathers at these places, no more than `most` at once.
+/// Gathers at these points, at most `most` at once.
 fn gathered(
     gather: &mut TracedGather,
     field: &RadiosityField,
@@ -823,7 +827,7 @@ fn gathers_have_the_same_bits_in_any_batches() {
         let (corners, reflected) = random_radiosity(&mesh);
         let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
         let new = || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap();
-        // More batches of 64 than are under way at once.
+        // More batches of 64 than are in flight at once.
         let points = places(&mesh, 200);
         let mut gather = new();
         let all = gathered(&mut gather, &field, &points, MAX_POINTS);
@@ -840,7 +844,7 @@ fn gathers_have_the_same_bits_in_any_batches() {
     }
 }
 
-/// More rays than one pass casts: passes add up to what one does, but for the order of sums.
+/// More rays than in one pass: passes add up to the result of one, except for the order of sums.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn many_rays_are_cast_in_several_passes() {

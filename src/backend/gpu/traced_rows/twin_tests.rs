@@ -1,5 +1,5 @@
-//! `row_rays.wgsl` and `compact_rows.wgsl` against their twins; and the same bits however patches
-//! are handed over.
+//! `row_rays.wgsl` and `compact_rows.wgsl` against their twins; and the same bits for any division
+//! of patches into calls.
 
 use glam::{DVec3, Vec2, Vec3};
 use rustc_hash::FxHashSet;
@@ -15,7 +15,7 @@ use crate::backend::gpu::test_support::{
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::split_mix64_nth;
 
-/// Rows with counts that can be read and written here.
+/// Rows with counts that the tests can read and write.
 fn open_rows(gpu: &Gpu, mesh: &Mesh, rays: u32) -> TracedRows {
     use wgpu::BufferUsages as Usage;
     let mut rows = TracedRows::new(gpu, mesh, rays).unwrap();
@@ -43,8 +43,8 @@ fn patches(mesh: &Mesh) -> Vec<NodeId> {
     elements.chain([mesh.root(0)]).collect()
 }
 
-/// Each slot is met by as many rays as the twin says, but for those that rounding may turn aside:
-/// see [`shifts`]; and what panes let through of them is its sum, but for one unit a ray.
+/// The number of hits of each slot is that of the twin, except for rays that rounding may deflect:
+/// see [`shifts`]; and the sum of transmittances is its sum, up to one unit per ray.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn row_rays_equal_their_twin() {
@@ -63,7 +63,7 @@ fn row_rays_equal_their_twin() {
         let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
         let mut traced: Vec<TracedPatch> =
             patches(&mesh).iter().map(|&patch| rows.traced_patch(&mesh, patch)).collect();
-        // One above its own triangle that does not see what lies before it.
+        // One above its own triangle that does not see the triangle in front of it.
         let met = |k: u32| twin.met(&traced[0], twin.direction(k, &traced[0])).1.triangle;
         let before = (0..count).map(met).find(|&triangle| triangle != NOTHING).unwrap();
         let own_triangle = arrays.triangles[before as usize].index;
@@ -85,7 +85,7 @@ fn row_rays_equal_their_twin() {
                 }
             }
             assert_eq!(found[..slots].iter().sum::<u32>(), count, "{what}");
-            // Between which each number may be.
+            // Range of each number.
             let (mut low, mut high) = (vec![0; channels * slots], vec![0; channels * slots]);
             let mut unsure = 0;
             for ray in 0..count {
@@ -137,7 +137,7 @@ fn row_rays_equal_their_twin() {
                 .filter(|&k| found[slots + k] > 0 && found[slots + k] != found[2 * slots + k])
                 .count();
         }
-        // Nothing is left for the next batch.
+        // Counts are zero for the next batch.
         let counts: Vec<u32> = read_buffer(&gpu, &rows.buffers.counts);
         assert!(counts.iter().all(|&count| count == 0), "{name}");
     }
@@ -145,8 +145,8 @@ fn row_rays_equal_their_twin() {
     assert!(open > 0 && back > 0 && dimmed > 0);
 }
 
-/// No ray goes through a side that two triangles share: in a closed room none meets nothing, though
-/// all are cast to sides.
+/// No ray passes through a side that two triangles share: in a closed room every ray has a hit,
+/// though all are cast to sides.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn no_ray_goes_through_a_shared_side() {
@@ -158,7 +158,7 @@ fn no_ray_goes_through_a_shared_side() {
         let from = mesh.viewpoint(patch);
         let mut rows = open_rows(&gpu, &mesh, 64);
         let traced = rows.traced_patch(&mesh, patch);
-        // Along the tangents and the normal that the device makes of these.
+        // Along the tangents and the normal that the device computes from these.
         let [x, y, z] =
             [Vec3::X, Vec3::Y, Vec3::Z].map(|v| turned(v, traced.normal.into(), traced.rotation));
         let local = |to: DVec3| {
@@ -184,15 +184,15 @@ fn no_ray_goes_through_a_shared_side() {
     assert!(cast > 5000, "{cast}");
 }
 
-/// Entries are exactly the slots that are not 0, and these are 0 then; of more entries than there
-/// is room for as many are written, and all are counted.
+/// Entries are exactly the slots that are not 0, and these are reset to 0; beyond the capacity no
+/// entry is written, but all are counted.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn compact_rows_equals_its_twin() {
     let gpu = gpu();
     for (name, mesh) in traced_scenes() {
         let mut rows = open_rows(&gpu, &mesh, 1000);
-        // As many slots as the mesh has, one for each lane, and several for most.
+        // The number of slots of the mesh, one for each lane, and several for most.
         for slots in [rows.slots, 256, 1001] {
             compare_entries(&format!("{name}, {slots} slots"), &gpu, &mut rows, slots);
         }
@@ -203,7 +203,7 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     let patches: Vec<TracedPatch> = vec![Default::default(); 40];
     let channels = if rows.has_panes { 4 } else { 1 };
     let slots = slot_count as usize;
-    // A third of the slots, the first and the last among them, of any number.
+    // Random counts in a third of the slots, including the first and the last.
     let random = |k: usize| split_mix64_nth(k as u64) as u32;
     let count = |k: usize| match (k % slots, k / slots % channels) {
         (slot, 0) if slot == 0 || slot == slots - 1 || random(k).is_multiple_of(3) => {
@@ -213,7 +213,7 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
         _ => random(k),
     };
     let mut counts: Vec<u32> = (0..patches.len() * channels * slots).map(count).collect();
-    // What panes let through of no ray is nothing.
+    // Without rays the transmittance is 0.
     for row in counts.chunks_mut(channels * slots) {
         let (rays, passed) = row.split_at_mut(slots);
         for channel in passed.chunks_mut(slots) {
@@ -227,7 +227,7 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     // No ray is cast.
     let settings = RowSettings { slots: slot_count, ..rows.settings(0) };
     let found = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
-    // Rows come in any order, each in that of its slots.
+    // Rows come in any order, the entries of each in the order of slots.
     let in_rows = found.chunk_by(|a, b| a.patch_ == b.patch_);
     assert_eq!(in_rows.clone().count(), patches.len(), "{what}");
     assert!(in_rows.into_iter().all(|row| row.is_sorted_by_key(|e| e.slot)), "{what}");
@@ -238,7 +238,7 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     let on_device = || read_buffer::<u32>(gpu, &on_device);
     assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{what}");
 
-    // Room for two thirds of them, after which there is what was there: nothing.
+    // Capacity for two thirds of them; the memory beyond keeps its zeros.
     let room = expected.len() * 2 / 3;
     let nothing = vec![0; size_of_val(&expected[..])];
     gpu.queue.write_buffer(&rows.buffers.compacted.found, ROW_ENTRIES_HEADER_BYTES, &nothing);
@@ -276,7 +276,7 @@ fn rows_have_the_same_bits_in_any_batches() {
             let alone = rows.rows(&mesh, &patches[k..=k], 1.0).unwrap();
             assert!(alone == all[k..=k], "{name}: patch {k} alone");
         }
-        // Batches that have no room for their entries are made in two.
+        // Batches that exceed the capacity are made in two.
         rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
         rows.buffers.patches_at_once = 3;
