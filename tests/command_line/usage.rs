@@ -122,7 +122,13 @@ fn settings_are_listed_with_the_options_that_help_leaves_out() {
     let out = run("bake", &["--list-settings"]);
     let [listed, error] = texts(&out);
     assert!(out.status.success() && error.is_empty(), "{error}");
-    for words in ["gather.refinement.min_edge\n", "scene unit", "[1073741824]", "--state <FILE>"] {
+    for words in [
+        "gather.refinement.min_edge\n",
+        "scene unit",
+        "[1073741824]",
+        "--state <FILE>",
+        "--elements\n",
+    ] {
         assert!(listed.contains(words), "'{words}' not in {listed}");
     }
     let help = &texts(&run("bake", &["--help"]))[0];

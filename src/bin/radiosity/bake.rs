@@ -32,15 +32,16 @@ const DARK: (&str, &str) = (
 const BLACK: (&str, &str) =
     ("no surface reflects or emits anything", "give materials a `Kd`, or --emit MATERIAL=r,g,b");
 
-/// Bakes the radiosity of a scene at the vertices of a mesh, with a report and a picture
+/// Bakes the radiosity of a scene at the vertices of a mesh
 #[derive(Args)]
 #[command(after_help = "\
-Without --error, --error-each, --time, --gather and --set a bake goes to an error of 5 %. The error \
-of radiosity is estimated, a root mean square over the area that reflects, as a share. Ctrl-C or \
-SIGTERM stops the bake and writes what there is; a second one ends the program at once.")]
+Without --error, --error-each, --time, --gather and --set a bake goes to an error of 5 %. The \
+error of radiosity is estimated, a root mean square over the area that reflects, as a share. \
+Ctrl-C or SIGTERM stops the bake and writes what there is; a second one ends the program at \
+once.")]
 pub struct Bake {
     /// Scene, an OBJ file
-    #[arg(value_name = "SCENE.obj", required_unless_present = "list_settings")]
+    #[arg(value_name = "SCENE.obj", required = true)]
     scene: Option<PathBuf>,
     /// Bake until the estimated error of reflected radiosity is below this share [default: 0.05]
     #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
@@ -49,7 +50,7 @@ pub struct Bake {
     /// Bake until the estimated error of each group of the scene is below this share
     #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
     error_each: Option<f64>,
-    /// Bake for this time at the longest, as exactly as it allows or until the error is reached
+    /// Limit of time: bake to the error that it permits or, with an error, until that is reached
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "state")]
     time: Option<Duration>,
     /// Vertices that gather the solved light: none; needed, where elements are split since light is
@@ -60,7 +61,7 @@ pub struct Bake {
     #[arg(long, value_name = "NAME=VALUE", value_parser = settings::adjustment)]
     set: Vec<Adjustment>,
     /// Print the settings for --set and the options that are not listed here, and exit
-    #[arg(long)]
+    #[arg(long, exclusive = true)]
     list_settings: bool,
     /// Light in bands too, for the materials in this file: STEM.bands.ply and, where bands have
     /// wavelengths, STEM.bands.exr and .png

@@ -29,7 +29,7 @@ const METRES: &str = "a length in metres";
 /// Measures irradiance or illuminance on measuring grids, by default above each floor
 #[derive(Args)]
 #[command(after_help = "\
-Bakes the scene and measures what arrives at the points of grids. Writes STEM.grid.csv, a line a \
+Bakes the scene and measures light at the points of grids. Writes STEM.grid.csv, a line a \
 point with its standard error, and a picture in false colours of each grid, STEM.grid.png or \
 STEM.grid-1.png and so on; prints mean, minimum, maximum and uniformity (minimum / mean). Points \
 inside solids are marked and do not count. Lengths are in metres.")]
@@ -51,7 +51,7 @@ pub struct Options {
     /// Width that is left out along edges [default: above floors 0.5, along walls; else 0]
     #[arg(long, value_name = "W", value_parser = value::<f64>(METRES))]
     strip: Option<f64>,
-    /// Distance of points, at most [default: 0.2 * 5^log10(d) and 10 at most, EN 12464-1, where d is
+    /// Maximum distance of points [default: 0.2 * 5^log10(d), limited to 10, EN 12464-1, where d is
     /// the longer side, or the shorter one where the longer is twice as long or more]
     #[arg(long, value_name = "P", value_parser = value::<f64>(METRES))]
     spacing: Option<f64>,

@@ -13,13 +13,13 @@ use crate::args::{self, List, Stop, list, value};
 use crate::progress;
 use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 
-/// Solves the radiative heat balance of groups: temperatures and net fluxes, by their view factors
+/// Solves the radiative heat balance of groups by their view factors
 #[derive(Args)]
 #[command(after_help = "\
 Writes temperature (K), radiosity, irradiance and net flux out (W/m²) of each group. View factors \
-are made as `radiosity view-factors` makes them, or read from a file that it has written. What is \
-seen through openings is black and has one temperature; groups are grey in each band, and diffuse. \
-Powers are in W where lengths are in m.
+are made as `radiosity view-factors` makes them, or read from a file that it has written. Openings \
+are black and have one temperature; groups are grey in each band, and diffuse. Powers are in W \
+where lengths are in m.
 
 Columns of --boundaries:
   group        its name; with --facets that of a face (GROUP/1) or of all faces of a group; * for

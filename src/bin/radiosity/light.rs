@@ -23,7 +23,7 @@ const NOISE_SHARE: f64 = 0.5;
 /// The light, and how exact what is measured in it is to be.
 #[derive(Args)]
 pub struct LightOptions {
-    /// Error of what is measured, root mean square, as a share
+    /// Error of the measurement, root mean square, as a share
     #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = value::<f64>(SHARE))]
     error: f64,
     #[command(flatten)]

@@ -27,8 +27,8 @@ pub struct LuminaireOptions {
     /// [1]; may be repeated
     #[arg(long, value_name = "FILE@x,y,z…", value_parser = luminaire)]
     luminaire: Vec<Given>,
-    /// Lamps as a JSON list of {"file": "a.ies", "at": [x, y, z]}, with "aim", "c0" and "scale" where
-    /// needed; files are in the folder of the list; may be repeated
+    /// Lamps as a JSON list of {"file": "a.ies", "at": [x, y, z]}, with "aim", "c0" and "scale"
+    /// where needed; files are in the folder of the list; may be repeated
     #[arg(long, value_name = "LIST.json", hide = true)]
     luminaires: Vec<PathBuf>,
     /// Metres in the scene's unit, for luminaires: 0.001 for millimetres

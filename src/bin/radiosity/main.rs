@@ -47,8 +47,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use view_factors::merge;
 
-/// Radiosity of scenes: at vertices, in textures, on grids and at probes; view factors and radiative
-/// heat between their groups
+/// Radiosity of scenes: at vertices, in textures, on grids and at probes; view factors and
+/// radiative heat between their groups
 #[derive(Parser)]
 #[command(name = "radiosity", version, args_override_self = true, max_term_width = 100)]
 struct Program {
@@ -112,7 +112,7 @@ mod tests {
         let mut program = super::program();
         program.build();
         let command = program.find_subcommand(command).unwrap();
-        let options = command.get_opts().filter(|arg| !arg.is_hide_set());
+        let options = command.get_arguments().filter(|arg| !arg.is_hide_set());
         options.filter_map(|arg| arg.get_long().map(String::from)).collect()
     }
 

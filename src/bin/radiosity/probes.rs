@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use radiosity::glam::DVec3;
 use radiosity::probe::{Probe, ProbeGrid, probes_at};
 use radiosity::scene::Aabb;
@@ -15,22 +15,23 @@ use crate::{interrupt, progress};
 
 /// Gathers irradiance at a grid of probes in the air, as spherical harmonics for games
 #[derive(Args)]
+#[command(group(ArgGroup::new("cells").required(true).multiple(true)))]
 #[command(after_help = "\
-Bakes the scene and gathers what arrives at probes in the cells of a box: irradiance over the \
-normal as spherical harmonics to order 2, nine coefficients a channel. Writes STEM.probes.json and \
+Bakes the scene and gathers the light at probes in the cells of a box: irradiance over the normal \
+as spherical harmonics to order 2, nine coefficients a channel. Writes STEM.probes.json and \
 STEM.probes.csv, a line a probe: along x, then rows along y, then layers along z. `inside` are \
-probes in solids or behind walls, which see more backs than fronts and sky. Formulas and formats: \
-docs/grids_and_probes.md.")]
+probes in solids or behind walls: more backs than fronts and sky are visible there. Formulas and \
+formats: docs/grids_and_probes.md.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    /// Edge of a cell, about, scene unit
+    /// Edge of a cell, scene unit, rounded so that cells fit
     #[arg(long, value_name = "X", value_parser = value::<f64>("a length"))]
-    #[arg(required_unless_present = "counts", overrides_with = "counts")]
+    #[arg(group = "cells", overrides_with = "counts")]
     spacing: Option<f64>,
     /// Cells along x, y and z
-    #[arg(long, value_name = "NX,NY,NZ", overrides_with = "spacing")]
+    #[arg(long, value_name = "NX,NY,NZ", group = "cells", overrides_with = "spacing")]
     #[arg(value_parser = numbers::<usize, 3>("three whole numbers"))]
     counts: Option<[usize; 3]>,
     /// Lowest and highest corner of the box [default: those of the scene]

@@ -41,21 +41,21 @@ errors that are asked for. Writes STEM.csv (a row a run), STEM.svg and STEM.png 
 and prints the time of a bake to an error beside that of the fastest settings that are as exact. \
 Seconds are those of the stages of a bake and of the estimate of its error, without reading the \
 file and opening the device; short runs are timed three times, and the least time counts. Errors \
-are root mean squares over the area, as shares of radiosity. After Ctrl-C the table of the finished \
-runs is written.")]
+are root mean squares over the area, as shares of radiosity. After Ctrl-C the table of the \
+finished runs is written.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    /// Points with their radiosity, a JSON file; errors are those at its points of kind \"area\"
+    /// Points with their radiosity, a JSON file; errors are those at its points of kind "area"
     /// [default: a run three times finer than the finest, at 4096 points, without narrow gaps]
     #[arg(long, value_name = "FILE.json")]
     truth: Option<PathBuf>,
     /// Fewer and coarser runs, around the settings for 5 %
     #[arg(long)]
     quick: bool,
-    /// Path of the files without their endings, or a folder for them [default: the scene without its
-    /// ending, and _trade_off]
+    /// Path of the files without their endings, or a folder for them [default: the scene without
+    /// its ending, and _trade_off]
     #[arg(short, long, value_name = "STEM")]
     out: Option<PathBuf>,
     #[command(flatten)]

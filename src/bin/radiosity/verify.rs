@@ -29,9 +29,9 @@ const MAX_PRINTED: usize = 20;
 #[command(after_help = "\
 Path traces the scene at random points of its surfaces and prints for each group, and for all, the \
 root mean square over the area of |B - true B| / max(|true B|, 5 % of its mean): B is reflected \
-radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the report \
-of the bake, where there is one; the last line compares them. The options of the scene and its \
-light have to be those of the bake. After Ctrl-C the points so far count.")]
+radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the \
+report of the bake, where there is one; the last line compares them. The options of the scene and \
+its light have to be those of the bake. After Ctrl-C the points so far count.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
@@ -45,12 +45,12 @@ pub struct Options {
     /// Begin no round that would end after this time; inf for no limit
     #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = time)]
     time: Limit,
-    /// Points of each group, at least
+    /// Minimum number of points in each group
     #[arg(long, value_name = "N", default_value = "16")]
     #[arg(value_parser = value::<usize>("a whole number"))]
     points_per_group: usize,
-    /// Count hidden points too, which see backs of surfaces or surfaces close by alone, as the ground
-    /// under a box; they are left out otherwise, and their share is printed
+    /// Count hidden points too, which see backs of surfaces or surfaces close by alone, as the
+    /// ground under a box; they are left out otherwise, and their share is printed
     #[arg(long)]
     hidden: bool,
     /// Seed of the points and paths

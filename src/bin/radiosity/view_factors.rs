@@ -34,8 +34,8 @@ const ROUNDING_OF_SUMS: f64 = 1e-12;
 #[command(after_help = "\
 Writes the view factors of each file and prints them, with standard errors and with closure, \
 reciprocity and bounds of the raw numbers. F[i, j] is the share of the flux leaving group i (row) \
-that arrives at group j (column); `open` is what leaves the scene, `back` what arrives at the backs \
-of surfaces.")]
+that arrives at group j (column); `open` is the share that leaves the scene, `back` the share that \
+arrives at the backs of surfaces.")]
 pub struct Options {
     /// Scenes, OBJ files
     #[arg(value_name = "SCENE.obj", required = true)]

@@ -258,8 +258,8 @@ impl Files {
 
 /// Eye, target, degrees and, if there are three more numbers, the direction up.
 pub fn camera(text: &str) -> Parsed<Camera> {
-    const EXPECTED: &str = "7 numbers with commas between them, eye, target and degrees, or 10: the \
-                            direction up behind them";
+    const EXPECTED: &str = "7 numbers with commas between them, eye, target and degrees, or 10: \
+                            the direction up behind them";
     let mut numbers = args::list(EXPECTED)(text)?;
     if numbers.len() == 7 {
         numbers.extend([0.0, 1.0, 0.0]);

@@ -52,7 +52,7 @@ field! {
     u64, "a whole number of at least zero", value => value;
     usize, "a whole number of at least zero", value => value;
     NonZeroU32, "a whole number above zero", value => value.get();
-    Method, "shooting, overshoot, jacobi, gauss-seidel, gmres or direct", value => value.to_string();
+    Method, "shooting, overshoot, jacobi, gauss-seidel, gmres or direct", it => it.to_string();
 }
 
 impl<T: Field> Field for Option<T> {
@@ -114,8 +114,8 @@ const SETTINGS: &[Setting] = &[
     setting!(solve.near_reach,
         "closed forms for receivers within this many patch diameters; below 0 for none [1]"),
     setting!(solve.viewpoint_tolerance,
-        "share of a patch's light that may land on other elements when it is sent from the parts of \
-         the patch, above which rows are made at the parts [none: one viewpoint a patch]"),
+        "share of a patch's light that may land on other elements when it is sent from the parts \
+         of the patch, above which rows are made at the parts [none: one viewpoint a patch]"),
     Setting {
         name: "solve.solver.method",
         meaning: "how light is spread: shooting, overshoot, jacobi, gauss-seidel, gmres or direct \
@@ -155,17 +155,18 @@ const SETTINGS: &[Setting] = &[
         "predicted error of the mesh, as a share of radiosity, at which splitting stops [by the \
          error]"),
     setting!(gather.refinement.min_edge,
-        "length over which light may change; elements are split down to an eighth of it; scene unit \
-         [by the error]"),
+        "length over which light may change; elements are split down to an eighth of it; scene \
+         unit [by the error]"),
     setting!(gather.refinement.interpolation_tolerance,
-        "share of radiosity by which the quadratic interpolant may differ from an element before it \
-         is split once more, without a gather; inf for never [by the error]"),
+        "share of radiosity by which the quadratic interpolant may differ from an element before \
+         it is split once more, without a gather; inf for never [by the error]"),
     setting!(gather.refinement.max_elements,
-        "elements at most [524288; of large scenes 20 a triangle, up to 4 million]"),
+        "maximum number of elements [524288; of large scenes 20 a triangle, up to 4 million]"),
     setting!(gather.refinement.initial_subdivisions,
         "subdivisions of all elements before refinement; --gather sets it [0]"),
     setting!(gather.refinement.gap_factor,
-        "smallest element in a gap over the mean distance to what it sees; inf for as elsewhere [1]"),
+        "smallest element in a gap over the mean distance of what is visible; inf for as elsewhere \
+         [1]"),
     setting!(gather.refinement.gather_passes,
         "passes in which all vertices gather, each the light of the pass before [by the error]"),
 ];
@@ -205,23 +206,40 @@ pub fn adjustment(text: &str) -> Parsed<Adjustment> {
     (named(name)?.read)(value.trim())
 }
 
+/// Columns of a line.
+const WIDTH: usize = 100;
+
 /// Prints all settings, and the options that the help does not list.
 pub fn print() {
     say!(
-        "Settings of a bake: radiosity bake SCENE.obj --set NAME=VALUE. The end of a name is enough \
-         where no\nother setting has it: --set rays=512. In brackets the value unless set; without \
-         an error it is that\nof --gather none.\n"
+        "Settings of a bake, --set NAME=VALUE. The end of a name is enough where no other setting \
+         has it:\n--set rays=512. In brackets the value unless set; without an error it is that of \
+         --gather none.\n"
     );
-    for Setting { name, meaning, .. } in SETTINGS {
-        say!("  {name}\n      {meaning}");
-    }
+    SETTINGS.iter().for_each(|setting| print_entry(setting.name, setting.meaning));
     say!("\nOptions that the help does not list, of the scene and the device for all commands:\n");
     let mut program = crate::Program::command();
     program.build();
     let bake = program.find_subcommand("bake").expect("it is a command");
-    for option in bake.get_opts().filter(|option| option.is_hide_set()) {
-        say!("  {option}\n      {}", option.get_help().cloned().unwrap_or_default());
+    for option in bake.get_arguments().filter(|option| option.is_hide_set()) {
+        let help = option.get_help().cloned().unwrap_or_default();
+        print_entry(&option.to_string(), &help.to_string());
     }
+}
+
+/// Prints a name and, below it, a text in lines of no more than [`WIDTH`] columns.
+fn print_entry(name: &str, text: &str) {
+    say!("  {name}");
+    let mut line = " ".repeat(5);
+    for word in text.split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+            say!("{line}");
+            line.truncate(5);
+        }
+        line += " ";
+        line += word;
+    }
+    say!("{line}");
 }
 
 /// All settings, for the report. JSON has no infinity: what is infinite is null.

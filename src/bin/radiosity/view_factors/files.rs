@@ -40,10 +40,10 @@ pub struct MatrixOptions {
     /// Change the matrix so that it keeps closure and reciprocity, and print the change
     #[arg(long)]
     pub enforce: bool,
-    /// Files: csv, the matrix; list, its nonzeros with standard errors and areas, as CSV; mtx, Matrix
-    /// Market; npy, a square array of f_from_row_to_column and standard_error; npz, sparse rows as
-    /// SciPy's load_npz reads them, with standard errors, areas, open and back. Square tables have
-    /// 8192 groups at most [default: csv,list; npz for more groups]
+    /// Files: csv, the matrix; list, its nonzeros with standard errors and areas, as CSV; mtx,
+    /// Matrix Market; npy, a square array of f_from_row_to_column and standard_error; npz, sparse
+    /// rows as SciPy's load_npz reads them, with standard errors, areas, open and back. Square
+    /// tables are limited to 8192 groups [default: csv,list; npz for more groups]
     #[arg(long = "format", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     pub formats: Option<List<Format>>,
 }
