@@ -72,7 +72,7 @@ pub struct Options {
     #[arg(conflicts_with = "points_ply")]
     points: Option<PathBuf>,
     /// Paths a point of --points
-    #[arg(long, value_name = "N", default_value = "65536", requires = "points")]
+    #[arg(long, value_name = "N", default_value = "65536", conflicts_with = "solution")]
     #[arg(value_parser = value::<NonZeroUsize>("a whole number above 0"))]
     paths: NonZeroUsize,
     #[command(flatten)]
