@@ -12,8 +12,17 @@ fn spectra() -> &'static str {
 /// Bakes the Cornell box coarsely to `stem`, with more arguments.
 fn bake(stem: &Path, more: &[&str]) -> String {
     let stem = stem.to_str().unwrap();
-    let coarse = ["--cpu", "--gather", "needed", "--gather-size", "300", "--max-elements", "1"];
-    let quick = ["--element-size", "300", "--rays", "128", "--image", "32,32", "--out", stem];
+    let coarse = [
+        "--cpu",
+        "--gather",
+        "needed",
+        "--set",
+        "gather.element_size=300",
+        "--set",
+        "max_elements=1",
+    ];
+    let quick =
+        ["--set", "solve.element_size=300", "--set", "rays=128", "--image", "32,32", "--out", stem];
     let out = run("bake", &[&[cornell()], &coarse[..], &quick, more].concat());
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     String::from_utf8(out.stdout).unwrap()

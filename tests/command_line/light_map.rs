@@ -57,7 +57,7 @@ fn light_map_refuses_what_it_cannot_do() {
             &["texture coordinates", "missing for 32 triangles"][..],
             1,
         ),
-        (&["--coordinates", "odd"], &["auto, file or new"], 2),
+        (&["--coordinates", "odd"], &["auto, file, new"], 2),
         (&["--size", "9000"], &["9000", "8192"], 1),
         (&["--texel", "-1"], &["above 0"], 1),
         (&["--texel", "1e-9"], &["8192"], 1),

@@ -221,7 +221,7 @@ fn rows_of_many_machines_merge_to_the_same_bytes() {
     assert!(String::from_utf8_lossy(&other.stderr).contains("of other settings"));
     for (more, words) in [
         (&["--rows", "5..5"][..], "A..B"),
-        (&["--rows", "0..2", "--enforce"], "radiosity merge"),
+        (&["--rows", "0..2", "--enforce"], "'--enforce'"),
         (&["--sampled", "--rows", "0..2"], "--rows"),
         (&["--checkpoint", "x", cornell], "one scene"),
         (&["--memory", "0"], "GiB"),

@@ -14,10 +14,17 @@ use std::time::{Duration, SystemTime};
 fn bake(method: &str, state: Option<&Path>, out: &Path) -> Child {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     let mut command = Command::new(env!("CARGO_BIN_EXE_radiosity"));
-    command.args(["bake", scene, "--cpu", "--solver", method, "--out"]).arg(out);
-    command.args(["--element-size", "80", "--hemicube", "32", "--unshot", "1e-5"]);
+    command.args(["bake", scene, "--cpu", "--set", &format!("method={method}"), "--out"]).arg(out);
+    command.args([
+        "--set",
+        "solve.element_size=80",
+        "--set",
+        "hemicube_resolution=32",
+        "--set",
+        "unshot=1e-5",
+    ]);
     // 1 MiB holds a part of the rows.
-    command.args(["--row-memory", "1"]);
+    command.args(["--set", "row_memory=1048576"]);
     if let Some(state) = state {
         command.arg("--state").arg(state);
     }

@@ -7,7 +7,7 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use lexopt::prelude::*;
+use clap::Args;
 use picture::{Picture, three_digits};
 use radiosity::camera::up_axis;
 use radiosity::glam::DVec3;
@@ -16,127 +16,90 @@ use radiosity::grid::{
 };
 use radiosity::{Error, ErrorKind, Scene};
 
-use crate::args::{self, Stop};
-use crate::light::{Light, LightOptions, light_usage};
+use crate::args::{self, Parsed, Stop, numbers, value};
+use crate::light::{Light, LightOptions};
 use crate::{interrupt, progress};
-
-pub const USAGE: &str = concat!(
-    "\
-usage: radiosity grid SCENE.obj [--group NAME | --plane ox,oy,oz,ux,uy,uz,vx,vy,vz]…
-                      [--height H] [--strip W] [--spacing P] [--metre X] [--photometric]
-                      [--error X] [--out STEM] [--adapter NAME | --cpu]
-
-Bakes the scene and measures what arrives at the points of grids: above each floor, unless groups
-or planes are named. Writes STEM.grid.csv (a line a point, with its standard error) and a picture in
-false colours with lines of equal value for each grid, STEM.grid.png or STEM.grid-1.png and so on,
-and prints mean, minimum, maximum and uniformity, minimum over mean. Points inside of solids are
-marked and do not count. Lengths are in metres.
-
-Where:
-  --group NAME      above this group instead: its highest side that faces up or, if none does,
-                    before the side that most of it shows; may be repeated
-  --plane …         a corner and two edges, in the scene's unit: light arrives from where the cross
-                    product of the edges points; may be repeated
-  --height H        of grids above floors and groups [0.8; above groups 0]
-  --strip W         what is left out along edges [above floors 0.5, along the walls; else 0]
-  --spacing P       between points, at most [0.2 * 5^log10(d), and 10, as in EN 12464-1: d is the
-                    longer side, or the shorter one where the other is at least twice as long]
-  --metre X         length of a metre in the scene's unit: 1000 where that is a millimetre [1]
-  --up x,y,z        which way is up [+y or +z, whichever seems to be]
-What:
-  --photometric     `Ke` and skies are luminances in cd/m²: measure illuminance in lx, of which
-                    0.2126 are of r, 0.7152 of g and 0.0722 of b; else irradiance in W/m², the mean
-                    of the channels
-  --out STEM        where the files go, and how they begin [the scene without its ending]; a folder
-                    takes files of the scene's name
-",
-    light_usage!()
-);
 
 /// Height above floors, m: that of desks.
 const DESK_HEIGHT: f64 = 0.8;
 
-/// What is asked of the command.
-struct Options {
+/// A length for people.
+const METRES: &str = "a length in metres";
+
+/// Measures irradiance or illuminance on measuring grids, by default above each floor
+#[derive(Args)]
+#[command(after_help = "\
+Bakes the scene and measures light at the points of grids. Writes STEM.grid.csv, a line a \
+point with its standard error, and a picture in false colours of each grid, STEM.grid.png or \
+STEM.grid-1.png and so on; prints mean, minimum, maximum and uniformity (minimum / mean). Points \
+inside solids are marked and do not count. Lengths are in metres.")]
+pub struct Options {
+    /// Scene, an OBJ file
+    #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    light: LightOptions,
+    /// Measure above this group: its highest side that faces up or, if none does, before the side
+    /// with the largest area; may be repeated
+    #[arg(long = "group", value_name = "NAME")]
     groups: Vec<String>,
+    /// Measure on this parallelogram: a corner and two edges, scene unit; light arrives from where
+    /// the cross product of the edges points; may be repeated
+    #[arg(long = "plane", value_name = "NUMBERS", value_parser = plane)]
     planes: Vec<GridPlane>,
+    /// Height of grids above floors and groups [default: 0.8; above groups 0]
+    #[arg(long, value_name = "H", value_parser = value::<f64>(METRES))]
     height: Option<f64>,
+    /// Width that is left out along edges [default: above floors 0.5, along walls; else 0]
+    #[arg(long, value_name = "W", value_parser = value::<f64>(METRES))]
     strip: Option<f64>,
+    /// Maximum distance of points [default: 0.2 * 5^log10(d), limited to 10, EN 12464-1, where d is
+    /// the longer side, or the shorter one where the longer is twice as long or more]
+    #[arg(long, value_name = "P", value_parser = value::<f64>(METRES))]
     spacing: Option<f64>,
+    /// Length of a metre in the scene's unit: 1000 for millimetres
+    #[arg(long, value_name = "X", default_value = "1", value_parser = value::<f64>("a length"))]
     metre: f64,
-    quantity: Quantity,
+    /// Measure illuminance, lx: `Ke` and skies are luminances, cd/m², of which 0.2126 are of r,
+    /// 0.7152 of g and 0.0722 of b. Without it: irradiance, W/m², the mean of the channels
+    #[arg(long)]
+    photometric: bool,
+    /// Path of the files without their endings, or a folder for files of the scene's name [default:
+    /// the scene without its ending]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    light: LightOptions,
+    #[arg(skip)]
     stem: PathBuf,
+}
+
+/// A corner and two edges.
+fn plane(text: &str) -> Parsed<GridPlane> {
+    let [a, b, c, d, e, f, g, h, i] = numbers("nine numbers: a corner and two edges")(text)?;
+    let edges = [DVec3::new(d, e, f), DVec3::new(g, h, i)];
+    Ok(GridPlane { origin: DVec3::new(a, b, c), edges })
 }
 
 /// A grid, and where it is, in words.
 type Placed = (String, MeasuringGrid);
 
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    args::check_writable(&options.file(".csv"))?;
-    let scene = options.light.scene(&options.scene)?;
-    // Before the bake, which may take minutes.
-    let grids = options.grids(&scene)?;
-    let light = options.light.bake(scene)?;
-    let measured = options.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
-    options.write(&grids, &measured)?;
-    progress::print_written();
-    args::end()
-}
-
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let mut scenes = vec![];
-        let mut out = None;
-        let mut options = Options {
-            scene: PathBuf::new(),
-            light: LightOptions::new(),
-            groups: vec![],
-            planes: vec![],
-            height: None,
-            strip: None,
-            spacing: None,
-            metre: 1.0,
-            quantity: Quantity::Irradiance,
-            stem: PathBuf::new(),
-        };
-        let length = |parser: &mut lexopt::Parser, name: &str| {
-            args::value::<f64>(parser, name, "a length in metres")
-        };
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("group") => {
-                    options.groups.push(args::value(parser, "group", "a group's name")?);
-                }
-                Long("plane") => {
-                    let expected = "nine numbers: a corner and two edges";
-                    let [a, b, c, d, e, f, g, h, i] = args::numbers(parser, "plane", expected)?;
-                    let edges = [DVec3::new(d, e, f), DVec3::new(g, h, i)];
-                    options.planes.push(GridPlane { origin: DVec3::new(a, b, c), edges });
-                }
-                Long("height") => options.height = Some(length(parser, "height")?),
-                Long("strip") => options.strip = Some(length(parser, "strip")?),
-                Long("spacing") => options.spacing = Some(length(parser, "spacing")?),
-                Long("metre") => options.metre = args::value(parser, "metre", "a length")?,
-                Long("photometric") => options.quantity = Quantity::Illuminance,
-                Long("out") => out = Some(PathBuf::from(parser.value()?)),
-                Value(path) => scenes.push(path.into()),
-                Long(name) => {
-                    let name = name.to_string();
-                    if !options.light.option(&name, parser)? {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        options.scene = args::only_scene(scenes)?;
-        options.stem = args::stem(out, options.scene.with_extension(""), &["csv", "png"]);
-        Ok(options)
+    /// Runs the command.
+    pub fn run(mut self) -> Result<(), Stop> {
+        let formats = [("csv", ()), ("png", ())];
+        self.stem = args::stem(self.out.take(), self.scene.with_extension(""), &formats);
+        args::check_writable(&self.file(".csv"))?;
+        let scene = self.light.scene(&self.scene)?;
+        // Before the bake, which may take minutes.
+        let grids = self.grids(&scene)?;
+        let light = self.light.bake(scene)?;
+        let measured = self.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
+        self.write(&grids, &measured)?;
+        progress::print_written();
+        args::end()
+    }
+
+    fn quantity(&self) -> Quantity {
+        if self.photometric { Quantity::Illuminance } else { Quantity::Irradiance }
     }
 
     /// The file that ends so.
@@ -199,7 +162,7 @@ impl Options {
     fn write(&self, grids: &[Placed], measured: &[MeasuredGrid]) -> Result<(), Error> {
         for (k, ((place, _), measured)) in grids.iter().zip(measured).enumerate() {
             let name = format!("{} {}", k + 1, measured.grid.name);
-            let Some(statistics) = measured.statistics(self.quantity) else {
+            let Some(statistics) = measured.statistics(self.quantity()) else {
                 say!("{name}: all points are inside of solids");
                 continue;
             };
@@ -208,7 +171,7 @@ impl Options {
             self.draw(measured, &statistics, place, &self.file(&format!("{number}.png")))?;
         }
         progress::of_writing(&self.file(".csv"), |path| {
-            let bytes = table::csv(measured, self.quantity)
+            let bytes = table::csv(measured, self.quantity())
                 .map_err(|e| cannot_make(path, e.to_string()))?;
             args::write_file(path, &bytes)
         })
@@ -221,7 +184,7 @@ impl Options {
         place: &str,
         file: &Path,
     ) -> Result<(), Error> {
-        let (quantity, metre) = (self.quantity, self.metre);
+        let (quantity, metre) = (self.quantity(), self.metre);
         let picture = Picture { measured, statistics, quantity, place, metre };
         progress::of_writing(file, |path| {
             args::write_file(path, &picture.png().map_err(|found| cannot_make(path, found))?)
@@ -233,7 +196,7 @@ impl Options {
             statistics;
         let [a, b] = measured.grid.cell().map(|edge| edge / self.metre);
         let inside = measured.values.iter().flatten().count() - points;
-        let unit = self.quantity.unit();
+        let unit = self.quantity().unit();
         let error = if *mean > 0.0 { 100.0 * mean_error / mean } else { 0.0 };
         let [mean, minimum, maximum] = [mean, minimum, maximum].map(|value| three_digits(*value));
         let left_out = if inside > 0 { format!(", {inside} inside of solids") } else { "".into() };

@@ -4,50 +4,52 @@ mod boundaries;
 
 use std::path::{Path, PathBuf};
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::heat::{HeatBalance, HeatSettings};
 use radiosity::io::read_npz;
 use radiosity::{Error, ErrorKind, Scene, ViewFactors};
 
-use crate::args::{self, Stop};
+use crate::args::{self, List, Stop, list, value};
 use crate::progress;
-use crate::scene_options::SceneOptions;
 use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 
-pub const USAGE: &str = "\
-usage: radiosity heat SCENE.obj --boundaries FILE.csv [--facets] [--error E] [--two-sided NAME]…
-                      [--bands L,…] [--surroundings T] [--enforce] [--out FILE.csv]
-       radiosity heat FACTORS.npz --boundaries FILE.csv …
+/// Solves the radiative heat balance of groups by their view factors
+#[derive(Args)]
+#[command(after_help = "\
+Writes temperature (K), radiosity, irradiance and net flux out (W/m²) of each group. View factors \
+are made as `radiosity view-factors` makes them, or read from a file that it has written. Openings \
+are black and have one temperature; groups are grey in each band, and diffuse. Powers are in W \
+where lengths are in m.
 
-Writes the radiative heat balance of the groups of a scene: temperatures (K), radiosity, irradiance
-and net flux out (W/m²) of each, beside the scene as SCENE.heat.csv. View factors are made as
-`radiosity view-factors` makes them, or read from a file that it has written. What is seen through
-openings is black and has one temperature; groups are grey in each band, and diffuse. Powers are in
-W where lengths are in m.
-
-  --boundaries FILE   what is known of the groups, as CSV with the columns
-                        group        its name; with --facets that of a face (GROUP/1) or of all
-                                     faces of a group; * for all that no line names
-                        temperature  K, or empty where the flux is given
-                        flux         net flux out, W/m²: what heats the group otherwise; 0 if it is
-                                     adiabatic; empty where the temperature is given
-                        emissivity   0 to 1; with --bands as many columns, emissivity_1, …
-  --bands L,…         wavelengths in µm that part the bands
-  --surroundings T    temperature of the surroundings in K [0]
-  --facets, --error E, --two-sided NAME   as in `radiosity view-factors`
-  --enforce           make the view factors keep closure and reciprocity first: heat then balances
-  --out FILE.csv      the table, or a folder for it
-  --strict            refuse what would be repaired in the file";
-
-/// What is asked of the command.
-struct Options {
+Columns of --boundaries:
+  group        its name; with --facets that of a face (GROUP/1) or of all faces of a group; * for
+               all groups that no line names
+  temperature  K; empty where the flux is given
+  flux         net flux out, W/m²; 0 for adiabatic; empty where the temperature is given
+  emissivity   0 to 1; with --bands a column a band: emissivity_1, …")]
+pub struct Options {
+    /// Scene, an OBJ file, or view factors, an npz file
+    #[arg(value_name = "SCENE.obj|FACTORS.npz")]
     input: PathBuf,
-    reading: SceneOptions,
-    factors: ToError,
+    /// Boundary conditions of the groups, a CSV file
+    #[arg(long, value_name = "FILE.csv")]
     boundaries: PathBuf,
-    settings: HeatSettings,
+    /// Wavelengths in µm that separate the bands, ascending [default: one band]
+    #[arg(long, value_name = "L,…")]
+    #[arg(value_parser = list::<f64>("wavelengths in µm, ascending, with commas between"))]
+    bands: Option<List<f64>>,
+    /// Temperature of the surroundings, K
+    #[arg(long, value_name = "T", default_value = "0")]
+    #[arg(value_parser = value::<f64>("a temperature"))]
+    surroundings: f64,
+    #[command(flatten)]
+    factors: ToError,
+    /// Change the view factors so that they keep closure and reciprocity: heat then balances
+    #[arg(long)]
     enforce: bool,
-    out: PathBuf,
+    /// The table, or a folder for it [default: SCENE.heat.csv]
+    #[arg(short, long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
 }
 
 /// Where view factors come from.
@@ -66,73 +68,33 @@ impl Source {
     }
 }
 
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    args::check_writable(&options.out)?;
-    let source = options.source()?;
-    let bands = options.settings.band_edges.len() + 1;
-    // Before the view factors, which may take minutes.
-    let surfaces = boundaries::read(&options.boundaries, source.groups(), bands)?;
-    let mut matrix = match source {
-        Source::Scene(scene) => options.factors.matrix(&scene)?,
-        Source::Matrix(matrix) => matrix,
-    };
-    print_checks(&matrix);
-    if options.enforce {
-        matrix = enforce(&matrix);
-    }
-    let balance = progress::of_stage("solving", || {
-        HeatBalance::of(&matrix, &surfaces, &options.settings, |_| crate::interrupt::flow())
-    })?;
-    let balance = balance.ok_or(Stop::Interrupted)?;
-    print_balance(&matrix, &balance);
-    progress::of_writing(&options.out, |path| write(path, &matrix, &balance))?;
-    Ok(())
-}
-
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let (mut scenes, mut boundaries, mut out) = (vec![], None, None);
-        let (mut settings, mut enforce) = (HeatSettings::default(), false);
-        let mut factors = ToError::default();
-        let mut reading = SceneOptions::ignoring_specular();
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("boundaries") => boundaries = Some(parser.value()?.into()),
-                Long("bands") => {
-                    let text: String = args::value(parser, "bands", "wavelengths")?;
-                    let edges: Result<Vec<f64>, _> =
-                        text.split(',').map(|edge| edge.trim().parse()).collect();
-                    let expected = "wavelengths in µm, ascending, with commas between";
-                    settings.band_edges =
-                        edges.map_err(|_| args::wrong_value("bands", &text, expected))?;
-                }
-                Long("surroundings") => {
-                    settings.surroundings = args::value(parser, "surroundings", "a temperature")?;
-                }
-                Long("enforce") => enforce = true,
-                Long("out") => out = Some(parser.value()?.into()),
-                Long("facets") => {
-                    factors.facets = true;
-                    reading.by_facets();
-                }
-                Long("error") => factors.error = args::value(parser, "error", "a number")?,
-                Long("two-sided") => {
-                    factors.two_sided.push(args::value(parser, "two-sided", "a group's name")?);
-                }
-                Long("strict") => _ = reading.option("strict", parser)?,
-                Value(path) => scenes.push(path.into()),
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        let input = args::only_scene(scenes)?;
-        let Some(boundaries) = boundaries else {
-            return Err(Stop::usage("no --boundaries: what is known of the groups"));
+    /// Runs the command.
+    pub fn run(self) -> Result<(), Stop> {
+        let default = self.input.with_extension("heat.csv");
+        let out = args::stem::<()>(self.out.clone(), default, &[]);
+        args::check_writable(&out)?;
+        let source = self.source()?;
+        let band_edges = self.bands.clone().unwrap_or_default();
+        let settings = HeatSettings { band_edges, surroundings: self.surroundings };
+        let bands = settings.band_edges.len() + 1;
+        // Before the view factors, which may take minutes.
+        let surfaces = boundaries::read(&self.boundaries, source.groups(), bands)?;
+        let mut matrix = match source {
+            Source::Scene(scene) => self.factors.matrix(&scene)?,
+            Source::Matrix(matrix) => matrix,
         };
-        let out = args::stem(out, input.with_extension("heat.csv"), &[]);
-        Ok(Options { input, reading, factors, boundaries, settings, enforce, out })
+        print_checks(&matrix);
+        if self.enforce {
+            matrix = enforce(&matrix);
+        }
+        let balance = progress::of_stage("solving", || {
+            HeatBalance::of(&matrix, &surfaces, &settings, |_| crate::interrupt::flow())
+        })?;
+        let balance = balance.ok_or(Stop::Interrupted)?;
+        print_balance(&matrix, &balance);
+        progress::of_writing(&out, |path| write(path, &matrix, &balance))?;
+        Ok(())
     }
 
     fn source(&self) -> Result<Source, Error> {
@@ -140,7 +102,7 @@ impl Options {
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz")) {
             return progress::of_reading(path, || read_npz(path)).map(Source::Matrix);
         }
-        progress::of_reading(path, || self.reading.load(path).map(Box::new)).map(Source::Scene)
+        Ok(Source::Scene(Box::new(self.factors.scene(path)?)))
     }
 }
 

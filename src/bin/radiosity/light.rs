@@ -3,25 +3,12 @@
 use std::cell::Cell;
 use std::path::Path;
 
+use clap::Args;
 use radiosity::{Backend, BakeResult, BakeTarget, Error, Scene, Solver};
 
-use crate::args::{self, Device, Stop};
-use crate::scene_options::SceneOptions;
+use crate::args::{DeviceOptions, SHARE, value};
+use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
-
-/// Help on what is taken.
-macro_rules! light_usage {
-    () => {
-        "\
-\x20 --error X         how far off what is measured may be, root mean square, as a share: 0.05 for
-                    5 % [0.05]
-  --adapter NAME    a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
-  --cpu             rays on the CPU instead of hemicubes
-  --sky, --sun, --emit, --transmit, --sides, --specular, --max-reflectance, --strict, …
-                    what the scene is and what lights it: as in `radiosity bake --help`"
-    };
-}
-pub(crate) use light_usage;
 
 /// Error of the light over that of what is measured in it: what vertices are off by is averaged
 /// over all that a point sees. That of a gather pass over the next one's, as in a bake.
@@ -33,11 +20,16 @@ const MAX_LIGHT_ERROR: f64 = 0.3;
 /// Noise of what is measured over its error. Chosen by hand.
 const NOISE_SHARE: f64 = 0.5;
 
-/// What is said of the light.
+/// The light, and how exact what is measured in it is to be.
+#[derive(Args)]
 pub struct LightOptions {
-    pub reading: SceneOptions,
+    /// Error of the measurement, root mean square, as a share
+    #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = value::<f64>(SHARE))]
     error: f64,
-    device: Device,
+    #[command(flatten)]
+    pub reading: SceneOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Light, and the device that it came from.
@@ -47,21 +39,6 @@ pub struct Light {
 }
 
 impl LightOptions {
-    pub fn new() -> LightOptions {
-        LightOptions { reading: SceneOptions::default(), error: 0.05, device: Device::Gpu(None) }
-    }
-
-    /// Takes option `name` with its value, if it is one of these.
-    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
-        match name {
-            "error" => self.error = args::value(parser, "error", "a share, such as 0.1 for 10 %")?,
-            "adapter" => self.device = Device::named(parser)?,
-            "cpu" => self.device = Device::Cpu,
-            _ => return self.reading.option(name, parser),
-        }
-        Ok(true)
-    }
-
     /// How far off what is measured may be, as a share.
     pub fn error(&self) -> f64 {
         self.error
@@ -72,18 +49,14 @@ impl LightOptions {
         (NOISE_SHARE * self.error).min(1.0)
     }
 
-    /// The scene of an OBJ file, its sides resolved, and the user told what is odd about it.
+    /// The scene of an OBJ file. Prints warnings.
     pub fn scene(&self, path: &Path) -> Result<Scene, Error> {
-        let scene = progress::of_reading(path, || {
-            Ok::<_, Error>(self.reading.load(path)?.resolve_sides())
-        })?;
-        self.reading.print_warnings(&scene);
-        Ok(scene)
+        self.reading.read(path).map(|Input { scene, .. }| scene)
     }
 
     /// Bakes `scene` as far as it takes. Ctrl-C stops it with what there is.
     pub fn bake(&self, scene: Scene) -> Result<Light, Error> {
-        let device = progress::of_stage("opening the device", || self.device.open())?;
+        let device = self.device.open()?;
         interrupt::catch();
         let error = (LIGHT_COARSENING * self.error).min(MAX_LIGHT_ERROR.max(self.error));
         let unshot = Cell::new(Solver::default().unshot);

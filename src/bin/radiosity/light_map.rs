@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::io::{
     ToneCurve, write_light_map_exr, write_light_map_glb, write_light_map_radiosity,
     write_ply_with_tone, write_png_with_tone,
@@ -14,43 +14,10 @@ use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::verify::Estimate;
 use radiosity::{Backend, BakeResult, BakeTarget, Camera, Error, ErrorKind, Scene};
 
-use crate::args::{self, Device, Stop};
+use crate::args::{self, DeviceOptions, List, Names, SHARE, Stop, one_of, some_of, value};
 use crate::bake::files::{SAMPLES, camera};
-use crate::scene_options::SceneOptions;
+use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
-
-pub const USAGE: &str = "\
-usage: radiosity light-map SCENE.obj [--error X | --error-each X] [--size PIXELS | --texel SIZE]
-            [--coordinates auto|file|new] [--radiosity] [--out STEM] [--write FORMATS]
-            [--camera ex,ey,ez,tx,ty,tz,vfov_deg] [--adapter NAME | --cpu]
-
-Bakes a scene and gathers its light at the texels of a light map. Writes STEM.exr (irradiance in
-W/m², linear, and the texels that gathered) and STEM.glb (the scene with its
-places in the map as TEXCOORD_1, and the map's radiosity in the colours of an image). STEM is the
-scene without its ending and with .light-map, unless given.
-
-  --error X         how far the bake, and what the map shows, may be off: see `radiosity bake
-                    --help` [0.05]. The last line says whether the map was measured to be so
-  --error-each X    the same for each group of the scene, however small
-  --size PIXELS     texels along a side of the map. Without, 64 to 2048, a power of two: as many
-                    as it takes for what is shown, between texels too, to be as exact as asked
-  --texel SIZE      edge of a texel on the surfaces, scene unit
-  --coordinates auto  the texture coordinates of the file, where they are within [0, 1] and no two
-                    triangles share a texel; else new ones. That is the default
-  --coordinates file  those of the file, or an error that says why a light map cannot have them
-  --coordinates new   new ones: charts for all smooth surfaces
-  --radiosity       write STEM.radiosity.exr too: what surfaces emit and reflect, without textures
-  --out STEM        where the files go, and how they begin; a folder takes files of the scene's name
-  --write FORMATS   some of exr, glb, ply, png, with commas between them [exr,glb]. STEM.ply has
-                    the scene cut to texels, each with the light that the map shows, as `radiosity
-                    verify` takes it; STEM.png is a picture of that
-  --camera ...      of the picture: eye, target, vertical field of view in degrees; three more
-                    numbers are the direction up [0,1,0]
-  --adapter NAME, --cpu, --strict, --max-reflectance, --emit, --transmit, --sky, --zenith, --sun,
-  --sun-at, --up, --north, --sides, --specular   as in `radiosity bake`
-
-Surfaces that reflect on both sides have texels for each; --sides front makes them one-sided.
-Ctrl-C ends it, and nothing is written but a map of fewer texels, if one was done.";
 
 /// Texels along a side where the error asked for says how many: the fewest and the most.
 const PIXELS: RangeInclusive<u32> = 64..=2048;
@@ -67,61 +34,65 @@ enum Format {
     Png,
 }
 
-const FORMATS: [(&str, Format); 4] =
-    [("exr", Format::Exr), ("glb", Format::Glb), ("ply", Format::Ply), ("png", Format::Png)];
+const FORMATS: Names<Format> =
+    &[("exr", Format::Exr), ("glb", Format::Glb), ("ply", Format::Ply), ("png", Format::Png)];
 
-/// What is asked of the command.
-struct Options {
+const COORDINATES: Names<Coordinates> =
+    &[("auto", Coordinates::Auto), ("file", Coordinates::Given), ("new", Coordinates::Unwrapped)];
+
+/// Bakes the irradiance of the surfaces of a scene in a texture
+#[derive(Args)]
+#[command(after_help = "\
+Writes STEM.exr, irradiance in W/m² and which texels gathered, and STEM.glb, the scene with its \
+coordinates in the map as TEXCOORD_1 and the map's radiosity as an image. Surfaces that reflect on \
+both sides have texels for each; --sides front makes them one-sided. Ctrl-C stops the command, \
+which then writes a map of fewer texels where one is done.")]
+pub struct Options {
+    /// Scene, an OBJ file
+    #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    reading: SceneOptions,
-    target: BakeTarget,
-    /// None for as many texels as it takes.
-    resolution: Option<Resolution>,
+    /// Error of the bake, and of the map between texels, as a share [default: 0.05]
+    #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
+    #[arg(overrides_with = "error_each")]
+    error: Option<f64>,
+    /// The same for each group of the scene
+    #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
+    #[arg(overrides_with = "error")]
+    error_each: Option<f64>,
+    /// Texels along a side of the map [default: a power of two, 64 to 2048, that suits the error]
+    #[arg(long, value_name = "PIXELS", overrides_with = "texel")]
+    #[arg(value_parser = value::<u32>("a whole number of pixels"))]
+    size: Option<u32>,
+    /// Edge of a texel on the surfaces, scene unit
+    #[arg(long, value_name = "SIZE", overrides_with = "size")]
+    #[arg(value_parser = value::<f64>("a length"))]
+    texel: Option<f64>,
+    /// Texture coordinates: file, those of the file, in [0, 1] and with no texel in two triangles;
+    /// new, charts for all smooth surfaces; auto, those of the file where they can be used
+    #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = one_of(COORDINATES))]
     coordinates: Coordinates,
+    /// Write STEM.radiosity.exr: what surfaces emit and reflect, without textures
+    #[arg(long)]
     radiosity: bool,
-    stem: PathBuf,
-    formats: Vec<Format>,
+    /// Path of the files without their endings, or a folder for files of the scene's name [default:
+    /// the scene with .light-map as its ending]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+    /// Files: exr; glb; ply, the scene cut to texels with the light of the map, for `radiosity
+    /// verify`; png, a picture of that
+    #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
+    #[arg(default_value = "exr,glb")]
+    formats: List<Format>,
+    /// Camera of the picture: eye, target, vertical field of view in degrees; and the direction up
+    /// [0,1,0]
+    #[arg(long, value_name = "NUMBERS", value_parser = camera)]
     camera: Option<Camera>,
-    device: Device,
-}
-
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    args::check_writable(&options.stem)?;
-    let start = Instant::now();
-    let scene = progress::of_reading(&options.scene, || {
-        Ok::<_, Error>(options.reading.load(&options.scene)?.resolve_sides())
-    })?;
-    options.reading.print_warnings(&scene);
-    let load = start.elapsed().as_secs_f64();
-    let atlas = options.first_atlas(scene)?;
-    let layout = start.elapsed().as_secs_f64();
-    let device = progress::of_stage("opening the device", || options.device.open())?;
-    let open = start.elapsed().as_secs_f64();
-    interrupt::catch();
-    let goal = || 1e-4;
-    let baked = progress::of_bake(goal, |report| {
-        options.target.bake(atlas.scene().clone(), &device, report)
-    })?;
-    let bake = start.elapsed().as_secs_f64();
-    let (map, shown) = options.map(atlas, &baked, &device)?;
-    let texels = start.elapsed().as_secs_f64();
-    options.write(&map, &baked)?;
-    print_map(&map, &baked);
-    let total = start.elapsed().as_secs_f64();
-    say!(
-        "seconds    load {load:.2}, layout {:.2}, open {:.2}, bake {:.2}, texels {:.2}, write \
-         {:.2}, total {total:.2}",
-        layout - load,
-        open - layout,
-        bake - open,
-        texels - bake,
-        total - texels
-    );
-    progress::print_written();
-    options.print_shown(shown, &baked);
-    Ok(())
+    #[command(flatten)]
+    reading: SceneOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    #[arg(skip)]
+    stem: PathBuf,
 }
 
 /// An error, in words.
@@ -166,64 +137,64 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
 }
 
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        const SHARE: &str = "a share, such as 0.1 for 10 %";
-        let (mut scenes, mut stem) = (vec![], None);
-        let mut options = Options {
-            scene: PathBuf::new(),
-            reading: SceneOptions::default(),
-            target: BakeTarget::Error(0.05),
-            resolution: None,
-            coordinates: Coordinates::Auto,
-            radiosity: false,
-            stem: PathBuf::new(),
-            formats: vec![Format::Exr, Format::Glb],
-            camera: None,
-            device: Device::Gpu(None),
-        };
-        options.reading.with_texture_coordinates();
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("error") => {
-                    options.target = BakeTarget::Error(args::value(parser, "error", SHARE)?);
-                }
-                Long("error-each") => {
-                    let error = args::value(parser, "error-each", SHARE)?;
-                    options.target = BakeTarget::ErrorEach(error);
-                }
-                Long("size") => {
-                    let pixels = args::value(parser, "size", "a whole number of pixels")?;
-                    options.resolution = Some(Resolution::Pixels(pixels));
-                }
-                Long("texel") => {
-                    let size = args::value(parser, "texel", "a length")?;
-                    options.resolution = Some(Resolution::TexelSize(size));
-                }
-                Long("coordinates") => options.coordinates = coordinates(parser)?,
-                Long("radiosity") => options.radiosity = true,
-                Long("out") => stem = Some(parser.value()?.into()),
-                Long("write") => options.formats = args::formats(parser, &FORMATS)?,
-                Long("camera") => options.camera = Some(camera(parser)?),
-                Long("adapter") => options.device = Device::named(parser)?,
-                Long("cpu") => options.device = Device::Cpu,
-                Long(name) => {
-                    let name = name.to_string();
-                    if !options.reading.option(&name, parser)? {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                Value(path) => scenes.push(path.into()),
-                Short(_) => return Err(arg.unexpected().into()),
-            }
-        }
-        options.scene = args::only_scene(scenes)?;
-        options.stem =
-            args::stem(stem, options.scene.with_extension("light-map"), &args::names(&FORMATS));
-        if let Some(camera) = &options.camera {
+    /// Runs the command.
+    pub fn run(mut self) -> Result<(), Stop> {
+        let default = self.scene.with_extension("light-map");
+        self.stem = args::stem(self.out.take(), default, FORMATS);
+        if let Some(camera) = &self.camera {
             camera.check(PICTURE.0, PICTURE.1, SAMPLES)?;
         }
-        Ok(options)
+        args::check_writable(&self.stem)?;
+        let start = Instant::now();
+        self.reading.texture_coordinates = true;
+        let Input { scene, .. } = self.reading.read(&self.scene)?;
+        let load = start.elapsed().as_secs_f64();
+        let atlas = self.first_atlas(scene)?;
+        let layout = start.elapsed().as_secs_f64();
+        let device = self.device.open()?;
+        let open = start.elapsed().as_secs_f64();
+        interrupt::catch();
+        let goal = || 1e-4;
+        let baked = progress::of_bake(goal, |report| {
+            self.target().bake(atlas.scene().clone(), &device, report)
+        })?;
+        let bake = start.elapsed().as_secs_f64();
+        let (map, shown) = self.map(atlas, &baked, &device)?;
+        let texels = start.elapsed().as_secs_f64();
+        self.write(&map, &baked)?;
+        print_map(&map, &baked);
+        let total = start.elapsed().as_secs_f64();
+        say!(
+            "seconds    load {load:.2}, layout {:.2}, open {:.2}, bake {:.2}, texels {:.2}, write \
+             {:.2}, total {total:.2}",
+            layout - load,
+            open - layout,
+            bake - open,
+            texels - bake,
+            total - texels
+        );
+        progress::print_written();
+        self.print_shown(shown, &baked);
+        Ok(())
+    }
+
+    /// How far to bake.
+    fn target(&self) -> BakeTarget {
+        match self.error_each {
+            Some(error) => BakeTarget::ErrorEach(error),
+            None => BakeTarget::Error(self.error()),
+        }
+    }
+
+    /// The error asked for.
+    fn error(&self) -> f64 {
+        self.error.or(self.error_each).unwrap_or(0.05)
+    }
+
+    /// The number of texels; none for as many as the error takes.
+    fn resolution(&self) -> Option<Resolution> {
+        let size = self.size.map(Resolution::Pixels);
+        size.or(self.texel.map(Resolution::TexelSize))
     }
 
     /// Lays out the surfaces of `scene`: in the fewest texels that they have room in, unless their
@@ -231,7 +202,7 @@ impl Options {
     fn first_atlas(&self, scene: Scene) -> Result<Atlas, Error> {
         let scene = Arc::new(scene);
         let atlas = progress::of_stage("laying out surfaces", || {
-            if let Some(resolution) = self.resolution {
+            if let Some(resolution) = self.resolution() {
                 return self.atlas(scene, resolution);
             }
             let mut pixels = *PIXELS.start();
@@ -271,7 +242,7 @@ impl Options {
                 (Err(Stop::Interrupted), Some((map, shown))) => return Ok((map, Some(shown))),
                 (measured, _) => measured?,
             };
-            let Some(shown) = shown.filter(|_| self.resolution.is_none()) else {
+            let Some(shown) = shown.filter(|_| self.resolution().is_none()) else {
                 return Ok((map, shown));
             };
             // What the light itself is off by is for no texel to mend.
@@ -306,14 +277,6 @@ impl Options {
         })?;
         args::end()?;
         Ok(shown)
-    }
-
-    /// The error asked for.
-    fn error(&self) -> f64 {
-        match self.target {
-            BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => error,
-            _ => f64::INFINITY,
-        }
     }
 
     /// Says whether the map shows what was asked for.
@@ -370,16 +333,5 @@ impl Options {
             })?;
         }
         Ok(())
-    }
-}
-
-/// Which texture coordinates the map has, by name.
-fn coordinates(parser: &mut lexopt::Parser) -> Result<Coordinates, Stop> {
-    let text = parser.value()?.string()?;
-    match text.as_str() {
-        "auto" => Ok(Coordinates::Auto),
-        "file" => Ok(Coordinates::Given),
-        "new" => Ok(Coordinates::Unwrapped),
-        _ => Err(args::wrong_value("coordinates", &text, "auto, file or new")),
     }
 }

@@ -3,67 +3,75 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::camera::up_axis;
 use radiosity::glam::DVec3;
 use radiosity::io::{Photometry, read_photometry};
 use radiosity::{Error, ErrorKind, Luminaire, Rgb, Scene};
 use serde_json::{Value as Json, json};
 
-use crate::args::{self, Stop, wrong_value};
+use crate::args::{self, Parsed, give};
 
 /// What `--luminaire` takes.
-const LUMINAIRE: &str = "FILE@x,y,z, perhaps with :AIM and :C0 behind it, both x,y,z, and *SCALE";
+const LUMINAIRE: &str =
+    "FILE@x,y,z, with :AIM and :C0 behind it where needed, both x,y,z, and *SCALE";
 
 /// Bytes that a list may have.
 const MAX_LIST_BYTES: u64 = 64 << 20;
 
-/// What is said of luminaires.
-#[derive(Clone, Debug, Default)]
+/// Luminaires that the options name.
+#[derive(Args)]
 pub struct LuminaireOptions {
-    placed: Vec<Placed>,
-    /// Each file that was read.
-    files: Vec<(PathBuf, Arc<Photometry>)>,
-    metres_per_unit: Option<f64>,
+    /// Lamp with the intensities of FILE (.ies LM-63, .ldt EULUMDAT) at x,y,z; :x,y,z the direction
+    /// that it is aimed along [down], :x,y,z the direction of C = 0° [+x], *SCALE a factor or r,g,b
+    /// [1]; may be repeated
+    #[arg(long, value_name = "FILE@x,y,z…", value_parser = luminaire)]
+    luminaire: Vec<Given>,
+    /// Lamps as a JSON list of {"file": "a.ies", "at": [x, y, z]}, with "aim", "c0" and "scale"
+    /// where needed; files are in the folder of the list; may be repeated
+    #[arg(long, value_name = "LIST.json", hide = true)]
+    luminaires: Vec<PathBuf>,
+    /// Metres in the scene's unit, for luminaires: 0.001 for millimetres
+    #[arg(long, value_name = "METRES", default_value = "1", value_parser = metres)]
+    metres_per_unit: f64,
 }
 
-/// A luminaire that is to be.
+/// A luminaire as an option names it.
 #[derive(Clone, Debug)]
-struct Placed {
+struct Given {
     file: PathBuf,
-    photometry: Arc<Photometry>,
     position: DVec3,
     aim: Option<DVec3>,
     c0: Option<DVec3>,
     scale: Rgb,
 }
 
-impl LuminaireOptions {
-    /// Takes the value of option `name`, if it is one of these.
-    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
-        match name {
-            "luminaire" => {
-                let text = parser.value()?.string()?;
-                let (file, rest) = text.rsplit_once('@').ok_or_else(|| wrong(&text))?;
-                let placed = self.place(file.into(), rest)?;
-                self.placed.push(placed.ok_or_else(|| wrong(&text))?);
-            }
-            "luminaires" => {
-                let path = PathBuf::from(parser.value()?);
-                self.read_list(&path)?;
-            }
-            "metres-per-unit" => {
-                let metres: f64 = args::value(parser, name, "metres, such as 0.001")?;
-                if !(metres.is_finite() && metres > 0.0) {
-                    return Err(wrong_value(name, &metres.to_string(), "a number above 0"));
-                }
-                self.metres_per_unit = Some(metres);
-            }
-            _ => return Ok(false),
-        }
-        Ok(true)
-    }
+/// Luminaires, their files read.
+#[derive(Clone, Debug)]
+pub struct Luminaires {
+    placed: Vec<(Given, Arc<Photometry>)>,
+    /// Each file that was read.
+    files: Vec<(PathBuf, Arc<Photometry>)>,
+    metres_per_unit: f64,
+}
 
+impl LuminaireOptions {
+    /// Reads the files of luminaires.
+    ///
+    /// # Errors
+    /// Those of [`read_photometry`]; [`ErrorKind`] `File` and `Setting` for lists.
+    pub fn read(&self) -> Result<Luminaires, Error> {
+        let metres_per_unit = self.metres_per_unit;
+        let mut read = Luminaires { placed: vec![], files: vec![], metres_per_unit };
+        for given in &self.luminaire {
+            read.place(given.clone())?;
+        }
+        self.luminaires.iter().try_for_each(|list| read.place_list(list))?;
+        Ok(read)
+    }
+}
+
+impl Luminaires {
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
     }
@@ -77,11 +85,11 @@ impl LuminaireOptions {
             return Ok(scene);
         }
         let down = -up_axis(&scene);
-        let metres = self.metres_per_unit.unwrap_or(1.0);
-        let luminaire = |placed: &Placed| {
-            let aim = placed.aim.unwrap_or(down);
-            let plain = placed.photometry.luminaire(placed.position, aim).in_unit_of(metres);
-            let (c0, scale) = (placed.c0.unwrap_or(plain.c0), plain.scale * placed.scale);
+        let metres = self.metres_per_unit;
+        let luminaire = |(given, photometry): &(Given, Arc<Photometry>)| {
+            let aim = given.aim.unwrap_or(down);
+            let plain = photometry.luminaire(given.position, aim).in_unit_of(metres);
+            let (c0, scale) = (given.c0.unwrap_or(plain.c0), plain.scale * given.scale);
             Luminaire { c0, scale, ..plain }
         };
         scene.with_luminaires(self.placed.iter().map(luminaire).collect())
@@ -98,8 +106,8 @@ impl LuminaireOptions {
 
     /// Each luminaire for the report: what and where it is, and its flux in lumens.
     pub fn report(&self) -> Json {
-        let entry = |placed: &Placed| {
-            let Placed { file, photometry, position, aim, c0, scale } = placed;
+        let entry = |(given, photometry): &(Given, Arc<Photometry>)| {
+            let Given { file, position, aim, c0, scale } = given;
             let axis = |axis: &Option<DVec3>| json!(axis.map(|axis| axis.to_array()));
             json!({
                 "file": file.display().to_string(), "name": photometry.name,
@@ -115,7 +123,7 @@ impl LuminaireOptions {
     /// A line for each file: how many, and the lumens of one.
     pub fn table(&self) -> Vec<String> {
         let line = |(file, photometry): &(PathBuf, Arc<Photometry>)| {
-            let count = self.placed.iter().filter(|placed| placed.file == *file).count();
+            let count = self.placed.iter().filter(|(given, _)| given.file == *file).count();
             let (file, name, flux) =
                 (file.display(), &photometry.name, photometry.intensity.flux());
             format!("luminaire  {file} ({name}): {count} of {flux:.1} lm")
@@ -123,15 +131,11 @@ impl LuminaireOptions {
         self.files.iter().map(line).collect()
     }
 
-    /// The luminaire that what follows the file in `--luminaire` says; none if it makes no sense.
-    fn place(&mut self, file: PathBuf, rest: &str) -> Result<Option<Placed>, Error> {
-        let (axes, scale) = rest.rsplit_once('*').unwrap_or((rest, "1"));
-        let vectors: Option<Vec<DVec3>> = axes.split(':').map(vector).collect();
-        let (Some(vectors), Some(scale)) = (vectors, args::rgb(scale)) else { return Ok(None) };
-        let ([position] | [position, _] | [position, _, _]) = vectors[..] else { return Ok(None) };
-        let (aim, c0) = (vectors.get(1).copied(), vectors.get(2).copied());
-        let photometry = self.photometry(&file)?;
-        Ok(Some(Placed { file, photometry, position, aim, c0, scale }))
+    /// Adds a luminaire.
+    fn place(&mut self, given: Given) -> Result<(), Error> {
+        let photometry = self.photometry(&given.file)?;
+        self.placed.push((given, photometry));
+        Ok(())
     }
 
     /// What `file` holds, read once.
@@ -144,8 +148,8 @@ impl LuminaireOptions {
         Ok(photometry)
     }
 
-    /// Takes the luminaires of a JSON list, whose files lie in its folder.
-    fn read_list(&mut self, path: &Path) -> Result<(), Error> {
+    /// Adds the luminaires of a JSON list, whose files are in its folder.
+    fn place_list(&mut self, path: &Path) -> Result<(), Error> {
         let wrong = |kind, found: String| {
             let remedy = "give a list of {\"file\": \"a.ies\", \"at\": [x, y, z]}, perhaps with \
                           \"aim\", \"c0\" and \"scale\"";
@@ -162,13 +166,12 @@ impl LuminaireOptions {
         let folder = path.parent().unwrap_or(Path::new(""));
         for Entry { file, at, aim, c0, scale } in list {
             let file = folder.join(file);
-            let photometry = self.photometry(&file)?;
             let scale = match scale {
                 None => Rgb::ONE,
                 Some(Scale::Grey(grey)) => Rgb::splat(grey),
                 Some(Scale::Colour(colour)) => colour,
             };
-            self.placed.push(Placed { file, photometry, position: at, aim, c0, scale });
+            self.place(Given { file, position: at, aim, c0, scale })?;
         }
         Ok(())
     }
@@ -192,12 +195,21 @@ enum Scale {
     Colour(Rgb),
 }
 
-/// `x,y,z`.
-fn vector(text: &str) -> Option<DVec3> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    Some(DVec3::from_array(numbers.ok()?.try_into().ok()?))
+/// `FILE@x,y,z`, with an aim, a direction of C = 0° and a scale where they are given.
+fn luminaire(text: &str) -> Parsed<Given> {
+    let wrong = || give(LUMINAIRE);
+    let (file, rest) = text.rsplit_once('@').ok_or_else(wrong)?;
+    let (axes, scale) = rest.rsplit_once('*').unwrap_or((rest, "1"));
+    let vector = |text| args::numbers(LUMINAIRE)(text).map(DVec3::from_array);
+    let vectors = axes.split(':').map(vector).collect::<Parsed<Vec<DVec3>>>()?;
+    let ([position] | [position, _] | [position, _, _]) = vectors[..] else { return Err(wrong()) };
+    let (aim, c0) = (vectors.get(1).copied(), vectors.get(2).copied());
+    let scale = args::rgb(scale).map_err(|_| wrong())?;
+    Ok(Given { file: file.into(), position, aim, c0, scale })
 }
 
-fn wrong(text: &str) -> Stop {
-    wrong_value("luminaire", text, LUMINAIRE)
+fn metres(text: &str) -> Parsed<f64> {
+    let positive = |metres: &f64| metres.is_finite() && *metres > 0.0;
+    let metres = text.parse().ok().filter(positive);
+    metres.ok_or_else(|| give("metres, a number above 0, such as 0.001"))
 }

@@ -42,84 +42,88 @@ mod trade_off;
 mod verify;
 mod view_factors;
 
-use std::ffi::OsStr;
 use std::process::ExitCode;
 
-use args::Stop;
-use lexopt::prelude::*;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use view_factors::merge;
 
-const USAGE: &str = "\
-usage: radiosity COMMAND SCENE.obj… [options]
-
-  bake          the radiosity of a scene, at the vertices of a mesh
-  light-map     the irradiance of a scene's surfaces, in a texture
-  view-factors  view factors between the groups of scenes
-  merge         rows of view factors from many machines, put together
-  heat          temperatures and net fluxes of groups, by their view factors
-  grid          irradiance or illuminance on measuring grids
-  probes        irradiance at points in the air as spherical harmonics, for games
-  trade-off     what a bake of a scene costs and how far it is off, over its settings
-  verify        how far off a solution of a scene is, by path tracing
-
-Options of a command: radiosity COMMAND --help. Of the program: --help, --version.";
-
-/// A command: its name, its help text, and what runs it on the arguments that follow the name.
-struct Command {
-    name: &'static str,
-    usage: &'static str,
-    run: fn(&mut lexopt::Parser) -> Result<(), Stop>,
+/// Radiosity of scenes: at vertices, in textures, on grids and at probes; view factors and
+/// radiative heat between their groups
+#[derive(Parser)]
+#[command(name = "radiosity", version, args_override_self = true, max_term_width = 100)]
+struct Program {
+    #[command(subcommand)]
+    command: Command,
 }
 
-const COMMANDS: [Command; 9] = [
-    Command { name: "bake", usage: bake::USAGE, run: bake::run },
-    Command { name: "light-map", usage: light_map::USAGE, run: light_map::run },
-    Command { name: "view-factors", usage: view_factors::USAGE, run: view_factors::run },
-    Command { name: "merge", usage: merge::USAGE, run: merge::run },
-    Command { name: "heat", usage: heat::USAGE, run: heat::run },
-    Command { name: "grid", usage: grid::USAGE, run: grid::run },
-    Command { name: "probes", usage: probes::USAGE, run: probes::run },
-    Command { name: "trade-off", usage: trade_off::USAGE, run: trade_off::run },
-    Command { name: "verify", usage: verify::USAGE, run: verify::run },
-];
+#[derive(Subcommand)]
+enum Command {
+    Bake(Box<bake::Bake>),
+    LightMap(Box<light_map::Options>),
+    ViewFactors(Box<view_factors::Options>),
+    Merge(merge::Options),
+    Heat(Box<heat::Options>),
+    Grid(Box<grid::Options>),
+    Probes(Box<probes::Options>),
+    TradeOff(Box<trade_off::Options>),
+    Verify(Box<verify::Options>),
+}
 
 fn main() -> ExitCode {
-    let mut parser = lexopt::Parser::from_env();
-    match command(&mut parser) {
-        Ok(Some(command)) => match (command.run)(&mut parser) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(stop) => stop.report(command.name, command.usage),
-        },
-        Ok(None) => ExitCode::SUCCESS,
-        Err(stop) => stop.report("", USAGE),
+    let mut program = program();
+    let parsed = program.try_get_matches_from_mut(std::env::args_os()).and_then(|mut matches| {
+        let name = matches.subcommand_name().unwrap_or_default().to_string();
+        Ok((name, Program::from_arg_matches_mut(&mut matches)?))
+    });
+    let (name, Program { command }) = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) => return args::print(&error),
+    };
+    let done = match command {
+        Command::Bake(options) => options.run(),
+        Command::LightMap(options) => options.run(),
+        Command::ViewFactors(options) => options.run(),
+        Command::Merge(options) => options.run(),
+        Command::Heat(options) => options.run(),
+        Command::Grid(options) => options.run(),
+        Command::Probes(options) => options.run(),
+        Command::TradeOff(options) => options.run(),
+        Command::Verify(options) => options.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(stop) => stop.report(program.find_subcommand_mut(name).expect("it was run")),
     }
 }
 
-/// The command that the first argument names, or none where there is nothing left to do.
-fn command(parser: &mut lexopt::Parser) -> Result<Option<&'static Command>, Stop> {
-    match parser.next()? {
-        Some(Long("help") | Short('h')) => Err(Stop::Help),
-        Some(Long("version") | Short('V')) => {
-            say!("radiosity {}", env!("CARGO_PKG_VERSION"));
-            Ok(None)
-        }
-        Some(Value(name)) if name == "help" => match parser.next()? {
-            Some(Value(name)) => {
-                say!("{}", named(&name)?.usage);
-                Ok(None)
-            }
-            _ => Err(Stop::Help),
-        },
-        Some(Value(name)) => named(&name).map(Some),
-        Some(other) => Err(other.unexpected().into()),
-        None => Err(Stop::usage("no command given")),
-    }
+/// The program as it reads its arguments: values may begin with a hyphen, as directions do.
+fn program() -> clap::Command {
+    let with_hyphens = |arg: clap::Arg| {
+        let has_value = arg.get_action().takes_values() && !arg.is_positional();
+        arg.allow_hyphen_values(has_value)
+    };
+    Program::command().mut_subcommands(|command| command.mut_args(with_hyphens))
 }
 
-/// The command of this name.
-fn named(name: &OsStr) -> Result<&'static Command, Stop> {
-    COMMANDS.iter().find(|command| *command.name == *name).ok_or_else(|| {
-        let names = COMMANDS.map(|command| command.name).join(", ");
-        Stop::usage(format!("no command '{}': there are {names}", name.display()))
-    })
+#[cfg(test)]
+mod tests {
+    /// Names of options that are not hidden.
+    fn listed(command: &str) -> Vec<String> {
+        let mut program = super::program();
+        program.build();
+        let command = program.find_subcommand(command).unwrap();
+        let options = command.get_arguments().filter(|arg| !arg.is_hide_set());
+        options.filter_map(|arg| arg.get_long().map(String::from)).collect()
+    }
+
+    #[test]
+    fn arguments_contradict_nothing() {
+        super::program().debug_assert();
+    }
+
+    #[test]
+    fn help_of_a_bake_is_short() {
+        let listed = listed("bake");
+        assert!(listed.len() <= 25, "{}: {listed:?}", listed.len());
+    }
 }

@@ -2,105 +2,77 @@
 
 use std::path::PathBuf;
 
-use lexopt::prelude::*;
+use clap::{ArgGroup, Args};
 use radiosity::glam::DVec3;
 use radiosity::probe::{Probe, ProbeGrid, probes_at};
 use radiosity::scene::Aabb;
 use radiosity::{Error, Scene};
 use serde_json::json;
 
-use crate::args::{self, Stop};
-use crate::light::{Light, LightOptions, light_usage};
+use crate::args::{self, Parsed, Stop, numbers, value};
+use crate::light::{Light, LightOptions};
 use crate::{interrupt, progress};
 
-pub const USAGE: &str = concat!(
-    "\
-usage: radiosity probes SCENE.obj --spacing X | --counts NX,NY,NZ [--box x0,y0,z0,x1,y1,z1]
-                        [--error X] [--out STEM] [--adapter NAME | --cpu]
-
-Bakes the scene and gathers at a regular grid of probes in the air what arrives from all sides:
-irradiance over the normal as spherical harmonics to order 2, nine coefficients a channel. Writes
-STEM.probes.json and STEM.probes.csv, a line a probe. Probes in the cells of the box: those along x
-follow one another, then rows along y, then layers along z. `inside` are those that see more backs
-than all else: within solids or behind walls. docs/grids_and_probes.md has formulas and formats.
-
-  --spacing X       edge of a cell, about, in the scene's unit
-  --counts NX,NY,NZ cells along x, y and z
-  --box …           lowest and highest corner [those of the scene]
-  --out STEM        where the files go, and how they begin [the scene without its ending]; a folder
-                    takes files of the scene's name
-",
-    light_usage!()
-);
-
-/// What is asked of the command.
-struct Options {
+/// Gathers irradiance at a grid of probes in the air, as spherical harmonics for games
+#[derive(Args)]
+#[command(group(ArgGroup::new("cells").required(true).multiple(true)))]
+#[command(after_help = "\
+Bakes the scene and gathers the light at probes in the cells of a box: irradiance over the normal \
+as spherical harmonics to order 2, nine coefficients a channel. Writes STEM.probes.json and \
+STEM.probes.csv, a line a probe: along x, then rows along y, then layers along z. `inside` are \
+probes in solids or behind walls: more backs than fronts and sky are visible there. Formulas and \
+formats: docs/grids_and_probes.md.")]
+pub struct Options {
+    /// Scene, an OBJ file
+    #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    light: LightOptions,
-    cells: Cells,
+    /// Edge of a cell, scene unit, rounded so that cells fit
+    #[arg(long, value_name = "X", value_parser = value::<f64>("a length"))]
+    #[arg(group = "cells", overrides_with = "counts")]
+    spacing: Option<f64>,
+    /// Cells along x, y and z
+    #[arg(long, value_name = "NX,NY,NZ", group = "cells", overrides_with = "spacing")]
+    #[arg(value_parser = numbers::<usize, 3>("three whole numbers"))]
+    counts: Option<[usize; 3]>,
+    /// Lowest and highest corner of the box [default: those of the scene]
+    #[arg(long = "box", value_name = "x,y,z,x,y,z", value_parser = bounds)]
     bounds: Option<Aabb>,
+    /// Path of the files without their endings, or a folder for files of the scene's name [default:
+    /// the scene without its ending]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    light: LightOptions,
+    #[arg(skip)]
     stem: PathBuf,
 }
 
-/// How many probes there are.
-enum Cells {
-    Spacing(f64),
-    Counts([usize; 3]),
-}
-
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    args::check_writable(&options.file("csv"))?;
-    let scene = options.light.scene(&options.scene)?;
-    let grid = options.grid(&scene)?;
-    let light = options.light.bake(scene)?;
-    let probes = options.gather(&grid, &light)?.ok_or(Stop::Interrupted)?;
-    let inside = probes.iter().filter(|probe| probe.is_inside()).count();
-    let [x, y, z] = grid.counts;
-    say!("{} probes, {x} by {y} by {z}, {inside} of them inside of something", probes.len());
-    progress::of_writing(&options.file("json"), |path| {
-        args::write_file(path, &json(&grid, &probes))
-    })?;
-    progress::of_writing(&options.file("csv"), |path| args::write_file(path, &csv(&probes)))?;
-    progress::print_written();
-    args::end()
+/// The lowest and the highest corner.
+fn bounds(text: &str) -> Parsed<Aabb> {
+    let corners = numbers("six numbers: the lowest and the highest corner");
+    let [a, b, c, d, e, f] = corners(text)?;
+    Ok(Aabb { low: DVec3::new(a, b, c), high: DVec3::new(d, e, f) })
 }
 
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let (mut scenes, mut cells, mut bounds, mut out) = (vec![], None, None, None);
-        let mut light = LightOptions::new();
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("spacing") => {
-                    cells = Some(Cells::Spacing(args::value(parser, "spacing", "a length")?));
-                }
-                Long("counts") => {
-                    let expected = "three whole numbers";
-                    cells = Some(Cells::Counts(args::numbers(parser, "counts", expected)?));
-                }
-                Long("box") => {
-                    let expected = "six numbers: the lowest and the highest corner";
-                    let [a, b, c, d, e, f] = args::numbers(parser, "box", expected)?;
-                    bounds = Some(Aabb { low: DVec3::new(a, b, c), high: DVec3::new(d, e, f) });
-                }
-                Long("out") => out = Some(PathBuf::from(parser.value()?)),
-                Value(path) => scenes.push(path.into()),
-                Long(name) => {
-                    let name = name.to_string();
-                    if !light.option(&name, parser)? {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        let scene = args::only_scene(scenes)?;
-        let cells = cells.ok_or_else(|| Stop::usage("how many probes? --spacing or --counts"))?;
-        let stem = args::stem(out, scene.with_extension(""), &["csv", "json"]);
-        Ok(Options { scene, light, cells, bounds, stem })
+    /// Runs the command.
+    pub fn run(mut self) -> Result<(), Stop> {
+        let formats = [("csv", ()), ("json", ())];
+        self.stem = args::stem(self.out.take(), self.scene.with_extension(""), &formats);
+        args::check_writable(&self.file("csv"))?;
+        let scene = self.light.scene(&self.scene)?;
+        let grid = self.grid(&scene)?;
+        let light = self.light.bake(scene)?;
+        let probes = self.gather(&grid, &light)?.ok_or(Stop::Interrupted)?;
+        let inside = probes.iter().filter(|probe| probe.is_inside()).count();
+        let [x, y, z] = grid.counts;
+        say!("{} probes, {x} by {y} by {z}, {inside} of them inside of something", probes.len());
+        progress::of_writing(&self.file("json"), |path| {
+            args::write_file(path, &json(&grid, &probes))
+        })?;
+        progress::of_writing(&self.file("csv"), |path| args::write_file(path, &csv(&probes)))?;
+        progress::print_written();
+        args::end()
     }
 
     fn file(&self, extension: &str) -> PathBuf {
@@ -111,9 +83,9 @@ impl Options {
 
     fn grid(&self, scene: &Scene) -> Result<ProbeGrid, Error> {
         let bounds = self.bounds.unwrap_or_else(|| scene.bounds());
-        match self.cells {
-            Cells::Spacing(spacing) => ProbeGrid::with_spacing(&bounds, spacing),
-            Cells::Counts(counts) => ProbeGrid::with_counts(&bounds, counts),
+        match (self.counts, self.spacing) {
+            (Some(counts), _) => ProbeGrid::with_counts(&bounds, counts),
+            (None, spacing) => ProbeGrid::with_spacing(&bounds, spacing.unwrap_or_default()),
         }
     }
 

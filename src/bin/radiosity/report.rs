@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use crate::bake::files::{Picture, camera_value};
 use crate::bake::{Target, bands, settings};
-use crate::luminaires::LuminaireOptions;
+use crate::luminaires::Luminaires;
 use crate::progress;
 
 /// What the report tells of.
@@ -21,7 +21,7 @@ pub struct Report {
     /// The options that give its sky, where that is more than a radiance.
     pub sky: Option<String>,
     /// What else lights it that is no surface.
-    pub luminaires: LuminaireOptions,
+    pub luminaires: Luminaires,
     /// Name, type and driver of what made the rows.
     pub adapter: AdapterInfo,
     /// What was asked for.
@@ -189,7 +189,7 @@ impl Report {
             Outcome::Missed(Obstacle::Elements) => {
                 let most = baked.settings.gather.as_ref().map(|g| g.refinement.max_elements);
                 let most = most.unwrap_or_default();
-                format!("; allow more than --max-elements {most}, which takes memory and time")
+                format!("; allow more than --set max_elements={most}, which takes memory and time")
             }
             Outcome::Missed(obstacle) => {
                 format!("; {}", obstacle.remedy(baked.settings.gather.as_ref()))

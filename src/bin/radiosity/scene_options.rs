@@ -2,106 +2,106 @@
 
 use std::path::Path;
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::io::SpecularSurfaces;
 use radiosity::{Error, ObjSettings, Rgb, Scene, Sides};
 
-use crate::args::{Stop, rgb, value, wrong_value};
-use crate::luminaires::LuminaireOptions;
+use crate::args::{Names, Parsed, give, one_of, rgb, value};
+use crate::luminaires::{LuminaireOptions, Luminaires};
+use crate::progress;
 use crate::sky::SkyOptions;
 
-/// What is said of how a scene is to be read.
-#[derive(Clone, Debug, Default)]
+const SIDES: Names<Sides> =
+    &[("auto", Sides::Auto), ("front", Sides::Front), ("both", Sides::Both)];
+
+const SPECULAR: Names<SpecularSurfaces> = &[
+    ("clear", SpecularSurfaces::Clear),
+    ("diffuse", SpecularSurfaces::Diffuse),
+    ("black", SpecularSurfaces::Black),
+    ("ignore", SpecularSurfaces::Ignore),
+];
+
+/// How a scene is read, and what lights it.
+#[derive(Args)]
+#[command(next_help_heading = "Scene and light (more: radiosity bake --list-settings)")]
 pub struct SceneOptions {
-    obj: ObjSettings,
+    #[command(flatten)]
     pub sky: SkyOptions,
-    pub luminaires: LuminaireOptions,
+    #[command(flatten)]
+    luminaires: LuminaireOptions,
+    /// Radiance that this material emits, W/(m² sr); may be repeated
+    #[arg(long, value_name = "MATERIAL=r,g,b", value_parser = of_material)]
+    emit: Vec<(String, Rgb)>,
+    /// Share of the light on either side of this material that leaves diffusely from the other side
+    /// instead of being reflected; may be repeated
+    #[arg(long, value_name = "MATERIAL=r,g,b", hide = true, value_parser = of_material)]
+    transmit: Vec<(String, Rgb)>,
+    /// Sides of surfaces that reflect: auto, those that light can reach; front; or both
+    #[arg(long, value_name = "SIDES", default_value = "auto", value_parser = one_of(SIDES))]
+    sides: Sides,
+    /// What mirrors and glass are for diffuse light. clear: glass transmits it unscattered, and
+    /// mirrors reflect their diffuse part; diffuse: both reflect their diffuse part; black; ignore:
+    /// both are diffuse. Pictures show them as mirrors and glass
+    #[arg(long, value_name = "KIND", hide = true, default_value = "clear")]
+    #[arg(value_parser = one_of(SPECULAR))]
+    specular: SpecularSurfaces,
+    /// Reflectance that replaces one of 1 or more, below 1
+    #[arg(long, value_name = "X", hide = true, value_parser = value::<f64>("a number below 1"))]
+    #[arg(default_value_t = ObjSettings::MAX_REFLECTANCE)]
+    max_reflectance: f64,
+    /// Refuse a file that would have to be repaired
+    #[arg(long)]
+    strict: bool,
+    /// Whether texture coordinates are kept where there is no texture.
+    #[arg(skip)]
+    pub texture_coordinates: bool,
+}
+
+/// A scene as the options say.
+pub struct Input {
+    /// With its sides resolved.
+    pub scene: Scene,
+    pub luminaires: Luminaires,
+    /// All that was printed.
+    pub warnings: Vec<String>,
 }
 
 impl SceneOptions {
-    /// Those under which mirrors and glass are surfaces as all others are.
-    pub fn ignoring_specular() -> SceneOptions {
-        let mut options = SceneOptions::default();
-        options.obj.specular = SpecularSurfaces::Ignore;
-        options
-    }
-
-    /// Makes each face a group of its own.
-    pub fn by_facets(&mut self) {
-        self.obj.facets = true;
-    }
-
-    /// Keeps texture coordinates, whether or not there are textures.
-    pub fn with_texture_coordinates(&mut self) {
-        self.obj.texture_coordinates = true;
-    }
-
-    /// Takes option `name` with its value, if it is one of these.
-    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
-        match name {
-            "strict" => self.obj.strict = true,
-            "max-reflectance" => {
-                self.obj.max_reflectance = value(parser, "max-reflectance", "a number below 1")?;
-            }
-            "emit" => self.obj.emit.push(of_material(parser, "emit")?),
-            "transmit" => self.obj.transmit.push(of_material(parser, "transmit")?),
-            "sides" => self.obj.sides = sides(parser)?,
-            "specular" => self.obj.specular = specular(parser)?,
-            _ => return Ok(self.sky.option(name, parser)? || self.luminaires.option(name, parser)?),
-        }
-        Ok(true)
-    }
-
-    /// Tells the user what is odd about a scene and what lights it, and returns that.
-    pub fn print_warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut warnings = self.luminaires.warnings();
-        warnings.extend(self.sky.warning(scene));
-        warnings.extend(scene.warnings().iter().map(ToString::to_string));
-        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-        warnings
-    }
-
-    /// The scene of an OBJ file, under the sky and with the luminaires that were asked for.
+    /// The scene of an OBJ file, under the sky and with the luminaires that the options name.
+    /// Prints warnings.
     ///
     /// # Errors
-    /// Those of [`ObjSettings::load`], [`SkyOptions::over`] and [`LuminaireOptions::over`].
-    pub fn load(&self, path: &Path) -> Result<Scene, Error> {
-        let mut obj = self.obj.clone();
-        obj.sky = self.sky.while_reading();
-        if !self.luminaires.is_empty() {
-            obj.sky.get_or_insert_default();
-        }
-        self.luminaires.over(self.sky.over(obj.load(path)?)?)
+    /// Those of [`ObjSettings::load`], [`SkyOptions::over`], [`Luminaires::read`] and
+    /// [`Luminaires::over`].
+    pub fn read(&self, path: &Path) -> Result<Input, Error> {
+        let (scene, luminaires) = progress::of_reading(path, || {
+            let luminaires = self.luminaires.read()?;
+            let mut obj = ObjSettings::default();
+            obj.strict = self.strict;
+            obj.max_reflectance = self.max_reflectance;
+            obj.emit.clone_from(&self.emit);
+            obj.transmit.clone_from(&self.transmit);
+            obj.sides = self.sides;
+            obj.specular = self.specular;
+            obj.texture_coordinates = self.texture_coordinates;
+            obj.sky = self.sky.while_reading();
+            if !luminaires.is_empty() {
+                obj.sky.get_or_insert_default();
+            }
+            let scene = luminaires.over(self.sky.over(obj.load(path)?)?)?;
+            Ok::<_, Error>((scene.resolve_sides(), luminaires))
+        })?;
+        let mut warnings = luminaires.warnings();
+        warnings.extend(self.sky.warning(&scene));
+        warnings.extend(scene.warnings().iter().map(ToString::to_string));
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        Ok(Input { scene, luminaires, warnings })
     }
 }
 
 /// `MATERIAL=r,g,b`, or one number for all three.
-fn of_material(parser: &mut lexopt::Parser, option: &str) -> Result<(String, Rgb), Stop> {
-    let text = parser.value()?.string()?;
-    let wrong = || wrong_value(option, &text, "MATERIAL=r,g,b");
+fn of_material(text: &str) -> Parsed<(String, Rgb)> {
+    let wrong = || give("MATERIAL=r,g,b, or one number for all three");
     let (name, colour) = text.rsplit_once('=').ok_or_else(wrong)?;
-    Ok((name.into(), rgb(colour).ok_or_else(wrong)?))
-}
-
-/// What surfaces do on their two sides, by its name.
-fn sides(parser: &mut lexopt::Parser) -> Result<Sides, Stop> {
-    let text = parser.value()?.string()?;
-    match text.as_str() {
-        "auto" => Ok(Sides::Auto),
-        "front" => Ok(Sides::Front),
-        "both" => Ok(Sides::Both),
-        _ => Err(wrong_value("sides", &text, "auto, front or both")),
-    }
-}
-
-/// What mirrors and glass count as where light is spread, by its name.
-fn specular(parser: &mut lexopt::Parser) -> Result<SpecularSurfaces, Stop> {
-    let text = parser.value()?.string()?;
-    match text.as_str() {
-        "clear" => Ok(SpecularSurfaces::Clear),
-        "diffuse" => Ok(SpecularSurfaces::Diffuse),
-        "black" => Ok(SpecularSurfaces::Black),
-        "ignore" => Ok(SpecularSurfaces::Ignore),
-        _ => Err(wrong_value("specular", &text, "clear, diffuse, black or ignore")),
-    }
+    Ok((name.into(), rgb(colour).map_err(|_| wrong())?))
 }

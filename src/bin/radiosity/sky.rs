@@ -3,34 +3,45 @@
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::camera::up_axis;
 use radiosity::glam::{DQuat, DVec3};
 use radiosity::io::read_radiance;
 use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, SkyDistribution, Sun};
 use solar_positioning::{Location, SolarPositions, delta_t};
 
-use crate::args::{self, Stop, wrong_value};
+use crate::args::{self, Parsed, give};
 
 /// What `--sky` takes.
 const SKIES: &str =
     "a radiance r,g,b, none, overcast, cie1 to cie15, perez:CLEARNESS,BRIGHTNESS, or a picture";
 
-/// What is said of the light from outside.
-#[derive(Clone, Debug, Default)]
+/// The light from outside.
+#[derive(Args)]
 pub struct SkyOptions {
-    kind: Kind,
+    /// Sky: radiance r,g,b of a uniform one; none; above the horizon overcast, cie1 to cie15 or
+    /// perez:CLEARNESS,BRIGHTNESS; a picture FILE.exr or FILE.hdr [default: 1 if nothing emits]
+    #[arg(long = "sky", value_name = "SKY", value_parser = Kind::parse)]
+    kind: Option<Kind>,
+    /// Radiance of the sky at the zenith, or factor of a picture [default: 1]
+    #[arg(long, value_name = "r,g,b", value_parser = args::rgb)]
     zenith: Option<Rgb>,
+    /// Sun: direction towards the sun, and irradiance E or r,g,b of a surface that faces it, W/m²
+    #[arg(long, value_name = "x,y,z=E", overrides_with = "sun_at", value_parser = sun_towards)]
+    sun: Option<GivenSun>,
+    /// The same by degrees north and east and a time, as 48.1,11.6,2026-06-21T12:00:00+02:00=800
+    #[arg(long, value_name = "LAT,LON,TIME=E", overrides_with = "sun", value_parser = sun_at)]
+    sun_at: Option<GivenSun>,
+    /// Direction away from the ground [default: +y or +z, whichever the scene suggests]
+    #[arg(long, value_name = "x,y,z", value_parser = direction)]
     up: Option<DVec3>,
+    /// Direction of north, for --sun-at [default: -z; +y where +z is up]
+    #[arg(long, value_name = "x,y,z", hide = true, value_parser = direction)]
     north: Option<DVec3>,
-    sun: Option<(SunPlace, Rgb)>,
 }
 
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Kind {
-    /// Nothing was said.
-    #[default]
-    Default,
     Uniform(Rgb),
     Overcast,
     Cie(u32),
@@ -38,6 +49,9 @@ enum Kind {
     Perez(f64, f64),
     Picture(PathBuf),
 }
+
+/// Where the sun is, and its irradiance.
+type GivenSun = (SunPlace, Rgb);
 
 #[derive(Clone, Debug, PartialEq)]
 enum SunPlace {
@@ -47,36 +61,6 @@ enum SunPlace {
 }
 
 impl SkyOptions {
-    /// Takes the value of option `name`, if it is one of these.
-    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
-        match name {
-            "sky" => self.kind = Kind::parse(&parser.value()?.string()?)?,
-            "zenith" => {
-                let text = parser.value()?.string()?;
-                let wrong = || wrong_value("zenith", &text, "a radiance r,g,b");
-                self.zenith = Some(args::rgb(&text).ok_or_else(wrong)?);
-            }
-            "up" => self.up = Some(direction(parser, "up")?),
-            "north" => self.north = Some(direction(parser, "north")?),
-            "sun" => {
-                let text = parser.value()?.string()?;
-                self.sun = Some(sun_towards(&text).ok_or_else(|| {
-                    wrong_value("sun", &text, "x,y,z=IRRADIANCE: towards it, and W/m² facing it")
-                })?);
-            }
-            "sun-at" => {
-                let text = parser.value()?.string()?;
-                self.sun = Some(sun_at(&text).ok_or_else(|| {
-                    let example = "LATITUDE,LONGITUDE,TIME=IRRADIANCE, as in \
-                                   48.1,11.6,2026-06-21T12:00:00+02:00=800";
-                    wrong_value("sun-at", &text, example)
-                })?);
-            }
-            _ => return Ok(false),
-        }
-        Ok(true)
-    }
-
     /// Which way is up, if that was said.
     pub fn up(&self) -> Option<DVec3> {
         self.up
@@ -84,14 +68,18 @@ impl SkyOptions {
 
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
     pub fn is_default(&self) -> bool {
-        self.kind == Kind::Default && self.sun.is_none()
+        self.kind.is_none() && self.given_sun().is_none()
+    }
+
+    fn given_sun(&self) -> Option<&GivenSun> {
+        self.sun.as_ref().or(self.sun_at.as_ref())
     }
 
     /// A sky to read the scene with, before its up axis is known: black only if this one is.
     pub fn while_reading(&self) -> Option<Sky> {
         match self.kind {
             _ if self.is_default() => None,
-            Kind::Uniform(radiance) if self.sun.is_none() => Some(radiance.into()),
+            Some(Kind::Uniform(sky)) if self.given_sun().is_none() => Some(sky.into()),
             _ => Some(Rgb::ONE.into()),
         }
     }
@@ -102,7 +90,7 @@ impl SkyOptions {
     /// [`ErrorKind::Setting`] for numbers that mean no sky, a time that is none, or a sun below the
     /// horizon; those of reading a picture.
     pub fn over(&self, scene: Scene) -> Result<Scene, Error> {
-        let is_even = matches!(self.kind, Kind::Default | Kind::Uniform(_));
+        let is_even = matches!(self.kind, None | Some(Kind::Uniform(_)));
         if is_even && self.zenith.is_some() {
             let found = "a radiance for a sky that differs by direction, and no such --sky".into();
             return Err(bad(
@@ -111,7 +99,7 @@ impl SkyOptions {
                 "add --sky overcast or another, or write --sky r,g,b",
             ));
         }
-        if is_even && self.sun.is_none() {
+        if is_even && self.given_sun().is_none() {
             return Ok(scene);
         }
         let up = self.up.unwrap_or_else(|| up_axis(&scene));
@@ -119,19 +107,20 @@ impl SkyOptions {
         let towards_sun = sun.map_or(up, |sun| sun.direction);
         let zenith = self.zenith.unwrap_or(Rgb::ONE);
         let spread = |distribution: Option<SkyDistribution>| {
-            let wrong = || bad("sky", format!("{:?}", self.kind), SKIES);
+            let words = || self.kind.as_ref().map_or_else(String::new, Kind::words);
+            let wrong = || bad("sky", words(), SKIES);
             Sky::new(distribution.ok_or_else(wrong)?, zenith, up, towards_sun)
         };
         let sky = match &self.kind {
-            Kind::Default => Sky::default(),
-            Kind::Uniform(radiance) => (*radiance).into(),
-            Kind::Overcast => spread(Some(SkyDistribution::OVERCAST))?,
-            Kind::Cie(number) => spread(SkyDistribution::cie(*number))?,
-            Kind::Perez(clearness, brightness) => {
+            None => Sky::default(),
+            Some(Kind::Uniform(radiance)) => (*radiance).into(),
+            Some(Kind::Overcast) => spread(Some(SkyDistribution::OVERCAST))?,
+            Some(Kind::Cie(number)) => spread(SkyDistribution::cie(*number))?,
+            Some(Kind::Perez(clearness, brightness)) => {
                 let angle = up.normalize().angle_between(towards_sun);
                 spread(SkyDistribution::perez(*clearness, *brightness, angle))?
             }
-            Kind::Picture(path) => {
+            Some(Kind::Picture(path)) => {
                 let (width, mut pixels) = read_radiance(path)?;
                 pixels.iter_mut().for_each(|pixel| *pixel *= zenith);
                 Sky::picture(width, &pixels, up)?
@@ -145,7 +134,8 @@ impl SkyOptions {
 
     /// What is odd about it over `scene`, which is under it.
     pub fn warning(&self, scene: &Scene) -> Option<String> {
-        let (Some((SunPlace::Towards(given), _)), Some(sun)) = (&self.sun, scene.sky().sun())
+        let (Some((SunPlace::Towards(given), _)), Some(sun)) =
+            (self.given_sun(), scene.sky().sun())
         else {
             return None;
         };
@@ -163,7 +153,7 @@ impl SkyOptions {
     }
 
     fn sun(&self, up: DVec3) -> Result<Option<Sun>, Error> {
-        let Some((place, irradiance)) = self.sun.clone() else { return Ok(None) };
+        let Some((place, irradiance)) = self.given_sun().cloned() else { return Ok(None) };
         let direction = match place {
             SunPlace::Towards(direction) => direction,
             SunPlace::At(place, time) => self.direction_at(place, &time, up)?,
@@ -210,16 +200,8 @@ impl SkyOptions {
         if scene.sky().uniform_radiance().is_some() && scene.sky().sun().is_none() {
             return None;
         }
-        let list = |v: DVec3| v.to_array().map(|x| x.to_string()).join(",");
-        let mut words = vec![match &self.kind {
-            Kind::Default => "none".into(),
-            Kind::Uniform(radiance) => list(*radiance),
-            Kind::Overcast => "overcast".into(),
-            Kind::Cie(number) => format!("cie{number}"),
-            Kind::Perez(clearness, brightness) => format!("perez:{clearness},{brightness}"),
-            Kind::Picture(path) => path.display().to_string(),
-        }];
-        if !matches!(self.kind, Kind::Default | Kind::Uniform(_)) {
+        let mut words = vec![self.kind.as_ref().map_or_else(|| "none".into(), Kind::words)];
+        if !matches!(self.kind, None | Some(Kind::Uniform(_))) {
             words.push(format!("--zenith {}", list(self.zenith.unwrap_or(Rgb::ONE))));
             words.push(format!("--up {}", list(self.up.unwrap_or_else(|| up_axis(scene)))));
         }
@@ -230,10 +212,26 @@ impl SkyOptions {
     }
 }
 
+/// `x,y,z`.
+fn list(v: DVec3) -> String {
+    v.to_array().map(|x| x.to_string()).join(",")
+}
+
 impl Kind {
-    fn parse(text: &str) -> Result<Kind, Stop> {
-        let wrong = || wrong_value("sky", text, SKIES);
-        if let Some(radiance) = args::rgb(text) {
+    /// The same as the value of `--sky`.
+    fn words(&self) -> String {
+        match self {
+            Kind::Uniform(radiance) => list(*radiance),
+            Kind::Overcast => "overcast".into(),
+            Kind::Cie(number) => format!("cie{number}"),
+            Kind::Perez(clearness, brightness) => format!("perez:{clearness},{brightness}"),
+            Kind::Picture(path) => path.display().to_string(),
+        }
+    }
+
+    fn parse(text: &str) -> Parsed<Kind> {
+        let wrong = || give(SKIES);
+        if let Ok(radiance) = args::rgb(text) {
             return Ok(Kind::Uniform(radiance));
         }
         if let Some(number) = text.strip_prefix("cie") {
@@ -259,26 +257,30 @@ fn bad(option: &str, found: String, remedy: &str) -> Error {
 }
 
 /// `x,y,z`, not zero.
-fn direction(parser: &mut lexopt::Parser, option: &str) -> Result<DVec3, Stop> {
-    let numbers = args::numbers::<f64, 3>(parser, option, "a direction x,y,z")?;
-    let direction = DVec3::from_array(numbers);
-    let expected = "a direction x,y,z that is not zero";
-    let wrong = || wrong_value(option, &format!("{direction}"), expected);
-    direction.try_normalize().ok_or_else(wrong)
+fn direction(text: &str) -> Parsed<DVec3> {
+    const EXPECTED: &str = "a direction x,y,z that is not zero";
+    let direction = DVec3::from_array(args::numbers(EXPECTED)(text)?);
+    direction.try_normalize().ok_or_else(|| give(EXPECTED))
 }
 
 /// `x,y,z=IRRADIANCE`.
-fn sun_towards(text: &str) -> Option<(SunPlace, Rgb)> {
-    let (direction, irradiance) = text.split_once('=')?;
-    let numbers: Result<Vec<f64>, _> = direction.split(',').map(|n| n.trim().parse()).collect();
-    let direction = DVec3::from_array(numbers.ok()?.try_into().ok()?);
-    Some((SunPlace::Towards(direction), args::rgb(irradiance)?))
+fn sun_towards(text: &str) -> Parsed<GivenSun> {
+    const EXPECTED: &str = "x,y,z=IRRADIANCE: the direction towards the sun, and W/m²";
+    let (direction, irradiance) = text.split_once('=').ok_or_else(|| give(EXPECTED))?;
+    let direction = DVec3::from_array(args::numbers(EXPECTED)(direction)?);
+    let irradiance = args::rgb(irradiance).map_err(|_| give(EXPECTED))?;
+    Ok((SunPlace::Towards(direction), irradiance))
 }
 
 /// `LATITUDE,LONGITUDE,TIME=IRRADIANCE`.
-fn sun_at(text: &str) -> Option<(SunPlace, Rgb)> {
-    let (at, irradiance) = text.split_once('=')?;
-    let [latitude, longitude, time] = at.split(',').collect::<Vec<_>>().try_into().ok()?;
-    let place = [latitude.trim().parse().ok()?, longitude.trim().parse().ok()?];
-    Some((SunPlace::At(place, time.trim().into()), args::rgb(irradiance)?))
+fn sun_at(text: &str) -> Parsed<GivenSun> {
+    let sun = || {
+        let (at, irradiance) = text.split_once('=')?;
+        let [latitude, longitude, time] = at.split(',').collect::<Vec<_>>().try_into().ok()?;
+        let place = [latitude.trim().parse().ok()?, longitude.trim().parse().ok()?];
+        Some((SunPlace::At(place, time.trim().into()), args::rgb(irradiance).ok()?))
+    };
+    let expected = "LATITUDE,LONGITUDE,TIME=IRRADIANCE, as in \
+                    48.1,11.6,2026-06-21T12:00:00+02:00=800";
+    sun().ok_or_else(|| give(expected))
 }

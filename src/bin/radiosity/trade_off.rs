@@ -22,62 +22,49 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clap::Args;
 use grid::{Grid, Run, Target};
-use lexopt::prelude::*;
 use measure::Measured;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene};
 use reference::Reference;
 use surface_points::SurfacePoints;
 
-use crate::args::{self, Device, Stop};
-use crate::scene_options::SceneOptions;
-use crate::{interrupt, progress};
+use crate::args::{self, DeviceOptions, Stop};
+use crate::interrupt;
+use crate::scene_options::{Input, SceneOptions};
 
-pub const USAGE: &str = "\
-usage: radiosity trade-off SCENE.obj [--truth FILE] [--out STEM] [--quick]
-            [--adapter NAME | --cpu]
-
-Bakes SCENE with many settings, one knob at a time around those meant for 2 %, and with those that
-the dial (an accuracy asked for) chooses. Measures time and error of each. Writes STEM.csv (a row a
-run), STEM.svg and STEM.png (error over time), and prints what the dial's choices take against the
-fastest settings that are as good. STEM is the scene without its ending and with _trade_off, unless
-given.
-
-  --truth FILE    a JSON file of points with their radiosity; errors are those at its points of
-                  kind \"area\". Without it errors are against a run three times finer than the
-                  finest, which has errors of its own, at 4096 places; gaps that nobody looks
-                  into are left out
-  --quick         fewer runs, none of them fine, around those meant for 5 %
-  --strict        refuse what would be repaired in the file
-  --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
-  --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated
-  --transmit MATERIAL=r,g,b  this material is translucent: this share of the light on either side
-                    leaves diffusely from the other; may be repeated
-  --sky r,g,b       radiance of a uniform sky around the scene, or none [1 if nothing emits];
-                    for other skies and a sun see `radiosity bake --help`
-  --sides WHICH     sides of surfaces that reflect: auto, those that light can reach, however they
-                    are wound, front or both [auto]
-  --specular WHICH  what mirrors and glass count as: clear, light passes glass, diffuse, their
-                    diffuse part, black, or ignore [clear]
-  --adapter NAME  a graphics adapter with NAME in its name; WGPU_ADAPTER_NAME does the same
-  --cpu           rays on the CPU instead of hemicubes
-
-Seconds are those of the stages of a bake, the judging of its own error included; reading the file
-and opening the device come once and do not count. Short runs are done three times, and the least
-time is given; still, the machine should be idle. After Ctrl-C the
-table of the runs that are done is written. Errors are root mean squares over the area, as
-shares of the radiosity.";
-
-/// What is asked of the command.
-struct Options {
+/// Measures time and error of bakes of a scene, over their settings
+#[derive(Args)]
+#[command(after_help = "\
+Bakes the scene with many settings, one varied at a time around those for an error of 2 %, and to \
+errors that are asked for. Writes STEM.csv (a row a run), STEM.svg and STEM.png (error over time), \
+and prints the time of a bake to an error beside that of the fastest settings that are as exact. \
+Seconds are those of the stages of a bake and of the estimate of its error, without reading the \
+file and opening the device; short runs are timed three times, and the least time counts. Errors \
+are root mean squares over the area, as shares of radiosity. After Ctrl-C the table of the \
+finished runs is written.")]
+pub struct Options {
+    /// Scene, an OBJ file
+    #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    reading: SceneOptions,
-    /// A file of points with their true radiosity.
+    /// Points with their radiosity, a JSON file; errors are those at its points of kind "area"
+    /// [default: a run three times finer than the finest, at 4096 points, without narrow gaps]
+    #[arg(long, value_name = "FILE.json")]
     truth: Option<PathBuf>,
-    /// Path of the output without its ending.
-    out: PathBuf,
+    /// Fewer and coarser runs, around the settings for 5 %
+    #[arg(long)]
     quick: bool,
-    device: Device,
+    /// Path of the files without their endings, or a folder for them [default: the scene without
+    /// its ending, and _trade_off]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    reading: SceneOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Path of the files without their endings.
+    #[arg(skip)]
+    stem: PathBuf,
 }
 
 /// All that was measured.
@@ -105,49 +92,22 @@ const WARM_UP_ERROR: f64 = 0.3;
 /// How many times finer than the finest run the reference is, where there is no truth.
 const REFERENCE_FINER: f64 = 3.0;
 
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    say!("{}", options.run()?.summary());
-    args::end()
-}
-
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let (mut scenes, mut truth, mut out) = (vec![], None, None);
-        let (mut quick, mut device) = (false, Device::Gpu(None));
-        let mut reading = SceneOptions::default();
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("truth") => truth = Some(parser.value()?.into()),
-                Long("out") => out = Some(parser.value()?.into()),
-                Long("quick") => quick = true,
-                Long("adapter") => device = Device::named(parser)?,
-                Long("cpu") => device = Device::Cpu,
-                Value(path) => scenes.push(path.into()),
-                Long(name) => {
-                    let name = name.to_string();
-                    if !reading.option(&name, parser)? {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        let scene = args::only_scene(scenes)?;
-        let mut stem = scene.with_extension("").into_os_string();
+    /// Runs the command.
+    pub fn run(mut self) -> Result<(), Stop> {
+        let mut stem = self.scene.with_extension("").into_os_string();
         stem.push("_trade_off");
-        let out = args::stem(out, stem.into(), &["csv", "svg", "png"]);
-        Ok(Options { scene, reading, truth, out, quick, device })
+        let formats = [("csv", ()), ("svg", ()), ("png", ())];
+        self.stem = args::stem(self.out.take(), stem.into(), &formats);
+        say!("{}", self.results()?.summary());
+        args::end()
     }
 
-    fn run(&self) -> Result<Results, Error> {
-        args::check_writable(&self.out)?;
+    fn results(&self) -> Result<Results, Error> {
+        args::check_writable(&self.stem)?;
         let truth = self.read_truth()?;
-        let scene = progress::of_reading(&self.scene, || self.reading.load(&self.scene))?;
+        let Input { scene, .. } = self.reading.read(&self.scene)?;
         let scene = Arc::new(scene);
-        self.reading.print_warnings(&scene);
         let device = self.device.open()?;
         let mut grid = Grid::new(&scene, self.quick);
         interrupt::catch();
@@ -234,11 +194,11 @@ impl Options {
 
     fn bad_chart(&self, found: &str) -> Error {
         let remedy = "the table of all runs has been written";
-        Error::new(ErrorKind::File, format!("chart {}", self.out.display()), found, remedy)
+        Error::new(ErrorKind::File, format!("chart {}", self.stem.display()), found, remedy)
     }
 
     fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.out.with_added_extension(ending);
+        let path = self.stem.with_added_extension(ending);
         args::write_file(&path, bytes)?;
         eprintln!("wrote {}", path.display());
         Ok(())

@@ -8,166 +8,121 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verification, verify};
 use radiosity::{Error, ErrorKind, Rgb, Scene, VertexMesh, read_ply};
 use serde_json::{Value as Json, json};
 
-use crate::args::{self, Stop};
+use crate::args::{self, Parsed, Stop, give, value};
 use crate::bake::files::estimated_error;
-use crate::scene_options::SceneOptions;
+use crate::luminaires::Luminaires;
+use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
 use points::Points;
 use verdict::verdict;
 
-pub const USAGE: &str = "\
-usage: radiosity verify SCENE.obj SOLUTION.ply [--precision X] [--time SECONDS] [--places N]
-                    [--hidden] [--seed N] [--csv FILE] [--points-ply FILE]
-       radiosity verify SCENE.obj --points FILE.json [--paths N] [--seed N] [--csv FILE]
-
-Measures how far off SOLUTION.ply is, independently of what made it: path traces SCENE.obj at random
-points of its surfaces, and prints for each group, and for all, the root mean square over the area
-of |B - true B| / max(|true B|, 5 % of its mean): B is the reflected radiosity, lengths are over
-the channels. Beside it stands what the bake told, from SOLUTION.json, if that is there, and the
-last line compares the two. After Ctrl-C what was measured so far is printed.
-
-  --precision X     go on until the standard error is below this share of the error [0.1]
-  --time SECONDS    begin no round that would end later; inf for no limit [120]
-  --places N        points that each group has at least [16]
-  --hidden          count what nobody sees too: points that look at backs of surfaces, as the
-                    ground under a box or a wall right behind a plate; said, and left out if not
-  --seed N          another seed, other points and paths [0]
-  --csv FILE        write the table, all groups, as CSV
-  --strict          refuse what would be repaired in the file
-  --max-reflectance X  what a reflectance of 1 or more becomes [0.98]
-  --emit MATERIAL=r,g,b  this material emits this radiance; may be repeated (as the bake had)
-  --transmit MATERIAL=r,g,b  this material lets this share through (as the bake had)
-  --sky r,g,b       radiance of a uniform sky, or none; another sky, a sun and luminaires are given
-                    by the options that the bake had, those of `radiosity bake --help`
-  --sides WHICH     auto, front or both (as the bake had) [auto]
-  --specular WHICH  clear, diffuse, black or ignore (as the bake had) [clear]
-  --points-ply FILE write the points, with error and radiosity, coloured from blue (none) over green
-                    (the error of all) to red (four times that or more), grey where hidden
-Radiosity at given points, to judge this instrument itself:
-  --points FILE     JSON: {\"points\": [{\"p\": [x,y,z], \"n\": [x,y,z]}, …]}; where \"B\" is given,
-                    radiosity, and \"se\", its standard error, prints how far the paths are off in
-                    units of the standard error of both; with --csv writes radiosity and standard
-                    error
-  --paths N         paths a point [65536]";
-
 /// Groups in the printed table at most.
 const MAX_PRINTED: usize = 20;
 
-/// Paths a point for given points, where no number is asked for.
-const DEFAULT_PATHS: usize = 65536;
-
-/// What is asked of the command.
-struct Options {
+/// Measures the error of a solution of a scene, by path tracing
+#[derive(Args)]
+#[command(after_help = "\
+Path traces the scene at random points of its surfaces and prints for each group, and for all, the \
+root mean square over the area of |B - true B| / max(|true B|, 5 % of its mean): B is reflected \
+radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the \
+report of the bake, where there is one; the last line compares them. The options of the scene and \
+its light have to be those of the bake. After Ctrl-C the points so far count.")]
+pub struct Options {
+    /// Scene, an OBJ file
+    #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    reading: SceneOptions,
-    settings: Settings,
+    /// Radiosity at vertices, a PLY file
+    #[arg(value_name = "SOLUTION.ply", required_unless_present = "points")]
+    solution: Option<PathBuf>,
+    /// Standard error at which the measurement ends, as a share of the error
+    #[arg(long, value_name = "X", default_value = "0.1", value_parser = value::<f64>("a number"))]
+    precision: f64,
+    /// Begin no round that would end after this time; inf for no limit
+    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = time)]
+    time: Limit,
+    /// Minimum number of points in each group
+    #[arg(long, value_name = "N", default_value = "16")]
+    #[arg(value_parser = value::<usize>("a whole number"))]
+    points_per_group: usize,
+    /// Count hidden points too, which see backs of surfaces or surfaces close by alone, as the
+    /// ground under a box; they are left out otherwise, and their share is printed
+    #[arg(long)]
+    hidden: bool,
+    /// Seed of the points and paths
+    #[arg(long, value_name = "N", default_value = "0")]
+    #[arg(value_parser = value::<u64>("a whole number"))]
+    seed: u64,
+    /// Write the table, all groups, as CSV
+    #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    what: What,
+    /// Write the points with error and radiosity, in colours from blue (none) over green (the error
+    /// of all) to red (four times that or more), grey where hidden
+    #[arg(long, value_name = "FILE.ply")]
+    points_ply: Option<PathBuf>,
+    /// Trace these points instead of verifying a solution: {"points": [{"p": [x,y,z], "n":
+    /// [x,y,z]}, …]}; where "B", radiosity, and "se", its standard error, are given, print the
+    /// difference in units of the standard error of both; --csv has radiosity and standard error
+    #[arg(long, value_name = "FILE.json")]
+    #[arg(conflicts_with_all = ["solution", "precision", "time", "points_per_group", "hidden"])]
+    #[arg(conflicts_with = "points_ply")]
+    points: Option<PathBuf>,
+    /// Paths a point of --points
+    #[arg(long, value_name = "N", default_value = "65536", conflicts_with = "solution")]
+    #[arg(value_parser = value::<NonZeroUsize>("a whole number above 0"))]
+    paths: NonZeroUsize,
+    #[command(flatten)]
+    reading: SceneOptions,
 }
 
-enum What {
-    Solution { ply: PathBuf, points_ply: Option<PathBuf> },
-    Points { json: PathBuf, paths: usize },
-}
-
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    options.run()?;
-    args::end()
-}
+/// A limit of time; none for no limit.
+type Limit = Option<Duration>;
 
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let (mut files, mut csv, mut points_ply) = (vec![], None, None);
-        let (mut points, mut paths) = (None, None);
-        let (mut only_solution, mut settings) = (false, Settings::default());
-        let mut reading = SceneOptions::default();
-        while let Some(arg) = parser.next()? {
-            only_solution |=
-                matches!(arg, Long("precision" | "time" | "places" | "hidden" | "points-ply"));
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("precision") => {
-                    settings.precision = args::value(parser, "precision", "a number")?;
-                }
-                Long("time") => settings.time = time(parser)?,
-                Long("places") => {
-                    settings.points_per_group = args::value(parser, "places", "a whole number")?;
-                }
-                Long("hidden") => settings.hidden = true,
-                Long("seed") => settings.seed = args::value(parser, "seed", "a whole number")?,
-                Long("csv") => csv = Some(PathBuf::from(parser.value()?)),
-                Long("points-ply") => points_ply = Some(PathBuf::from(parser.value()?)),
-                Long("points") => points = Some(PathBuf::from(parser.value()?)),
-                Long("paths") => {
-                    let expected = "a whole number above 0";
-                    paths = Some(args::value::<NonZeroUsize>(parser, "paths", expected)?);
-                }
-                Value(path) => files.push(PathBuf::from(path)),
-                Long(name) => {
-                    let name = name.to_string();
-                    if !reading.option(&name, parser)? {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        let what = match points {
-            Some(json) => {
-                if only_solution {
-                    let options = "--precision, --time, --places, --hidden and --points-ply";
-                    return Err(Stop::usage(format!("{options} are for a solution")));
-                }
-                What::Points { json, paths: paths.map_or(DEFAULT_PATHS, NonZeroUsize::get) }
-            }
-            None if paths.is_some() => return Err(Stop::usage("--paths is for --points")),
-            None if files.len() < 2 => {
-                return Err(Stop::usage("give an OBJ file and the PLY file of its solution"));
-            }
-            None => What::Solution { ply: files.remove(1), points_ply },
-        };
-        Ok(Options { scene: args::only_scene(files)?, reading, settings, csv, what })
-    }
-
-    fn run(&self) -> Result<(), Error> {
-        let points_ply = match &self.what {
-            What::Solution { points_ply, .. } => points_ply.as_ref(),
-            What::Points { .. } => None,
-        };
-        for file in self.csv.iter().chain(points_ply) {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), Stop> {
+        for file in self.csv.iter().chain(&self.points_ply) {
             args::check_writable(file)?;
         }
-        let scene = progress::of_reading(&self.scene, || {
-            Ok::<_, Error>(self.reading.load(&self.scene)?.resolve_sides())
-        })?;
-        self.reading.print_warnings(&scene);
-        match &self.what {
-            What::Solution { ply, points_ply } => self.verify(&scene, ply, points_ply.as_deref()),
-            What::Points { json, paths } => {
+        let Input { scene, luminaires, .. } = self.reading.read(&self.scene)?;
+        match (&self.points, &self.solution) {
+            (Some(json), _) => {
                 let points = Points::read(json)?;
-                let traced = points.trace(&scene, *paths, self.settings.seed, json)?;
+                let traced = points.trace(&scene, self.paths.get(), self.seed, json)?;
                 say!("{}", traced.summary());
-                self.csv.iter().try_for_each(|f| args::write_file(f, traced.csv().as_bytes()))
+                if let Some(file) = &self.csv {
+                    args::write_file(file, traced.csv().as_bytes())?;
+                }
             }
+            (None, Some(ply)) => self.verify(&scene, &luminaires, ply)?,
+            (None, None) => return Err(Stop::usage("give the PLY file of a solution")),
         }
+        args::end()
     }
 
-    fn verify(&self, scene: &Scene, ply: &Path, points_ply: Option<&Path>) -> Result<(), Error> {
+    fn settings(&self) -> Settings {
+        let mut settings = Settings::default();
+        settings.seed = self.seed;
+        settings.precision = self.precision;
+        settings.points_per_group = self.points_per_group;
+        settings.time = self.time;
+        settings.hidden = self.hidden;
+        settings
+    }
+
+    fn verify(&self, scene: &Scene, luminaires: &Luminaires, ply: &Path) -> Result<(), Error> {
         let start = Instant::now();
         let solution = progress::of_reading(ply, || read_ply(ply))?;
         let told = Told::of(&solution, ply);
         told.check_sky(scene, self.reading.sky.words(scene), ply)?;
-        told.check_luminaires(&self.reading.luminaires.report(), ply)?;
+        told.check_luminaires(&luminaires.report(), ply)?;
         interrupt::catch();
         let found = progress::of_count("points", |report| {
-            verify(scene, &solution, &self.settings, |progress| {
+            verify(scene, &solution, &self.settings(), |progress| {
                 report(progress.done, progress.of)?;
                 interrupt::flow()
             })
@@ -181,15 +136,16 @@ impl Options {
         if let Some(file) = &self.csv {
             args::write_file(file, csv(&lines).as_bytes())?;
         }
-        points_ply
-            .map_or(Ok(()), |file| args::write_file(file, points::coloured_ply(&found).as_bytes()))
+        self.points_ply
+            .iter()
+            .try_for_each(|file| args::write_file(file, points::coloured_ply(&found).as_bytes()))
     }
 
     /// How it ended, and what deserves a look.
     fn end(&self, found: &Verification, spent: Duration) -> String {
-        let why = match (found.stop, self.settings.time) {
+        let why = match (found.stop, self.time) {
             (Reason::Precise, _) => {
-                format!("known to {} % of itself", (100.0 * self.settings.precision) as f32)
+                format!("known to {} % of itself", (100.0 * self.precision) as f32)
             }
             (Reason::Negligible, _) => "negligible".into(),
             (Reason::Time, Some(time)) => {
@@ -202,9 +158,9 @@ impl Options {
         let mut end = format!(
             "{why}; {points} points, {paths} paths each, {:.1} s, seed {}",
             spent.as_secs_f64(),
-            self.settings.seed
+            self.seed
         );
-        if found.hidden_share > 0.0 && !self.settings.hidden {
+        if found.hidden_share > 0.0 && !self.hidden {
             let with_it = found.error_with_hidden.map_or(0.0, |error| error.value);
             let _ = write!(
                 end,
@@ -225,15 +181,12 @@ impl Options {
     }
 }
 
-/// The limit of `--time`; none for inf.
-fn time(parser: &mut lexopt::Parser) -> Result<Option<Duration>, Stop> {
-    let expected = "seconds, such as 10, or inf";
-    let seconds: f64 = args::value(parser, "time", expected)?;
-    if seconds == f64::INFINITY {
-        return Ok(None);
-    }
-    let time = Duration::try_from_secs_f64(seconds);
-    time.map(Some).map_err(|_| args::wrong_value("time", &seconds.to_string(), expected))
+fn time(text: &str) -> Parsed<Limit> {
+    let limit = |seconds: f64| match seconds {
+        f64::INFINITY => Some(None),
+        _ => Duration::try_from_secs_f64(seconds).ok().map(Some),
+    };
+    text.parse().ok().and_then(limit).ok_or_else(|| give("seconds, such as 10, or inf"))
 }
 
 /// Twice what an error is rounded by in the comment of a PLY file.

@@ -10,55 +10,16 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use files::Format;
-use lexopt::prelude::*;
+use clap::Args;
+use files::MatrixOptions;
 use radiosity::backend::AdapterInfo;
+use radiosity::io::SpecularSurfaces;
 use radiosity::scene::WarningKind;
 use radiosity::view_factor::{ErrorStats, Estimate};
-use radiosity::{BakeSettings, Error, ErrorKind, Mesh, Scene, ViewFactors, Warning};
+use radiosity::{BakeSettings, Error, ErrorKind, Mesh, ObjSettings, Scene, ViewFactors, Warning};
 
-use crate::args::{self, Device, Stop};
+use crate::args::{self, DeviceOptions, Stop, value};
 use crate::progress;
-use crate::scene_options::SceneOptions;
-
-pub const USAGE: &str = "\
-usage: radiosity view-factors SCENE.obj… [--facets] [--error E] [--two-sided NAME]… [--check ROWS]
-                    [--checkpoint FILE] [--memory GIB] [--enforce] [--format F,…] [--out DIR]
-       radiosity view-factors SCENE.obj --rows A..B [--facets] [--error E] [--two-sided NAME]…
-                    [--checkpoint FILE] [--out DIR]
-       radiosity view-factors SCENE.obj… --sampled [--facets] [--element-size X] [--hemicube N]
-                    [--adapter NAME | --cpu] [--enforce] [--format F,…] [--out DIR]
-
-Writes the view factors between the groups (or objects) of each file beside it, or in DIR, and
-prints them with their standard errors and what raw numbers say of closure, reciprocity and bounds.
-F[i, j] is the share of the flux leaving group i (row) that arrives at group j (column); `open` is
-what leaves the scene, `back` what meets the backs of surfaces.
-
-  --facets          between faces instead: each is a group of its own, in the file's order, named
-                    GROUP/1, GROUP/2, …; --two-sided takes the names of GROUPs too
-  --error E         absolute error wanted of every factor, two standard errors [1e-4]; far
-                    smaller errors where exact factors take no minutes
-  --two-sided NAME  this group gives and takes on both sides; its area is that of both
-  --check ROWS      hold so many rows, drawn at random, against exact ones, and print how far off
-                    they are; an exact row of a large scene takes seconds
-  --rows A..B       only rows A to B − 1, counted from 0, to SCENE.A-B.rows: for many machines;
-                    `radiosity merge` makes a matrix of all of them
-  --checkpoint FILE keep the rows that are done there, every few seconds and at Ctrl-C; go on from
-                    it if it is there
-  --memory GIB      predict how many factors there will be, and refuse what would take more
-  --enforce         make the matrix keep closure and reciprocity, and say what that changed
-  --format F,…      csv: the matrix, SCENE.csv; list: nonzeros with standard errors and areas,
-                    SCENE.list.csv; mtx: Matrix Market, SCENE.mtx; npy: SCENE.npy, a square array of
-                    f_from_row_to_column and standard_error; npz: sparse rows as SciPy's load_npz
-                    reads them, with standard errors, areas, open and back, SCENE.npz; square
-                    tables have 8192 groups at most [csv,list, or npz for more]
-  --sampled         from hemicubes, one an element: for scenes of more than some ten thousand
-                    polygons; the error is what it is
-  --element-size X  longest edge of the elements that are seen from [diagonal / 32]
-  --hemicube N      pixels along an edge of a hemicube's top face, even [128]
-  --adapter NAME    a graphics adapter with NAME in its name
-  --cpu             rays on the CPU instead of hemicubes, N squared a row
-  --strict          refuse what would be repaired in the file";
 
 /// Groups whose factors are printed at most.
 pub const MAX_PRINTED: usize = 16;
@@ -66,169 +27,121 @@ pub const MAX_PRINTED: usize = 16;
 /// Above the rounding of a sum of thousands of factors.
 const ROUNDING_OF_SUMS: f64 = 1e-12;
 
-/// Absolute error of a factor where none is asked for.
-const DEFAULT_ERROR: f64 = 1e-4;
-
-/// Pixels along an edge of a hemicube's top face where none are asked for.
-const DEFAULT_HEMICUBE: u32 = 128;
-
-/// What is asked of the command.
-struct Options {
+/// Makes view factors between the groups of scenes
+#[derive(Args)]
+#[command(mut_arg("cpu", |arg| arg.requires("sampled")))]
+#[command(mut_arg("adapter", |arg| arg.requires("sampled")))]
+#[command(after_help = "\
+Writes the view factors of each file and prints them, with standard errors and with closure, \
+reciprocity and bounds of the raw numbers. F[i, j] is the share of the flux leaving group i (row) \
+that arrives at group j (column); `open` is the share that leaves the scene, `back` the share that \
+arrives at the backs of surfaces.")]
+pub struct Options {
+    /// Scenes, OBJ files
+    #[arg(value_name = "SCENE.obj", required = true)]
     scenes: Vec<PathBuf>,
-    reading: SceneOptions,
-    /// The folder for files, or none for that of each scene.
+    #[command(flatten)]
+    to_error: ToError,
+    /// Compare this number of rows, drawn at random, with exact ones, and print their errors; an
+    /// exact row of a large scene takes seconds
+    #[arg(long, value_name = "ROWS", value_parser = value::<usize>("a whole number of rows"))]
+    #[arg(default_value = "0", hide_default_value = true)]
+    check: usize,
+    /// Make only rows A to B − 1, counted from 0, and write SCENE.A-B.rows: for several machines;
+    /// `radiosity merge` makes a matrix of all rows
+    #[arg(long, value_name = "A..B", value_parser = rows::range)]
+    #[arg(conflicts_with_all = ["check", "enforce", "formats"])]
+    rows: Option<Range<usize>>,
+    #[command(flatten)]
+    matrix: MatrixOptions,
+    /// Folder for the files [default: that of each scene]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// None for what suits the number of groups.
-    formats: Option<Vec<Format>>,
-    enforce: bool,
-    method: Method,
-}
-
-enum Method {
-    ToError { to_error: ToError, check: usize, rows: Option<Range<usize>> },
-    Sampled { element_size: Option<f64>, hemicube: u32, device: Device },
+    /// Sample the factors, with hemicubes or rays at each element: for scenes of more than some ten
+    /// thousand polygons; the error is not controlled
+    #[arg(long)]
+    #[arg(conflicts_with_all = ["error", "two_sided", "check", "memory", "rows", "checkpoint"])]
+    sampled: bool,
+    /// Longest edge of the elements that are sampled, scene unit [default: diagonal / 32]
+    #[arg(long, value_name = "X", requires = "sampled", value_parser = value::<f64>("a number"))]
+    element_size: Option<f64>,
+    /// Pixels along an edge of a hemicube's top face, even; of rays on the CPU, the square root of
+    /// their number
+    #[arg(long, value_name = "N", requires = "sampled", default_value = "128")]
+    #[arg(value_parser = value::<u32>("a whole number of pixels"))]
+    hemicube: u32,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// View factors to an error that is asked for.
+#[derive(Args)]
 pub struct ToError {
-    /// Standard errors are half of it at most.
-    pub error: f64,
-    /// Names of groups.
-    pub two_sided: Vec<String>,
-    /// Whether each face is a group, and `two_sided` may name those of the file.
-    pub facets: bool,
-    /// Where rows that are done are kept.
-    pub checkpoint: Option<PathBuf>,
-    /// Memory that it may take, GiB.
-    pub memory: Option<f64>,
+    /// Each face is a group, named GROUP/1, GROUP/2, … in the order of the file; --two-sided takes
+    /// GROUP too
+    #[arg(long)]
+    facets: bool,
+    /// Absolute error of every factor, two standard errors
+    #[arg(long, value_name = "E", default_value = "1e-4", value_parser = value::<f64>("a number"))]
+    error: f64,
+    /// Group that emits and receives on both sides; its area is that of both; may be repeated
+    #[arg(long, value_name = "GROUP")]
+    two_sided: Vec<String>,
+    /// File that the finished rows are kept in, every few seconds and at Ctrl-C; it is resumed from
+    /// where it exists
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Predict the memory of the factors, and refuse more than this
+    #[arg(long, value_name = "GIB", value_parser = rows::memory)]
+    memory: Option<f64>,
+    /// Refuse a file that would have to be repaired
+    #[arg(long)]
+    strict: bool,
 }
 
-impl Default for ToError {
-    fn default() -> ToError {
-        ToError {
-            error: DEFAULT_ERROR,
-            two_sided: vec![],
-            facets: false,
-            checkpoint: None,
-            memory: None,
-        }
+impl ToError {
+    /// The scene of an OBJ file, in which mirrors and glass are surfaces as all others are.
+    pub fn scene(&self, path: &Path) -> Result<Scene, Error> {
+        let mut obj = ObjSettings::default();
+        obj.specular = SpecularSurfaces::Ignore;
+        obj.facets = self.facets;
+        obj.strict = self.strict;
+        progress::of_reading(path, || obj.load(path))
     }
-}
-
-/// Runs the command: all scenes, whatever becomes of the others.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let options = Options::parse(parser)?;
-    let mut failed = false;
-    for scene in &options.scenes {
-        match options.run(scene) {
-            Ok(()) => {}
-            Err(Stop::Failed(e)) => {
-                eprintln!("error: {e}");
-                failed = true;
-            }
-            Err(stop) => return Err(stop),
-        }
-    }
-    if failed { Err(Stop::Reported) } else { Ok(()) }
 }
 
 impl Options {
-    fn parse(parser: &mut lexopt::Parser) -> Result<Options, Stop> {
-        let (mut scenes, mut out, mut enforce) = (vec![], None, false);
-        let mut formats = None;
-        let (mut error, mut two_sided, mut check) = (None, vec![], None);
-        let (mut sampled, mut element_size, mut hemicube) = (false, None, None);
-        let (mut device, mut facets) = (None, false);
-        let (mut rows, mut checkpoint, mut memory) = (None, None, None);
-        let mut reading = SceneOptions::ignoring_specular();
-        while let Some(arg) = parser.next()? {
-            match arg {
-                Long("help") | Short('h') => return Err(Stop::Help),
-                Long("out") => out = Some(parser.value()?.into()),
-                Long("format") => formats = Some(Format::list(parser)?),
-                Long("facets") => {
-                    facets = true;
-                    reading.by_facets();
-                }
-                Long("enforce") => enforce = true,
-                Long("error") => error = Some(args::value(parser, "error", "a number")?),
-                Long("check") => {
-                    check = Some(args::value(parser, "check", "a whole number of rows")?);
-                }
-                Long("rows") => rows = Some(rows::range(parser)?),
-                Long("memory") => memory = Some(rows::memory(parser)?),
-                Long("checkpoint") => checkpoint = Some(parser.value()?.into()),
-                Long("two-sided") => {
-                    two_sided.push(args::value(parser, "two-sided", "a group's name")?);
-                }
-                Long("sampled") => sampled = true,
-                Long("element-size") => {
-                    element_size = Some(args::value(parser, "element-size", "a number")?);
-                }
-                Long("hemicube") => {
-                    hemicube = Some(args::value(parser, "hemicube", "a whole number of pixels")?);
-                }
-                Long("adapter") => device = Some(Device::named(parser)?),
-                Long("cpu") => device = Some(Device::Cpu),
-                Value(path) => scenes.push(path.into()),
-                Long(name) => {
-                    let name = name.to_string();
-                    // Factors are of fronts, and --two-sided names the groups with two.
-                    if matches!(&*name, "sides" | "specular" | "luminaire" | "luminaires")
-                        || !reading.option(&name, parser)?
-                    {
-                        return Err(Long(&name).unexpected().into());
-                    }
-                }
-                _ => return Err(arg.unexpected().into()),
-            }
-        }
-        if scenes.is_empty() {
-            return Err(Stop::usage("no scene given: name one or more OBJ files"));
-        }
-        if checkpoint.is_some() && scenes.len() > 1 {
+    /// Runs the command: all scenes, whatever becomes of the others.
+    pub fn run(self) -> Result<(), Stop> {
+        if self.to_error.checkpoint.is_some() && self.scenes.len() > 1 {
             return Err(Stop::usage("--checkpoint keeps the rows of one scene"));
         }
-        if rows.is_some() && (check.is_some() || enforce || formats.is_some()) {
-            let needing = "--check, --enforce and --format need all rows: `radiosity merge`";
-            return Err(Stop::usage(needing));
+        let mut failed = false;
+        for scene in &self.scenes {
+            match self.run_scene(scene) {
+                Ok(()) => {}
+                Err(Stop::Failed(e)) => {
+                    eprintln!("error: {e}");
+                    failed = true;
+                }
+                Err(stop) => return Err(stop),
+            }
         }
-        let is_kept = rows.is_some() || checkpoint.is_some();
-        let is_sized = check.is_some() || memory.is_some();
-        let only_to_error = error.is_some() || !two_sided.is_empty() || is_sized || is_kept;
-        let only_sampled = element_size.is_some() || hemicube.is_some() || device.is_some();
-        let method = if sampled {
-            if only_to_error {
-                let not_for = "--error, --two-sided, --check, --memory, --rows and --checkpoint \
-                               are not for --sampled";
-                return Err(Stop::usage(not_for));
-            }
-            let hemicube = hemicube.unwrap_or(DEFAULT_HEMICUBE);
-            let device = device.unwrap_or(Device::Gpu(None));
-            Method::Sampled { element_size, hemicube, device }
-        } else {
-            if only_sampled {
-                let needing = "--element-size, --hemicube, --adapter and --cpu need --sampled";
-                return Err(Stop::usage(needing));
-            }
-            let error = error.unwrap_or(DEFAULT_ERROR);
-            let to_error = ToError { error, two_sided, facets, checkpoint, memory };
-            Method::ToError { to_error, check: check.unwrap_or(0), rows }
-        };
-        Ok(Options { scenes, reading, out, formats, enforce, method })
+        if failed { Err(Stop::Reported) } else { Ok(()) }
     }
 
-    fn run(&self, path: &Path) -> Result<(), Stop> {
+    fn run_scene(&self, path: &Path) -> Result<(), Stop> {
         let stem = match (&self.out, path.file_stem()) {
             (Some(folder), Some(name)) => folder.join(name),
             _ => path.with_extension(""),
         };
-        for format in self.formats.iter().flatten() {
+        for format in self.matrix.formats.iter().flatten() {
             args::check_writable(&format.path(&stem))?;
         }
-        let scene = progress::of_reading(path, || self.reading.load(path))?;
+        let scene = self.to_error.scene(path)?;
         let groups = scene.groups().len();
-        let formats = self.formats.clone().unwrap_or_else(|| Format::default_for(groups));
+        let formats =
+            self.matrix.formats.clone().unwrap_or_else(|| files::Format::default_for(groups));
         for format in &formats {
             format.check(groups)?;
             args::check_writable(&format.path(&stem))?;
@@ -239,26 +152,53 @@ impl Options {
         for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
             eprintln!("warning: {warning}");
         }
-        if let Method::ToError { to_error, rows: Some(rows), .. } = &self.method {
-            return to_error.write_rows(&scene, rows.clone(), &stem);
+        if let Some(rows) = &self.rows {
+            return self.to_error.write_rows(&scene, rows.clone(), &stem);
         }
         let start = Instant::now();
-        let mut matrix = self.method.matrix(&scene)?;
+        let mut matrix = self.factors(&scene)?;
         let seconds = start.elapsed().as_secs_f64();
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
         let groups = matrix.names.len();
         say!("{}: {groups} groups, {nonzeros} nonzeros, {seconds:.3} s", path.display());
         print_checks(&matrix);
-        self.method.check(&scene, &matrix)?;
-        if self.enforce {
+        self.check(&scene, &matrix)?;
+        if self.matrix.enforce {
             matrix = enforce(&matrix);
         }
         Ok(write_all(&formats, &stem, &matrix)?)
     }
+
+    /// The view factors between the groups of `scene`.
+    fn factors(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
+        if !self.sampled {
+            return self.to_error.matrix(scene);
+        }
+        let default = || BakeSettings::elements_only(scene).solve.element_size;
+        let mesh = Mesh::new(scene.clone(), self.element_size.unwrap_or_else(default))?;
+        let device = self.device.open()?;
+        let mut rows = device.rows(&mesh, self.hemicube, NonZeroU32::MIN)?;
+        let AdapterInfo { name, kind, .. } = device.adapter();
+        say!("{} elements, {name} ({kind})", mesh.element_count());
+        let matrix = progress::of_count("elements", |report| {
+            ViewFactors::sampled(&mesh, &mut rows, report)
+        })?;
+        matrix.ok_or(Stop::Interrupted)
+    }
+
+    /// Compares rows of `matrix` with exact ones, if that was asked for.
+    fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Stop> {
+        let ToError { error, two_sided, facets, .. } = &self.to_error;
+        if self.check == 0 {
+            return Ok(());
+        }
+        let groups = group_indices(scene, two_sided, *facets)?;
+        check::check(scene, matrix, *error, &groups, self.check)
+    }
 }
 
 /// Prints the factors if they are few, and writes them in all of `formats`.
-fn write_all(formats: &[Format], stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
+fn write_all(formats: &[files::Format], stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
     if matrix.names.len() <= MAX_PRINTED {
         print_factors(matrix);
     }
@@ -266,39 +206,6 @@ fn write_all(formats: &[Format], stem: &Path, matrix: &ViewFactors) -> Result<()
         progress::of_writing(&format.path(stem), |_| format.write(stem, matrix))?;
     }
     Ok(())
-}
-
-impl Method {
-    /// The view factors between the groups of `scene`.
-    fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
-        let matrix = match self {
-            Method::ToError { to_error, .. } => return to_error.matrix(scene),
-            Method::Sampled { element_size, hemicube, device } => {
-                let size = element_size
-                    .unwrap_or_else(|| BakeSettings::elements_only(scene).solve.element_size);
-                let mesh = Mesh::new(scene.clone(), size)?;
-                let device = device.open()?;
-                let mut rows = device.rows(&mesh, *hemicube, NonZeroU32::MIN)?;
-                let AdapterInfo { name, kind, .. } = device.adapter();
-                say!("{} elements, {name} ({kind})", mesh.element_count());
-                progress::of_count("elements", |report| {
-                    ViewFactors::sampled(&mesh, &mut rows, report)
-                })?
-            }
-        };
-        matrix.ok_or(Stop::Interrupted)
-    }
-
-    /// Holds as many rows of `matrix` as are asked for against exact ones.
-    fn check(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Stop> {
-        match self {
-            Method::ToError { to_error, check: rows @ 1.., .. } => {
-                let groups = group_indices(scene, &to_error.two_sided, to_error.facets)?;
-                check::check(scene, matrix, to_error.error, &groups, *rows)
-            }
-            _ => Ok(()),
-        }
-    }
 }
 
 /// Makes the matrix keep closure and reciprocity, and prints what that changed.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::glam::DVec3;
 use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
@@ -10,7 +10,7 @@ use radiosity::{
     RadianceImage, VertexMesh, write_exr, write_glb,
 };
 
-use crate::args::{self, Stop};
+use crate::args::{self, List, Names, Parsed, give, numbers, some_of, value};
 use crate::bake::bands;
 use crate::progress;
 
@@ -32,7 +32,7 @@ enum Format {
     Csv,
 }
 
-const FORMATS: [(&str, Format); 6] = [
+const FORMATS: Names<Format> = &[
     ("ply", Format::Ply),
     ("glb", Format::Glb),
     ("json", Format::Json),
@@ -42,21 +42,37 @@ const FORMATS: [(&str, Format); 6] = [
 ];
 
 /// What to write, and where.
+#[derive(Args)]
+#[command(next_help_heading = "Files")]
 pub struct Files {
-    /// Where the files go, as it is given.
+    /// Path of the files without their endings, or a folder for files of the scene's name [default:
+    /// the scene without its ending]
+    #[arg(short, long, value_name = "STEM")]
     out: Option<PathBuf>,
     /// Path of the files without their ending.
+    #[arg(skip)]
     stem: PathBuf,
-    formats: Vec<Format>,
-    /// The camera of the picture; one is chosen where none is given.
+    /// Files: ply, vertices with radiosity and error; glb, the same for viewers of glTF; json, a
+    /// report; exr and png, a picture; csv, with --bands, a table
+    #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
+    #[arg(default_value = "ply,glb,json,exr,png")]
+    formats: List<Format>,
+    /// Camera of the picture: eye, target, vertical field of view in degrees; and the direction up
+    /// [0,1,0] [default: chosen, and in the report]
+    #[arg(long, value_name = "NUMBERS", value_parser = camera)]
     camera: Option<Camera>,
-    /// Of all colours for viewers; one is chosen where none is given.
+    /// Factor of radiance for the colours of png, glb and ply [default: chosen, and in the report]
+    #[arg(long, value_name = "X", value_parser = value::<f64>("a number"))]
     exposure: Option<f64>,
-    /// Pixels of the picture: width and height.
-    image: (u32, u32),
-    /// Whether the pixels of the picture gather.
+    /// Pixels of the picture
+    #[arg(long, value_name = "W,H", default_value = "512,512")]
+    #[arg(value_parser = numbers::<u32, 2>("2 whole numbers with a comma between them"))]
+    image: [u32; 2],
+    /// Gather the light at each pixel of the picture
+    #[arg(long, hide = true)]
     pixel_gather: bool,
-    /// Whether to write the elements' own values too.
+    /// Write STEM.elements.ply: each element with its own value, constant on the element
+    #[arg(long, hide = true)]
     elements: bool,
 }
 
@@ -69,46 +85,9 @@ pub struct Picture {
 }
 
 impl Files {
-    /// All formats but the table of bands, which is large, at the place that is named after the
-    /// scene later.
-    pub fn new() -> Files {
-        let formats = FORMATS.map(|(_, format)| format).into_iter();
-        Files {
-            out: None,
-            stem: PathBuf::new(),
-            formats: formats.filter(|&format| format != Format::Csv).collect(),
-            camera: None,
-            exposure: None,
-            image: (512, 512),
-            pixel_gather: false,
-            elements: false,
-        }
-    }
-
-    /// Takes an option, if it is one of files.
-    pub fn option(&mut self, name: &str, parser: &mut lexopt::Parser) -> Result<bool, Stop> {
-        match name {
-            "out" => self.out = Some(parser.value()?.into()),
-            "write" => self.formats = args::formats(parser, &FORMATS)?,
-            "camera" => self.camera = Some(camera(parser)?),
-            "exposure" => self.exposure = Some(args::value(parser, "exposure", "a number")?),
-            "image" => {
-                let expected = "2 whole numbers with a comma between them";
-                let [width, height] = args::numbers(parser, "image", expected)?;
-                self.image = (width, height);
-            }
-            "pixel-gather" => self.pixel_gather = true,
-            "elements" => self.elements = true,
-            _ => return Ok(false),
-        }
-        Ok(true)
-    }
-
     /// Names the files after the scene, where they are given no name.
-    pub fn named_after(mut self, scene: &Path) -> Files {
-        let default = scene.with_extension("");
-        self.stem = args::stem(self.out.take(), default, &args::names(&FORMATS));
-        self
+    pub fn name_after(&mut self, scene: &Path) {
+        self.stem = args::stem(self.out.take(), scene.with_extension(""), FORMATS);
     }
 
     /// Whether all of it can be written, before any work is done for it.
@@ -121,7 +100,7 @@ impl Files {
             let remedy = "give a factor above 0, such as the one that a report names";
             return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
         }
-        let (width, height) = self.image;
+        let [width, height] = self.image;
         // The one that will be chosen is good; sizes are checked with any.
         let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
         let any = Camera { eye, target, up, vertical_fov: 90.0 };
@@ -163,7 +142,7 @@ impl Files {
 
     /// The camera where none is given.
     fn framing(&self, baked: &BakeResult) -> Camera {
-        let (width, height) = self.image;
+        let [width, height] = self.image;
         progress::of_stage("choosing a view", || {
             Camera::framing(&baked.light, f64::from(width) / f64::from(height))
         })
@@ -254,7 +233,7 @@ impl Files {
         baked: &BakeResult,
         device: &Backend,
     ) -> Result<RadianceImage, Error> {
-        let (width, height) = self.image;
+        let [width, height] = self.image;
         if !self.pixel_gather {
             return self.interpolated(camera, &baked.light);
         }
@@ -269,7 +248,7 @@ impl Files {
 
     /// The picture by the light between vertices.
     fn interpolated(&self, camera: &Camera, light: &GatheredMesh) -> Result<RadianceImage, Error> {
-        let (width, height) = self.image;
+        let [width, height] = self.image;
         let image = progress::of_count("pixels of the picture", |report| {
             camera.interpolated_image(light, width, height, SAMPLES, report)
         })?;
@@ -278,20 +257,18 @@ impl Files {
 }
 
 /// Eye, target, degrees and, if there are three more numbers, the direction up.
-pub fn camera(parser: &mut lexopt::Parser) -> Result<Camera, Stop> {
-    let text = parser.value()?.string()?;
-    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
-    let (numbers, up) = match numbers.as_deref() {
-        Some([numbers @ .., x, y, z]) if numbers.len() == 7 => (numbers, [*x, *y, *z]),
-        Some(numbers) if numbers.len() == 7 => (numbers, [0.0, 1.0, 0.0]),
-        _ => {
-            let expected = "7 numbers with commas between them, eye, target and degrees, or 10: \
+pub fn camera(text: &str) -> Parsed<Camera> {
+    const EXPECTED: &str = "7 numbers with commas between them, eye, target and degrees, or 10: \
                             the direction up behind them";
-            return Err(args::wrong_value("camera", &text, expected));
-        }
-    };
+    let mut numbers = args::list(EXPECTED)(text)?;
+    if numbers.len() == 7 {
+        numbers.extend([0.0, 1.0, 0.0]);
+    }
+    if numbers.len() != 10 {
+        return Err(give(EXPECTED));
+    }
     let point = |k: usize| DVec3::from_slice(&numbers[k..k + 3]);
-    Ok(Camera { eye: point(0), target: point(3), up: up.into(), vertical_fov: numbers[6] })
+    Ok(Camera { eye: point(0), target: point(3), up: point(7), vertical_fov: numbers[6] })
 }
 
 /// `camera` as the value of `--camera`.

@@ -4,13 +4,14 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use npyz::WriterBuilder;
 use radiosity::io::view_factors::{write_csv_list, write_csv_matrix, write_matrix_market};
 use radiosity::io::write_npz;
 use radiosity::view_factor::Estimate;
 use radiosity::{Error, ErrorKind, ViewFactors};
 
-use crate::args::{self, Stop};
+use crate::args::{List, Names, some_of};
 
 /// Groups of a square table at most: 134 million numbers, some gigabyte of text.
 const MAX_DENSE_GROUPS: usize = 1 << 13;
@@ -24,6 +25,29 @@ pub enum Format {
     Npz,
 }
 
+/// The formats by their names. A list is a CSV file too.
+pub const FORMATS: Names<Format> = &[
+    ("csv", Format::Csv),
+    ("list", Format::List),
+    ("mtx", Format::MatrixMarket),
+    ("npy", Format::Npy),
+    ("npz", Format::Npz),
+];
+
+/// What becomes of a matrix.
+#[derive(Args)]
+pub struct MatrixOptions {
+    /// Change the matrix so that it keeps closure and reciprocity, and print the change
+    #[arg(long)]
+    pub enforce: bool,
+    /// Files: csv, the matrix; list, its nonzeros with standard errors and areas, as CSV; mtx,
+    /// Matrix Market; npy, a square array of f_from_row_to_column and standard_error; npz, sparse
+    /// rows as SciPy's load_npz reads them, with standard errors, areas, open and back. Square
+    /// tables are limited to 8192 groups [default: csv,list; npz for more groups]
+    #[arg(long = "format", value_name = "FORMATS", value_parser = some_of(FORMATS))]
+    pub formats: Option<List<Format>>,
+}
+
 /// One entry of the array in an `.npy` file.
 #[derive(npyz::Serialize, npyz::AutoSerialize)]
 struct Entry {
@@ -32,28 +56,6 @@ struct Entry {
 }
 
 impl Format {
-    /// What files end in.
-    pub const ENDINGS: [&str; 4] = ["csv", "mtx", "npy", "npz"];
-
-    /// The value of `--format`.
-    pub fn list(parser: &mut lexopt::Parser) -> Result<Vec<Format>, Stop> {
-        let expected = "some of csv, list, mtx, npy, npz, with commas between";
-        let text: String = args::value(parser, "format", expected)?;
-        let formats: Option<Vec<Format>> = text.split(',').map(Format::named).collect();
-        formats.ok_or_else(|| args::wrong_value("format", &text, expected))
-    }
-
-    fn named(name: &str) -> Option<Format> {
-        match name {
-            "csv" => Some(Format::Csv),
-            "list" => Some(Format::List),
-            "mtx" => Some(Format::MatrixMarket),
-            "npy" => Some(Format::Npy),
-            "npz" => Some(Format::Npz),
-            _ => None,
-        }
-    }
-
     /// Those that are written unless others are asked for.
     pub fn default_for(groups: usize) -> Vec<Format> {
         if groups <= MAX_DENSE_GROUPS { vec![Format::Csv, Format::List] } else { vec![Format::Npz] }

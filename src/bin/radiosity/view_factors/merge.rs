@@ -2,59 +2,55 @@
 
 use std::path::{Path, PathBuf};
 
-use lexopt::prelude::*;
+use clap::Args;
 use radiosity::Error;
 use radiosity::io::view_factors::read_rows;
 use radiosity::view_factor::PartialMatrix;
 
-use super::files::Format;
+use super::files::{FORMATS, Format, MatrixOptions};
 use super::{enforce, print_checks, write_all};
 use crate::args::{self, Stop};
 use crate::progress;
 
-pub const USAGE: &str = "\
-usage: radiosity merge FILE.rows… [--enforce] [--format F,…] [--out STEM]
+/// Merges rows of view factors from several machines to a matrix
+#[derive(Args)]
+#[command(after_help = "\
+The rows are those of `radiosity view-factors --rows`, of one scene with the same settings. The \
+matrix has the same bytes as one that is made at once.")]
+pub struct Options {
+    /// Files of rows
+    #[arg(value_name = "FILE.rows", required = true)]
+    paths: Vec<PathBuf>,
+    #[command(flatten)]
+    matrix: MatrixOptions,
+    /// Path of the files without their endings [default: that of the first file, without A-B.rows]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+}
 
-Puts rows together that `radiosity view-factors --rows` has written, all of one scene with the same
-settings, and writes the matrix: the same bytes as if one machine had made it.
-
-  --enforce     make the matrix keep closure and reciprocity, and say what that changed
-  --format F,…  as in `radiosity view-factors`
-  --out STEM    path of the files without extension [that of the first file, without A-B.rows]";
-
-/// Runs the command.
-pub fn run(parser: &mut lexopt::Parser) -> Result<(), Stop> {
-    let (mut paths, mut formats, mut out, mut enforced) = (vec![], None, None, false);
-    while let Some(arg) = parser.next()? {
-        match arg {
-            Long("help") | Short('h') => return Err(Stop::Help),
-            Long("enforce") => enforced = true,
-            Long("format") => formats = Some(Format::list(parser)?),
-            Long("out") => out = Some(PathBuf::from(parser.value()?)),
-            Value(path) => paths.push(PathBuf::from(path)),
-            _ => return Err(arg.unexpected().into()),
+impl Options {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), Stop> {
+        let Options { paths, matrix: MatrixOptions { enforce: enforced, formats }, out } = self;
+        // SCENE.A-B.rows
+        let stem = paths[0].with_extension("").with_extension("");
+        let stem = args::stem(out, stem, FORMATS);
+        let parts =
+            paths.iter().map(|path: &PathBuf| progress::of_reading(path, || read_rows(path)));
+        let parts = parts.collect::<Result<Vec<_>, Error>>()?;
+        let mut matrix = PartialMatrix::merge(parts)?.into_matrix()?;
+        let groups = matrix.names.len();
+        let formats = formats.unwrap_or_else(|| Format::default_for(groups));
+        for format in &formats {
+            format.check(groups)?;
+            args::check_writable(&format.path(&stem))?;
         }
+        let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
+        say!("{}: {groups} groups, {nonzeros} nonzeros", Path::new(&stem).display());
+        print_checks(&matrix);
+        if enforced {
+            matrix = enforce(&matrix);
+        }
+        Ok(write_all(&formats, &stem, &matrix)?)
     }
-    let Some(first) = paths.first() else {
-        return Err(Stop::usage("no rows given: name the files that --rows has written"));
-    };
-    // SCENE.A-B.rows
-    let stem = first.with_extension("").with_extension("");
-    let stem = args::stem(out, stem, &Format::ENDINGS);
-    let parts = paths.iter().map(|path: &PathBuf| progress::of_reading(path, || read_rows(path)));
-    let parts = parts.collect::<Result<Vec<_>, Error>>()?;
-    let mut matrix = PartialMatrix::merge(parts)?.into_matrix()?;
-    let groups = matrix.names.len();
-    let formats = formats.unwrap_or_else(|| Format::default_for(groups));
-    for format in &formats {
-        format.check(groups)?;
-        args::check_writable(&format.path(&stem))?;
-    }
-    let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
-    say!("{}: {groups} groups, {nonzeros} nonzeros", Path::new(&stem).display());
-    print_checks(&matrix);
-    if enforced {
-        matrix = enforce(&matrix);
-    }
-    Ok(write_all(&formats, &stem, &matrix)?)
 }

@@ -10,7 +10,7 @@ use radiosity::view_factor::PartialMatrix;
 use radiosity::{Error, ErrorKind, Scene, ViewFactors};
 
 use super::{ToError, group_indices};
-use crate::args::{self, Stop};
+use crate::args::{self, Parsed, Stop, give};
 use crate::{interrupt, progress};
 
 /// Between two writings of what is done: at least, and in times of what the last one took, so that
@@ -18,19 +18,17 @@ use crate::{interrupt, progress};
 const MIN_INTERVAL: Duration = Duration::from_secs(1);
 const WRITINGS: u32 = 20;
 
-/// The value of `--rows`.
-pub fn range(parser: &mut lexopt::Parser) -> Result<Range<usize>, Stop> {
-    let text: String = args::value(parser, "rows", "A..B")?;
+/// `A..B`.
+pub fn range(text: &str) -> Parsed<Range<usize>> {
     let ends = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
     let rising = ends.filter(|range: &Range<usize>| range.start < range.end);
-    rising.ok_or_else(|| args::wrong_value("rows", &text, "A..B, from 0, such as 0..500"))
+    rising.ok_or_else(|| give("A..B, from 0, such as 0..500"))
 }
 
-/// The value of `--memory`, GiB.
-pub fn memory(parser: &mut lexopt::Parser) -> Result<f64, Stop> {
-    let text: String = args::value(parser, "memory", "a number of GiB")?;
+/// GiB.
+pub fn memory(text: &str) -> Parsed<f64> {
     let positive = text.parse().ok().filter(|gib: &f64| *gib > 0.0);
-    positive.ok_or_else(|| args::wrong_value("memory", &text, "GiB, more than 0, such as 8"))
+    positive.ok_or_else(|| give("GiB, more than 0, such as 8"))
 }
 
 impl ToError {
