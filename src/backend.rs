@@ -30,6 +30,7 @@ pub use fallback::Fallback;
 pub use row_maker::RowMaker;
 pub use rows::BackendRows;
 
+use crate::accuracy::Measure;
 use crate::error::{Error, ErrorKind};
 use crate::gather::point_irradiance::rays_for_noise;
 use crate::gather::{Gather, GatheredMesh};
@@ -203,7 +204,7 @@ impl Backend {
             return Err(Error::new(ErrorKind::Setting, "noise", noise.to_string(), remedy));
         }
         let (rays, noise) = rays_for_noise(noise);
-        let dim = light.radiosity_field().radiosity_floor();
+        let dim = light.radiosity_field().radiosity_floor(Measure::default().floor);
         self.gather_or_cast_rays(&light.mesh, (rays, noise, dim), |_| ())
     }
 

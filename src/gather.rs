@@ -167,15 +167,10 @@ impl<G: Gather + ?Sized> Gather for Box<G> {
     }
 }
 
-/// Reflected radiosity below this share of its mean over the area that reflects counts as that much
-/// when errors are made relative, so that the insides of gaps do not take most of the elements.
-/// Chosen by hand.
-pub(crate) const RADIOSITY_FLOOR_SHARE: f64 = 0.05;
-
 impl RadiosityField<'_> {
-    /// Reflected radiosity below which errors are relative to this instead, W/m²: a length over the
-    /// channels. What is darker is not worth most of the elements.
-    pub(crate) fn radiosity_floor(&self) -> f64 {
+    /// Reflected radiosity below which errors are relative to this instead, W/m²: this `share` of
+    /// the mean over the area that reflects; a length over the channels.
+    pub(crate) fn radiosity_floor(&self, share: f64) -> f64 {
         let (mut flux, mut area) = (0.0, f64::MIN_POSITIVE);
         for (e, corners) in self.corners.iter().enumerate() {
             let node = self.mesh.element(e);
@@ -185,7 +180,7 @@ impl RadiosityField<'_> {
                 area += self.mesh.solid_area(node);
             }
         }
-        RADIOSITY_FLOOR_SHARE * flux / area
+        share * flux / area
     }
 
     /// Radiosity that barycentric position (`u`, `v`) of the scene's triangle `t` reflects, W/m²

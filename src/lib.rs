@@ -63,6 +63,7 @@
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
 //! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
 //! | [`light_map`] | irradiance at the texels of a texture |
+//! | [`accuracy`] | the measure of error |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
 //! | [`camera`], [`io`] | pictures; OBJ and PLY in, PLY, GLB, EXR, PNG and tables out |
 //!
@@ -99,6 +100,7 @@
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.
 #![cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
 
+pub mod accuracy;
 pub mod backend;
 pub mod bake;
 pub mod bands;

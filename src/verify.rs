@@ -8,37 +8,14 @@
 //!                                 └── more paths, or more points, by which adds more variance
 //! ```
 //!
-//! # The measure
-//!
-//! Over the area of the surfaces that reflect (reflectance not zero), the root mean square of
-//!
-//! ```text
-//! e = |B_told − B_true| / max(|B_true|, 0.05 m)
-//! ```
-//!
-//! where B is the *reflected* radiosity, that is radiosity minus the material's exitance; lengths
-//! |·| are Euclidean over the three channels; and m is the mean of |B_true| over that area. A
-//! textured point is told and measured with the mean reflectance of its material: that compares the
-//! light, and no detail of the texture, which takes part where paths go on. What emits and does not
-//! reflect has no error and no weight. A group's error is the same root mean square over its own
-//! reflecting area, with the scene's m.
-//!
-//! What is hidden is left out unless asked for ([`Settings::hidden`]): points that see backs in
-//! more than 95 % of their hemisphere, weighted by the cosine; or in more than 5 % of it, and no
-//! light comes to them by 4096 paths or more; or in more than 40 % of it backs nearer than 0.2 % of
-//! the diagonal of where the light is; or whose mean of 1/distance to what they see is above 10 000
-//! over that diagonal. They lie inside a solid, under what stands on them, right behind a plate or
-//! in a crack; nobody sees them, and bakes tell there what would be seen without it. So are points
-//! that see surfaces in less than 1 % of their hemisphere: what the sky gives them is exact. The
-//! mean m is over the points that count: a dark plane of a kilometre makes nothing on it brighter.
-//! The light is in the box around all that reflects, unless all but 1 % of it at either end of each
-//! axis is in one that is four times smaller.
+//! The measure is that of [`accuracy`](crate::accuracy), over the points that are not hidden unless
+//! these are asked for ([`Settings::hidden`]).
 //!
 //! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
-//! has the mean |B_told − B_true|², however noisy they are.
+//! has the mean |B_told − B_true|², however noisy they are. Which points are in the tail is decided
+//! by other paths than those that measure them.
 
 mod emitters;
-mod hidden;
 mod luminaires;
 mod path_tracer;
 mod sampler;
@@ -51,6 +28,7 @@ mod verification;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub use crate::accuracy::Estimate;
 use crate::error::Error;
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
@@ -59,7 +37,6 @@ use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;
 use solution::SolutionLookup;
-pub use statistics::Estimate;
 pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 

@@ -12,6 +12,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("geometry", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
+    ("accuracy", "error"),
     ("visibility", "error geometry sampling scene"),
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),

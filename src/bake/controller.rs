@@ -376,7 +376,8 @@ mod tests {
         let gather = settings();
         let met = ErrorEstimate { total: 0.01, mesh: 0.01, ..ErrorEstimate::default() };
         let missed = ErrorEstimate { total: 0.1, mesh: 0.1, ..met };
-        let group = |group, estimate| GroupError { group, area_share: 0.1, estimate };
+        let group =
+            |group, estimate| GroupError { group, area_share: 0.1, estimate, tail_share: 0.0 };
         let groups = [group(1, met), group(3, missed)];
         for each_group in [false, true] {
             let target = target(0.02, each_group);

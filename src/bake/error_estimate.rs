@@ -1,20 +1,6 @@
 //! The estimated error of a result: statistics of what random points observe.
 //!
-//! **The measure.** Over the area of all surfaces that reflect, the root mean square of
-//!
-//! ```text
-//!   e = |B − B_true| / max(|B_true|, floor)      floor: 5 % of the mean of |B_true|
-//! ```
-//!
-//! with B the reflected radiosity (emission is known and has no error) and | | a length over the
-//! channels. Surfaces that reflect nothing have neither error nor weight. Places that nobody sees
-//! are left out: those that see backs in more than 95 % of their hemisphere, weighted by the
-//! cosine, or in more than 40 % of it backs that nearly touch them, or on average nothing but what
-//! touches them (a mean of 1/distance above 1e4 over the diagonal). They are inside a solid, under
-//! what stands on them, or in a crack. Those that see surfaces in less than 1 % of their hemisphere
-//! are left out too: what the sky gives them is exact, and would hide the error of others. The mean
-//! is over the same places: a dark plane of a kilometre makes nothing on it brighter. A group has
-//! the same figure over its own area, with the floor of the scene.
+//! The measure is that of [`accuracy`](crate::accuracy).
 //!
 //! **How it is estimated.** At each point the reflected radiosity that the vertices interpolate to
 //! is compared with two independent gathers there, `a` and `b`, and with a gather `c` of the result
@@ -28,7 +14,8 @@
 //!
 //! Points are spread over the groups as well as the area: each group is a stratum, and means are
 //! those of the strata, weighted by area. Within a stratum there are more points where errors are
-//! expected, each with the area that it stands for as its weight. The squared error of mesh and
+//! expected, each with the area that it stands for as its weight. The points with the largest
+//! squares are the tail; all that follows is over the others. The squared error of mesh and
 //! sampling is the first, plus one standard error of that mean, less half the noise. Truncation is
 //! the change of all further bounces: the next one times a growth that paths through the change
 //! find, since light that is off in a gap of bright walls stays there. Light not shot is
@@ -39,16 +26,16 @@
 
 use glam::DVec3;
 
+use crate::accuracy::hidden;
+use crate::accuracy::tail::{Trimmed, trimmed};
 use crate::bake::model;
 use crate::gather::refinement_indicator::GAP_DIMNESS;
 use crate::scene::Rgb;
-use crate::visibility::buried;
 
 /// An estimate of the error of vertex radiosity.
 ///
-/// Over the area of all surfaces that reflect, or those of one group: the root mean square of the
-/// error of the reflected radiosity, relative to it, where that counts as no less than 5 % of its
-/// mean over the scene. The squares of the parts add up to that of the total.
+/// By the measure of [`accuracy`](crate::accuracy), over all surfaces that reflect or those of one
+/// group. The squares of the parts add up to that of the total.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ErrorEstimate {
@@ -56,6 +43,8 @@ pub struct ErrorEstimate {
     pub total: f64,
     /// Standard error of the total, since it is found at random points.
     pub uncertainty: f64,
+    /// Root mean square over the tail, which the total leaves out.
+    pub tail: f64,
     /// Radiosity is linear over the faces of the mesh, and light is not.
     pub mesh: f64,
     /// The same at dim points that see surfaces nearer than their element is large, in a gap or at
@@ -98,6 +87,8 @@ pub struct GroupError {
     pub area_share: f64,
     /// The error over its area. [`ErrorEstimate::unshot_bound`] is that of the scene.
     pub estimate: ErrorEstimate,
+    /// Share of the squared errors of the scene's tail that is on the group.
+    pub tail_share: f64,
 }
 
 /// What was found at a random point of the surface.
@@ -145,6 +136,9 @@ pub(super) struct Stratum {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conditions<'a> {
     pub strata: &'a [Stratum],
+    /// The floor of the measure, and the share of the area that is its tail.
+    pub floor: f64,
+    pub tail: f64,
     /// Radiosity below which errors are relative to this instead, W/m².
     pub radiosity_floor: f64,
     /// Mean albedo over the area that scatters light, of the channel in which it is highest.
@@ -180,8 +174,10 @@ pub(super) struct Estimate {
 /// A point's observation, relative to the reflected radiosity there.
 #[derive(Clone, Copy)]
 struct Deviation {
-    /// See [`Observation::weight`].
-    weight: f64,
+    /// Area that the point stands for, scene unit squared.
+    area: f64,
+    /// Share of that area that is not in the tail.
+    kept: f64,
     /// Of the interpolated radiosity from the gathered one.
     interpolation: DVec3,
     /// Squared noise of one gather.
@@ -201,22 +197,21 @@ struct Deviation {
 }
 
 /// The deviations of a stratum that has some.
+#[derive(Clone)]
 struct StratumDeviations {
     stratum: Stratum,
-    /// Its area less that of the excluded points.
-    area: f64,
+    /// Those of its points that are not excluded.
     deviations: Vec<Deviation>,
 }
 
 impl StratumDeviations {
-    /// The same by light: places dimmer than `floor` (W/m²) weigh less in proportion, and their
-    /// errors are relative to it.
+    /// The same by light: points dimmer than `floor` (W/m²) stand for less area in proportion, and
+    /// their errors are relative to it.
     fn by_light(&self, floor: f64) -> StratumDeviations {
-        let weight = |d: &Deviation| (d.reflected / floor).min(1.0);
         let lit = |d: &Deviation| {
             let scale = d.scale / d.reflected.max(floor);
             Deviation {
-                weight: d.weight * weight(d),
+                area: d.area * (d.reflected / floor).min(1.0),
                 interpolation: d.interpolation * scale,
                 noise: d.noise * scale * scale,
                 next: d.next * scale,
@@ -225,9 +220,13 @@ impl StratumDeviations {
                 ..*d
             }
         };
-        let area = self.area * mean(&self.deviations, &weight);
         let deviations = self.deviations.iter().map(lit).collect();
-        StratumDeviations { stratum: self.stratum, area, deviations }
+        StratumDeviations { stratum: self.stratum, deviations }
+    }
+
+    /// Area of its points, scene unit squared.
+    fn area(&self) -> f64 {
+        self.deviations.iter().map(|d| d.area).sum()
     }
 }
 
@@ -237,40 +236,67 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     let mut all: Vec<StratumDeviations> = conditions
         .strata
         .iter()
-        .map(|&stratum| StratumDeviations { stratum, area: 0.0, deviations: vec![] })
+        .map(|&stratum| StratumDeviations { stratum, deviations: vec![] })
         .collect();
     for observation in observations {
         observed[observation.stratum] += observation.weight;
         all[observation.stratum].deviations.extend(observation.deviation(conditions));
     }
     for (stratum, observed) in all.iter_mut().zip(observed) {
-        let used: f64 = stratum.deviations.iter().map(|d| d.weight).sum();
-        stratum.area = if used > 0.0 { stratum.stratum.area * used / observed } else { 0.0 };
+        let per_weight = if observed > 0.0 { stratum.stratum.area / observed } else { 0.0 };
+        stratum.deviations.iter_mut().for_each(|d| d.area *= per_weight);
     }
-    all.retain(|stratum| stratum.area > 0.0);
+    all.retain(|stratum| stratum.area() > 0.0);
     let passed = passed_share(observations, conditions);
     let further = FurtherBounces::new(&Means(&all), conditions);
-    let parts = |strata: &[StratumDeviations], standard_errors: f64| {
-        parts(strata, further, passed, standard_errors, conditions)
+    let parts = |strata: &mut [StratumDeviations], standard_errors: f64| {
+        let tail = split_off_tail(strata, &further, conditions.tail);
+        parts(strata, further, passed, (standard_errors, tail), conditions)
     };
-    let whole = parts(&all, 1.0);
-    let lit_floor = lit_floor(&Means(&all));
+    let lit_floor = lit_floor(&Means(&all), conditions);
     let mut lit: Vec<StratumDeviations> = all.iter().map(|s| s.by_light(lit_floor)).collect();
-    lit.retain(|stratum| stratum.area > 0.0);
-    let by_light = parts(&lit, 1.0);
-    let area: f64 = all.iter().map(|stratum| stratum.area).sum();
-    let groups = all.iter().filter_map(|one| {
+    lit.retain(|stratum| stratum.area() > 0.0);
+    let by_light = parts(&mut lit, 1.0);
+    let whole = parts(&mut all, 1.0);
+    let area: f64 = all.iter().map(StratumDeviations::area).sum();
+    let tails: Vec<f64> = all.iter().map(|stratum| tail_square(stratum, &further)).collect();
+    let of_all: f64 = tails.iter().sum();
+    let groups = all.iter().zip(tails).filter_map(|(one, tail)| {
         let group = one.stratum.group?;
-        let estimate = parts(std::slice::from_ref(one), 0.0);
-        Some(GroupError { group, area_share: one.area / area, estimate })
+        let estimate = parts(&mut [one.clone()], 0.0);
+        let tail_share = if of_all > 0.0 { tail / of_all } else { 0.0 };
+        Some(GroupError { group, area_share: one.area() / area, estimate, tail_share })
     });
+    let groups = groups.collect();
     let residual = Means(&all).of(|d| d.residual);
     let even = whole.sampling.powi(2) + whole.truncation.powi(2) + whole.unshot.powi(2);
     let spread = ErrorSpread {
         per_residual: whole.mesh.hypot(whole.gaps) / residual.max(1e-30).sqrt(),
         even: even.sqrt(),
     };
-    Estimate { groups: groups.collect(), whole, by_light, spread }
+    Estimate { groups, whole, by_light, spread }
+}
+
+/// Splits the points with the largest errors off, a share `tail` of the area; the squared error at
+/// the cut.
+fn split_off_tail(strata: &mut [StratumDeviations], further: &FurtherBounces, tail: f64) -> f64 {
+    let point = |d: &Deviation| (d.area, further.error_square(d));
+    let points: Vec<(f64, f64)> =
+        strata.iter().flat_map(|s| s.deviations.iter().map(point)).collect();
+    let Trimmed { kept, cut } = trimmed(&points, tail);
+    let deviations = strata.iter_mut().flat_map(|s| &mut s.deviations);
+    deviations.zip(kept).for_each(|(deviation, kept)| deviation.kept = kept);
+    cut
+}
+
+/// Squared error times area that the points of a stratum have in the tail; without the noise of
+/// the gathers, as far as that is known.
+fn tail_square(stratum: &StratumDeviations, further: &FurtherBounces) -> f64 {
+    let of_point = |d: &Deviation| {
+        let square = further.error_square(d) - model::HALF * d.noise;
+        d.area * (1.0 - d.kept) * square.max(0.0)
+    };
+    stratum.deviations.iter().map(of_point).sum()
 }
 
 /// Mean length of the reflected radiosity that was gathered at the points that are not excluded, by
@@ -292,19 +318,19 @@ pub(super) fn mean_reflected(observations: &[Observation], strata: &[Stratum]) -
 
 /// [`StratumDeviations::by_light`]'s floor, W/m²: as that of the measure, of the mean radiosity
 /// that a reflected photon leaves.
-fn lit_floor(means: &Means) -> f64 {
+fn lit_floor(means: &Means, conditions: &Conditions) -> f64 {
     let (flux, square) = (means.of(|d| d.reflected), means.of(|d| d.reflected.powi(2)));
     let mean = if flux > 0.0 { square / flux } else { 0.0 };
-    (model::RADIOSITY_FLOOR * mean).max(f64::MIN_POSITIVE)
+    (conditions.floor * mean).max(f64::MIN_POSITIVE)
 }
 
-/// All parts over `strata`, with so many standard errors added to what scatters most; `passed` is
-/// the share of the unshot light that bounces keep.
+/// All parts over `strata`, with so many standard errors added to what scatters most, and cut off
+/// from the tail at this square; `passed` is the share of the unshot light that bounces keep.
 fn parts(
     strata: &[StratumDeviations],
     further: FurtherBounces,
     passed: f64,
-    standard_errors: f64,
+    (standard_errors, cut): (f64, f64),
     conditions: &Conditions,
 ) -> ErrorEstimate {
     let means = Means(strata);
@@ -313,24 +339,28 @@ fn parts(
         let square =
             |d: &Deviation| if d.in_gap == in_gap { d.interpolation.length_squared() } else { 0.0 };
         // The largest errors are at rare points.
-        let squares = means.of(square) + standard_errors * means.standard_error(square);
+        let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
         ((squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares), noise)
     };
     let (interpolation, noise) = share_of(false);
     let (gaps, _) = share_of(true);
     let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
     let mesh = interpolation - sampling;
-    let area: f64 = strata.iter().map(|s| s.area).sum::<f64>().max(f64::MIN_POSITIVE);
+    let area: f64 = strata.iter().map(StratumDeviations::area).sum();
+    let area = area.max(f64::MIN_POSITIVE);
     // Folded from +0: the sum of nothing is -0, which is printed as such.
-    let ambient = strata.iter().fold(0.0, |sum, s| sum + s.stratum.ambient * s.area) / area;
+    let ambient = strata.iter().fold(0.0, |sum, s| sum + s.stratum.ambient * s.area()) / area;
     let unshot = ambient * passed * passed;
     // Light that was not shot is a part of what further bounces add.
     let truncation = (means.of(|d| further.square(d)) - unshot).max(0.0);
     let total = (interpolation + gaps + truncation + unshot).sqrt();
-    let scatter = means.standard_error(|d| d.interpolation.length_squared() + further.square(d));
+    let scatter = means.standard_error(cut, |d| further.error_square(d));
+    let tails: f64 = strata.iter().map(|stratum| tail_square(stratum, &further)).sum();
+    let tail_area = conditions.tail * area;
     ErrorEstimate {
         total,
         uncertainty: if total > 0.0 { scatter / (2.0 * total) } else { 0.0 },
+        tail: if tail_area > 0.0 { (tails / tail_area).sqrt() } else { 0.0 },
         mesh: mesh.sqrt(),
         gaps: gaps.sqrt(),
         sampling: sampling.sqrt(),
@@ -353,10 +383,11 @@ impl Observation {
         let [first, second] = self.gathered;
         let truth = (first + second) / 2.0;
         let dim_or_behind =
-            truth.length() < GAP_DIMNESS * floor || self.backface > buried::NEAR_BACKS;
+            truth.length() < GAP_DIMNESS * floor || self.backface > hidden::NEAR_BACKS;
         let scale = truth.length().max(floor);
         Some(Deviation {
-            weight: self.weight,
+            area: self.weight,
+            kept: 1.0,
             interpolation: (self.interpolated - truth) / scale,
             noise: ((first - second) / scale).length_squared() / 2.0,
             next: (self.next - first) / scale,
@@ -369,19 +400,24 @@ impl Observation {
     }
 }
 
-/// Means over strata, each weighted by its area.
+/// Means over strata, by area; without the tail.
 struct Means<'a>(&'a [StratumDeviations]);
 
 impl Means<'_> {
-    fn weighted(&self, of_stratum: impl Fn(&StratumDeviations) -> f64) -> f64 {
-        let area: f64 = self.0.iter().map(|s| s.area).sum();
-        let sum: f64 = self.0.iter().map(|s| s.area * of_stratum(s)).sum();
-        if area > 0.0 { sum / area } else { 0.0 }
+    fn deviations(&self) -> impl Iterator<Item = &Deviation> {
+        self.0.iter().flat_map(|stratum| &stratum.deviations)
+    }
+
+    /// Area that is not in the tail, scene unit squared.
+    fn counted(&self) -> f64 {
+        self.deviations().map(|d| d.area * d.kept).sum()
     }
 
     /// Mean of `value`.
     fn of(&self, value: impl Fn(&Deviation) -> f64) -> f64 {
-        self.weighted(|s| mean(&s.deviations, &value))
+        let sum: f64 = self.deviations().map(|d| d.area * d.kept * value(d)).sum();
+        let counted = self.counted();
+        if counted > 0.0 { sum / counted } else { 0.0 }
     }
 
     /// Mean of the vector `value`.
@@ -390,25 +426,23 @@ impl Means<'_> {
         DVec3::new(axis(0), axis(1), axis(2))
     }
 
-    /// Standard error of the mean of `value`, over points that are independent within each stratum.
-    fn standard_error(&self, value: impl Fn(&Deviation) -> f64) -> f64 {
-        let area: f64 = self.0.iter().map(|s| s.area).sum();
+    /// Standard error of the mean of `value`, over points that are independent within each stratum,
+    /// with values of the tail winsorised to `cut` (Tukey and McLaughlin 1963).
+    fn standard_error(&self, cut: f64, value: impl Fn(&Deviation) -> f64) -> f64 {
+        let winsorised = |d: &Deviation| {
+            let value = value(d);
+            if d.kept < 1.0 { d.kept * value + (1.0 - d.kept) * value.min(cut) } else { value }
+        };
         let variance = |s: &StratumDeviations| {
             // A ratio of two sums over random points (Cochran 1977, equation 6.13).
-            let middle = mean(&s.deviations, &value);
-            let weight: f64 = s.deviations.iter().map(|d| d.weight).sum();
-            let square = |d: &Deviation| (d.weight / weight * (value(d) - middle)).powi(2);
-            (s.area / area).powi(2) * s.deviations.iter().map(square).sum::<f64>()
+            let sum: f64 = s.deviations.iter().map(|d| d.area * winsorised(d)).sum();
+            let middle = sum / s.area();
+            let square = |d: &Deviation| (d.area * (winsorised(d) - middle)).powi(2);
+            s.deviations.iter().map(square).sum::<f64>()
         };
-        self.0.iter().map(variance).sum::<f64>().sqrt()
+        let variance: f64 = self.0.iter().map(variance).sum();
+        if variance > 0.0 { variance.sqrt() / self.counted() } else { 0.0 }
     }
-}
-
-/// Mean of `value`, by weight.
-fn mean(deviations: &[Deviation], value: &impl Fn(&Deviation) -> f64) -> f64 {
-    let weight: f64 = deviations.iter().map(|d| d.weight).sum();
-    let sum: f64 = deviations.iter().map(|d| d.weight * value(d)).sum();
-    if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
 /// What all further bounces add, next to what is known of it at each point.
@@ -439,6 +473,11 @@ impl FurtherBounces {
     /// Squared, at a point.
     fn square(&self, deviation: &Deviation) -> f64 {
         (self.growth * deviation.next).length_squared() + self.even
+    }
+
+    /// Squared error of a point: of what it interpolates, with noise, and of further bounces.
+    fn error_square(&self, deviation: &Deviation) -> f64 {
+        deviation.interpolation.length_squared() + self.square(deviation)
     }
 }
 

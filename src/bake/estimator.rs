@@ -14,6 +14,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::accuracy::Measure;
 use crate::bake::controller::Judged;
 use crate::bake::error_estimate::{
     self, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError, Observation, Stratum,
@@ -21,7 +22,7 @@ use crate::bake::error_estimate::{
 use crate::bake::model;
 use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
 use crate::error::Error;
-use crate::gather::gather_points::{SurfaceOffset, is_hidden, is_in_the_open};
+use crate::gather::gather_points::{SurfaceOffset, outlook};
 use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, GatheredMesh, IrradianceSample, RadiosityField};
@@ -68,6 +69,8 @@ pub(super) struct ErrorEstimator<'a> {
     pub ledger: &'a Ledger,
     /// Bounces of what was shot that vertices have gathered.
     pub bounces: f64,
+    /// Which errors count.
+    pub measure: Measure,
     /// Diagonal of where the light is, scene unit.
     pub diagonal: f64,
     /// Over which points are spread.
@@ -149,6 +152,8 @@ impl ErrorEstimator<'_> {
         let unshot_bound = self.unshot(radiosity_floor, &mut strata);
         let conditions = Conditions {
             strata: &strata,
+            floor: self.measure.floor,
+            tail: self.measure.tail,
             radiosity_floor,
             mean_albedo: self.light.mesh.mean_albedo().max_element(),
             bounces: self.lit_by.map(|_| self.bounces),
@@ -203,7 +208,7 @@ impl ErrorEstimator<'_> {
     /// observed. Where next to nothing is reflected, rounding of what is emitted is no error.
     fn floor(&self, observations: &[Observation], strata: &[Stratum]) -> f64 {
         let observed = error_estimate::mean_reflected(observations, strata)
-            .map(|mean| model::RADIOSITY_FLOOR * mean);
+            .map(|mean| self.measure.floor * mean);
         self.at_least_negligible(observed.unwrap_or(self.expected_floor))
     }
 
@@ -458,8 +463,7 @@ impl Sample {
             next: self.reflected(next),
             later: *later,
             element_residual: estimator.residual(self.element),
-            excluded: [first, second, next].iter().any(|g| is_hidden(g, estimator.diagonal))
-                || is_in_the_open([first, second]),
+            excluded: outlook([first, second]).is_hidden(estimator.diagonal),
             escaped: first.escaped,
             backface: first.backface,
             inverse_distance: first.inverse_distance,

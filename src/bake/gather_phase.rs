@@ -14,6 +14,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::accuracy::Measure;
 use crate::backend::cpu::RayGather;
 use crate::bake::controller::{self, ErrorTarget, Judged, Step};
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError, Pilot};
@@ -42,6 +43,7 @@ pub(super) struct GatherPhase<'a> {
     /// What was used to shoot; shown to the target's overrides only.
     solve: SolveSettings,
     gather: GatherSettings,
+    measure: Measure,
     target: Option<ErrorTarget<'a>>,
     state: AdaptiveGather<'a>,
     gatherer: Box<dyn Gather + 'a>,
@@ -64,15 +66,15 @@ impl<'a> GatherPhase<'a> {
     /// Vertices of `mesh` that are to gather `light`, as `settings` say. Given a `target`, a pilot
     /// chooses how many rays a vertex casts.
     pub fn new(
-        settings: (SolveSettings, GatherSettings),
+        settings: (SolveSettings, GatherSettings, Measure),
         target: Option<ErrorTarget<'a>>,
         mesh: Mesh,
         light: &'a GatheredMesh,
         shot: &'a ShotLight,
         backend: &'a ResilientBackend<'a>,
     ) -> Result<GatherPhase<'a>, Error> {
-        let (solve, gather) = settings;
-        let state = AdaptiveGather::new(mesh, light, gather.refinement.region);
+        let (solve, gather, measure) = settings;
+        let state = AdaptiveGather::new(mesh, light, gather.refinement.region, measure);
         let gatherer = backend.gather(
             &shot.mesh,
             gather.rays,
@@ -80,11 +82,12 @@ impl<'a> GatherPhase<'a> {
             state.radiosity_floor(),
         )?;
         let scene = shot.mesh.scene();
-        let judge = Judge::new(scene, target.is_some_and(|target| target.each_group));
+        let judge = Judge::new(scene, measure, target.is_some_and(|target| target.each_group));
         let (paths, octaves) = (PathTracer::new(scene), octaves_of(scene));
         let mut phase = GatherPhase {
             solve,
             gather,
+            measure,
             target,
             state,
             gatherer,
@@ -252,6 +255,7 @@ impl<'a> GatherPhase<'a> {
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
             bounces: self.state.bounces(),
+            measure: self.measure,
             diagonal: self.diagonal(),
             octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
@@ -320,6 +324,7 @@ impl<'a> GatherPhase<'a> {
             element_residual: &[],
             ledger: &self.shot.solution.ledger,
             bounces: 0.0,
+            measure: self.measure,
             diagonal: self.diagonal(),
             octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
@@ -334,7 +339,7 @@ impl<'a> GatherPhase<'a> {
             pilot.pilot(model::PILOT_POINTS, &mut *gatherer)?;
         self.state.set_radiosity_floor(radiosity_floor);
         let chosen = controller::with_rays_for(&self.gather, sampling, target.error);
-        let settings = BakeSettings { solve: self.solve.clone(), gather: Some(chosen) };
+        let settings = self.settings(chosen);
         if let (solve, Some(gather)) = target.overridden(settings) {
             self.solve = solve;
             self.gather = gather;
@@ -360,7 +365,7 @@ impl<'a> GatherPhase<'a> {
         refined: GatherSettings,
         target: ErrorTarget,
     ) -> Result<Option<Step>, Error> {
-        let settings = BakeSettings { solve: self.solve.clone(), gather: Some(refined) };
+        let settings = self.settings(refined);
         let (solve, Some(gather)) = target.overridden(settings) else { return Ok(None) };
         if (&solve, &gather) == (&self.solve, &self.gather) {
             return Ok(None);
@@ -372,6 +377,12 @@ impl<'a> GatherPhase<'a> {
         Ok(Some(step))
     }
 
+    /// All settings, with these of the gather.
+    fn settings(&self, gather: GatherSettings) -> BakeSettings {
+        let (solve, measure) = (self.solve.clone(), self.measure);
+        BakeSettings { solve, gather: Some(gather), measure }
+    }
+
     /// Diagonal of where the light is, scene unit.
     fn diagonal(&self) -> f64 {
         self.solve.light_diagonal(self.shot.mesh.scene())
@@ -381,7 +392,8 @@ impl<'a> GatherPhase<'a> {
         let Estimated { mut light, found, .. } = estimated;
         let EstimatedError { whole: estimate, groups, vertices, .. } = found;
         light.surface.error = vertices;
-        let settings = BakeSettings { solve: self.solve, gather: Some(self.gather) };
+        let (solve, measure) = (self.solve, self.measure);
+        let settings = BakeSettings { solve, gather: Some(self.gather), measure };
         BakedLight { light, estimate, groups, outcome, settings }
     }
 }

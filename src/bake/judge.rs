@@ -19,6 +19,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::accuracy::Measure;
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::estimator::{EstimatedError, negligible_reflection};
 use crate::bake::model;
@@ -38,6 +39,7 @@ const SURELY_OF_MANY: f64 = 3.0;
 /// Measures the results of a bake.
 pub(super) struct Judge<'a> {
     scene: &'a Scene,
+    measure: Measure,
     each_group: bool,
     /// None before the first result.
     verifier: Option<Verifier<'a>>,
@@ -45,8 +47,8 @@ pub(super) struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     /// Of results for `scene`, with more points where `each_group` is judged.
-    pub fn new(scene: &'a Scene, each_group: bool) -> Judge<'a> {
-        Judge { scene, each_group, verifier: None }
+    pub fn new(scene: &'a Scene, measure: Measure, each_group: bool) -> Judge<'a> {
+        Judge { scene, measure, each_group, verifier: None }
     }
 
     /// `found`, the estimate of `light`, held against paths: so many that it is known whether
@@ -99,6 +101,7 @@ impl<'a> Judge<'a> {
     fn settings(&self) -> Settings {
         Settings {
             seed: model::JUDGE_SEED,
+            measure: self.measure,
             precision: model::JUDGE_PRECISION,
             points_per_group: match self.each_group {
                 true => model::JUDGED_POINTS_PER_GROUP,
@@ -129,6 +132,7 @@ fn held_against(found: EstimatedError, measured: &Verification) -> EstimatedErro
         return EstimatedError { whole, by_light, groups, vertices };
     };
     let told = whole.held_against(error, SURELY, (measured.bias, measured.paths));
+    let told = ErrorEstimate { tail: told.tail.max(measured.tail.unwrap_or(0.0)), ..told };
     let growth = if whole.total > 0.0 { told.total / whole.total } else { 1.0 };
     vertices.iter_mut().for_each(|error| *error *= growth);
     let of_group = |group: GroupError| {

@@ -18,6 +18,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use crate::accuracy::Measure;
 use crate::backend::cpu::RayGather;
 use crate::bake::model;
 use crate::error::Error;
@@ -58,7 +59,7 @@ pub(super) fn light_in_gaps(
         .collect();
     let corners: Vec<[u32; 3]> = (0..mesh.element_count() as u32).map(|e| [e; 3]).collect();
     let field = RadiosityField { mesh, corners: &corners, reflected: &shot };
-    let floor = field.radiosity_floor();
+    let floor = field.radiosity_floor(Measure::default().floor);
     let mut elements =
         GatheringElements { mesh, above: SurfaceOffset::new(mesh.scene()), progress };
     let mut rays = RayGather::new(mesh, model::GAP_RAYS)?;

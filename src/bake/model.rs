@@ -439,9 +439,6 @@ pub const MAX_SAMPLING_SHARE: f64 = 0.7;
 /// than twice as much: errors have heavier tails than a normal distribution.
 pub const TAIL_FACTOR: f64 = 1.8;
 
-/// Errors of radiosity below this share of the mean reflected radiosity are relative to that.
-pub const RADIOSITY_FLOOR: f64 = crate::gather::RADIOSITY_FLOOR_SHARE;
-
 /// Points on each group, at least: enough to see an error that is everywhere.
 pub const SAMPLES_PER_GROUP: usize = 8;
 

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use crate::accuracy::Measure;
 use crate::bake::light_survey::LightSurvey;
 use crate::bake::model;
 use crate::error::Error;
@@ -28,6 +29,8 @@ pub struct BakeSettings {
     /// How the vertices of a second mesh gather that light; with none, the vertices of the first
     /// get the mean of the elements around them.
     pub gather: Option<GatherSettings>,
+    /// Which errors count. Of a bake to an error it counts at the first call of overrides only.
+    pub measure: Measure,
 }
 
 /// Settings of the first phase of a bake: mesh, rows of form factors, solver.
@@ -129,6 +132,7 @@ impl BakeSettings {
     /// Whether a bake would take these settings of gathering: worth asking before a long solve.
     /// What comes before that is checked where it is used.
     pub(super) fn check(&self) -> Result<(), Error> {
+        self.measure.check()?;
         self.gather.as_ref().map_or(Ok(()), |gather| gather.refinement.check())
     }
 
@@ -232,6 +236,6 @@ impl BakeSettings {
             noise_tolerance: e,
             refinement,
         };
-        BakeSettings { solve, gather: Some(gather) }
+        BakeSettings { solve, gather: Some(gather), measure: Measure::default() }
     }
 }

@@ -202,9 +202,10 @@ pub(super) fn estimate_elements(
         element_residual: &corner_spread(&light),
         ledger: &shot.solution.ledger,
         bounces: 0.0,
+        measure: settings.measure,
         diagonal: settings.solve.light_diagonal(shot.mesh.scene()),
         octaves: &octaves_of(shot.mesh.scene()),
-        expected_floor: light.radiosity_field().radiosity_floor(),
+        expected_floor: light.radiosity_field().radiosity_floor(settings.measure.floor),
         paths: None,
     };
     let counts =
@@ -217,12 +218,14 @@ pub(super) fn estimate_elements(
     })?;
     let found = match target {
         // What is told of a bake that was stopped is to hold, too.
-        Some(target) if cancelled => Judge::new(shot.mesh.scene(), target.each_group).judge(
-            found,
-            &light,
-            (Some(target.error), [model::JUDGE_PATHS; 2]),
-            &mut |_, _| ControlFlow::Continue(()),
-        ),
+        Some(target) if cancelled => {
+            Judge::new(shot.mesh.scene(), settings.measure, target.each_group).judge(
+                found,
+                &light,
+                (Some(target.error), [model::JUDGE_PATHS; 2]),
+                &mut |_, _| ControlFlow::Continue(()),
+            )
+        }
         _ => found,
     };
     let is_reached = target.is_some_and(|target| target.is_reached(found.judged(), cancelled));

@@ -9,6 +9,7 @@ use super::lookup::{Lookup, add};
 use super::spectra::{Band, Bands};
 use super::surface_vertices::SurfaceVertices;
 use super::vertex_system::{Settled, VertexEquation, VertexSystem};
+use crate::accuracy::hidden;
 use crate::backend::cpu::RayGather;
 use crate::bake::BakeResult;
 use crate::bake::model;
@@ -17,7 +18,6 @@ use crate::gather::vertex_rows::{VertexRows, neighbours_of_buried};
 use crate::mesh::Mesh;
 use crate::scene::{Rgb, Sky};
 use crate::vertex::VertexMesh;
-use crate::visibility::buried;
 
 /// Ratio of the rays of a vertex for the final gather to those for the iteration: noise that
 /// differs from vertex to vertex is averaged over all that a vertex sees.
@@ -118,7 +118,7 @@ impl<'a> Gathering<'a> {
     ) -> Gathering<'a> {
         let region = baked.settings.solve.region;
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
-        let touching = buried::NEAR_BACKS_DISTANCE * diagonal;
+        let touching = hidden::NEAR * diagonal;
         let lookup = Lookup::new(bands, mesh, &surface.vertices.corners);
         Gathering { bands, mesh, surface, lookup, touching }
     }

@@ -34,6 +34,8 @@ use super::scouts::{self, Scouts};
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
 use super::{Gather, RadiosityField};
+use crate::accuracy::Measure;
+use crate::accuracy::tail::trimmed;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::{BatchSizer, StopReason};
@@ -78,7 +80,7 @@ pub fn gather_at_vertices(
 ) -> Result<GatheredMesh, Error> {
     settings.check()?;
     source.check_scene(mesh)?;
-    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region);
+    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region, Measure::default());
     let stop = state.run_passes(settings, gatherer, None, (None, None), &mut progress)?;
     let result = if stop == StopReason::Cancelled {
         state.to_gathered_mesh()
@@ -111,9 +113,14 @@ pub(crate) struct AdaptiveGather<'a> {
 impl<'a> AdaptiveGather<'a> {
     /// Starts on `mesh` with the values that `source`, of the same scene, has at its vertices. Most
     /// of the light is in `region`.
-    pub fn new(mesh: Mesh, source: &'a GatheredMesh, region: Option<Aabb>) -> AdaptiveGather<'a> {
+    pub fn new(
+        mesh: Mesh,
+        source: &'a GatheredMesh,
+        region: Option<Aabb>,
+        measure: Measure,
+    ) -> AdaptiveGather<'a> {
         let field = source.radiosity_field();
-        let scale = ErrorScale::new(&mesh, &field, region);
+        let scale = ErrorScale::new(&mesh, &field, region, measure);
         AdaptiveGather {
             scouts: Scouts::new(mesh.element_count()),
             samples: SampledMesh::new(mesh, &field),
@@ -403,9 +410,9 @@ impl<'a> AdaptiveGather<'a> {
         for (pool, share) in shares {
             by_pool[pool].push(share);
         }
-        let allowed = settings.mesh_error.powi(2);
+        let (allowed, tail) = (settings.mesh_error.powi(2), self.scale.tail);
         let mut marked: Vec<(f64, usize)> =
-            by_pool.into_iter().flat_map(|shares| bulk_above(shares, allowed)).collect();
+            by_pool.into_iter().flat_map(|shares| bulk_above(shares, allowed, tail)).collect();
         marked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         marked.into_iter().map(|(_, element)| element).collect()
     }
@@ -496,9 +503,22 @@ struct Share {
     element: usize,
 }
 
-/// Those of the elements that are to be split for the mean square to fall to what is `allowed`,
-/// with their shares in it; of many the worst, which make up most of it.
-fn bulk_above(mut shares: Vec<Share>, allowed: f64) -> Vec<(f64, usize)> {
+/// Those of the elements that are to be split for the mean square over all but the `tail`, a share
+/// of the area, to fall to what is `allowed`, with their shares in it; of many the worst, which
+/// make up most of it. What is in the tail is not split.
+fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usize)> {
+    // Of what is unknown, nothing says that it is in the tail.
+    let error = |share: &Share| {
+        let is_known = share.square.is_finite() && share.area > 0.0;
+        (share.area, if is_known { share.square / share.area } else { 0.0 })
+    };
+    let errors: Vec<(f64, f64)> = shares.iter().map(error).collect();
+    for (share, kept) in shares.iter_mut().zip(trimmed(&errors, tail).kept) {
+        if share.square.is_finite() {
+            share.square *= kept;
+            share.area *= kept;
+        }
+    }
     let area: f64 = shares.iter().map(|share| share.area).sum();
     let known = shares.iter().map(|share| share.square).filter(|square| square.is_finite());
     let total: f64 = known.sum();
@@ -532,7 +552,7 @@ mod tests {
             |(element, square): (usize, &f64)| Share { square: *square, area: 1.0, element };
         let marked = |squares: &[f64], allowed: f64| -> Vec<usize> {
             let shares = squares.iter().enumerate().map(share).collect();
-            bulk_above(shares, allowed).into_iter().map(|(_, element)| element).collect()
+            bulk_above(shares, allowed, 0.0).into_iter().map(|(_, element)| element).collect()
         };
         let squares = [1.0, 8.0, 0.0, 4.0, 2.0];
         // Mean 3: of it 8 and 4 are the bulk, 80 %.
@@ -553,7 +573,7 @@ mod tests {
         let settings = RefinementSettings::new(1e9);
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let mut proceed = |_: &Progress| ControlFlow::Continue(());
-        let mut at_once = AdaptiveGather::new(mesh, &light, None);
+        let mut at_once = AdaptiveGather::new(mesh, &light, None, Measure::default());
         at_once.gather_pass(&settings, &mut rays, None, &mut proceed).unwrap();
         let mut by_passes = at_once.clone();
         let first = at_once.samples.reflected.clone();

@@ -14,6 +14,7 @@ use glam::DVec3;
 
 use super::two_sided::TwoSidedPoint;
 use super::{GatherPoint, IrradianceSample};
+use crate::accuracy::hidden::Outlook;
 use crate::geometry::incidence::Incidence;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Material, Rgb, Scene};
@@ -158,19 +159,15 @@ impl SurfaceOffset {
     }
 }
 
-/// Whether a point is inside a solid, under what nearly touches it, or in a crack: no place to
-/// judge light by. `diagonal` of where the light is, scene unit.
-pub(crate) fn is_hidden(sample: &IrradianceSample, diagonal: f64) -> bool {
-    // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least this.
-    let near = buried::NEAR_BACKS / (buried::NEAR_BACKS_DISTANCE * diagonal);
-    sample.backface > buried::HIDDEN
-        || sample.inverse_distance * buried::CRACK * diagonal > 1.0
-        || sample.backface > buried::NEAR_BACKS && sample.inverse_distance > near
-}
-
-/// Whether a point that gathered these two sees next to nothing.
-pub(crate) fn is_in_the_open([first, second]: [&IrradianceSample; 2]) -> bool {
-    (first.escaped + second.escaped) / 2.0 > buried::OPEN
+/// What a point sees, by two gathers.
+pub(crate) fn outlook(gathers: [&IrradianceSample; 2]) -> Outlook {
+    let mean = |of: fn(&IrradianceSample) -> f64| gathers.map(of).iter().sum::<f64>() / 2.0;
+    Outlook {
+        covered: 1.0 - mean(|gathered| gathered.escaped),
+        backs: mean(|gathered| gathered.backface),
+        inverse_distance: mean(|gathered| gathered.inverse_distance),
+        dark: false,
+    }
 }
 
 /// Whether a point lies inside something that touches its surface: it sees almost nothing but

@@ -20,14 +20,14 @@
 use arrayvec::ArrayVec;
 use glam::DVec2;
 
+use super::RadiosityField;
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::surplus::{CHILD_SURPLUS, HierarchicalSurplus, MidsideSurplus, NodeValue, beyond_noise};
-use super::{RADIOSITY_FLOOR_SHARE, RadiosityField};
+use crate::accuracy::{Measure, hidden};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Aabb, Rgb};
-use crate::visibility::buried;
 
 /// Steps along an element's side of the lattice at which the source light is compared with its
 /// linear interpolant. Chosen by hand; no measurement kept.
@@ -66,13 +66,15 @@ const NEAR_GROWTH: f64 = 2.0;
 const SCOUTED_SIZE: f64 = 4.0;
 
 /// A vertex is dim if it reflects less than this many times the floor: a quarter of the mean.
-pub(crate) const GAP_DIMNESS: f64 = 0.25 / RADIOSITY_FLOOR_SHARE;
+pub(crate) const GAP_DIMNESS: f64 = 5.0;
 
 /// What errors are relative to, found once at the start of a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
+    /// Share of the area, where errors are largest, that is not refined.
+    pub tail: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
     pub touching: f64,
     /// Distance below which a gap is a crack that nobody looks into; scene unit.
@@ -82,13 +84,20 @@ pub(crate) struct ErrorScale {
 }
 
 impl ErrorScale {
-    /// For a gather of `field` on `mesh`, whose light is mostly in `region`.
-    pub fn new(mesh: &Mesh, field: &RadiosityField, region: Option<Aabb>) -> ErrorScale {
+    /// For a gather of `field` on `mesh`, whose light is mostly in `region`, with the floor of
+    /// `measure`.
+    pub fn new(
+        mesh: &Mesh,
+        field: &RadiosityField,
+        region: Option<Aabb>,
+        measure: Measure,
+    ) -> ErrorScale {
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
-            touching: buried::NEAR_BACKS_DISTANCE * diagonal,
-            crack: buried::CRACK * diagonal,
-            radiosity_floor: field.radiosity_floor(),
+            touching: hidden::NEAR * diagonal,
+            crack: hidden::CRACK * diagonal,
+            radiosity_floor: field.radiosity_floor(measure.floor),
+            tail: measure.tail,
             region,
         }
     }
@@ -288,7 +297,7 @@ mod tests {
         let mesh = ground();
         let even = GatheredMesh::from_elements(&mesh, &[Rgb::ONE; 2]).unwrap();
         let field = even.radiosity_field();
-        let scale = ErrorScale::new(&mesh, &field, None);
+        let scale = ErrorScale::new(&mesh, &field, None, Measure::default());
         let mut samples = SampledMesh::new(mesh, &field);
         // The longest edge is 90.5: less than four of these, so that corners tell.
         let settings = RefinementSettings::new(32.0);
@@ -333,7 +342,7 @@ mod tests {
         let mesh = ground();
         let [lit, dark] =
             [1.0, 0.0].map(|b| GatheredMesh::from_elements(&mesh, &[Rgb::splat(b); 2]).unwrap());
-        let scale = ErrorScale::new(&mesh, &lit.radiosity_field(), None);
+        let scale = ErrorScale::new(&mesh, &lit.radiosity_field(), None, Measure::default());
         let mut samples = SampledMesh::new(mesh, &dark.radiosity_field());
         samples.split(&[0, 1]).unwrap();
         samples.buried.fill(true);

@@ -142,7 +142,7 @@ pub(super) fn gatherer<'a>(
     baked: &BakeResult,
     backend: &Backend,
 ) -> Result<Box<dyn Gather + 'a>, Error> {
-    let dim = baked.light.radiosity_field().radiosity_floor();
+    let dim = baked.light.radiosity_field().radiosity_floor(baked.settings.measure.floor);
     let (rays, noise) = match &baked.settings.gather {
         Some(settings) => (settings.rays, settings.noise_tolerance),
         None => (RAYS, f64::INFINITY),

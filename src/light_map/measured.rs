@@ -20,11 +20,12 @@ use super::coverage::NO_TRIANGLE;
 use super::footprint::Footprint;
 use super::gathered::{LightMap, check_scene, gatherer};
 use super::texel_points::TexelPoints;
+use crate::accuracy::mean_square::{MeasuredPoint, SPLITS, Split, SquareError, TrimmedSquare};
+use crate::accuracy::{Estimate, Measure};
 use crate::backend::Backend;
 use crate::bake::BakeResult;
 use crate::error::Error;
-use crate::gather::RADIOSITY_FLOOR_SHARE;
-use crate::gather::gather_points::{SurfaceOffset, is_hidden, is_in_the_open};
+use crate::gather::gather_points::{SurfaceOffset, outlook};
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::geometry::barycentric::barycentric;
 use crate::progress::BatchSizer;
@@ -32,7 +33,6 @@ use crate::sampling::low_discrepancy::{golden_ratio_order, r2_point};
 use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::Rgb;
-use crate::verify::Estimate;
 
 /// Number of texels per point; minimum and maximum number of points. Plain choice: with two gathers
 /// per point, a sixteenth of the work of the texels.
@@ -87,8 +87,7 @@ impl LightMap {
                 for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
                     let ShownPoint { albedo, shown, area, .. } = points[k];
                     let pair = [first, second];
-                    let is_left_out = pair.iter().any(|g| is_hidden(g, diagonal));
-                    if !is_left_out && !is_in_the_open(pair) {
+                    if !outlook(pair).is_hidden(diagonal) {
                         let gathered = pair.map(|sample| albedo * sample.irradiance);
                         found.push(Found { shown, gathered, area });
                     }
@@ -99,7 +98,8 @@ impl LightMap {
                 return Ok(None);
             }
         }
-        Ok(root_mean_square(&found, baked.estimate.of_light()))
+        let measure = baked.settings.measure;
+        Ok(root_mean_square(&found, measure, baked.estimate.of_light()))
     }
 
     /// Half of the points lie evenly over the reflecting surfaces, half in the cells between four
@@ -179,7 +179,7 @@ impl LightMap {
         let radiosity: Vec<f64> = self.irradiance.iter().map(|e| e.length()).collect();
         let gathered = radiosity.iter().zip(&self.gathered).filter(|(_, gathered)| **gathered);
         let (sum, count) = gathered.fold((0.0, 0), |(sum, count), (e, _)| (sum + e, count + 1));
-        let floor = (RADIOSITY_FLOOR_SHARE * sum / f64::from(count)).max(f64::MIN_POSITIVE);
+        let floor = (Measure::default().floor * sum / f64::from(count)).max(f64::MIN_POSITIVE);
         let [width, height] = self.atlas.size;
         let contrast = |cell: u32| {
             let [x, y] = [cell % width, cell / width];
@@ -215,25 +215,28 @@ impl Found {
         (self.gathered[0] + self.gathered[1]) / 2.0
     }
 
-    /// The square of the relative error.
-    fn square(&self, floor: f64) -> f64 {
+    /// The square of the relative error, without bias by the noise of the gathers.
+    fn square_error(&self, floor: f64) -> SquareError {
         let scale = self.mean().length().max(floor);
         let [a, b] = self.gathered.map(|gathered| (self.shown - gathered) / scale);
-        a.dot(b)
+        let (value, rank) = (a.dot(b), ((a + b) / 2.0).length_squared());
+        SquareError { splits: [Split { value, rank }; SPLITS], value, noise: 0.0, bias: 0.0 }
     }
 }
 
-/// The root mean square of the relative errors of `found`, combined with the error of the `light`.
-fn root_mean_square(found: &[Found], light: f64) -> Option<Estimate> {
+/// The error by what was `found`, and by that of the `light`.
+fn root_mean_square(found: &[Found], measure: Measure, light: f64) -> Option<Estimate> {
     let sum = |of: &dyn Fn(&Found) -> f64| found.iter().map(of).sum::<f64>();
-    let area = sum(&|point| point.area);
-    let brightness = sum(&|point| point.area * point.mean().length()) / area;
-    // Without light there is no error.
-    let floor = (RADIOSITY_FLOOR_SHARE * brightness).max(f64::MIN_POSITIVE);
-    let mean = sum(&|point| point.area * point.square(floor)) / area;
-    let off = |point: &Found| (point.area * (point.square(floor) - mean)).powi(2);
-    let deviation = sum(&off).sqrt() / area;
-    let value = (mean.max(0.0) + light * light).sqrt();
-    let standard_error = deviation / (2.0 * value).max(deviation.sqrt());
-    (found.len() > 1).then_some(Estimate { value, standard_error })
+    let brightness = sum(&|point| point.area * point.mean().length()) / sum(&|point| point.area);
+    // Where nothing arrives, nothing is wrong.
+    let floor = (measure.floor * brightness).max(f64::MIN_POSITIVE);
+    let point = |point: &Found| MeasuredPoint {
+        stratum: 0,
+        area: point.area,
+        error: point.square_error(floor),
+    };
+    let points: Vec<MeasuredPoint> = found.iter().map(point).collect();
+    let mut mean = TrimmedSquare::new(&points, measure.tail)?.mean;
+    mean.value = mean.value.max(0.0) + light * light;
+    (found.len() > 1).then(|| mean.root())
 }

@@ -2,22 +2,35 @@
 
 use std::ops::ControlFlow;
 
+use fastrand::Rng;
 use rayon::prelude::*;
 
-use super::hidden::{self, Outlook};
 use super::path_tracer::{PathTracer, SurfacePoint};
 use super::settings::Settings;
 use super::solution::Solution;
-use super::statistics::{Estimate, FLOOR, MeanSquare, PARTS, Sample, SquareError};
+use super::statistics::{PARTS, Sample};
 use super::surfaces::ReflectingGroup;
 use super::verification::{GroupError, PointError, Stop, Verification};
+use crate::accuracy::Estimate;
+use crate::accuracy::hidden::{Outlook, PATHS_IN_THE_DARK};
+use crate::accuracy::mean_square::{MeanSquare, MeasuredPoint, TrimmedSquare};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::progress::BatchSizer;
 use crate::sampling::random::random_numbers;
-use crate::scene::{Rgb, Scene};
+use crate::scene::{Aabb, Rgb, Scene};
 
 /// A solution is of another scene if more than this share of the points lie on none of its faces.
 const MISSING_SHARE: f64 = 0.01;
+
+/// Rays by which a point finds what it sees.
+const OUTLOOK_RAYS: usize = 128;
+
+/// Share of the light that may lie outside of the box where the light is, at either end of an axis.
+const TRIMMED_SHARE: f64 = 0.01;
+
+/// The box has to be this many times smaller than the one around all that reflects: in an ordinary
+/// room the light fills the room.
+const MIN_CONCENTRATION: f64 = 4.0;
 
 /// Points of groups, and what was traced at them so far.
 pub(super) struct Sampler<'a> {
@@ -105,10 +118,10 @@ impl<'a> Sampler<'a> {
     /// Has the groups whose error `is_open` have twice as many points, from the next
     /// [`add_points`](Sampler::add_points) on; how many that will be more.
     pub fn double(&mut self, is_open: impl Fn(&Estimate) -> bool) -> usize {
-        let by_group = self.by_group(self.settings.hidden);
+        let errors = self.by_group(&self.counting(self.settings.hidden));
         let mut more = 0;
-        for (stratum, error) in self.strata.iter_mut().zip(by_group) {
-            if error.is_some_and(|(_, error)| is_open(&error.root())) {
+        for (stratum, error) in self.strata.iter_mut().zip(errors) {
+            if error.is_some_and(|error| is_open(&error.root())) {
                 more += stratum.points.len();
                 stratum.least = 2 * stratum.points.len();
             }
@@ -185,8 +198,8 @@ impl<'a> Sampler<'a> {
         self.paths = paths;
         let diagonal = self.lit_diagonal();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
-            let light = point.sample().found() != Rgb::ZERO;
-            point.hidden = point.outlook.is_hidden(diagonal, (light, point.paths));
+            let dark = point.sample().found() == Rgb::ZERO && point.paths >= PATHS_IN_THE_DARK;
+            point.hidden = Outlook { dark, ..point.outlook }.is_hidden(diagonal);
         }
         ControlFlow::Continue(())
     }
@@ -198,7 +211,11 @@ impl<'a> Sampler<'a> {
             let flux = |p: &TracedPoint| s.area_of(p) * p.sample().found().length();
             s.points.iter().map(move |p| (p.point.position, flux(p)))
         });
-        hidden::lit_diagonal(self.scene, &points.collect::<Vec<_>>())
+        let whole = self.scene.reflecting_bounds().diagonal();
+        match Aabb::around_most(&points.collect::<Vec<_>>(), TRIMMED_SHARE) {
+            Some(lit) if lit.diagonal() * MIN_CONCENTRATION < whole => lit.diagonal(),
+            _ => whole,
+        }
     }
 
     /// All points, with the groups that they are of.
@@ -216,7 +233,7 @@ impl<'a> Sampler<'a> {
         }
         if point.paths == 0 {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
-            traced.outlook = Outlook::new(&self.tracer, &point.point, &mut rng);
+            traced.outlook = outlook(&self.tracer, &point.point, &mut rng);
         }
         traced.paths = paths;
         traced
@@ -235,64 +252,103 @@ impl<'a> Sampler<'a> {
         if share > 0.0 { sum / share } else { 0.0 }
     }
 
-    /// The mean square error of every group, and the share that it counts with.
-    fn by_group(&self, hidden: bool) -> Vec<Option<(f64, MeanSquare)>> {
-        let floor = FLOOR * self.mean_reflected(hidden);
-        let group = |s: &Stratum| {
+    /// The points of every group that count, in order; none of a group with fewer than two.
+    fn counting(&self, hidden: bool) -> Vec<Vec<MeasuredPoint>> {
+        let floor = self.settings.measure.floor * self.mean_reflected(hidden);
+        let of_group = |(stratum, s): (usize, &Stratum)| {
             let counts = |p: &&TracedPoint| p.told.is_some() && (hidden || !p.hidden);
-            let counting = s.points.iter().filter(counts);
-            let squares: Vec<(f64, SquareError)> =
-                counting.map(|p| (s.area_of(p), p.sample().square_error(floor))).collect();
-            let share = squares.iter().map(|(area, _)| area).sum();
-            Some((share, MeanSquare::of_group(&squares)?))
+            let measured = |p: &TracedPoint| {
+                let error = p.sample().square_error(floor);
+                MeasuredPoint { stratum, area: s.area_of(p), error }
+            };
+            let points: Vec<MeasuredPoint> = s.points.iter().filter(counts).map(measured).collect();
+            if points.len() < 2 { vec![] } else { points }
         };
-        self.strata.iter().map(group).collect()
+        self.strata.iter().enumerate().map(of_group).collect()
     }
 
-    /// The mean square error of all that reflects.
+    /// The error of every group, by the measure on its own area.
+    fn by_group(&self, counting: &[Vec<MeasuredPoint>]) -> Vec<Option<MeanSquare>> {
+        let tail = self.settings.measure.tail;
+        counting.iter().map(|group| Some(TrimmedSquare::new(group, tail)?.mean)).collect()
+    }
+
+    /// The error of all that reflects.
     pub fn mean_square(&self, hidden: bool) -> MeanSquare {
-        MeanSquare::stratified(self.by_group(hidden).into_iter().flatten())
+        self.trimmed(&self.counting(hidden)).mean
+    }
+
+    fn trimmed(&self, counting: &[Vec<MeasuredPoint>]) -> TrimmedSquare {
+        TrimmedSquare::new(&counting.concat(), self.settings.measure.tail).unwrap_or_default()
     }
 
     /// What is known so far.
     pub fn verification(&self) -> Verification {
-        let mean_reflected = self.mean_reflected(self.settings.hidden);
-        let by_group = self.by_group(self.settings.hidden);
-        let group = |(s, error): (&Stratum, Option<(f64, MeanSquare)>)| GroupError {
-            group: s.surface.group,
-            area_share: s.surface.share,
-            points: s.points.len(),
-            hidden_share: s.hidden_share(),
-            error: error.map(|(_, error)| error.root()),
-            bias: error.map_or(0.0, |(_, error)| error.bias),
-        };
-        let point = |(group, traced): (usize, TracedPoint)| {
-            let sample = traced.sample();
-            Some(PointError {
-                position: traced.point.position,
-                normal: self.scene.normal(traced.point.triangle),
-                group,
-                told: traced.told?,
-                found: sample.found(),
-                standard_error: sample.variance().sqrt(),
-                error: sample.square_error(FLOOR * mean_reflected).value.max(0.0).sqrt(),
-                hidden: traced.hidden,
-            })
-        };
+        let hidden = self.settings.hidden;
+        let mean_reflected = self.mean_reflected(hidden);
+        let floor = self.settings.measure.floor * mean_reflected;
+        let counting = self.counting(hidden);
+        let all = self.trimmed(&counting);
+        let errors = self.by_group(&counting);
+        // Those of the points that count, in the order of all.
+        let mut tails = all.in_tail.iter().copied();
+        let mut squares = all.tail_squares.iter().copied();
+        let tail_squares: f64 = all.tail_squares.iter().sum();
+        let (mut groups, mut points) = (vec![], vec![]);
+        for ((s, counting), error) in self.strata.iter().zip(&counting).zip(errors) {
+            let of_tail: f64 = squares.by_ref().take(counting.len()).sum();
+            groups.push(GroupError {
+                group: s.surface.group,
+                area_share: s.surface.share,
+                points: s.points.len(),
+                hidden_share: s.hidden_share(),
+                error: error.map(|error| error.root()),
+                tail_share: if tail_squares > 0.0 { of_tail / tail_squares } else { 0.0 },
+                bias: error.map_or(0.0, |error| error.bias),
+            });
+            for traced in &s.points {
+                let Some(told) = traced.told else { continue };
+                let sample = traced.sample();
+                let counts = !counting.is_empty() && (hidden || !traced.hidden);
+                points.push(PointError {
+                    position: traced.point.position,
+                    normal: self.scene.normal(traced.point.triangle),
+                    group: s.surface.group,
+                    told,
+                    found: sample.found(),
+                    standard_error: sample.variance().sqrt(),
+                    error: sample.square_error(floor).value.max(0.0).sqrt(),
+                    tail: if counts { tails.next().unwrap_or(0.0) } else { 0.0 },
+                    hidden: traced.hidden,
+                });
+            }
+        }
         let is_told = self.paths > 0 && self.missing() < self.drawn();
-        let error = |hidden| is_told.then(|| self.mean_square(hidden).root());
         Verification {
-            error: error(self.settings.hidden),
-            bias: self.mean_square(self.settings.hidden).bias,
-            error_with_hidden: error(true),
+            error: is_told.then(|| all.mean.root()),
+            tail: is_told.then(|| all.tail.max(0.0).sqrt()),
+            bias: all.mean.bias,
+            error_with_hidden: is_told.then(|| self.mean_square(true).root()),
             hidden_share: self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum(),
-            groups: self.strata.iter().zip(by_group).map(group).collect(),
-            points: self.traced().filter_map(point).collect(),
+            groups,
+            points,
             mean_reflected,
             paths: self.paths,
             missing: self.missing(),
             stop: Stop::Cancelled,
         }
+    }
+}
+
+/// What `point` sees, by rays.
+fn outlook(tracer: &PathTracer, point: &SurfacePoint, rng: &mut Rng) -> Outlook {
+    let hits = tracer.hits(point, OUTLOOK_RAYS, rng);
+    let share = 1.0 / OUTLOOK_RAYS as f64;
+    Outlook {
+        covered: share * hits.len() as f64,
+        backs: share * hits.iter().filter(|hit| !hit.front).count() as f64,
+        inverse_distance: share * hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>(),
+        dark: false,
     }
 }
 

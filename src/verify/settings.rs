@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::accuracy::Measure;
 use crate::error::{Error, ErrorKind};
 
 /// How well, and how long, to look.
@@ -10,6 +11,8 @@ use crate::error::{Error, ErrorKind};
 pub struct Settings {
     /// The same seed gives the same points and paths.
     pub seed: u64,
+    /// Which errors count.
+    pub measure: Measure,
     /// The standard error wanted, as a share of the error of the whole scene.
     pub precision: f64,
     /// Points that each group has at least.
@@ -23,7 +26,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Settings {
         let time = Some(Duration::from_secs(120));
-        Settings { seed: 0, precision: 0.1, points_per_group: 16, time, hidden: false }
+        let measure = Measure::default();
+        Settings { seed: 0, measure, precision: 0.1, points_per_group: 16, time, hidden: false }
     }
 }
 
@@ -39,6 +43,6 @@ impl Settings {
             let found = self.points_per_group.to_string();
             return wrong("points per group", found, "give at least 2, and no more than a million");
         }
-        Ok(())
+        self.measure.check()
     }
 }

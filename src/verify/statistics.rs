@@ -1,12 +1,10 @@
 //! From paths at points to errors with uncertainties.
 
+use crate::accuracy::mean_square::{SPLITS, Split, SquareError};
 use crate::scene::Rgb;
 
 /// The paths of a point are in this many parts, each independent of the others.
 pub(super) const PARTS: usize = 4;
-
-/// Dark points count as no darker than this share of the mean reflected radiosity.
-pub(super) const FLOOR: f64 = 0.05;
 
 /// What was traced at a point, W/m².
 #[derive(Clone, Copy, Debug)]
@@ -15,27 +13,6 @@ pub(super) struct Sample {
     pub told: Rgb,
     /// Reflected radiosity that each part of the paths found.
     pub parts: [Rgb; PARTS],
-}
-
-/// The square of the error at a point, estimated.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SquareError {
-    /// Without bias; below zero at times.
-    pub value: f64,
-    /// The variance of it that comes from the noise of the paths; up to three times that where the
-    /// error is far below the noise.
-    pub noise: f64,
-    /// About how much too large it is, because the true radiosity that divides it is noisy too.
-    pub bias: f64,
-}
-
-/// A value and its standard error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Its standard error.
-    pub standard_error: f64,
 }
 
 impl Sample {
@@ -53,7 +30,8 @@ impl Sample {
 
     /// The square of |told − true| / max(|true|, `floor`).
     pub fn square_error(&self, floor: f64) -> SquareError {
-        let value = square_error(self.told, &self.parts, floor);
+        let splits = splits(self.told, &self.parts, floor);
+        let value = splits.iter().map(|split| split.value).sum::<f64>() / SPLITS as f64;
         // Jackknife (Tukey 1958): what the estimate is without each part.
         let without = |k: usize| {
             let mut rest = self.parts.to_vec();
@@ -67,12 +45,28 @@ impl Sample {
         // E[1/t²] = (1 + 3 s²) / E[t]² to second order; half the paths are in it.
         let size = self.found().length_squared().max(floor * floor);
         let relative_variance = if size > 0.0 { 2.0 * self.variance() / size } else { 0.0 };
-        SquareError { value, noise, bias: 3.0 * relative_variance * value.max(0.0) }
+        SquareError { splits, value, noise, bias: 3.0 * relative_variance * value.max(0.0) }
     }
 }
 
-/// Means over pairs of parts: two in the product (told − true)·(told − true), the others in the
-/// length that divides it, so that no noise is multiplied with itself.
+/// All splits of the parts in two pairs: two parts in the product (told − true)·(told − true), the
+/// others in the length that divides it, so that no noise is multiplied with itself.
+fn splits(told: Rgb, parts: &[Rgb; PARTS], floor: f64) -> [Split; SPLITS] {
+    let pairs = (0..PARTS).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let mut all = [Split::default(); SPLITS];
+    for (split, (i, j)) in all.iter_mut().zip(pairs) {
+        let others = (0..PARTS).filter(|&k| k != i && k != j).map(|k| parts[k]);
+        let other = others.sum::<Rgb>() / (PARTS - 2) as f64;
+        let size = other.length_squared().max(floor * floor);
+        let product = (told - parts[i]).dot(told - parts[j]);
+        // In a scene without light no light is right.
+        let ratio = |square: f64| if square == 0.0 { 0.0 } else { square / size };
+        *split = Split { value: ratio(product), rank: ratio(told.distance_squared(other)) };
+    }
+    all
+}
+
+/// The mean over all pairs of `parts`, of any number from three on.
 fn square_error(told: Rgb, parts: &[Rgb], floor: f64) -> f64 {
     let (mut sum, mut pairs) = (0.0, 0.0);
     for j in 0..parts.len() {
@@ -81,7 +75,6 @@ fn square_error(told: Rgb, parts: &[Rgb], floor: f64) -> f64 {
             let size = others.sum::<Rgb>() / (parts.len() - 2) as f64;
             let product = (told - parts[i]).dot(told - parts[j]);
             let size = size.length_squared().max(floor * floor);
-            // In a scene without light no light is right.
             sum += if product == 0.0 { 0.0 } else { product / size };
             pairs += 1.0;
         }
@@ -93,63 +86,10 @@ fn mean(parts: &[Rgb]) -> Rgb {
     parts.iter().sum::<Rgb>() / parts.len() as f64
 }
 
-/// The mean square error over an area, from points at random on it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct MeanSquare {
-    pub value: f64,
-    pub variance: f64,
-    /// The part of the variance that comes from the noise of the paths.
-    pub noise: f64,
-    pub bias: f64,
-}
-
-impl MeanSquare {
-    /// Over a group, from its points and the areas that they stand for; none from fewer than two.
-    pub fn of_group(points: &[(f64, SquareError)]) -> Option<MeanSquare> {
-        let count = points.len() as f64;
-        if points.len() < 2 {
-            return None;
-        }
-        let area: f64 = points.iter().map(|(area, _)| area).sum();
-        let sum = |of: &dyn Fn(f64, &SquareError) -> f64| -> f64 {
-            points.iter().map(|(part, point)| of(part / area, point)).sum()
-        };
-        let value = sum(&|share, p| share * p.value);
-        // A ratio of two sums over random points (Cochran 1977, equation 6.13).
-        let spread = sum(&|share, p| (share * (p.value - value)).powi(2));
-        Some(MeanSquare {
-            value,
-            variance: spread * count / (count - 1.0),
-            noise: sum(&|share, p| share * share * p.noise),
-            bias: sum(&|share, p| share * p.bias),
-        })
-    }
-
-    /// Over all groups, each with its share of the area.
-    pub fn stratified(groups: impl Iterator<Item = (f64, MeanSquare)> + Clone) -> MeanSquare {
-        let whole: f64 = groups.clone().map(|(share, _)| share).sum();
-        groups.fold(MeanSquare::default(), |sum, (share, group)| {
-            let share = share / whole;
-            MeanSquare {
-                value: sum.value + share * group.value,
-                variance: sum.variance + share * share * group.variance,
-                noise: sum.noise + share * share * group.noise,
-                bias: sum.bias + share * group.bias,
-            }
-        })
-    }
-
-    /// The root: by the delta method, and near zero by what a variance of that size may hide.
-    pub fn root(&self) -> Estimate {
-        let (value, off) = (self.value.max(0.0).sqrt(), self.variance.sqrt());
-        let standard_error = if off > 0.0 { off / (2.0 * value).max(off.sqrt()) } else { 0.0 };
-        Estimate { value, standard_error }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accuracy::mean_square::{MeanSquare, MeasuredPoint, TrimmedSquare};
     use fastrand::Rng;
 
     /// Samples of a true radiosity `truth` with noise of deviation `noise` in every part.
@@ -165,9 +105,40 @@ mod tests {
         (0..20_000).map(&mut sample).collect()
     }
 
+    fn points(samples: &[Sample], floor: f64) -> Vec<MeasuredPoint> {
+        let point =
+            |s: &Sample| MeasuredPoint { stratum: 0, area: 1.0, error: s.square_error(floor) };
+        samples.iter().map(point).collect()
+    }
+
     fn measured(samples: &[Sample], floor: f64) -> MeanSquare {
-        let squares: Vec<_> = samples.iter().map(|s| (1.0, s.square_error(floor))).collect();
-        MeanSquare::of_group(&squares).unwrap()
+        TrimmedSquare::new(&points(samples, floor), 0.0).unwrap().mean
+    }
+
+    #[test]
+    fn trim_takes_the_largest_errors_and_no_noise() {
+        // A point in fifty is off by 60 %, the others by 3 %, with noise of 8 % in each part.
+        let mut all = samples(1.03, 1.0, 0.08);
+        let large = Rgb::splat(1.6);
+        all.iter_mut().step_by(50).for_each(|sample| sample.told = large);
+        let (usual, tail): (f64, f64) = (0.03 * 0.03, 0.6 * 0.6);
+        for (trim, mean, rest) in [
+            // Without a tail; a tail of half of the large ones; of all of them; of twice as many,
+            // half of which are like those that are kept.
+            (0.0, 0.98 * usual + 0.02 * tail, 0.0),
+            (0.01, (0.98 * usual + 0.01 * tail) / 0.99, tail),
+            (0.02, usual, tail),
+            (0.04, usual, (tail + usual) / 2.0),
+        ] {
+            let found = TrimmedSquare::new(&points(&all, 0.05), trim).unwrap();
+            let (value, off) = (found.mean.value - found.mean.bias, found.mean.variance.sqrt());
+            // The bias is known to a tenth of itself.
+            let close = 4.0 * off + 0.1 * found.mean.bias;
+            assert!((value - mean).abs() < close, "{trim}: {value} for {mean}, {found:?}");
+            assert!((found.tail - rest).abs() < 0.05 * rest + 1e-12, "{trim}: {}", found.tail);
+            let area: f64 = found.in_tail.iter().sum();
+            assert!((area - trim * all.len() as f64).abs() < 1e-6);
+        }
     }
 
     #[test]
@@ -189,17 +160,5 @@ mod tests {
         assert_eq!(sample.square_error(0.5).value, 4.0);
         let same = Sample { told: Rgb::ZERO, ..sample };
         assert_eq!(same.square_error(0.0).value, 0.0);
-    }
-
-    #[test]
-    fn groups_count_by_their_area() {
-        let group = |value| MeanSquare { value, variance: 0.01, noise: 0.005, bias: 0.0 };
-        let groups = [(0.75, group(1.0)), (0.25, group(5.0))];
-        let all = MeanSquare::stratified(groups.into_iter());
-        assert!((all.value - 2.0).abs() < 1e-15);
-        assert!((all.variance - 0.01 * (0.5625 + 0.0625)).abs() < 1e-15);
-        let root = all.root();
-        assert!((root.value - 2f64.sqrt()).abs() < 1e-15);
-        assert!((root.standard_error - all.variance.sqrt() / 8f64.sqrt()).abs() < 1e-15);
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::statistics::Estimate;
+use crate::accuracy::Estimate;
 use crate::scene::Rgb;
 
 /// How far a verification has come.
@@ -39,9 +39,12 @@ pub struct Verification {
     /// The error of all that reflects, and its standard error, as shares (0.01 for 1 %); none if
     /// the first round was cancelled.
     pub error: Option<Estimate>,
+    /// Root mean square of the errors in the tail, the share of the area that
+    /// [`Measure::tail`](crate::accuracy::Measure) leaves out, where they are largest.
+    pub tail: Option<f64>,
     /// About how much too large the square of the error is: see the statistics.
     pub(crate) bias: f64,
-    /// The same with what is hidden.
+    /// The error with what is hidden.
     pub error_with_hidden: Option<Estimate>,
     /// Share of the area that reflects which is hidden.
     pub hidden_share: f64,
@@ -73,6 +76,8 @@ pub struct GroupError {
     pub hidden_share: f64,
     /// The error and its standard error, as shares; none of fewer than two points that count.
     pub error: Option<Estimate>,
+    /// Share of the squared errors of the scene's tail that is on this group.
+    pub tail_share: f64,
     /// As that of [`Verification`].
     pub(crate) bias: f64,
 }
@@ -95,6 +100,9 @@ pub struct PointError {
     pub standard_error: f64,
     /// The error e, as a share: zero where less than noise is left.
     pub error: f64,
+    /// Share of the area for which the point stands that is in the tail: 1 where the error is among
+    /// the largest by each half of the paths, 0 for hidden points.
+    pub tail: f64,
     /// Whether the point is hidden: see the measure.
     pub hidden: bool,
 }

@@ -9,6 +9,8 @@ const STRATUM: Stratum = Stratum { group: Some(0), area: 3.0, ambient: 0.0 };
 
 const CONDITIONS: Conditions = Conditions {
     strata: &[STRATUM],
+    floor: 0.05,
+    tail: 0.0,
     radiosity_floor: 0.05,
     mean_albedo: 0.5,
     bounces: Some(1.0),

@@ -39,6 +39,7 @@ fn samples_on_ground(light: &GatheredMesh, element_residual: &[f64], floor: f64)
         element_residual,
         ledger: &Ledger::default(),
         bounces: 0.0,
+        measure: Measure::default(),
         diagonal: 1.0,
         octaves: &octaves_of(light.mesh.scene()),
         expected_floor: 0.0,
