@@ -192,7 +192,7 @@ impl RadiosityField<'_> {
     }
 
     /// The same at barycentric position (`u`, `v`) of an element.
-    fn reflected_on_element(&self, element: usize, local: [f64; 2]) -> Rgb {
+    pub(crate) fn reflected_on_element(&self, element: usize, local: [f64; 2]) -> Rgb {
         self.interpolated(element, local) * self.mesh.relative_reflectance(element)
     }
 

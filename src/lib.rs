@@ -113,6 +113,7 @@ pub mod grid;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
+mod light;
 #[cfg(feature = "light-map")]
 pub mod light_map;
 pub mod mesh;

@@ -15,9 +15,6 @@
 //! has the mean |B_told − B_true|², however noisy they are. Which points are in the tail is decided
 //! by other paths than those that measure them.
 
-mod emitters;
-mod luminaires;
-mod path_tracer;
 mod sampler;
 mod settings;
 mod solution;
@@ -30,9 +27,9 @@ use std::time::Instant;
 
 pub use crate::accuracy::Estimate;
 use crate::error::Error;
+pub use crate::light::{PathTracer, Reflected, SurfacePoint};
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
-pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
 use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;

@@ -99,16 +99,20 @@ impl VertexMesh {
         let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
         let mut smoothed = average.mean(|e, _| element_radiosity[e]);
         let positions = &vertices.positions;
-        for (v, value) in
-            boundary_values(mesh, outlines, positions, &normals, element_radiosity, &smoothed)
-        {
-            smoothed[v] = value;
+        if !crate::error::xx("nocorner") {
+            for (v, value) in
+                boundary_values(mesh, outlines, positions, &normals, element_radiosity, &smoothed)
+            {
+                smoothed[v] = value;
+            }
         }
         let lost = average.mean(|e, outline| {
             let corners = outline.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
             element_radiosity[e] - corners / outline.len() as f64
         });
-        let restored = smoothed.iter().zip(lost).map(|(&b, lost)| (b + lost).max(Rgb::ZERO));
+        let restored = smoothed.iter().zip(lost).map(|(&b, lost)| {
+            (b + if crate::error::xx("novc") { Rgb::ZERO } else { lost }).max(Rgb::ZERO)
+        });
         let mut out = VertexMesh {
             radiosity: restored.collect(),
             normals,

@@ -26,6 +26,7 @@ use crate::gather::gather_points::{SurfaceOffset, outlook};
 use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, GatheredMesh, IrradianceSample, RadiosityField};
+use crate::light::{PathTracer, SurfacePoint as PathStart};
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::octaves::{Octaves, Part};
@@ -34,7 +35,6 @@ use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
-use crate::verify::{PathTracer, SurfacePoint as PathStart};
 use crate::visibility::ray_scene::Hit;
 
 /// How far points are drawn towards the centroid of their face, a share of the way: on a side,

@@ -33,10 +33,11 @@ use crate::gather::adaptive::AdaptiveGather;
 use crate::gather::point_row::PointRows;
 use crate::gather::scouts;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
+use crate::light::PathTracer;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::sampling::octaves::Octaves;
-use crate::verify::{PathTracer, octaves_of};
+use crate::verify::octaves_of;
 
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
@@ -113,7 +114,6 @@ impl<'a> GatherPhase<'a> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
-        let mut previous_sources = f64::INFINITY;
         loop {
             let stop = self.gather(step, reporter)?;
             let mut estimated = self.estimate(stop, reporter, clock)?;
@@ -128,10 +128,7 @@ impl<'a> GatherPhase<'a> {
             if next.is_err() {
                 // Gathers find nothing more to do, or were stopped; paths may find more.
                 estimated = self.judge(estimated, reporter, clock);
-                let sources = estimated.found.whole.sources;
-                let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
-                previous_sources = sources;
-                next = self.next_step(&estimated, if in_vain { 0 } else { rounds_left })?;
+                next = self.next_step(&estimated, rounds_left)?;
             }
             match next {
                 Ok(next) => step = next,

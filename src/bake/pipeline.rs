@@ -123,7 +123,14 @@ fn light_to_gather(
     }
     let diagonal = solve.light_diagonal(shot.mesh.scene());
     let footprint = model::pixel_footprint(solve.hemicube_resolution) * diagonal;
-    let resolved = resolved_light(&shot.mesh, &shot.solution.radiosity, footprint);
+    let resolved = if crate::error::xx("nores") {
+        shot.solution.radiosity.clone()
+    } else {
+        resolved_light(&shot.mesh, &shot.solution.radiosity, footprint)
+    };
+    if crate::error::xx("nogaps") {
+        return Ok(Some(GatheredMesh::from_elements(&shot.mesh, &resolved)?));
+    }
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Gathering(*p));
     match light_in_gaps(&shot.mesh, &resolved, footprint, &mut progress)? {
         Some(light) => Ok(Some(GatheredMesh::from_elements(&shot.mesh, &light)?)),

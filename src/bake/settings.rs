@@ -192,21 +192,35 @@ impl BakeSettings {
     fn by_survey(error: f64, survey: &LightSurvey, scene: &Scene) -> BakeSettings {
         let e = model::clamped(error, model::ERRORS);
         let diagonal = survey.diagonal;
-        let shooting_edge = model::SHOOTING_EDGE.setting(e);
+        let f = if crate::error::xx("edge2") {
+            2.0
+        } else if crate::error::xx("edge4") {
+            4.0
+        } else if crate::error::xx("edge8") {
+            8.0
+        } else {
+            1.0
+        };
         let solver = Solver {
             unshot: e / model::ERROR_OVER_UNSHOT,
             patch_tolerance: model::patch_tolerance(e),
             ..Solver::default()
         };
         let mut solve = SolveSettings {
-            element_size: diagonal * shooting_edge.max(model::COARSE_SHOOTING_EDGE.setting(e)),
+            element_size: diagonal
+                * model::SHOOTING_EDGE.setting(e).max(model::COARSE_SHOOTING_EDGE.setting(e))
+                * f,
             region: survey.region,
             gathered_materials: survey.gathered_materials.clone(),
-            contact_levels: model::shooting_contact_levels(e),
+            contact_levels: if crate::error::xx("nocont") {
+                0
+            } else {
+                model::shooting_contact_levels(e)
+            },
             hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
             rotations: NonZeroU32::MIN,
-            near_reach: model::NEAR_REACH,
+            near_reach: if crate::error::xx("nonear") { -1.0 } else { model::NEAR_REACH },
             viewpoint_tolerance: None,
             solver,
             gmres_if_bright: true,
@@ -224,7 +238,7 @@ impl BakeSettings {
             mesh_error: model::MESH_ERROR.setting(e),
             interpolation_tolerance: model::INTERPOLATION_TOLERANCE.setting(e),
             gather_passes: model::gather_passes(e),
-            gap_factor: 1.0,
+            gap_factor: if crate::error::xx("nogapf") { f64::INFINITY } else { 1.0 },
             region: survey.region,
             max_elements: model::max_elements(scene.triangles().len()),
             ..RefinementSettings::new(model::MIN_EDGE.times(diagonal).setting(e))

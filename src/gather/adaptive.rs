@@ -410,7 +410,10 @@ impl<'a> AdaptiveGather<'a> {
         for (pool, share) in shares {
             by_pool[pool].push(share);
         }
-        let (allowed, tail) = (settings.mesh_error.powi(2), self.scale.tail);
+        let (allowed, tail) = (
+            settings.mesh_error.powi(2),
+            if crate::error::xx("nomark") { 0.0 } else { self.scale.tail },
+        );
         let mut marked: Vec<(f64, usize)> =
             by_pool.into_iter().flat_map(|shares| bulk_above(shares, allowed, tail)).collect();
         marked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -505,28 +508,26 @@ struct Share {
 
 /// Those of the elements that are to be split for the mean square over all but the `tail`, a share
 /// of the area, to fall to what is `allowed`, with their shares in it; of many the worst, which
-/// make up most of it. What is in the tail is not split.
+/// make up most of it.
 fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usize)> {
+    let area: f64 = shares.iter().map(|share| share.area).sum();
     // Of what is unknown, nothing says that it is in the tail.
     let error = |share: &Share| {
         let is_known = share.square.is_finite() && share.area > 0.0;
         (share.area, if is_known { share.square / share.area } else { 0.0 })
     };
     let errors: Vec<(f64, f64)> = shares.iter().map(error).collect();
-    for (share, kept) in shares.iter_mut().zip(trimmed(&errors, tail).kept) {
-        if share.square.is_finite() {
-            share.square *= kept;
-            share.area *= kept;
-        }
-    }
-    let area: f64 = shares.iter().map(|share| share.area).sum();
-    let known = shares.iter().map(|share| share.square).filter(|square| square.is_finite());
-    let total: f64 = known.sum();
+    let kept = trimmed(&errors, tail).kept;
+    let known = |of: &dyn Fn(usize) -> f64| -> f64 {
+        let squares = shares.iter().enumerate().filter(|(_, share)| share.square.is_finite());
+        squares.map(|(k, share)| of(k) * share.square).sum()
+    };
+    let (total, counted) = (known(&|_| 1.0), known(&|k| kept[k]));
     shares.retain(|share| share.square > 0.0);
     let order =
         |a: &Share, b: &Share| b.square.total_cmp(&a.square).then(a.element.cmp(&b.element));
     shares.par_sort_unstable_by(order);
-    let (mut excess, mut bulk) = (total - allowed * area, BULK * total);
+    let (mut excess, mut bulk) = (counted - allowed * (1.0 - tail) * area, BULK * total);
     let is_marked = move |share: &Share| {
         if share.square.is_finite() {
             if excess <= 0.0 || bulk <= 0.0 {
@@ -560,6 +561,13 @@ mod tests {
         assert_eq!(marked(&squares, 2.3), [1], "half of 8 is enough: 11 of 15 are left");
         assert!(marked(&squares, 3.0).is_empty(), "no more than is allowed");
         assert_eq!(marked(&[1.0, f64::INFINITY], 3.0), [1], "nothing is known of it");
+        // A fifth of the area is the tail: 8. The mean of the others is 7/4.
+        let without_tail = |allowed: f64| {
+            let shares = squares.iter().enumerate().map(share).collect();
+            bulk_above(shares, allowed, 0.2).len()
+        };
+        assert_eq!(without_tail(1.76), 0);
+        assert_eq!(without_tail(1.74), 1, "the worst, though it is in the tail");
     }
 
     #[test]

@@ -40,7 +40,8 @@ pub(crate) struct SurfaceHit {
     pub element: u32,
     /// Weights of its second and third corner.
     pub barycentric: [f64; 2],
-    /// Share that panes on the way let through: the mean of the channels.
+    /// Share that arrives from there, through panes and by way of near surfaces: the mean of the
+    /// channels.
     pub passed: f64,
     /// Whether what the element emits is in no entry of [`PointRow::emitters`].
     pub emits: bool,

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use fastrand::Rng;
 use rayon::prelude::*;
 
-use super::path_tracer::{PathTracer, SurfacePoint};
 use super::settings::Settings;
 use super::solution::Solution;
 use super::statistics::{PARTS, Sample};
@@ -15,6 +14,7 @@ use crate::accuracy::Estimate;
 use crate::accuracy::hidden::{Outlook, PATHS_IN_THE_DARK};
 use crate::accuracy::mean_square::{MeanSquare, MeasuredPoint, TrimmedSquare};
 use crate::error::{Error, ErrorKind, quoted};
+use crate::light::{PathTracer, SurfacePoint};
 use crate::progress::BatchSizer;
 use crate::sampling::random::random_numbers;
 use crate::scene::{Aabb, Rgb, Scene};

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::path_tracer::{SurfacePoint, nearest_surfaces};
 use crate::error::{Error, ErrorKind, shortened};
+use crate::light::{SurfacePoint, nearest_surfaces};
 use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::{FacePlace, VertexMesh};
 use crate::visibility::ray_scene::{Hit, RayScene};

@@ -7,8 +7,8 @@
 use fastrand::Rng;
 use glam::DVec3;
 
-use super::path_tracer::{SurfacePoint, random_point};
 use crate::error::{Error, ErrorKind};
+use crate::light::{SurfacePoint, random_point};
 use crate::sampling::octaves::{Octaves, Part};
 use crate::scene::Scene;
 

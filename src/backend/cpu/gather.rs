@@ -12,6 +12,7 @@
 
 mod direct_light;
 mod doubled;
+mod near_field;
 mod point_rows;
 mod visible;
 mod wide_light;
@@ -31,9 +32,10 @@ use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
 use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::RayScene;
+use crate::visibility::ray_scene::{Hit, RayScene};
 use direct_light::DirectLight;
 use doubled::{Doubled, Found};
+use near_field::{NearField, NearLight, NearRay};
 use visible::Visible;
 use wide_light::WideLight;
 
@@ -49,6 +51,7 @@ pub struct RayGather {
     panes: Panes,
     lights: Lights,
     rotations: CellRotation,
+    near_field: NearField,
     samples: HemisphereSamples,
     /// Minimum and maximum number of rays per point.
     min_rays: u32,
@@ -77,6 +80,7 @@ impl RayGather {
             panes: Panes::of_scene(mesh.scene()),
             lights: Lights::new(mesh.shared_scene()),
             rotations: CellRotation::new(&mesh.scene().bounds()),
+            near_field: NearField::default(),
             samples: samples(mesh.scene(), min_rays, min_rays),
             min_rays,
             max_rays: min_rays,
@@ -169,11 +173,14 @@ impl RayGather {
         let sky = self.lights.scene().sky();
         let out = &mut found.of_all_fields;
         let of_wide = &mut found.of_wide;
+        let (mut ray, rays) = (range.start, range.len());
+        let mut near = vec![];
         let directions = self.samples.directions_in(range, point.normal, rotation);
         self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let passed =
                 |end: f64| self.panes.transmittance(point.position, direction, point.near..end);
             direct.add_to_wide(of_wide, direction, hit, passed);
+            ray += 1;
             let Some(hit) = hit else {
                 out.escaped += 1.0;
                 let radiosity = PI * sky.radiance(direction) * passed(f64::INFINITY);
@@ -187,18 +194,47 @@ impl RayGather {
                 return;
             }
             let passed = passed(hit.distance);
-            let reflected =
-                fields.map(|field| field.reflected_at(hit.triangle, hit.u, hit.v) * passed);
-            found.largest = found.largest.max(reflected[0].length());
-            for (sum, reflected) in found.reflected.iter_mut().zip(reflected) {
-                *sum += reflected;
+            let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
+            if NearField::is_near(fields[0].mesh, element, &hit) {
+                near.push(NearRay { hit, direction, passed, ray });
+            } else {
+                let first = fields[0].reflected_on_element(element, local);
+                let reflected = |k: usize| match k {
+                    0 => first * passed,
+                    k => fields[k].reflected_at(hit.triangle, hit.u, hit.v) * passed,
+                };
+                add(&mut found.reflected, &mut found.largest, std::array::from_fn(reflected));
             }
             let light = self.lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !direct.knows(light) {
                 out.direct += self.lights.lights[light as usize].exitance * passed;
             }
         });
+        let is_covered = NearField::is_covered(near.len(), rays);
+        for ray in near {
+            let reflected_at =
+                |field: &RadiosityField, hit: &Hit| field.reflected_at(hit.triangle, hit.u, hit.v);
+            let reflected = if is_covered {
+                let NearLight { light, end } = self.near_field.light(fields[0].mesh, point, &ray);
+                fields.map(|field| match &end {
+                    Some((share, end)) => light + *share * reflected_at(field, end),
+                    None => light,
+                })
+            } else {
+                fields.map(|field| reflected_at(field, &ray.hit))
+            };
+            let reflected = reflected.map(|radiosity| radiosity * ray.passed);
+            add(&mut found.reflected, &mut found.largest, reflected);
+        }
         found
+    }
+}
+
+/// Adds the radiosity along a ray, by field.
+fn add<const FIELDS: usize>(sums: &mut [Rgb; FIELDS], largest: &mut f64, reflected: [Rgb; FIELDS]) {
+    *largest = largest.max(reflected[0].length());
+    for (sum, reflected) in sums.iter_mut().zip(reflected) {
+        *sum += reflected;
     }
 }
 

@@ -16,7 +16,7 @@
 use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Deref};
 use std::sync::Arc;
 
 use fastrand::Rng;
@@ -50,10 +50,28 @@ const MAX_TRIES: usize = 1000;
 /// Surfaces whose normals agree by this cosine face alike.
 const ALIKE: f64 = 0.8;
 
+/// A scene, owned or not.
+#[derive(Debug)]
+enum SceneRef<'a> {
+    Borrowed(&'a Scene),
+    Shared(Arc<Scene>),
+}
+
+impl Deref for SceneRef<'_> {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        match self {
+            SceneRef::Borrowed(scene) => scene,
+            SceneRef::Shared(scene) => scene,
+        }
+    }
+}
+
 /// Path traces the light of a scene.
 #[derive(Debug)]
 pub struct PathTracer<'a> {
-    scene: &'a Scene,
+    scene: SceneRef<'a>,
     rays: Arc<RayScene>,
     panes: Panes,
     normals: Vec<DVec3>,
@@ -86,16 +104,25 @@ pub struct Reflected {
 impl<'a> PathTracer<'a> {
     /// For the light of `scene`.
     pub fn new(scene: &'a Scene) -> PathTracer<'a> {
+        PathTracer::of(SceneRef::Borrowed(scene))
+    }
+
+    /// For the light of `scene`, which it keeps.
+    pub(crate) fn of_shared(scene: Arc<Scene>) -> PathTracer<'static> {
+        PathTracer::of(SceneRef::Shared(scene))
+    }
+
+    fn of(scene: SceneRef<'_>) -> PathTracer<'_> {
         let diagonal = scene.bounds().diagonal();
         PathTracer {
-            scene,
-            rays: RayScene::of_scene(scene),
-            panes: Panes::of_scene(scene),
+            rays: RayScene::of_scene(&scene),
+            panes: Panes::of_scene(&scene),
             normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
-            emitters: Emitters::new(scene),
+            emitters: Emitters::new(&scene),
             contact: (offset::PATH_CONTACT * diagonal)
                 .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
             diagonal,
+            scene,
         }
     }
 
@@ -155,19 +182,49 @@ impl<'a> PathTracer<'a> {
     }
 
     /// The sum of what `paths` paths find.
-    pub(super) fn sum(&self, point: &SurfacePoint, paths: usize, rng: &mut Rng) -> Rgb {
+    pub(crate) fn sum(&self, point: &SurfacePoint, paths: usize, rng: &mut Rng) -> Rgb {
         (0..paths).map(|_| self.path(point, rng)).sum()
     }
 
     /// What those of `rays` rays from `point`, dense as the cosine, meet that meet anything.
-    pub(super) fn hits(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<Hit> {
+    pub(crate) fn hits(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<Hit> {
         let normal = self.normals[point.triangle];
         (0..rays).filter_map(|_| self.next_hit(point, cosine_weighted(normal, rng).0)).collect()
     }
 
-    /// Reflected radiosity at `point` as one path finds it, W/m².
+    /// Reflected radiosity at `point` by one path, W/m².
     fn path(&self, point: &SurfacePoint, rng: &mut Rng) -> Rgb {
-        let (mut at, mut throughput) = self.start(point, rng);
+        let (at, throughput) = self.start(point, rng);
+        self.follow(at, throughput, |_| false, rng).0
+    }
+
+    /// Radiosity that the front at `hit`, at `position`, reflects, by one path that ends at the
+    /// first surface that `ends` it: what arrives on the way, W/m², and the end with the share of
+    /// the radiosity reflected there that arrives.
+    pub(crate) fn path_to(
+        &self,
+        hit: &Hit,
+        position: DVec3,
+        ends: impl Fn(&Hit) -> bool,
+        rng: &mut Rng,
+    ) -> (Rgb, Option<(Rgb, Hit)>) {
+        let mut at = SurfacePoint { triangle: hit.triangle, position };
+        let place = [hit.u, hit.v];
+        let reflectance = self.scene.reflectance_at(hit.triangle, place);
+        let transmittance = self.scene.albedo_around(hit.triangle, place, 0.0) - reflectance;
+        let throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        self.follow(at, throughput, ends, rng)
+    }
+
+    /// Follows a path from `at` until it leaves, is absorbed, or meets a surface that `ends` it:
+    /// the light that arrives, W/m², and that surface with the `throughput` up to it.
+    fn follow(
+        &self,
+        mut at: SurfacePoint,
+        mut throughput: Rgb,
+        ends: impl Fn(&Hit) -> bool,
+        rng: &mut Rng,
+    ) -> (Rgb, Option<(Rgb, Hit)>) {
         let mut reflected = Rgb::ZERO;
         loop {
             let weights = self.emitters.weights(at.position);
@@ -181,11 +238,11 @@ impl<'a> PathTracer<'a> {
             let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
             let hit = match self.next_hit(&at, direction) {
                 Some(hit) if hit.front => hit,
-                Some(_) => return reflected,
+                Some(_) => return (reflected, None),
                 None => {
                     let passed = self.passed(&at, direction, f64::INFINITY);
                     let sky = self.scene.sky().radiance(direction);
-                    return reflected + throughput * passed * PI * sky;
+                    return (reflected + throughput * passed * PI * sky, None);
                 }
             };
             throughput *= self.passed(&at, direction, hit.distance);
@@ -197,10 +254,13 @@ impl<'a> PathTracer<'a> {
                 let balance = cosine / PI / (cosine / PI + light);
                 reflected += throughput * exitance * balance;
             }
+            if ends(&hit) {
+                return (reflected, Some((throughput, hit)));
+            }
             at.position += hit.distance * direction;
             match self.scatter_at(&mut at, &hit, rng) {
                 Some(share) => throughput *= share,
-                None => return reflected,
+                None => return (reflected, None),
             }
         }
     }
@@ -354,7 +414,7 @@ impl<'a> PathTracer<'a> {
 /// The hits nearest to `position` along the line of `normal` (unit length), before and behind, of
 /// triangles that face alike by their `normals`, within [`LOOKUP_REACH`] of `diagonal`: those that
 /// lie in one place, the nearest first.
-pub(super) fn nearest_surfaces(
+pub(crate) fn nearest_surfaces(
     rays: &RayScene,
     normals: &[DVec3],
     position: DVec3,
@@ -382,7 +442,7 @@ pub(super) fn nearest_surfaces(
 
 /// A point of a `part` of triangle `t`, uniform over its solid area; where little of it is solid,
 /// it may be in a hole.
-pub(super) fn random_point(scene: &Scene, t: usize, part: &Part, rng: &mut Rng) -> DVec3 {
+pub(crate) fn random_point(scene: &Scene, t: usize, part: &Part, rng: &mut Rng) -> DVec3 {
     let mut random_place = || part.place(random_barycentric(rng));
     let place = random_place();
     let others = std::iter::repeat_with(random_place).take(MAX_TRIES);

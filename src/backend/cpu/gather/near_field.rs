@@ -1,0 +1,85 @@
+//! Near surfaces, whose elements are too large to know their light there.
+//!
+//! ```text
+//!        ▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔   one element, lit at its right end
+//!          ╲ ↗ ╲
+//!   ────────x───────────────►  light from outside, which reaches no further in
+//! ```
+//!
+//! An element that is wider than it is far away covers much of the hemisphere of a point, and its
+//! interpolated light may differ from what the point sees of it: in a gap, light that is
+//! interpolated from its mouth would fill all of it, and be reflected between its walls. So where
+//! such surfaces cover much of the hemisphere, the light that they reflect is found by paths, one a
+//! ray, that end at the first surface that is further away than its element is wide (secondary
+//! final gathering: Jensen 1996; Christensen 1999).
+
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use crate::gather::GatherPoint;
+use crate::light::PathTracer;
+use crate::mesh::Mesh;
+use crate::sampling::random::random_numbers;
+use crate::scene::Rgb;
+use crate::visibility::ray_scene::Hit;
+
+/// Distance of a hit over the width of its element below which it is near.
+const NEAR: f64 = 0.5;
+
+/// Share of the hemisphere that near surfaces cover above which paths find their light.
+const MIN_COVERED: f64 = 0.5;
+
+/// A ray that meets a near surface.
+pub(super) struct NearRay {
+    pub hit: Hit,
+    pub direction: DVec3,
+    /// Share of the light that clear panes on the way let through.
+    pub passed: Rgb,
+    /// Number of the ray.
+    pub ray: u32,
+}
+
+/// What a near surface reflects to a point by one path.
+pub(super) struct NearLight {
+    /// Light that arrives on the path, W/m².
+    pub light: Rgb,
+    /// The end of the path, and the share of the radiosity reflected there that arrives.
+    pub end: Option<(Rgb, Hit)>,
+}
+
+/// Finds the light of near surfaces.
+#[derive(Debug, Default)]
+pub(super) struct NearField {
+    /// None before the first point that needs it.
+    paths: OnceLock<PathTracer<'static>>,
+}
+
+impl NearField {
+    /// Whether a hit on `element` of `mesh` is near.
+    pub fn is_near(mesh: &Mesh, element: usize, hit: &Hit) -> bool {
+        // A right triangle with two sides of this width has the area.
+        let square = 2.0 * mesh.area(mesh.element(element));
+        hit.distance * hit.distance < NEAR * NEAR * square
+    }
+
+    /// Whether paths find the light of as many `near` rays of all.
+    pub fn is_covered(near: usize, rays: usize) -> bool {
+        near as f64 > MIN_COVERED * rays as f64
+    }
+
+    /// The light of a near surface at the end of a `ray` from `point`, where light is known on the
+    /// elements of `mesh`.
+    pub fn light(&self, mesh: &Mesh, point: &GatherPoint, ray: &NearRay) -> NearLight {
+        let paths = self.paths.get_or_init(|| PathTracer::of_shared(mesh.shared_scene()));
+        let [x, y, z] = point.position.to_array().map(f64::to_bits);
+        let mut rng = random_numbers(&[x, y, z, u64::from(ray.ray)]);
+        let position = point.position + ray.hit.distance * ray.direction;
+        let ends = |hit: &Hit| {
+            let (element, _) = mesh.element_at(hit.triangle, hit.u, hit.v);
+            !NearField::is_near(mesh, element, hit)
+        };
+        let (light, end) = paths.path_to(&ray.hit, position, ends, &mut rng);
+        NearLight { light, end }
+    }
+}
