@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use clap::error::ErrorKind as Usage;
+use radiosity::accuracy::Measure;
 use radiosity::backend::AdapterKind;
 use radiosity::{Backend, Error, ErrorKind, Rgb};
 
@@ -158,6 +159,29 @@ const KINDS: Names<AdapterKind> = &[
     ("integrated", AdapterKind::IntegratedGpu),
     ("software", AdapterKind::Cpu),
 ];
+
+/// Which errors count.
+#[derive(Args, Clone, Copy)]
+pub struct MeasureOptions {
+    /// Share of the area, where errors are largest, that does not count and has an error of its own;
+    /// 0 for the plain root mean square [default: 0.01]
+    #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
+    tail: Option<f64>,
+    /// Points darker than this share of the mean reflected radiosity count as that bright [default:
+    /// 0.05]
+    #[arg(long, value_name = "SHARE", hide = true, value_parser = value::<f64>(SHARE))]
+    floor: Option<f64>,
+}
+
+impl MeasureOptions {
+    /// The measure that they give.
+    pub fn measure(self) -> Measure {
+        let mut measure = Measure::default();
+        measure.tail = self.tail.unwrap_or(measure.tail);
+        measure.floor = self.floor.unwrap_or(measure.floor);
+        measure
+    }
+}
 
 /// What makes form factors and gathers.
 #[derive(Args)]

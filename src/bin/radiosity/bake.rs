@@ -13,7 +13,7 @@ use files::Files;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, Solver};
 use settings::Adjustment;
 
-use crate::args::{self, DeviceOptions, Parsed, SHARE, Stop, give, value};
+use crate::args::{self, DeviceOptions, MeasureOptions, Parsed, SHARE, Stop, give, value};
 use crate::report::Report;
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
@@ -36,7 +36,8 @@ const BLACK: (&str, &str) =
 #[derive(Args)]
 #[command(after_help = "\
 Without --error, --error-each, --time, --gather and --set a bake goes to an error of 5 %. The \
-error of radiosity is estimated, a root mean square over the area that reflects, as a share. \
+error of radiosity is estimated, as a share: a root mean square over the area that reflects, less \
+the tail. \
 Ctrl-C or SIGTERM stops the bake and writes what there is; a second one ends the program at \
 once.")]
 pub struct Bake {
@@ -50,6 +51,8 @@ pub struct Bake {
     /// Bake until the estimated error of each group of the scene is below this share
     #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
     error_each: Option<f64>,
+    #[command(flatten)]
+    measure: MeasureOptions,
     /// Limit of time: bake to the error that it permits or, with an error, until that is reached
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "state")]
     time: Option<Duration>,
@@ -65,7 +68,7 @@ pub struct Bake {
     list_settings: bool,
     /// Light in bands too, for the materials in this file: STEM.bands.ply and, where bands have
     /// wavelengths, STEM.bands.exr and .png
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", hide = true)]
     bands: Option<PathBuf>,
     /// Write the state of the solve to this file while it runs, and resume from the file where it
     /// exists; not with --time, which solves several times
@@ -133,6 +136,7 @@ impl Bake {
 
     /// Makes the settings that options name, after all others were chosen.
     fn adjust(&self, settings: &mut BakeSettings) {
+        settings.measure = self.measure.measure();
         self.set.iter().for_each(|adjustment| adjustment(settings));
         if self.state.is_some() {
             settings.solve.checkpoint.clone_from(&self.state);

@@ -12,9 +12,11 @@ use radiosity::io::{
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::verify::Estimate;
-use radiosity::{Backend, BakeResult, BakeTarget, Camera, Error, ErrorKind, Scene};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorKind, Scene};
 
-use crate::args::{self, DeviceOptions, List, Names, SHARE, Stop, one_of, some_of, value};
+use crate::args::{
+    self, DeviceOptions, List, MeasureOptions, Names, SHARE, Stop, one_of, some_of, value,
+};
 use crate::bake::files::{SAMPLES, camera};
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
@@ -88,6 +90,8 @@ pub struct Options {
     #[arg(long, value_name = "NUMBERS", value_parser = camera)]
     camera: Option<Camera>,
     #[command(flatten)]
+    measure: MeasureOptions,
+    #[command(flatten)]
     reading: SceneOptions,
     #[command(flatten)]
     device: DeviceOptions,
@@ -156,7 +160,8 @@ impl Options {
         interrupt::catch();
         let goal = || 1e-4;
         let baked = progress::of_bake(goal, |report| {
-            self.target().bake(atlas.scene().clone(), &device, report)
+            let measure = |settings: &mut BakeSettings| settings.measure = self.measure.measure();
+            self.target().bake_with(atlas.scene().clone(), &device, measure, report)
         })?;
         let bake = start.elapsed().as_secs_f64();
         let (map, shown) = self.map(atlas, &baked, &device)?;

@@ -132,6 +132,7 @@ impl Report {
                 "group": names.get(group.group as usize),
                 "error": group.estimate.total,
                 "area": group.area_share,
+                "tail_share": group.tail_share,
             });
             merge(&mut entry, parts(&group.estimate));
             entry
@@ -257,14 +258,15 @@ impl Report {
             ),
             format!(
                 "error      about {:.2} %: mesh {:.2}, gaps {:.2}, sampling {:.2}, \
-                 truncation {:.2}, unshot {:.2}, sources {:.2}",
+                 truncation {:.2}, unshot {:.2}, sources {:.2}; tail {:.2}",
                 100.0 * error.total,
                 100.0 * error.mesh,
                 100.0 * error.gaps,
                 100.0 * error.sampling,
                 100.0 * error.truncation,
                 100.0 * error.unshot,
-                100.0 * error.sources
+                100.0 * error.sources,
+                100.0 * error.tail
             ),
             format!(
                 "seconds    load {:.2}, open {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, \
@@ -301,7 +303,7 @@ const WORST_GROUPS: usize = 4;
 /// The parts of an estimate.
 fn parts(error: &ErrorEstimate) -> Value {
     json!({
-        "total": error.total, "uncertainty": error.uncertainty, "mesh": error.mesh,
+        "total": error.total, "uncertainty": error.uncertainty, "tail": error.tail, "mesh": error.mesh,
         "gaps": error.gaps, "sampling": error.sampling, "settling": error.truncation,
         "unshot": error.unshot, "sources": error.sources, "places": error.samples,
         "paths": error.paths,

@@ -13,13 +13,18 @@ use radiosity::verify::{Estimate, GroupError, Settings, Stop as Reason, Verifica
 use radiosity::{Error, ErrorKind, Rgb, Scene, VertexMesh, read_ply};
 use serde_json::{Value as Json, json};
 
-use crate::args::{self, Parsed, Stop, give, value};
+use crate::args::{self, MeasureOptions, Parsed, Stop, give, value};
 use crate::bake::files::estimated_error;
 use crate::luminaires::Luminaires;
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
 use points::Points;
 use verdict::verdict;
+
+/// Maximum number of groups that are named as those of the tail, and least share of its squared
+/// error that each has.
+const TAIL_GROUPS: usize = 3;
+const MIN_TAIL_SHARE: f64 = 0.05;
 
 /// Groups in the printed table at most.
 const MAX_PRINTED: usize = 20;
@@ -28,8 +33,8 @@ const MAX_PRINTED: usize = 20;
 #[derive(Args)]
 #[command(after_help = "\
 Path traces the scene at random points of its surfaces and prints for each group, and for all, the \
-root mean square over the area of |B - true B| / max(|true B|, 5 % of its mean): B is reflected \
-radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the \
+root mean square over the area, less its tail, of |B - true B| / max(|true B|, 5 % of its mean): B \
+is reflected radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the \
 report of the bake, where there is one; the last line compares them. The options of the scene and \
 its light have to be those of the bake. After Ctrl-C the points so far count.")]
 pub struct Options {
@@ -45,6 +50,8 @@ pub struct Options {
     /// Begin no round that would end after this time; inf for no limit
     #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = time)]
     time: Limit,
+    #[command(flatten)]
+    measure: MeasureOptions,
     /// Minimum number of points in each group
     #[arg(long, value_name = "N", default_value = "16")]
     #[arg(value_parser = value::<usize>("a whole number"))]
@@ -69,6 +76,7 @@ pub struct Options {
     /// difference in units of the standard error of both; --csv has radiosity and standard error
     #[arg(long, value_name = "FILE.json")]
     #[arg(conflicts_with_all = ["solution", "precision", "time", "points_per_group", "hidden"])]
+    #[arg(conflicts_with_all = ["tail", "floor"])]
     #[arg(conflicts_with = "points_ply")]
     points: Option<PathBuf>,
     /// Paths a point of --points
@@ -107,6 +115,7 @@ impl Options {
     fn settings(&self) -> Settings {
         let mut settings = Settings::default();
         settings.seed = self.seed;
+        settings.measure = self.measure.measure();
         settings.precision = self.precision;
         settings.points_per_group = self.points_per_group;
         settings.time = self.time;
@@ -129,7 +138,7 @@ impl Options {
         })?;
         let lines = lines(scene, &found, &told);
         say!("{}", table(&lines));
-        say!("{}", self.end(&found, start.elapsed()));
+        say!("{}", self.end(scene, &found, start.elapsed()));
         if let Some(verdict) = verdict(told.total(), found.error) {
             say!("{verdict}");
         }
@@ -142,7 +151,7 @@ impl Options {
     }
 
     /// How it ended, and what deserves a look.
-    fn end(&self, found: &Verification, spent: Duration) -> String {
+    fn end(&self, scene: &Scene, found: &Verification, spent: Duration) -> String {
         let why = match (found.stop, self.time) {
             (Reason::Precise, _) => {
                 format!("known to {} % of itself", (100.0 * self.precision) as f32)
@@ -160,6 +169,17 @@ impl Options {
             spent.as_secs_f64(),
             self.seed
         );
+        let share = self.measure.measure().tail;
+        if let Some(tail) = found.tail.filter(|_| share > 0.0) {
+            let _ = write!(
+                end,
+                "\n{:.2} % of the area, where errors are largest, is the tail and left out: its \
+                 error is {:.2} %{}",
+                100.0 * share,
+                100.0 * tail,
+                tail_groups(scene, found)
+            );
+        }
         if found.hidden_share > 0.0 && !self.hidden {
             let with_it = found.error_with_hidden.map_or(0.0, |error| error.value);
             let _ = write!(
@@ -179,6 +199,19 @@ impl Options {
         }
         end
     }
+}
+
+/// The groups that hold most of the tail, in words.
+fn tail_groups(scene: &Scene, found: &Verification) -> String {
+    let mut groups: Vec<&GroupError> = found.groups.iter().collect();
+    groups.sort_by(|a, b| b.tail_share.total_cmp(&a.tail_share));
+    let name = |group: &GroupError| {
+        let share = 100.0 * group.tail_share;
+        format!("{share:.0} % of it on {}", scene.groups()[group.group])
+    };
+    let most = groups.iter().take(TAIL_GROUPS).filter(|g| g.tail_share >= MIN_TAIL_SHARE);
+    let names: Vec<String> = most.map(|group| name(group)).collect();
+    if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) }
 }
 
 fn time(text: &str) -> Parsed<Limit> {
