@@ -51,6 +51,26 @@ pub enum Backend {
     Cpu,
 }
 
+/// How points gather.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GatherRays {
+    /// Minimum number of rays of a point.
+    pub rays: u32,
+    /// See [`RayGather::with_noise`].
+    pub noise: f64,
+    pub dim: f64,
+    /// Whether the light that is gathered is a solution of its scene, known on elements that may be
+    /// too large for it near a point: see [`RayGather::with_near_field`].
+    pub near_field: bool,
+}
+
+impl GatherRays {
+    /// As many for each point, of any light.
+    pub fn evenly(rays: u32) -> GatherRays {
+        GatherRays { rays, noise: f64::INFINITY, dim: 0.0, near_field: false }
+    }
+}
+
 impl Backend {
     /// The graphics adapter with `name` in its name, or the best.
     ///
@@ -183,7 +203,7 @@ impl Backend {
     /// Those of [`TracedGather::new`](crate::backend::gpu::TracedGather::new) and
     /// [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
-        self.gather_evenly(mesh, rays, f64::INFINITY, 0.0)
+        self.gather_evenly(mesh, GatherRays::evenly(rays))
     }
 
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): the number of
@@ -205,7 +225,8 @@ impl Backend {
         }
         let (rays, noise) = rays_for_noise(noise);
         let dim = light.radiosity_field().radiosity_floor(Measure::default().floor);
-        self.gather_or_cast_rays(&light.mesh, (rays, noise, dim), |_| ())
+        let rays = GatherRays { rays, noise, dim, near_field: false };
+        self.gather_or_cast_rays(&light.mesh, rays, |_| ())
     }
 
     /// As [`Backend::gather_evenly`], with rays on the CPU from the time when the device fails, or
@@ -213,19 +234,19 @@ impl Backend {
     pub(crate) fn gather_or_cast_rays<'a>(
         &self,
         mesh: &Mesh,
-        (rays, noise, dim): (u32, f64, f64),
+        rays: GatherRays,
         mut failed: impl FnMut(Error) + 'a,
     ) -> Result<Box<dyn Gather + 'a>, Error> {
-        match self.gather_evenly(mesh, rays, noise, dim) {
+        match self.gather_evenly(mesh, rays) {
             Ok(first) if self.gathers_on_device() => {
                 let mesh = mesh.clone();
                 Ok(Box::new(Fallback::new(first, move |error| {
                     failed(error);
-                    Backend::Cpu.gather_evenly(&mesh, rays, noise, dim)
+                    Backend::Cpu.gather_evenly(&mesh, rays)
                 })))
             }
             Err(e) if e.is_device_error() || e.kind() == ErrorKind::Setting => {
-                let gather = Backend::Cpu.gather_evenly(mesh, rays, noise, dim)?;
+                let gather = Backend::Cpu.gather_evenly(mesh, rays)?;
                 failed(e);
                 Ok(gather)
             }
@@ -237,16 +258,17 @@ impl Backend {
     pub(crate) fn gather_evenly(
         &self,
         mesh: &Mesh,
-        rays: u32,
-        noise: f64,
-        dim: f64,
+        GatherRays { rays, noise, dim, near_field }: GatherRays,
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
                 Ok(Box::new(TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?))
             }
-            _ => Ok(Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim))),
+            _ => {
+                let gather = RayGather::new(mesh, rays)?.with_noise(noise, dim);
+                Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
+            }
         }
     }
 }

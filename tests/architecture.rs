@@ -14,31 +14,37 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("scene", "error geometry"),
     ("accuracy", "error"),
     ("visibility", "error geometry sampling scene"),
+    ("light", "error geometry progress sampling scene visibility"),
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
     ("form_factor", "error geometry mesh ranks scene"),
     ("solver", "error form_factor geometry mesh progress scene visibility"),
     ("vertex", "error form_factor geometry mesh scene"),
-    ("gather", "error form_factor geometry mesh progress ranks sampling scene vertex visibility"),
+    (
+        "gather",
+        "accuracy error form_factor geometry mesh progress ranks sampling scene vertex visibility",
+    ),
     ("grid", "error gather geometry scene visibility"),
     ("probe", "error gather progress scene visibility"),
     ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),
     ("heat", "error geometry view_factor"),
     (
         "backend",
-        "error form_factor gather geometry hemicube mesh progress sampling scene visibility",
+        "accuracy error form_factor gather geometry hemicube light mesh progress sampling scene \
+         visibility",
     ),
     ("camera", "error gather geometry mesh progress sampling scene vertex visibility"),
-    ("verify", "error geometry progress sampling scene vertex visibility"),
+    ("verify", "accuracy error geometry light progress sampling scene vertex visibility"),
     (
         "bake",
-        "backend error form_factor gather geometry mesh progress sampling scene solver verify \
-         vertex visibility",
+        "accuracy backend error form_factor gather geometry light mesh progress sampling scene \
+         solver verify vertex visibility",
     ),
-    ("bands", "backend bake error gather mesh scene vertex visibility"),
+    ("bands", "accuracy backend bake error gather mesh scene vertex visibility"),
     (
         "light_map",
-        "backend bake error gather geometry mesh progress sampling scene verify vertex visibility",
+        "accuracy backend bake error gather geometry mesh progress sampling scene verify vertex \
+         visibility",
     ),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];

@@ -1,6 +1,6 @@
 //! The mean square error over an area, from points at random on it.
 
-use super::tail::{Trimmed, trimmed};
+use super::tail::trimmed;
 
 /// Independent ways to decide whether a point is in the tail, and its square error by each.
 pub(crate) const SPLITS: usize = 6;
@@ -88,12 +88,19 @@ impl TrimmedSquare {
         for split in 0..SPLITS {
             let ranks: Vec<(f64, f64)> =
                 points.iter().map(|p| (p.area, p.error.splits[split].rank)).collect();
-            let Trimmed { kept: shares, cut } = trimmed(&ranks, tail);
+            let shares = trimmed(&ranks, tail).kept;
+            let value = |k: usize| points[k].error.splits[split].value;
+            // The error at the cut, without noise: the mean over the next points of as much area.
+            let beyond = trimmed(&ranks, 2.0 * tail).kept;
+            let at_cut = |k: usize| points[k].area * (shares[k] - beyond[k]);
+            let area_at_cut: f64 = (0..points.len()).map(at_cut).sum();
+            let cut = (0..points.len()).map(|k| at_cut(k) * value(k)).sum::<f64>()
+                / area_at_cut.max(f64::MIN_POSITIVE);
             for (k, share) in shares.into_iter().enumerate() {
-                let value = points[k].error.splits[split].value;
+                let value = value(k);
                 kept[k] += share / SPLITS as f64;
                 squares[k] += share * value / SPLITS as f64;
-                let rest = if share < 1.0 { (1.0 - share) * cut } else { 0.0 };
+                let rest = if share < 1.0 { (1.0 - share) * cut.max(0.0) } else { 0.0 };
                 winsorised[k] += (share * value + rest) / SPLITS as f64;
             }
         }

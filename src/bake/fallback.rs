@@ -5,7 +5,7 @@
 
 use std::cell::{Cell, OnceCell};
 
-use crate::backend::{Backend, BackendRows, Fallback, RowMaker};
+use crate::backend::{Backend, BackendRows, Fallback, GatherRays, RowMaker};
 use crate::bake::settings::SolveSettings;
 use crate::error::{Error, ErrorKind};
 use crate::gather::Gather;
@@ -88,6 +88,7 @@ impl<'a> ResilientBackend<'a> {
         noise: f64,
         dim: f64,
     ) -> Result<Box<dyn Gather + '_>, Error> {
-        self.backend.gather_or_cast_rays(mesh, (rays, noise, dim), |error| self.record(error))
+        let rays = GatherRays { rays, noise, dim, near_field: true };
+        self.backend.gather_or_cast_rays(mesh, rays, |error| self.record(error))
     }
 }

@@ -191,7 +191,7 @@ impl<'a> GatherPhase<'a> {
     /// What makes the rows by which vertices exchange all further bounces.
     fn bounce_rows(&self) -> Result<RayGather, Error> {
         let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
-        RayGather::new(&self.shot.mesh, rays)
+        Ok(RayGather::new(&self.shot.mesh, rays)?.with_near_field())
     }
 
     /// Takes `step`, and says why it ended.

@@ -194,17 +194,26 @@ impl<'a> PathTracer<'a> {
 
     /// Reflected radiosity at `point` by one path, W/m².
     fn path(&self, point: &SurfacePoint, rng: &mut Rng) -> Rgb {
-        let (at, throughput) = self.start(point, rng);
-        self.follow(at, throughput, |_| false, rng).0
+        let (mut at, mut throughput) = self.start(point, rng);
+        let mut reflected = Rgb::ZERO;
+        while let Some(hit) = self.advance(&mut at, &mut throughput, true, &mut reflected, rng) {
+            match self.scatter_at(&mut at, &hit, rng) {
+                Some(share) => throughput *= share,
+                None => break,
+            }
+        }
+        reflected
     }
 
     /// Radiosity that the front at `hit`, at `position`, reflects, by one path that ends at the
     /// first surface that `ends` it: what arrives on the way, W/m², and the end with the share of
-    /// the radiosity reflected there that arrives.
+    /// the radiosity reflected there that arrives. Emitters are met by the path alone or, `by_area`,
+    /// sampled too.
     pub(crate) fn path_to(
         &self,
         hit: &Hit,
         position: DVec3,
+        by_area: bool,
         ends: impl Fn(&Hit) -> bool,
         rng: &mut Rng,
     ) -> (Rgb, Option<(Rgb, Hit)>) {
@@ -212,57 +221,63 @@ impl<'a> PathTracer<'a> {
         let place = [hit.u, hit.v];
         let reflectance = self.scene.reflectance_at(hit.triangle, place);
         let transmittance = self.scene.albedo_around(hit.triangle, place, 0.0) - reflectance;
-        let throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
-        self.follow(at, throughput, ends, rng)
-    }
-
-    /// Follows a path from `at` until it leaves, is absorbed, or meets a surface that `ends` it:
-    /// the light that arrives, W/m², and that surface with the `throughput` up to it.
-    fn follow(
-        &self,
-        mut at: SurfacePoint,
-        mut throughput: Rgb,
-        ends: impl Fn(&Hit) -> bool,
-        rng: &mut Rng,
-    ) -> (Rgb, Option<(Rgb, Hit)>) {
+        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
         let mut reflected = Rgb::ZERO;
-        loop {
-            let weights = self.emitters.weights(at.position);
-            reflected += throughput * self.next_event(&at, &weights, rng);
-            if let Some(sun) = self.scene.sky().sun() {
-                reflected += throughput * self.irradiance_of_sun(&at, sun, rng);
-            }
-            if !self.scene.luminaires().is_empty() {
-                reflected += throughput * self.irradiance_of_luminaire(&at, rng);
-            }
-            let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
-            let hit = match self.next_hit(&at, direction) {
-                Some(hit) if hit.front => hit,
-                Some(_) => return (reflected, None),
-                None => {
-                    let passed = self.passed(&at, direction, f64::INFINITY);
-                    let sky = self.scene.sky().radiance(direction);
-                    return (reflected + throughput * passed * PI * sky, None);
-                }
-            };
-            throughput *= self.passed(&at, direction, hit.distance);
-            let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
-            if exitance != Rgb::ZERO {
-                let facing = self.normals[hit.triangle].dot(direction).abs();
-                let by_area = self.emitters.density(&weights, hit.triangle);
-                let light = by_area * hit.distance * hit.distance / facing;
-                let balance = cosine / PI / (cosine / PI + light);
-                reflected += throughput * exitance * balance;
-            }
+        while let Some(hit) = self.advance(&mut at, &mut throughput, by_area, &mut reflected, rng) {
             if ends(&hit) {
                 return (reflected, Some((throughput, hit)));
             }
-            at.position += hit.distance * direction;
             match self.scatter_at(&mut at, &hit, rng) {
                 Some(share) => throughput *= share,
-                None => return (reflected, None),
+                None => break,
             }
         }
+        (reflected, None)
+    }
+
+    /// Takes a path one surface further from `at`: adds the light that arrives at `at` to what is
+    /// `reflected`, W/m², moves `at` to the next hit, and multiplies `throughput` by what panes on
+    /// the way let through. None where the path leaves or meets a back.
+    fn advance(
+        &self,
+        at: &mut SurfacePoint,
+        throughput: &mut Rgb,
+        by_area: bool,
+        reflected: &mut Rgb,
+        rng: &mut Rng,
+    ) -> Option<Hit> {
+        let weights = by_area.then(|| self.emitters.weights(at.position));
+        if let Some(weights) = &weights {
+            *reflected += *throughput * self.next_event(at, weights, rng);
+        }
+        if let Some(sun) = self.scene.sky().sun() {
+            *reflected += *throughput * self.irradiance_of_sun(at, sun, rng);
+        }
+        if !self.scene.luminaires().is_empty() {
+            *reflected += *throughput * self.irradiance_of_luminaire(at, rng);
+        }
+        let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
+        let Some(hit) = self.next_hit(at, direction) else {
+            let passed = self.passed(at, direction, f64::INFINITY);
+            *reflected += *throughput * passed * PI * self.scene.sky().radiance(direction);
+            return None;
+        };
+        if !hit.front {
+            return None;
+        }
+        *throughput *= self.passed(at, direction, hit.distance);
+        let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
+        if exitance != Rgb::ZERO {
+            let balance = weights.map_or(1.0, |weights| {
+                let facing = self.normals[hit.triangle].dot(direction).abs();
+                let by_area = self.emitters.density(&weights, hit.triangle);
+                let light = by_area * hit.distance * hit.distance / facing;
+                cosine / PI / (cosine / PI + light)
+            });
+            *reflected += *throughput * exitance * balance;
+        }
+        at.position += hit.distance * direction;
+        Some(hit)
     }
 
     /// What the light that is `emitted` at places causes at `point` after two bounces and more, by

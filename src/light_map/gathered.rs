@@ -7,7 +7,7 @@ use super::coverage::{NO_TRIANGLE, triangles_of_texels};
 use super::dilation::fill_from_neighbours;
 use super::seams;
 use super::texel_points::TexelPoints;
-use crate::backend::Backend;
+use crate::backend::{Backend, GatherRays};
 use crate::bake::BakeResult;
 use crate::error::{Error, ErrorKind};
 use crate::gather::gather_points::is_buried;
@@ -147,7 +147,8 @@ pub(super) fn gatherer<'a>(
         Some(settings) => (settings.rays, settings.noise_tolerance),
         None => (RAYS, f64::INFINITY),
     };
-    backend.gather_or_cast_rays(&baked.light.mesh, (rays, noise, dim), |_| ())
+    let rays = GatherRays { rays, noise, dim, near_field: true };
+    backend.gather_or_cast_rays(&baked.light.mesh, rays, |_| ())
 }
 
 /// Fills empty texels next to charts from their neighbours.

@@ -135,7 +135,9 @@ mod tests {
             // The bias is known to a tenth of itself.
             let close = 4.0 * off + 0.1 * found.mean.bias;
             assert!((value - mean).abs() < close, "{trim}: {value} for {mean}, {found:?}");
-            assert!((found.tail - rest).abs() < 0.05 * rest + 1e-12, "{trim}: {}", found.tail);
+            // The half that chooses divides by its own length: noise of 6 % there makes those that
+            // it chooses among equals too large by about as much.
+            assert!((found.tail - rest).abs() < 0.08 * rest + 1e-12, "{trim}: {}", found.tail);
             let area: f64 = found.in_tail.iter().sum();
             assert!((area - trim * all.len() as f64).abs() < 1e-6);
         }

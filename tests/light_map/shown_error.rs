@@ -22,7 +22,7 @@ fn told(map: &LightMap, baked: &BakeResult) -> f64 {
 
 #[test]
 fn a_coarse_map_tells_what_it_misses() {
-    let (mut map, baked) = cornell_map(64);
+    let (mut map, baked) = cornell_map(32);
     let found = told(&map, &baked);
     let true_error = truth::area_error(&map.surface().unwrap(), TRUTH);
     // Far more than the vertices are off by: it is the texels that are too large.

@@ -51,7 +51,8 @@ pub struct RayGather {
     panes: Panes,
     lights: Lights,
     rotations: CellRotation,
-    near_field: NearField,
+    /// None where interpolated light counts however near it is.
+    near_field: Option<NearField>,
     samples: HemisphereSamples,
     /// Minimum and maximum number of rays per point.
     min_rays: u32,
@@ -80,7 +81,7 @@ impl RayGather {
             panes: Panes::of_scene(mesh.scene()),
             lights: Lights::new(mesh.shared_scene()),
             rotations: CellRotation::new(&mesh.scene().bounds()),
-            near_field: NearField::default(),
+            near_field: None,
             samples: samples(mesh.scene(), min_rays, min_rays),
             min_rays,
             max_rays: min_rays,
@@ -99,6 +100,12 @@ impl RayGather {
         let max_rays = most_rays(self.min_rays, noise);
         let samples = samples(self.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
+    }
+
+    /// Finds the light of near surfaces by paths through the scene, where their elements are too
+    /// large to know it. For fields that are solutions: paths find the scene's own light.
+    pub fn with_near_field(self) -> RayGather {
+        RayGather { near_field: Some(NearField::default()), ..self }
     }
 
     /// Mean of 1/distance over the hemisphere above `point`, per scene unit, by the minimum number
@@ -195,7 +202,7 @@ impl RayGather {
             }
             let passed = passed(hit.distance);
             let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
-            if NearField::is_near(fields[0].mesh, element, &hit) {
+            if self.near_field.is_some() && NearField::is_near(fields[0].mesh, element, &hit) {
                 near.push(NearRay { hit, direction, passed, ray });
             } else {
                 let first = fields[0].reflected_on_element(element, local);
@@ -210,12 +217,15 @@ impl RayGather {
                 out.direct += self.lights.lights[light as usize].exitance * passed;
             }
         });
-        let is_covered = NearField::is_covered(near.len(), rays);
+        let covered = self.near_field.as_ref();
+        let covered = covered.filter(|_| NearField::is_covered(near.len(), rays));
         for ray in near {
             let reflected_at =
                 |field: &RadiosityField, hit: &Hit| field.reflected_at(hit.triangle, hit.u, hit.v);
-            let reflected = if is_covered {
-                let NearLight { light, end } = self.near_field.light(fields[0].mesh, point, &ray);
+            let reflected = if let Some(near_field) = covered {
+                let by_area = !direct.lights().is_empty();
+                let NearLight { light, end } =
+                    near_field.light(fields[0].mesh, point, &ray, by_area);
                 fields.map(|field| match &end {
                     Some((share, end)) => light + *share * reflected_at(field, end),
                     None => light,

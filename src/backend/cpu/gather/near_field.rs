@@ -69,8 +69,14 @@ impl NearField {
     }
 
     /// The light of a near surface at the end of a `ray` from `point`, where light is known on the
-    /// elements of `mesh`.
-    pub fn light(&self, mesh: &Mesh, point: &GatherPoint, ray: &NearRay) -> NearLight {
+    /// elements of `mesh`. Paths look for emitters `by_area` too where some are small from there.
+    pub fn light(
+        &self,
+        mesh: &Mesh,
+        point: &GatherPoint,
+        ray: &NearRay,
+        by_area: bool,
+    ) -> NearLight {
         let paths = self.paths.get_or_init(|| PathTracer::of_shared(mesh.shared_scene()));
         let [x, y, z] = point.position.to_array().map(f64::to_bits);
         let mut rng = random_numbers(&[x, y, z, u64::from(ray.ray)]);
@@ -79,7 +85,7 @@ impl NearField {
             let (element, _) = mesh.element_at(hit.triangle, hit.u, hit.v);
             !NearField::is_near(mesh, element, hit)
         };
-        let (light, end) = paths.path_to(&ray.hit, position, ends, &mut rng);
+        let (light, end) = paths.path_to(&ray.hit, position, by_area, ends, &mut rng);
         NearLight { light, end }
     }
 }

@@ -97,7 +97,7 @@ impl RayGather {
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
             let light = self.lights.of_triangle[hit.triangle];
             let passed = passed(hit.distance);
-            if NearField::is_near(mesh, element, &hit) {
+            if self.near_field.is_some() && NearField::is_near(mesh, element, &hit) {
                 let passed = Rgb::splat(passed);
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
@@ -109,9 +109,12 @@ impl RayGather {
             });
         });
         // What is emitted on the way is in no row: rows with lights leave near surfaces as they are.
-        if direct.is_none() && NearField::is_covered(near.len(), range.len()) {
+        if direct.is_none()
+            && let Some(near_field) = &self.near_field
+            && NearField::is_covered(near.len(), range.len())
+        {
             for (k, ray) in near {
-                let NearLight { end, .. } = self.near_field.light(mesh, point, &ray);
+                let NearLight { end, .. } = near_field.light(mesh, point, &ray, false);
                 let hit = &mut row.hits[k];
                 hit.passed *= end.map_or(0.0, |(share, _)| mean(share));
                 if let Some((_, end)) = end {
