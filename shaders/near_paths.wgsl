@@ -166,7 +166,8 @@ fn light_by_path(p: u32, start: Hit, start_reflectance: vec3f) -> vec3f {
     return found;
 }
 
-// What of the light that arrives at a triangle leaves its other side, where it has this reflectance.
+// What of the light that arrives at a triangle leaves its other side, where its front reflects this
+// much.
 fn transmittance(t: TracedTriangle, reflectance: vec3f) -> vec3f {
     let row = t.flags >> ROW_OF_FLAGS;
     if row == 0u {

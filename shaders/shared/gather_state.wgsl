@@ -8,7 +8,7 @@ const RAYS_PER_SHADOW_RAY: u32 = 4u;
 
 // Sums over rays.
 struct RaySums {
-    light: vec3f,         // from surfaces and the sky, except near ones and lights sampled separately
+    light: vec3f,         // from the sky and surfaces, without near ones and lights sampled apart
     escaped: f32,
     lamps: vec3f,         // exitance of the other lights
     back: f32,

@@ -1,7 +1,8 @@
-// Near surfaces, whose elements are too wide to know their light there: where they cover much of the
-// hemisphere of a point, paths find the light that they reflect. Needs shared/trace.wgsl before it.
+// Near surfaces, whose elements are too wide to know their light there: where they cover much of
+// the hemisphere of a point, paths find the light that they reflect. Needs shared/trace.wgsl before
+// it.
 
-const NEAR: f32 = 0.5;                // distance over the width of an element, below which it is near
+const NEAR: f32 = 0.5;                // distance over the width of an element that is near below
 const MIN_COVERED: f32 = 0.5;         // share of the hemisphere above which paths find the light
 
 // Whether a hit is near, on an element of which there are `side` along an edge of the triangle.

@@ -1,4 +1,5 @@
-// Light from outside: the sky and the sun. Needs shared/trace.wgsl and shared/lights.wgsl before it.
+// Light from outside: the sky and the sun. Needs shared/trace.wgsl and shared/lights.wgsl before
+// it.
 
 @group(0) @binding(7) var sky_pieces: texture_2d<f32>;
 

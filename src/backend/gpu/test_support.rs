@@ -312,9 +312,9 @@ pub fn room_with_doubled_leaf() -> Mesh {
     Parts::new(&parts).mesh(Sky::default(), 0.5)
 }
 
-/// Two bright plates with a gap between them that is narrower than their elements. Light comes in on
-/// one side, from a lamp and a low sun through a pane, and from the sky all around; in the gap there
-/// are a small lamp and a translucent leaf.
+/// Two bright plates with a gap between them that is narrower than their elements. Light comes in
+/// on one side, from a lamp and a low sun through a pane, and from the sky all around; in the gap
+/// there are a small lamp and a translucent leaf.
 pub fn narrow_gap() -> Mesh {
     let x = [0.0, 2.0];
     let white =

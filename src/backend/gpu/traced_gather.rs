@@ -1,16 +1,15 @@
 //! Irradiance gathered with rays on the device: batches of points, several in flight.
 //!
 //! ```text
-//! points ─► rank lights ─► rays over the hemisphere ─► near paths ─► settle ─┬─► samples ─► readback
-//!                      └─► rays to lights ─────────────────────────┘   ▲    │
-//!                                           more rays, where halves    └────┘
-//!                                           disagree
+//! points ─► rank lights ─┬► rays over the hemisphere ─► near paths ─┬► settle ─┬─► samples
+//!                        └► rays to lights ────────────────────────┘   ▲      │     read back
+//!                                    more rays, where halves disagree ─┴──────┘
 //! ```
 //!
-//! The sums are those of [`RayGather`], in 32 bits. Lists of the points that need more rays are made
-//! on the device: the host waits for samples only. Rays to luminaires are cast on the CPU, and so
-//! is all light, in scenes with luminaires, of points that near surfaces cover: paths on the device
-//! meet no luminaires.
+//! The sums are those of [`RayGather`], in 32 bits. Lists of the points that need more rays are
+//! made on the device: the host waits for samples only. Rays to luminaires are cast on the CPU, and
+//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device meet
+//! no luminaires.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};

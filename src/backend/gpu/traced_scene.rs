@@ -193,8 +193,8 @@ impl TracedArrays {
         self.nodes.extend(nodes);
     }
 
-    /// Rows of translucent materials: they begin after those of the lights, which are not there yet,
-    /// and of panes.
+    /// Rows of translucent materials: they begin after those of the lights, which are not there
+    /// yet, and of panes.
     fn add_translucent(&mut self, scene: &Scene, light_count: usize, blocking: usize) {
         let mut rows = rustc_hash::FxHashMap::default();
         for triangle in &mut self.triangles[..blocking] {

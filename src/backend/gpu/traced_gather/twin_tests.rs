@@ -28,6 +28,7 @@ use crate::backend::gpu::test_support::{
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
+use crate::scene::{IntensityDistribution, Luminaire};
 use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Relative rounding error of 32-bit numbers.
@@ -306,7 +307,7 @@ fn gather_passes_equal_their_twins() {
     // All cases to compare have occurred.
     assert!(met.wide > 0 && met.folded > 0 && met.full > 0 && met.escaped > 0.0);
     assert!(met.back > 0.0 && met.lamps > 0.0 && met.dim > 0 && met.rounds >= 6);
-    assert!(met.covered > 50 && met.near_by_field > 0.0);
+    assert!(met.covered > 20 && met.near_by_field > 0.0);
 }
 
 /// Cases that occurred in the scenes.
@@ -490,7 +491,7 @@ fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint)
 // ---------------------------------------------------------------------------------------------
 // Rays over the hemisphere.
 
-/// Number of values in [`Found`], and the indices of the largest rays: to near surfaces, and others.
+/// Number of values in [`Found`], and the indices of the largest rays, others and near ones.
 const NUMBERS: usize = size_of::<Found>() / 4;
 const LARGEST: [usize; 2] = [9, 11];
 
@@ -712,9 +713,10 @@ fn paths_choose_lights_with_their_chance() {
     }
 }
 
-/// Between plates that are closer than their elements are wide the device's light is that of rays on
-/// the CPU, within the noise of the paths: at each place many points so close together that they
-/// differ in nothing but their random numbers. Paths from there have a spread that their mean tells.
+/// Between plates that are closer than their elements are wide the device's light is that of rays
+/// on the CPU, within the noise of the paths: at each place there are many points so close together
+/// that they differ in nothing but their random numbers, and their spread tells the noise of their
+/// mean.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
@@ -767,6 +769,35 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
     // The channels of a place depend on each other: as few as a third of all are free.
     println!("mean square {:.2}", squares / f64::from(numbers));
     assert!(squares / f64::from(numbers) < 2.5);
+}
+
+/// Paths on the device meet no luminaires: of a scene with some, points that near surfaces cover
+/// are gathered on the CPU, and the others are not.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn covered_points_under_luminaires_are_gathered_on_the_cpu() {
+    let (gpu, mesh) = (gpu(), narrow_gap());
+    let intensity = IntensityDistribution::isotropic(1.0).unwrap();
+    let luminaire = Luminaire::new(intensity, DVec3::new(1.2, 0.7, 0.1), -DVec3::Z);
+    let scene = mesh.scene().clone().with_luminaires(vec![luminaire]).unwrap();
+    let mesh = mesh.with_scene(scene).unwrap();
+    let (corners, reflected) = random_radiosity(&mesh);
+    let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+    let above = [([1.0, 1.0, 1e-4], DVec3::Z), ([1.0, 1.0, 0.2], DVec3::Z)];
+    let points = above.map(|(position, normal)| GatherPoint {
+        position: DVec3::from_array(position),
+        normal,
+        near: 2.5e-5,
+    });
+    for noise in [f64::INFINITY, 0.05] {
+        let mut device = TracedGather::with_noise(&gpu, &mesh, 256, (noise, 0.1)).unwrap();
+        let mut cpu = RayGather::new(&mesh, 256).unwrap().with_noise(noise, 0.1);
+        let found = device.gather(&field, &points).unwrap();
+        let expected = cpu.gather(&field, &points).unwrap();
+        assert_eq!(found[0], expected[0]);
+        assert_ne!(found[1], expected[1]);
+        assert!(found[1].irradiance.distance(expected[1].irradiance) < 1e-3);
+    }
 }
 
 // ---------------------------------------------------------------------------------------------
