@@ -314,7 +314,7 @@ pub fn room_with_doubled_leaf() -> Mesh {
 
 /// Two bright plates with a gap between them that is narrower than their elements. Light comes in
 /// on one side, from a lamp and a low sun through a pane, and from the sky all around; in the gap
-/// there are a small lamp and a translucent leaf.
+/// there are two small lamps, one of which has a fold, and a translucent leaf. Quadtrees are uneven.
 pub fn narrow_gap() -> Mesh {
     let x = [0.0, 2.0];
     let white =
@@ -339,7 +339,15 @@ pub fn narrow_gap() -> Mesh {
     ];
     let sun = Sun { direction: DVec3::new(1.0, 0.2, 0.06), irradiance: Rgb::new(9.0, 8.0, 7.0) };
     let sky = Sky::uniform(Rgb::new(0.4, 0.5, 0.6)).with_sun(sun).unwrap();
-    Parts::new(&parts).mesh(sky, 2.0)
+    let mut parts = Parts::new(&parts);
+    let (q, r) = ([0.5, 0.5, 0.13], [0.5, 0.8, 0.13]);
+    let folded = [[r, q, [0.42, 0.65, 0.05]], [q, r, [0.6, 0.65, 0.05]]];
+    parts.add(&folded, emitting([2.0, 3.0, 4.0]));
+    let mesh = parts.mesh(sky, 2.0);
+    let split: Vec<usize> = (0..mesh.element_count()).filter(|e| e % 2 == 1).collect();
+    let mesh = mesh.split(&split).unwrap();
+    let split: Vec<usize> = (0..mesh.element_count()).filter(|e| e % 3 == 1).collect();
+    mesh.split(&split).unwrap()
 }
 
 /// `count` points just above the elements of `mesh`, distributed over all of these.
