@@ -1,10 +1,7 @@
 // Cosine-distributed rays from each point, and the sums of their results: a workgroup per point, a
-// lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/gather_state.wgsl,
-// shared/lattice.wgsl and shared/field.wgsl before it.
-
-@group(0) @binding(7) var sky_pieces: texture_2d<f32>;
-// Unit vectors along two tangents and the normal, ray by ray.
-@group(1) @binding(2) var directions: texture_2d<f32>;
+// lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl,
+// shared/gather_state.wgsl, shared/hemisphere.wgsl, shared/near_field.wgsl, shared/lattice.wgsl and
+// shared/field.wgsl before it.
 
 var<private> light_sums: array<Visible, 16>;
 
@@ -26,54 +23,28 @@ fn more_hemisphere_rays(
     cast_rays(work.points[group.x], lane);
 }
 
-// Light from the sky along a direction, as the radiosity of a surface.
-fn from_sky(direction: vec3f) -> vec3f {
-    if scene.sky_side == 0u {
-        return scene.sky;
-    }
-    let along = vec3f(
-        dot(scene.sky_x, direction),
-        dot(scene.sky_y, direction),
-        dot(scene.sky_z, direction),
-    );
-    let d = along / dot(abs(along), vec3f(1.0));
-    let side = f32(scene.sky_side);
-    let last = scene.sky_side - 1u;
-    let column = min(u32(max((d.x + d.y + 1.0) * 0.5 * side, 0.0)), last);
-    let line = min(u32(max((d.x - d.y + 1.0) * 0.5 * side, 0.0)), last);
-    let square = select(0u, scene.sky_side, d.z < 0.0);
-    return textureLoad(sky_pieces, vec2u(column, square + line), 0).rgb;
-}
-
 fn cast_rays(p: u32, lane: u32) {
     let point = points[p];
-    let total = states[p].ray_count;
     let light_count = states[p].light_count;
-    // In the first pass all rays, in two halves; then the same number again, as the second half.
-    let is_first = states[p].pending == 3u;
-    let start = select(total, 0u, is_first);
-    let middle = select(total, total / 2u, is_first);
-    let end = select(2u * total, total, is_first);
-    let from_ray = start + settings.first;
-    let to_ray = min(from_ray + settings.pass_rays, end);
+    let rays = rays_of_pass(states[p].ray_count, states[p].pending);
     for (var k = 0u; k < 2u * light_count; k++) {
         light_sums[k] = Visible();
     }
     var found = array<RaySums, 2>();
-    for (var k = from_ray + lane; k < to_ray; k += LANES) {
-        let local = textureLoad(directions, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0).xyz;
-        let direction = turned(local, point.normal, point.rotation);
-        let half = select(0u, 1u, k >= middle);
-        cast_ray(p, point, direction, light_count, half, &found);
+    for (var k = rays.start + lane; k < rays.stop; k += LANES) {
+        let half = select(0u, 1u, k >= rays.middle);
+        cast_ray(p, point, direction_of(k, point), light_count, half, &found);
     }
-    if from_ray >= end {
+    if rays.start >= rays.end {
         return;
     }
     for (var half = 0u; half < 2u; half++) {
         let light = added_up(lane, vec4f(found[half].light, found[half].escaped));
         let emitted = added_up(lane, vec4f(found[half].lamps, found[half].back));
+        let near = added_up(lane, vec4f(found[half].near_light, found[half].near));
         let rest = added_up(lane, vec4f(found[half].inverse_distance, 0.0, 0.0, 0.0));
         let largest = largest_of(lane, found[half].largest);
+        let near_largest = largest_of(lane, found[half].near_largest);
         if lane == 0u {
             states[p].rays[half].light += light.xyz;
             states[p].rays[half].escaped += light.w;
@@ -81,6 +52,10 @@ fn cast_rays(p: u32, lane: u32) {
             states[p].rays[half].back += emitted.w;
             states[p].rays[half].inverse_distance += rest.x;
             states[p].rays[half].largest = max(states[p].rays[half].largest, largest);
+            states[p].rays[half].near += near.w;
+            states[p].rays[half].near_largest =
+                max(states[p].rays[half].near_largest, near_largest);
+            states[p].rays[half].near_light += near.xyz;
         }
         for (var k = 0u; k < light_count; k++) {
             let sum = light_sums[half * light_count + k];
@@ -135,9 +110,16 @@ fn cast_ray(
         (*found)[half].back += 1.0;
         return;
     }
-    let light = reflected(triangles[hit.triangle].index, vec2f(hit.u, hit.v)) * share;
-    (*found)[half].light += light;
-    (*found)[half].largest = max((*found)[half].largest, length(light));
+    let there = field_at(triangles[hit.triangle].index, vec2f(hit.u, hit.v));
+    let light = there.radiosity * share;
+    if settings.near_field != 0u && is_near(hit, there.side) {
+        (*found)[half].near += 1.0;
+        (*found)[half].near_light += light;
+        (*found)[half].near_largest = max((*found)[half].near_largest, length(light));
+    } else {
+        (*found)[half].light += light;
+        (*found)[half].largest = max((*found)[half].largest, length(light));
+    }
     if of_light != NO_LIGHT && !is_known {
         (*found)[half].lamps += lights[of_light].exitance * share;
     }

@@ -1,5 +1,5 @@
 // Rays from each point to points on its lights and on the sun: a workgroup per point. Needs
-// shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
+// shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl and shared/gather_state.wgsl before it.
 
 // All points.
 @compute @workgroup_size(64)
@@ -53,10 +53,7 @@ fn cast_rays(p: u32, lane: u32) {
     if scene.has_sun != 0u {
         var visible = array<vec4f, 2>();
         for (var i = from_ray + lane; i < to_ray; i += LANES) {
-            let at = rotated_sobol(i, point);
-            let turn = 2.0 * PI * at.y;
-            let across = scene.sun_right * cos(turn) + scene.sun_up * sin(turn);
-            let direction = normalize(scene.sun_middle + across * sqrt(at.x));
+            let direction = towards_sun(rotated_sobol(i, point));
             let cosine = dot(point.normal, direction);
             if cosine > 0.0 {
                 var seen = vec3f(0.0);

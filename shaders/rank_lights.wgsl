@@ -167,4 +167,5 @@ fn write(p: u32, kept: u32) {
     states[p].pending = 3u;
     states[p].ray_error = 0.0;
     states[p].shadow_error = 0.0;
+    states[p].covered = 0u;
 }

@@ -1,5 +1,6 @@
 // Evaluates the rays of each point, and selects the points that cast more: a lane per point. Needs
-// shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
+// shared/trace.wgsl, shared/lights.wgsl, shared/gather_state.wgsl and shared/near_field.wgsl before
+// it.
 //
 // error = max(|E of the first half − E of the second|, largest ray / rays) / 2, for rays over the
 // hemisphere and for rays to lights; those with the larger error are doubled.
@@ -13,6 +14,8 @@ struct Sample {
     inverse_distance: f32,
     rays: u32,            // over the hemisphere
     shadow_rays: u32,     // to each light
+    covered: u32,         // whether paths found the light of near surfaces
+    padding: array<u32, 3>,
 }
 
 @group(1) @binding(2) var<storage, read_write> samples: array<Sample>;
@@ -93,6 +96,16 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     var seen = array<Visibilities, 2>(half_of(p, 0u), half_of(p, 1u));
     var all_seen = together(seen[0], seen[1]);
     let rays = f32(ray_count);
+    // Of near surfaces the light by the field, unless paths have found it.
+    var covered = states[p].covered;
+    for (var h = 0u; h < 2u; h++) {
+        if is_covered(halves[h].near, 0.5 * rays) {
+            covered = 1u;
+        } else {
+            halves[h].light += halves[h].near_light;
+            halves[h].largest = max(halves[h].largest, halves[h].near_largest);
+        }
+    }
     let shadow_rays = f32(shadow_count);
     var ray_means: array<vec3f, 2>;
     var shadow_means: array<vec3f, 2>;
@@ -127,6 +140,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     out.inverse_distance = (halves[0].inverse_distance + halves[1].inverse_distance) / rays;
     out.rays = ray_count;
     out.shadow_rays = shadow_count;
+    out.covered = covered;
     samples[p] = out;
     // Both halves become the first half of the next pass; without doubling too, since only the
     // total of these sums is used again.
@@ -149,10 +163,12 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     states[p].shadow_count = shadow_count;
     states[p].ray_error = ray_error;
     states[p].shadow_error = shadow_error;
+    states[p].covered = covered;
     states[p].rays[0] = RaySums(
         light, halves[0].escaped + halves[1].escaped,
         emitted, halves[0].back + halves[1].back,
-        halves[0].inverse_distance + halves[1].inverse_distance, largest, vec2f(0.0),
+        halves[0].inverse_distance + halves[1].inverse_distance, largest,
+        0.0, 0.0, vec3f(0.0), 0.0,
     );
     states[p].rays[1] = RaySums();
     for (var k = 0u; k < 9u; k++) {

@@ -263,7 +263,8 @@ impl Backend {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
-                Ok(Box::new(TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?))
+                let gather = TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?;
+                Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
             _ => {
                 let gather = RayGather::new(mesh, rays)?.with_noise(noise, dim);

@@ -9,13 +9,14 @@ const INNER: u32 = 0x80000000u;
 struct InElement {
     element: u32,
     weights: vec2f,       // of its second and third corner
+    side: u32,            // elements of its size along an edge of the triangle
 }
 
 // Looked up in a lattice of nodes at the deepest level that the quadtree is complete to, then by
 // descent; `weights` are those of the triangle's second and third corner.
 fn element_at(triangle: u32, weights: vec2f) -> InElement {
     let first = quadtrees[2u * triangle];
-    let side = quadtrees[2u * triangle + 1u];
+    var side = quadtrees[2u * triangle + 1u];
     let at = weights * f32(side);
     let square = lattice_square(at, side);
     var p = at - vec2f(square);
@@ -27,6 +28,7 @@ fn element_at(triangle: u32, weights: vec2f) -> InElement {
     // Reads outside of the array return 0, an element: the descent ends.
     while (node & INNER) != 0u {
         node &= ~INNER;
+        side *= 2u;
         if p.x > 0.5 {
             node += 1u;
             p = vec2f(2.0 * p.x - 1.0, 2.0 * p.y);
@@ -41,5 +43,5 @@ fn element_at(triangle: u32, weights: vec2f) -> InElement {
         }
         node = quadtrees[node];
     }
-    return InElement(node, p);
+    return InElement(node, p, side);
 }

@@ -1,19 +1,23 @@
 // The state of each point of a gather between passes. Needs shared/lights.wgsl before it.
 //
-// rank_lights ─► hemisphere_rays, light_rays ─► settle ─► those again, of points that need more
+// rank_lights ─► hemisphere_rays, near_paths, light_rays ─► settle ─► those again, of points that
+//                                                                     need more
 
 const LANES: u32 = 64u;               // size of a workgroup; each serves one point
 const RAYS_PER_SHADOW_RAY: u32 = 4u;
 
 // Sums over rays.
 struct RaySums {
-    light: vec3f,         // from surfaces and the sky, except lights sampled separately
+    light: vec3f,         // from the sky and surfaces, without near ones and lights sampled apart
     escaped: f32,
     lamps: vec3f,         // exitance of the other lights
     back: f32,
     inverse_distance: f32,
     largest: f32,         // largest contribution of one ray to `light`: length over channels
-    padding: vec2f,
+    near: f32,            // number of rays that meet near surfaces
+    near_largest: f32,    // the same as `largest` of `near_light`
+    near_light: vec3f,    // from near surfaces by the field; it counts where paths do not find it
+    padding: f32,
 }
 
 // Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
@@ -41,7 +45,8 @@ struct PointState {
     pending: u32,         // 1: rays were doubled; 2: rays to lights were doubled
     ray_error: f32,
     shadow_error: f32,
-    padding: array<u32, 2>,
+    covered: u32,         // whether paths found the light of near surfaces for earlier rays
+    padding: u32,
 }
 
 struct GatherSettings {
@@ -52,7 +57,7 @@ struct GatherSettings {
     points: u32,
     first: u32,           // number of rays of a half cast by preceding passes
     pass_rays: u32,       // number of rays cast by one pass
-    padding: u32,
+    near_field: u32,      // whether paths find the light of near surfaces
 }
 
 struct Work {

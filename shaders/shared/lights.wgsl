@@ -6,12 +6,14 @@ const ANY_LIGHT: u32 = 0xfffffffeu;   // of no triangle: any hit hides the sun
 const PI: f32 = 3.14159265;
 
 struct TracedLight {
-    exitance: vec3f,      // per channel, in units of about the brightest; a pane's transmittance
+    // Per channel, in units of about the brightest. Rows after the lights: a pane's transmittance;
+    // of a translucent material that, and in the next row its reflectance.
+    exitance: vec3f,
     is_convex: u32,       // no part of it hides another
     first: u32,           // its first triangle in `lamps`
     count: u32,
     area: f32,
-    padding: u32,
+    power_end: f32,       // cumulative share of the power of all lights up to its end
 }
 
 struct Lamp {

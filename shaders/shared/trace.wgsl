@@ -13,6 +13,8 @@ const ROUNDING: f32 = 5e-7;
 
 const BACK_IS_COVERED: u32 = 1u;      // flags of a triangle: rays do not hit its back
 const HAS_HOLES: u32 = 2u;            // a mask defines its solid part
+// From this bit on: 1 plus the row of its material's transmittance, if light leaves its other side.
+const ROW_OF_FLAGS: u32 = 2u;
 
 struct Node {
     low_a: vec3f,         // the first child's box

@@ -11,6 +11,7 @@
 //! | `reduce.wgsl` | `reduce` | `gpu/rows/twin_tests.rs`: integers equal |
 //! | `rank_lights.wgsl` | `twins/rank_lights` | `gpu/traced_gather/twin_tests.rs`: rounding |
 //! | `hemisphere_rays.wgsl` | `twins/hemisphere_rays` | the same, but for rays near an edge |
+//! | `near_paths.wgsl` | `twins/near_paths` | the same |
 //! | `light_rays.wgsl` | `twins/light_rays` | the same |
 //! | `settle.wgsl` | `twins/settle` | the same decisions, samples within rounding |
 //! | `row_rays.wgsl` | `twins/row_rays` | `gpu/traced_rows/twin_tests.rs`: but for edges |

@@ -157,7 +157,8 @@ impl RayGather {
         [self.min_rays, self.max_rays].map(|rays| (rays / RAYS_PER_SHADOW_RAY).max(2))
     }
 
-    fn luminaires(&self) -> LuminaireLight<'_> {
+    /// The light of luminaires.
+    pub(crate) fn luminaires(&self) -> LuminaireLight<'_> {
         LuminaireLight {
             luminaires: self.lights.scene().luminaires(),
             rays: &self.scene,

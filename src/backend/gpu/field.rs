@@ -24,8 +24,8 @@ use crate::scene::Rgb;
 pub struct FieldBuffers {
     /// Lattices, then nodes: [`INNER`] plus the first of four children, or an element.
     pub quadtrees: wgpu::Buffer,
-    /// Per element, the reflected radiosity at its three corners, per channel, in three lines;
-    /// [`ELEMENTS_A_LINE`] elements side by side.
+    /// Per element, the reflected radiosity at its three corners, per channel, in three lines, each
+    /// with a channel of its reflectance; [`ELEMENTS_A_LINE`] elements side by side.
     pub elements: wgpu::TextureView,
     _memory: Memory,
 }
@@ -67,8 +67,9 @@ pub fn key(field: &RadiosityField) -> u64 {
 /// The texture of the elements' corners, line by line.
 pub fn element_texels(field: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4]> {
     let RadiosityField { mesh, corners, reflected } = *field;
-    let value = |k: u32, relative: Rgb| {
-        (reflected[k as usize] * relative / radiance_unit).as_vec3().extend(0.0).to_array()
+    let value = |k: u32, relative: Rgb, reflectance: f64| {
+        let radiosity = reflected[k as usize] * relative / radiance_unit;
+        radiosity.as_vec3().extend(reflectance as f32).to_array()
     };
     let line = ELEMENTS_A_LINE as usize;
     let mut texels = vec![[0f32; 4]; corners.len().div_ceil(line).max(1) * 3 * line];
@@ -76,8 +77,9 @@ pub fn element_texels(field: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4
     lines.for_each(|(first, (texels, corners))| {
         for (x, corner) in corners.iter().enumerate() {
             let relative = mesh.relative_reflectance(first * line + x);
+            let reflectance = mesh.reflectance(first * line + x).to_array();
             for k in 0..3 {
-                texels[k * line + x] = value(corner[k], relative);
+                texels[k * line + x] = value(corner[k], relative, reflectance[k]);
             }
         }
     });

@@ -7,6 +7,7 @@
 //! | `reduce.wgsl` | those, u32 a weight, u32 a slot, [`Reduction`] | u32 a slot of each row |
 //! | `rank_lights.wgsl` | [`TracedTriangle`], [`TracedLight`], [`Lamp`], [`TracedPoint`] | states |
 //! | `hemisphere_rays.wgsl` | those, [`TraceNode`], [`TracedSceneInfo`], quadtrees | states |
+//! | `near_paths.wgsl` | the same, and states | states |
 //! | `light_rays.wgsl` | those but for quadtrees | states |
 //! | `settle.wgsl` | states, [`GatherSettings`] | [`Sample`] a point, lists of points |
 //! | `row_rays.wgsl` | [`TraceNode`], [`TracedTriangle`], quadtrees, [`TracedPatch`] | u32 a slot |
@@ -113,7 +114,8 @@ pub struct TracedSceneInfo {
     pub padding_8: u32,
 }
 
-/// A light, or the transmittance of a pane.
+/// A light, or the transmittance of a pane or of a translucent material, or the latter's
+/// reflectance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TracedLight {
@@ -122,7 +124,7 @@ pub struct TracedLight {
     pub first: u32,
     pub count: u32,
     pub area: f32,
-    pub padding: u32,
+    pub power_end: f32,
 }
 
 /// A triangle of a light.
@@ -158,7 +160,7 @@ pub struct GatherSettings {
     pub points: u32,
     pub first: u32,
     pub pass_rays: u32,
-    pub padding: u32,
+    pub near_field: u32,
 }
 
 /// The sample of a gather point.
@@ -173,6 +175,8 @@ pub struct Sample {
     pub inverse_distance: f32,
     pub rays: u32,
     pub shadow_rays: u32,
+    pub covered: u32,
+    pub padding: [u32; 3],
 }
 
 /// A patch whose row is computed.
@@ -213,7 +217,7 @@ pub struct RowEntry {
 pub const ROW_ENTRIES_HEADER_BYTES: u64 = 16;
 
 /// Bytes of a `PointState`, which the host does not read.
-pub const POINT_STATE_BYTES: u64 = 544;
+pub const POINT_STATE_BYTES: u64 = 576;
 
 /// Bytes of the workgroup counts at the beginning of `Work`: those of rays, those of shadow rays.
 pub const WORK_HEADER_BYTES: u64 = 32;
@@ -227,6 +231,10 @@ pub const LEAF: u32 = 1 << 31;
 /// Flags of a traced triangle.
 pub const BACK_IS_COVERED: u32 = 1;
 pub const HAS_HOLES: u32 = 2;
+
+/// From this bit of the flags on: 1 plus the row of the transmittance of its material among the
+/// lights, followed by that of its reflectance; 0 if no light leaves its other side.
+pub const ROW_OF_FLAGS: u32 = 2;
 
 /// Texels side by side in textures that are read as arrays.
 pub const TEXELS_A_LINE: u32 = 2048;
@@ -254,7 +262,7 @@ mod tests {
 
     use super::super::shaders::{
         COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, ITEM_BUFFER_WGSL, LIGHT_RAYS_WGSL,
-        RANK_LIGHTS_WGSL, REDUCE_WGSL, ROW_RAYS_WGSL, SETTLE_WGSL,
+        NEAR_PATHS_WGSL, RANK_LIGHTS_WGSL, REDUCE_WGSL, ROW_RAYS_WGSL, SETTLE_WGSL,
     };
     use super::*;
     use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
@@ -266,13 +274,14 @@ mod tests {
     use crate::visibility::sah_tree::MAX_LEVELS;
 
     /// All ray-casting shaders, and [`COMPACT_ROWS_WGSL`].
-    const RAY_SHADERS: [&str; 6] = [
+    const RAY_SHADERS: [&str; 7] = [
         RANK_LIGHTS_WGSL,
         HEMISPHERE_RAYS_WGSL,
         LIGHT_RAYS_WGSL,
         SETTLE_WGSL,
         ROW_RAYS_WGSL,
         COMPACT_ROWS_WGSL,
+        NEAR_PATHS_WGSL,
     ];
 
     fn parsed(source: &str) -> naga::Module {
@@ -438,7 +447,7 @@ mod tests {
             ),
             (
                 "TracedLight",
-                rust_layout!(TracedLight { exitance, is_convex, first, count, area, padding }),
+                rust_layout!(TracedLight { exitance, is_convex, first, count, area, power_end }),
             ),
             ("Lamp", rust_layout!(Lamp { triangle, end })),
             (
@@ -464,7 +473,7 @@ mod tests {
                     points,
                     first,
                     pass_rays,
-                    padding
+                    near_field
                 }),
             ),
             (
@@ -477,7 +486,9 @@ mod tests {
                     back,
                     inverse_distance,
                     rays,
-                    shadow_rays
+                    shadow_rays,
+                    covered,
+                    padding
                 }),
             ),
             (
@@ -505,6 +516,9 @@ mod tests {
                     back,
                     inverse_distance,
                     largest,
+                    near,
+                    near_largest,
+                    near_light,
                     padding
                 }),
             ),
@@ -522,6 +536,7 @@ mod tests {
                     pending,
                     ray_error,
                     shadow_error,
+                    covered,
                     padding
                 }),
             ),
@@ -559,6 +574,7 @@ mod tests {
             ("LEAF", LEAF),
             ("BACK_IS_COVERED", BACK_IS_COVERED),
             ("HAS_HOLES", HAS_HOLES),
+            ("ROW_OF_FLAGS", ROW_OF_FLAGS),
             ("TEXELS_A_LINE", TEXELS_A_LINE),
             ("ELEMENTS_A_LINE", ELEMENTS_A_LINE),
             ("INNER", INNER),
@@ -583,7 +599,7 @@ mod tests {
         assert!(constant(&modules[0], "STACK") >= MAX_LEVELS + 2);
         // One of each light and the sun, for either half; the shaders have these numbers as
         // literals.
-        assert_eq!([SOURCES, size_of::<PointState>()], [9, 544]);
+        assert_eq!([SOURCES, size_of::<PointState>()], [9, 576]);
         // A workgroup serves one point, a lane one ray; the host counts workgroups of that size.
         // The workgroup for compacting a row is as large as any device allows.
         for module in &modules {

@@ -28,15 +28,29 @@ macro_rules! ray_shader {
 pub const RANK_LIGHTS_WGSL: &str = ray_shader!("rank_lights.wgsl", "gather_state.wgsl");
 pub const HEMISPHERE_RAYS_WGSL: &str = ray_shader!(
     "hemisphere_rays.wgsl",
+    "sky.wgsl",
     "gather_state.wgsl",
+    "hemisphere.wgsl",
+    "near_field.wgsl",
+    "work_list.wgsl",
+    "lattice.wgsl",
+    "element.wgsl",
+    "field.wgsl"
+);
+pub const NEAR_PATHS_WGSL: &str = ray_shader!(
+    "near_paths.wgsl",
+    "sky.wgsl",
+    "gather_state.wgsl",
+    "hemisphere.wgsl",
+    "near_field.wgsl",
     "work_list.wgsl",
     "lattice.wgsl",
     "element.wgsl",
     "field.wgsl"
 );
 pub const LIGHT_RAYS_WGSL: &str =
-    ray_shader!("light_rays.wgsl", "gather_state.wgsl", "work_list.wgsl");
-pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl");
+    ray_shader!("light_rays.wgsl", "sky.wgsl", "gather_state.wgsl", "work_list.wgsl");
+pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl", "near_field.wgsl");
 pub const ROW_RAYS_WGSL: &str =
     ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl", "row_settings.wgsl");
 pub const COMPACT_ROWS_WGSL: &str = shader!("compact_rows.wgsl", "row_settings.wgsl");

@@ -312,6 +312,44 @@ pub fn room_with_doubled_leaf() -> Mesh {
     Parts::new(&parts).mesh(Sky::default(), 0.5)
 }
 
+/// Two bright plates with a gap between them that is narrower than their elements. Light comes in
+/// on one side, from a lamp and a low sun through a pane, and from the sky all around; in the gap
+/// there are two small lamps, one of which has a fold, and a translucent leaf. Quadtrees are uneven.
+pub fn narrow_gap() -> Mesh {
+    let x = [0.0, 2.0];
+    let white =
+        |name: &str| Material { reflectance: Rgb::new(0.8, 0.6, 0.7), ..Material::grey(name, 0.5) };
+    let leaf = |name: &str| Material {
+        reflectance: Rgb::new(0.3, 0.5, 0.4),
+        transmittance: Rgb::new(0.4, 0.3, 0.1),
+        ..Material::grey(name, 0.5)
+    };
+    let sheet = facing_up([1.1, 1.7], [0.2, 0.9], 0.07);
+    let [a, b, c, d] = sheet;
+    let upright =
+        |x: f64, [z0, z1]: [f64; 2]| [[x, 0.3, z0], [x, 0.3, z1], [x, 1.7, z1], [x, 1.7, z0]];
+    let parts = [
+        (facing_up(x, x, 0.0), white("floor")),
+        (facing_down(x, x, 0.15), white("ceiling")),
+        (sheet, leaf("leaf")),
+        ([d, c, b, a], leaf("leaf from below")),
+        (facing_down([0.5, 0.62], [1.0, 1.1], 0.12), emitting([3.0, 4.0, 2.0])),
+        (upright(2.5, [-0.3, 0.4]), emitting([7.0, 5.0, 6.0])),
+        (upright(2.2, [-0.5, 0.5]), glass([0.9, 0.7, 0.8])),
+    ];
+    let sun = Sun { direction: DVec3::new(1.0, 0.2, 0.06), irradiance: Rgb::new(9.0, 8.0, 7.0) };
+    let sky = Sky::uniform(Rgb::new(0.4, 0.5, 0.6)).with_sun(sun).unwrap();
+    let mut parts = Parts::new(&parts);
+    let (q, r) = ([0.5, 0.5, 0.13], [0.5, 0.8, 0.13]);
+    let folded = [[r, q, [0.42, 0.65, 0.05]], [q, r, [0.6, 0.65, 0.05]]];
+    parts.add(&folded, emitting([2.0, 3.0, 4.0]));
+    let mesh = parts.mesh(sky, 2.0);
+    let split: Vec<usize> = (0..mesh.element_count()).filter(|e| e % 2 == 1).collect();
+    let mesh = mesh.split(&split).unwrap();
+    let split: Vec<usize> = (0..mesh.element_count()).filter(|e| e % 3 == 1).collect();
+    mesh.split(&split).unwrap()
+}
+
 /// `count` points just above the elements of `mesh`, distributed over all of these.
 pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
     let random = |k: usize| unit_interval(split_mix64_nth(k as u64));

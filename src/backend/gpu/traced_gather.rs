@@ -1,14 +1,15 @@
 //! Irradiance gathered with rays on the device: batches of points, several in flight.
 //!
 //! ```text
-//! points ─► rank lights ─► rays over the hemisphere ─► settle ─┬─► samples ─► readback
-//!                      └─► rays to lights ────────────┘   ▲    │
-//!                                                         └────┘ more rays, where halves disagree
+//! points ─► rank lights ─┬► rays over the hemisphere ─► near paths ─┬► settle ─┬─► samples
+//!                        └► rays to lights ────────────────────────┘   ▲      │     read back
+//!                                    more rays, where halves disagree ─┴──────┘
 //! ```
 //!
-//! The sums are those of [`RayGather`](crate::backend::cpu::RayGather), in 32 bits. Lists of the
-//! points that need more rays are made on the device: the host waits for samples only. Rays to
-//! luminaires are cast on the CPU.
+//! The sums are those of [`RayGather`], in 32 bits. Lists of the points that need more rays are
+//! made on the device: the host waits for samples only. Rays to luminaires are cast on the CPU, and
+//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device meet
+//! no luminaires.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};
@@ -25,17 +26,15 @@ use super::memory::Memory;
 use super::pipeline::bind_group;
 use super::traced_scene::TracedScene;
 use crate::backend::adapter::AdapterKind;
+use crate::backend::cpu::RayGather;
 use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, least_rays, most_rays, samples};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
-use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::HemisphereSamples;
 use crate::sampling::rotation::{CellRotation, second_rotation};
 use crate::scene::Rgb;
-use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::RayScene;
 
 /// Gathers by casting cosine-distributed rays on a graphics device, in compute passes.
 ///
@@ -48,13 +47,15 @@ pub struct TracedGather {
     lights: Arc<Lights>,
     scene: Arc<TracedScene>,
     rotations: CellRotation,
-    /// Surfaces and panes for rays to luminaires; `None` without luminaires.
-    sight: Option<(Arc<RayScene>, Panes)>,
+    /// For light of luminaires; `None` without luminaires.
+    on_cpu: Option<RayGather>,
     triangles: usize,
     min_rays: u32,
     max_rays: u32,
     noise: f64,
     dim: f64,
+    /// Whether paths find the light of near surfaces.
+    near_field: bool,
     directions: wgpu::TextureView,
     _memory: Memory,
     rays: u64,
@@ -69,8 +70,8 @@ pub struct Slots {
     slots: Vec<Slot>,
     /// Maximum number of points of a batch.
     points: u32,
-    /// Maximum number of passes that cast rays of one half.
-    passes: u32,
+    /// Maximum number of passes that cast rays of one half, and of those that follow paths.
+    passes: [u32; 2],
     _memory: Memory,
 }
 
@@ -84,6 +85,8 @@ struct Slot {
     staging: wgpu::Buffer,
     /// One per preceding pass that cast rays of the same half.
     settings: Vec<wgpu::Buffer>,
+    /// The same of passes that follow paths.
+    path_settings: Vec<wgpu::Buffer>,
 }
 
 /// A batch in flight.
@@ -100,6 +103,17 @@ const IN_FLIGHT: usize = 3;
 /// Maximum number of rays of a point in one pass, 64 per lane: lavapipe (Mesa 22.3) leaves all
 /// loops of an invocation after 65 535 iterations in total, and a ray takes some hundred.
 const PASS_RAYS: u32 = 4096;
+
+/// The same of passes that follow paths from near surfaces, by kind of device. A path of 128
+/// vertices casts up to 384 rays: lavapipe's loops have room for one per lane. On hardware a ray
+/// with its path takes some ten times as long as a ray, of which most end after a few vertices:
+/// plain choice, within seconds even if none does.
+fn path_rays(kind: AdapterKind) -> u32 {
+    match kind {
+        AdapterKind::Cpu => 64,
+        _ => 1024,
+    }
+}
 
 /// Maximum number of points of a batch: an H200 gets no faster beyond that.
 pub const MAX_POINTS: u32 = 32_768;
@@ -147,18 +161,29 @@ impl TracedGather {
             lights,
             scene: traced,
             rotations: CellRotation::new(&scene.bounds()),
-            sight: (!scene.luminaires().is_empty())
-                .then(|| (RayScene::of_scene(scene), Panes::of_scene(scene))),
+            on_cpu: match scene.luminaires().is_empty() {
+                true => None,
+                false => Some(RayGather::new(mesh, count)?.with_noise(noise, dim)),
+            },
             triangles: scene.triangles().len(),
             min_rays,
             max_rays,
             noise,
             dim,
+            near_field: false,
             directions,
             _memory: memory,
             rays: 0,
             seconds: 0.0,
         })
+    }
+
+    /// Finds the light of near surfaces by paths: see [`RayGather::with_near_field`].
+    ///
+    /// [`RayGather::with_near_field`]: crate::backend::cpu::RayGather::with_near_field
+    pub fn with_near_field(self) -> TracedGather {
+        let on_cpu = self.on_cpu.map(RayGather::with_near_field);
+        TracedGather { near_field: true, on_cpu, ..self }
     }
 
     /// Rays cast so far, those to lights included.
@@ -189,9 +214,7 @@ impl TracedGather {
 
     /// Direct irradiance from luminaires, W/m².
     fn luminaires(&self, point: &GatherPoint) -> Rgb {
-        let Some((rays, panes)) = &self.sight else { return Rgb::ZERO };
-        let (luminaires, rotations) = (self.lights.scene().luminaires(), &self.rotations);
-        LuminaireLight { luminaires, rays, panes, rotations }.irradiance(point)
+        self.on_cpu.as_ref().map_or(Rgb::ZERO, |gather| gather.luminaires().irradiance(point))
     }
 
     fn sample(&self, sample: &Sample) -> Result<IrradianceSample, String> {
@@ -228,19 +251,22 @@ impl TracedGather {
         ((DISPATCH_SECONDS / seconds) as u32).max(64).min(most)
     }
 
-    /// The samples of `points`, in batches of at most `most`.
+    /// The samples of `points`, in batches of at most `most`, and whether paths found the light of
+    /// surfaces near them.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,
         points: &[TracedPoint],
         most: u32,
-    ) -> Result<Vec<IrradianceSample>, Error> {
+    ) -> Result<Vec<(IrradianceSample, bool)>, Error> {
         let gpu = self.gpu.clone();
         let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let len = (self.batch_len(most) as usize).min(points.len());
         // For all rays of the first pass, or of the last doubling.
-        let passes = self.min_rays.max(self.max_rays / 2).div_ceil(PASS_RAYS);
-        let has_room = |slots: &Slots| slots.points as usize >= len && slots.passes >= passes;
+        let rays = self.min_rays.max(self.max_rays / 2);
+        let passes = [PASS_RAYS, self.path_rays()].map(|of_pass| rays.div_ceil(of_pass));
+        let has_passes = |slots: &Slots| (0..2).all(|k| slots.passes[k] >= passes[k]);
+        let has_room = |slots: &Slots| slots.points as usize >= len && has_passes(slots);
         // Taken out, so that a failing batch leaves no unfinished slots.
         let slots = match kept.take().filter(has_room) {
             Some(slots) => slots,
@@ -275,26 +301,30 @@ impl TracedGather {
         points: &[TracedPoint],
     ) -> wgpu::SubmissionIndex {
         let gpu = &self.gpu;
-        let Slot { points: buffer, samples, work, staging, settings, .. } = &slots.slots[slot];
+        let Slot { points: buffer, samples, work, staging, settings, path_settings, .. } =
+            &slots.slots[slot];
         let count = points.len() as u32;
         gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(points));
-        for (pass, buffer) in (0..).zip(settings) {
-            let settings = GatherSettings {
-                min_rays: self.min_rays,
-                max_rays: self.max_rays,
-                noise: self.noise as f32,
-                dim: (self.dim / self.scene.radiance_unit) as f32,
-                points: count,
-                first: pass * PASS_RAYS,
-                pass_rays: PASS_RAYS,
-                padding: 0,
-            };
-            gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
+        for (pass_rays, buffers) in [(PASS_RAYS, settings), (self.path_rays(), path_settings)] {
+            for (pass, buffer) in (0..).zip(buffers) {
+                let settings = GatherSettings {
+                    min_rays: self.min_rays,
+                    max_rays: self.max_rays,
+                    noise: self.noise as f32,
+                    dim: (self.dim / self.scene.radiance_unit) as f32,
+                    points: count,
+                    first: pass * pass_rays,
+                    pass_rays,
+                    near_field: self.near_field.into(),
+                };
+                gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
+            }
         }
         let pipelines = gpu.gather_pipelines();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let has_lights = self.has_lights();
         let passes = |rays: u32| rays.div_ceil(PASS_RAYS) as usize;
+        let path_passes = |rays: u32| rays.div_ceil(self.path_rays()) as usize;
         let shadow_rays = |rays: u32| (rays / RAYS_PER_SHADOW_RAY).max(2);
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -302,6 +332,10 @@ impl TracedGather {
             pass.dispatch_workgroups(count, 1, 1);
             for k in 0..passes(self.min_rays) {
                 bound.hemisphere_rays.set(&mut pass, &pipelines.hemisphere_rays, k);
+                pass.dispatch_workgroups(count, 1, 1);
+            }
+            for k in 0..path_passes(self.min_rays) {
+                bound.near_paths.set(&mut pass, &pipelines.near_paths, k);
                 pass.dispatch_workgroups(count, 1, 1);
             }
             for k in 0..if has_lights { passes(shadow_rays(self.min_rays)) } else { 0 } {
@@ -325,6 +359,10 @@ impl TracedGather {
                 bound.more_hemisphere_rays.set(&mut pass, &pipelines.more_hemisphere_rays, k);
                 pass.dispatch_workgroups_indirect(work, 0);
             }
+            for k in 0..path_passes(rays) {
+                bound.more_near_paths.set(&mut pass, &pipelines.more_near_paths, k);
+                pass.dispatch_workgroups_indirect(work, 0);
+            }
             for k in 0..if has_lights { passes(shadow_rays(rays)) } else { 0 } {
                 bound.more_light_rays.set(&mut pass, &pipelines.more_light_rays, k);
                 pass.dispatch_workgroups_indirect(work, 12);
@@ -337,6 +375,11 @@ impl TracedGather {
         gpu.queue.submit([encoder.finish()])
     }
 
+    /// Number of rays of a point in one pass that follows paths.
+    fn path_rays(&self) -> u32 {
+        path_rays(self.gpu.adapter().kind)
+    }
+
     fn has_lights(&self) -> bool {
         !self.lights.lights.is_empty() || self.lights.scene().sky().sun().is_some()
     }
@@ -346,7 +389,7 @@ impl TracedGather {
         &mut self,
         slots: &Slots,
         batch: &InFlight,
-        out: &mut Vec<IrradianceSample>,
+        out: &mut Vec<(IrradianceSample, bool)>,
     ) -> Result<(), Error> {
         let staging = &slots.slots[batch.slot].staging;
         let slice = staging.slice(..(size_of::<Sample>() * batch.points) as u64);
@@ -354,7 +397,8 @@ impl TracedGather {
         let samples = self.gpu.read_mapped(slice, batch.submission.clone(), |bytes| {
             let samples: &[Sample] = bytemuck::cast_slice(bytes);
             rays = samples.iter().map(|s| u64::from(s.rays + s.shadow_rays)).sum();
-            samples.par_iter().map(|s| self.sample(s)).collect::<Result<Vec<_>, String>>()
+            let sample = |s: &Sample| Ok((self.sample(s)?, s.covered != 0));
+            samples.par_iter().map(sample).collect::<Result<Vec<_>, String>>()
         })?;
         staging.unmap();
         self.rays += rays;
@@ -366,7 +410,7 @@ impl TracedGather {
     fn bind(&self, slot: &Slot, field: &FieldBuffers) -> Bound {
         let (device, scene) = (&self.gpu.device, &*self.scene);
         let pipelines = self.gpu.gather_pipelines();
-        let Slot { points, states, samples, work, settings, .. } = slot;
+        let Slot { points, states, samples, work, settings, path_settings, .. } = slot;
         let view = wgpu::BindingResource::TextureView;
         let geometry = scene.geometry();
         let without_nodes = geometry[1..].to_vec();
@@ -377,9 +421,10 @@ impl TracedGather {
         let point = [(0, points.as_entire_binding()), (1, states.as_entire_binding())];
         let directions = [(2, view(&self.directions))];
         let work_list = [(4, work.as_entire_binding())];
-        let bind = |pipeline: &wgpu::ComputePipeline,
-                    fixed: Vec<(u32, Vec<(u32, wgpu::BindingResource)>)>,
-                    batch: Vec<(u32, wgpu::BindingResource)>| {
+        let bind_to = |settings: &[wgpu::Buffer],
+                       pipeline: &wgpu::ComputePipeline,
+                       fixed: Vec<(u32, Vec<(u32, wgpu::BindingResource)>)>,
+                       batch: Vec<(u32, wgpu::BindingResource)>| {
             let groups = fixed.into_iter().map(|(group, entries)| {
                 let layout = pipeline.get_bind_group_layout(group);
                 (group, bind_group(device, "scene", &layout, &entries))
@@ -397,10 +442,13 @@ impl TracedGather {
         ) -> Vec<(u32, wgpu::BindingResource<'a>)> {
             parts.concat()
         }
-        let rays = |pipeline, batch| {
+        let bind = |pipeline, fixed, batch| bind_to(settings, pipeline, fixed, batch);
+        let rays = |settings, pipeline, batch| {
             let scene = all(&[&geometry, &lights, &sky]);
-            bind(pipeline, vec![(0, scene), (2, light_field.clone())], batch)
+            bind_to(settings, pipeline, vec![(0, scene), (2, light_field.clone())], batch)
         };
+        let of_all = all(&[&point, &directions]);
+        let of_listed = all(&[&point, &directions, &work_list]);
         let to_lights =
             |pipeline, batch| bind(pipeline, vec![(0, all(&[&geometry, &lights]))], batch);
         Bound {
@@ -409,11 +457,14 @@ impl TracedGather {
                 vec![(0, all(&[&without_nodes, &lights]))],
                 point.to_vec(),
             ),
-            hemisphere_rays: rays(&pipelines.hemisphere_rays, all(&[&point, &directions])),
+            hemisphere_rays: rays(settings, &pipelines.hemisphere_rays, of_all.clone()),
             more_hemisphere_rays: rays(
+                settings,
                 &pipelines.more_hemisphere_rays,
-                all(&[&point, &directions, &work_list]),
+                of_listed.clone(),
             ),
+            near_paths: rays(path_settings, &pipelines.near_paths, of_all),
+            more_near_paths: rays(path_settings, &pipelines.more_near_paths, of_listed),
             light_rays: to_lights(&pipelines.light_rays, point.to_vec()),
             more_light_rays: to_lights(&pipelines.more_light_rays, all(&[&point, &work_list])),
             settle: bind(
@@ -430,6 +481,8 @@ struct Bound {
     rank_lights: BoundPass,
     hemisphere_rays: BoundPass,
     more_hemisphere_rays: BoundPass,
+    near_paths: BoundPass,
+    more_near_paths: BoundPass,
     light_rays: BoundPass,
     more_light_rays: BoundPass,
     settle: BoundPass,
@@ -453,7 +506,7 @@ impl BoundPass {
 }
 
 impl Slots {
-    fn new(memory: Memory, points: u32, passes: u32) -> Result<Slots, Error> {
+    fn new(memory: Memory, points: u32, passes: [u32; 2]) -> Result<Slots, Error> {
         use wgpu::BufferUsages as Usage;
         let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
         let no_work =
@@ -462,6 +515,10 @@ impl Slots {
         let room = u64::from(points);
         let storage = Usage::STORAGE | Usage::COPY_DST;
         let sample_bytes = room * size_of::<Sample>() as u64;
+        let settings = |count: u32| {
+            let settings = |_| memory.uniform("settings", &[0; size_of::<GatherSettings>()]);
+            (0..count).map(settings).collect::<Result<_, Error>>()
+        };
         let slot = |_| {
             Ok(Slot {
                 points: memory.buffer("points", room * size_of::<TracedPoint>() as u64, storage)?,
@@ -481,9 +538,8 @@ impl Slots {
                     sample_bytes,
                     Usage::MAP_READ | Usage::COPY_DST,
                 )?,
-                settings: (0..passes)
-                    .map(|_| memory.uniform("settings", &[0; size_of::<GatherSettings>()]))
-                    .collect::<Result<_, Error>>()?,
+                settings: settings(passes[0])?,
+                path_settings: settings(passes[1])?,
             })
         };
         let slots = (0..IN_FLIGHT).map(slot).collect::<Result<_, Error>>()?;
@@ -555,7 +611,16 @@ impl Gather for TracedGather {
             }
         };
         self.seconds += start.elapsed().as_secs_f64();
-        samples
+        let samples = samples?;
+        let covered: Vec<usize> = (0..samples.len()).filter(|&k| samples[k].1).collect();
+        let mut samples: Vec<IrradianceSample> = samples.into_iter().map(|s| s.0).collect();
+        if let Some(on_cpu) = &mut self.on_cpu {
+            let points: Vec<GatherPoint> = covered.iter().map(|&k| points[k]).collect();
+            for (k, sample) in covered.into_iter().zip(on_cpu.gather(field, &points)?) {
+                samples[k] = sample;
+            }
+        }
+        Ok(samples)
     }
 
     fn preferred_batch_len(&self) -> usize {

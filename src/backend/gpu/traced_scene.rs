@@ -4,6 +4,7 @@
 //! nodes      [hierarchy of blockers of light][hierarchy of clear panes]
 //! triangles  [in the order of the first][of the second][lamps that no ray hits]
 //! lights     [lights of the scene][a row for each pane: its transmittance]
+//!            [two rows for each translucent material: transmittance, reflectance]
 //! lamps      triangles of each light, and cumulative shares of its area
 //! ```
 
@@ -13,13 +14,13 @@ use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, Vec3A};
 
 use super::layout::{
-    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, TEXELS_A_LINE, TraceNode, TracedLight,
-    TracedSceneInfo, TracedTriangle,
+    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, ROW_OF_FLAGS, TEXELS_A_LINE, TraceNode,
+    TracedLight, TracedSceneInfo, TracedTriangle,
 };
 use super::memory::Memory;
 use super::split_float::SplitFloat;
 use crate::error::Error;
-use crate::gather::lights::{Lights, NO_LIGHT};
+use crate::gather::lights::{Light, Lights, NO_LIGHT};
 use crate::scene::{Rgb, Scene, SkyMap, Sun};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
@@ -130,11 +131,12 @@ impl TracedArrays {
                     .triangles()
                     .map(|k| with_holes(triangle(clear[k], (first_row + k) as u32))),
             );
-            arrays.lights = transmittance.iter().map(pane_row).collect();
+            arrays.lights = transmittance.iter().map(share_row).collect();
             arrays.info.panes = arrays.nodes.len() as u32;
             arrays.add_nodes(hierarchy, blocking);
         }
         arrays.triangles = triangles;
+        arrays.add_translucent(scene, lights.lights.len(), blocking);
         arrays.add_lights(lights, blocking);
         arrays.add_light_from_outside(scene);
         // A buffer must not be empty, even if unused.
@@ -191,6 +193,25 @@ impl TracedArrays {
         self.nodes.extend(nodes);
     }
 
+    /// Rows of translucent materials: they begin after those of the lights, which are not there
+    /// yet, and of panes.
+    fn add_translucent(&mut self, scene: &Scene, light_count: usize, blocking: usize) {
+        let mut rows = rustc_hash::FxHashMap::default();
+        for triangle in &mut self.triangles[..blocking] {
+            let t = triangle.index as usize;
+            if scene.other_side(t).next().is_none() {
+                continue;
+            }
+            let row = *rows.entry(scene.triangles()[t].material).or_insert_with(|| {
+                let material = scene.material(t);
+                self.lights.push(share_row(&material.transmittance));
+                self.lights.push(share_row(&material.reflectance));
+                light_count + self.lights.len() - 2
+            });
+            triangle.flags |= (row as u32 + 1) << ROW_OF_FLAGS;
+        }
+    }
+
     fn add_lights(&mut self, lights: &Lights, blocking: usize) {
         let scene = lights.scene();
         let mut slot = vec![u32::MAX; scene.triangles().len()];
@@ -198,7 +219,11 @@ impl TracedArrays {
             slot[triangle.index as usize] = k as u32;
         }
         let mut rows = vec![];
+        let power = |light: &Light| light.exitance.max_element() * light.surface.total_area();
+        let all_power: f64 = lights.lights.iter().map(power).sum();
+        let mut power_end = 0.0;
         for (number, light) in (0..).zip(&lights.lights) {
+            power_end += power(light) / all_power;
             let first = self.lamps.len() as u32;
             let area = light.surface.total_area();
             let mut end = 0.0;
@@ -217,7 +242,7 @@ impl TracedArrays {
                 first,
                 count: light.triangles.len() as u32,
                 area: self.coordinates.area(area),
-                padding: 0,
+                power_end: power_end as f32,
             });
         }
         self.info.lights = rows.len() as u32;
@@ -295,8 +320,9 @@ fn pair((a, child_a): ([[f32; 3]; 2], u32), (b, child_b): ([[f32; 3]; 2], u32)) 
     TraceNode { low_a, child_a, high_a, child_b, low_b, padding: 0, high_b, padding_2: 0 }
 }
 
-fn pane_row(transmittance: &Rgb) -> TracedLight {
-    TracedLight { exitance: transmittance.as_vec3().to_array(), ..Zeroable::zeroed() }
+/// A row with a share of light per channel.
+fn share_row(share: &Rgb) -> TracedLight {
+    TracedLight { exitance: share.as_vec3().to_array(), ..Zeroable::zeroed() }
 }
 
 /// Radiosity of the pieces of a map in units of `radiance_unit`, line by line.

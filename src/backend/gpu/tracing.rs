@@ -7,8 +7,8 @@ use super::device::Gpu;
 use super::field::{self, FieldBuffers};
 use super::pipeline;
 use super::shaders::{
-    COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, RANK_LIGHTS_WGSL, ROW_RAYS_WGSL,
-    SETTLE_WGSL,
+    COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, NEAR_PATHS_WGSL, RANK_LIGHTS_WGSL,
+    ROW_RAYS_WGSL, SETTLE_WGSL,
 };
 use super::traced_gather::Slots;
 use super::traced_scene::TracedScene;
@@ -46,6 +46,8 @@ pub struct GatherPipelines {
     pub rank_lights: wgpu::ComputePipeline,
     pub hemisphere_rays: wgpu::ComputePipeline,
     pub more_hemisphere_rays: wgpu::ComputePipeline,
+    pub near_paths: wgpu::ComputePipeline,
+    pub more_near_paths: wgpu::ComputePipeline,
     pub light_rays: wgpu::ComputePipeline,
     pub more_light_rays: wgpu::ComputePipeline,
     pub settle: wgpu::ComputePipeline,
@@ -54,9 +56,10 @@ pub struct GatherPipelines {
 impl GatherPipelines {
     fn new(device: &wgpu::Device) -> GatherPipelines {
         let module = |label, source| pipeline::shader(device, label, source);
-        let [rank, hemisphere, lights, settle] = [
+        let [rank, hemisphere, near, lights, settle] = [
             ("rank_lights.wgsl", RANK_LIGHTS_WGSL),
             ("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL),
+            ("near_paths.wgsl", NEAR_PATHS_WGSL),
             ("light_rays.wgsl", LIGHT_RAYS_WGSL),
             ("settle.wgsl", SETTLE_WGSL),
         ]
@@ -66,6 +69,8 @@ impl GatherPipelines {
             (&rank, "rank_lights"),
             (&hemisphere, "hemisphere_rays"),
             (&hemisphere, "more_hemisphere_rays"),
+            (&near, "near_paths"),
+            (&near, "more_near_paths"),
             (&lights, "light_rays"),
             (&lights, "more_light_rays"),
             (&settle, "settle"),
@@ -82,6 +87,8 @@ impl GatherPipelines {
             rank_lights,
             hemisphere_rays,
             more_hemisphere_rays,
+            near_paths,
+            more_near_paths,
             light_rays,
             more_light_rays,
             settle,
@@ -90,6 +97,8 @@ impl GatherPipelines {
             rank_lights,
             hemisphere_rays,
             more_hemisphere_rays,
+            near_paths,
+            more_near_paths,
             light_rays,
             more_light_rays,
             settle,

@@ -24,9 +24,6 @@ use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 
-/// Distance of a hit over the width of its element below which it is near.
-const NEAR: f64 = 0.5;
-
 /// Share of the hemisphere that near surfaces cover above which paths find their light.
 const MIN_COVERED: f64 = 0.5;
 
@@ -56,11 +53,11 @@ pub(super) struct NearField {
 }
 
 impl NearField {
-    /// Whether a hit on `element` of `mesh` is near.
+    /// Whether a hit on `element` of `mesh` is near: nearer than the element is wide.
     pub fn is_near(mesh: &Mesh, element: usize, hit: &Hit) -> bool {
         // A right triangle with two sides of this width has the area.
         let square = 2.0 * mesh.area(mesh.element(element));
-        hit.distance * hit.distance < NEAR * NEAR * square
+        hit.distance * hit.distance < square
     }
 
     /// Whether paths find the light of as many `near` rays of all.

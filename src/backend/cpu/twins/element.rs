@@ -10,13 +10,15 @@ pub struct InElement {
     pub element: u32,
     /// Of its second and third corner.
     pub weights: Vec2,
+    /// Elements of its size along an edge of the triangle.
+    pub side: u32,
 }
 
 /// Looked up in a lattice of nodes, then by descent; `weights` are those of the triangle's second
 /// and third corner.
 pub fn element_at(quadtrees: &[u32], triangle: u32, weights: Vec2) -> InElement {
     let first = quadtrees[2 * triangle as usize];
-    let side = quadtrees[2 * triangle as usize + 1];
+    let mut side = quadtrees[2 * triangle as usize + 1];
     let at = weights * side as f32;
     let square = lattice_square(at, side);
     let mut p = at - square.as_vec2();
@@ -37,8 +39,9 @@ pub fn element_at(quadtrees: &[u32], triangle: u32, weights: Vec2) -> InElement 
             (0, 2.0 * p)
         };
         node = quadtrees[((node & !INNER) + child) as usize];
+        side *= 2;
     }
-    InElement { element: node, weights: p }
+    InElement { element: node, weights: p, side }
 }
 
 /// Linear interpolation between three corners.

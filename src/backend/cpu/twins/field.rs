@@ -1,18 +1,36 @@
-//! Twin of `shaders/shared/field.wgsl`: the radiosity that surfaces reflect.
+//! Twin of `shaders/shared/field.wgsl`: the radiosity that surfaces reflect, and their reflectance.
 
 use glam::{Vec2, Vec3, Vec4};
 
 use super::element::{between, element_at};
 use crate::backend::gpu::layout::ELEMENTS_A_LINE;
 
-/// Reflected radiosity at a position of a triangle: `elements` are texels of lines of
-/// [`ELEMENTS_A_LINE`], the corners of an element below one another.
-pub fn reflected(quadtrees: &[u32], elements: &[[f32; 4]], triangle: u32, weights: Vec2) -> Vec3 {
+#[derive(Clone, Copy, Debug)]
+pub struct OnElement {
+    /// Reflected radiosity.
+    pub radiosity: Vec3,
+    /// Mean over the element.
+    pub reflectance: Vec3,
+    /// Elements of its size along an edge of the triangle.
+    pub side: u32,
+}
+
+/// The field at a position of a triangle: `elements` are texels of lines of [`ELEMENTS_A_LINE`],
+/// the corners of an element below one another, each with a channel of its reflectance.
+pub fn field_at(
+    quadtrees: &[u32],
+    elements: &[[f32; 4]],
+    triangle: u32,
+    weights: Vec2,
+) -> OnElement {
     let at = element_at(quadtrees, triangle, weights);
     let corners = [0, 1, 2].map(|k| {
         let line = at.element / ELEMENTS_A_LINE * 3 + k;
-        let texel = elements[(line * ELEMENTS_A_LINE + at.element % ELEMENTS_A_LINE) as usize];
-        Vec4::from(texel).truncate()
+        Vec4::from(elements[(line * ELEMENTS_A_LINE + at.element % ELEMENTS_A_LINE) as usize])
     });
-    between(corners, at.weights)
+    OnElement {
+        radiosity: between(corners.map(Vec4::truncate), at.weights),
+        reflectance: Vec3::from_array(corners.map(|texel| texel.w)),
+        side: at.side,
+    }
 }

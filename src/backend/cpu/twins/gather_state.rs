@@ -20,7 +20,8 @@ pub const RAYS_PER_SHADOW_RAY: u32 = 4;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RaySums {
-    /// Light reflected by surfaces and from the sky, except for lights sampled separately.
+    /// Light reflected by surfaces and from the sky, except for near surfaces and lights sampled
+    /// separately.
     pub light: [f32; 3],
     pub escaped: f32,
     /// Exitance of the other lights.
@@ -29,7 +30,13 @@ pub struct RaySums {
     pub inverse_distance: f32,
     /// The largest contribution of one ray to `light`: its length over the channels.
     pub largest: f32,
-    pub padding: [f32; 2],
+    /// Number of rays that meet near surfaces.
+    pub near: f32,
+    /// The same as `largest` of `near_light`.
+    pub near_largest: f32,
+    /// Light of near surfaces by the field.
+    pub near_light: [f32; 3],
+    pub padding: f32,
 }
 
 /// Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
@@ -68,7 +75,9 @@ pub struct PointState {
     pub pending: u32,
     pub ray_error: f32,
     pub shadow_error: f32,
-    pub padding: [u32; 2],
+    /// Whether paths found the light of near surfaces for earlier rays.
+    pub covered: u32,
+    pub padding: u32,
 }
 
 impl PointState {

@@ -3,10 +3,12 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 
-use super::field::reflected;
+use super::field::{OnElement, field_at};
 use super::gather_state::{LANES, PointState, RaySums, SOURCES, Visible, added_up};
 use super::lights::{passed, ray_from};
-use super::trace::{FAR, Ray, meet, nearest, turned};
+use super::near_field::is_near;
+use super::sky::from_sky;
+use super::trace::{FAR, Hit, Ray, meet, nearest, turned};
 use crate::backend::gpu::layout::{GatherSettings, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
@@ -32,10 +34,11 @@ pub struct Found {
 impl Found {
     pub fn add(&mut self, other: &Found) {
         let largest = self.sums.largest.max(other.sums.largest);
+        let near_largest = self.sums.near_largest.max(other.sums.near_largest);
         let terms = bytemuck::cast_slice::<Found, f32>(std::slice::from_ref(other));
         let sums = bytemuck::cast_slice_mut::<Found, f32>(std::slice::from_mut(self));
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        self.sums.largest = largest;
+        (self.sums.largest, self.sums.near_largest) = (largest, near_largest);
     }
 }
 
@@ -69,6 +72,7 @@ impl HemisphereRays<'_> {
             let vector = |v: [f32; 3], last: f32| Vec3::from(v).extend(last);
             let light = sum(&|f| vector(f.sums.light, f.sums.escaped));
             let emitted = sum(&|f| vector(f.sums.lamps, f.sums.back));
+            let near = sum(&|f| vector(f.sums.near_light, f.sums.near));
             let rest = sum(&|f| vector([f.sums.inverse_distance, 0.0, 0.0], 0.0));
             let out = &mut state.rays[half];
             out.light = (Vec3::from(out.light) + light.truncate()).to_array();
@@ -76,7 +80,13 @@ impl HemisphereRays<'_> {
             out.lamps = (Vec3::from(out.lamps) + emitted.truncate()).to_array();
             out.back += emitted.w;
             out.inverse_distance += rest.x;
-            out.largest = lanes.iter().map(|f| f.sums.largest).fold(out.largest, f32::max);
+            let largest = |of: fn(&RaySums) -> f32, start: f32| {
+                lanes.iter().map(|found| of(&found.sums)).fold(start, f32::max)
+            };
+            out.largest = largest(|sums| sums.largest, out.largest);
+            out.near_largest = largest(|sums| sums.near_largest, out.near_largest);
+            out.near += near.w;
+            out.near_light = (Vec3::from(out.near_light) + near.truncate()).to_array();
             for k in 0..state.light_count as usize {
                 if state.lights[k].is_wide != 0 {
                     let of_light = sum(&|f| vector(f.lights[k].seen, f.lights[k].all));
@@ -92,6 +102,12 @@ impl HemisphereRays<'_> {
     pub fn direction(&self, k: u32, point: &TracedPoint) -> Vec3 {
         let local = Vec4::from(self.directions[k as usize]).truncate();
         turned(local, point.normal.into(), point.rotation)
+    }
+
+    /// The field at a hit.
+    pub fn field_at(&self, hit: &Hit) -> OnElement {
+        let index = self.scene.triangles[hit.triangle as usize].index;
+        field_at(self.quadtrees, self.elements, index, Vec2::new(hit.u, hit.v))
     }
 
     /// The result of one ray.
@@ -131,35 +147,22 @@ impl HemisphereRays<'_> {
             sums.back = 1.0;
             return found;
         }
-        let index = scene.triangles[hit.triangle as usize].index;
-        let weights = Vec2::new(hit.u, hit.v);
-        let light = reflected(self.quadtrees, self.elements, index, weights) * share;
-        sums.light = light.to_array();
-        sums.largest = light.length();
+        let there = self.field_at(&hit);
+        let light = there.radiosity * share;
+        if is_near(scene, &hit, there.side) {
+            sums.near = 1.0;
+            sums.near_light = light.to_array();
+            sums.near_largest = light.length();
+        } else {
+            sums.light = light.to_array();
+            sums.largest = light.length();
+        }
         if of_light != NO_LIGHT && !is_known {
             let exitance = Vec3::from(scene.lights[of_light as usize].exitance);
             sums.lamps = (exitance * share).to_array();
         }
         found
     }
-}
-
-/// Light from the sky along a direction, as the radiosity of a surface.
-pub fn from_sky(scene: &TracedArrays, direction: Vec3) -> Vec3 {
-    let info = &scene.info;
-    if info.sky_side == 0 {
-        return info.sky.into();
-    }
-    let along = Vec3::from_array(
-        [info.sky_x, info.sky_y, info.sky_z].map(|axis| Vec3::from(axis).dot(direction)),
-    );
-    let d = along / along.abs().element_sum();
-    let side = info.sky_side as f32;
-    let last = info.sky_side - 1;
-    let column = (((d.x + d.y + 1.0) * 0.5 * side).max(0.0) as u32).min(last);
-    let line = (((d.x - d.y + 1.0) * 0.5 * side).max(0.0) as u32).min(last);
-    let square = if d.z < 0.0 { info.sky_side } else { 0 };
-    Vec4::from(scene.sky[((square + line) * info.sky_side + column) as usize]).truncate()
 }
 
 /// Whether a light, occluded or not, lies along the ray.

@@ -1,12 +1,11 @@
 //! Twin of `shaders/light_rays.wgsl`: rays from points to points on lights and on the sun.
 
-use std::f32::consts::PI;
-
 use glam::{Vec2, Vec3, Vec4};
 
 use super::gather_state::{LANES, PointState, SOURCES, SUN, added_up};
 use super::hemisphere_rays::range;
 use super::lights::{ANY_LIGHT, passed, ray_from, rotated_sobol, to_light};
+use super::sky::towards_sun;
 use super::trace::{FAR, is_hidden};
 use crate::backend::gpu::layout::{GatherSettings, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
@@ -60,14 +59,6 @@ pub fn cast_ray(
     let is_seen = to.is_solid && !is_hidden(scene, &to.ray, to.distance, number);
     let seen = if is_seen { to.factor * passed(scene, &to.ray, to.distance) } else { Vec3::ZERO };
     seen.extend(to.factor)
-}
-
-/// The direction to a point on the sun.
-pub fn towards_sun(scene: &TracedArrays, at: Vec2) -> Vec3 {
-    let info = &scene.info;
-    let [middle, right, up] = [info.sun_middle, info.sun_right, info.sun_up].map(Vec3::from);
-    let (sine, cosine) = (2.0 * PI * at.y).sin_cos();
-    (middle + (right * cosine + up * sine) * at.x.sqrt()).normalize()
 }
 
 /// Visible and total cosine of the sun in a direction.

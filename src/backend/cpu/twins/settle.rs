@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::gather_state::{PointState, RAYS_PER_SHADOW_RAY, RaySums, SOURCES, SUN, Visible};
+use super::near_field::is_covered;
 use crate::backend::gpu::layout::{GatherSettings, Sample, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
@@ -81,10 +82,19 @@ pub fn settle(
     let normal = Vec3::from(point.normal);
     let ray_count = state.ray_count * if pending == 1 { 2 } else { 1 };
     let shadow_count = state.shadow_count * if pending == 2 { 2 } else { 1 };
-    let halves = state.rays;
+    let mut halves = state.rays;
     let seen = [half_of(state, 0), half_of(state, 1)];
     let all_seen = together(&seen[0], &seen[1]);
     let (rays, shadow_rays) = (ray_count as f32, shadow_count as f32);
+    let mut covered = state.covered;
+    for half in &mut halves {
+        if is_covered(half.near, 0.5 * rays) {
+            covered = 1;
+        } else {
+            half.light = (Vec3::from(half.light) + Vec3::from(half.near_light)).to_array();
+            half.largest = half.largest.max(half.near_largest);
+        }
+    }
     let vectors = |of: fn(&RaySums) -> [f32; 3]| halves.each_ref().map(|h| Vec3::from(of(h)));
     let (light, lamps) = (vectors(|h| h.light), vectors(|h| h.lamps));
     let ray_means = [0, 1].map(|h| {
@@ -121,6 +131,8 @@ pub fn settle(
         inverse_distance: inverse_distance / rays,
         rays: ray_count,
         shadow_rays: shadow_count,
+        covered,
+        padding: [0; 3],
     };
     let allowed = settings.noise * irradiance.length().max(settings.dim);
     state.pending = 0;
@@ -138,6 +150,7 @@ pub fn settle(
         state.shadow_count = shadow_count;
         state.ray_error = ray_error;
         state.shadow_error = shadow_error;
+        state.covered = covered;
         state.rays = [
             RaySums {
                 light: light.to_array(),
@@ -146,7 +159,7 @@ pub fn settle(
                 back,
                 inverse_distance,
                 largest,
-                padding: [0.0; 2],
+                ..RaySums::default()
             },
             RaySums::default(),
         ];

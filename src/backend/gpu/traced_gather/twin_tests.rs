@@ -1,5 +1,6 @@
-//! `rank_lights.wgsl`, `hemisphere_rays.wgsl`, `light_rays.wgsl` and `settle.wgsl` against their
-//! twins, pass by pass; and the same bits for any division of points into calls.
+//! `rank_lights.wgsl`, `hemisphere_rays.wgsl`, `near_paths.wgsl`, `light_rays.wgsl` and
+//! `settle.wgsl` against their twins, pass by pass; the same bits for any division of points into
+//! calls; and the light of near surfaces against rays on the CPU.
 
 use std::f32::consts::PI;
 
@@ -10,20 +11,25 @@ use crate::backend::cpu::twins::gather_state::{PointState, SOURCES, SUN};
 use crate::backend::cpu::twins::hemisphere_rays::{Found, HemisphereRays, range};
 use crate::backend::cpu::twins::light_rays;
 use crate::backend::cpu::twins::lights::{ray_from, rotated_sobol};
+use crate::backend::cpu::twins::near_paths::{
+    self, Shift, chance_of, choose_light, covered_halves,
+};
 use crate::backend::cpu::twins::rank_lights::{
     MIN_IRRADIANCE_SHARE, Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
 };
 use crate::backend::cpu::twins::settle::{Settled, settle};
+use crate::backend::cpu::twins::sky::towards_sun;
 use crate::backend::cpu::twins::trace::nearest;
 use crate::backend::gpu::field::{element_texels, quadtrees};
 use crate::backend::gpu::layout::{NOTHING, TracedLight};
 use crate::backend::gpu::test_support::{
-    gpu, lamp_within_ceiling, on_sides, places, random_radiosity, read_buffer, shifts,
+    gpu, lamp_within_ceiling, narrow_gap, on_sides, places, random_radiosity, read_buffer, shifts,
     traced_scenes, turned_by, under_sky_and_sun,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
-use crate::visibility::ray_scene::Hit;
+use crate::scene::{IntensityDistribution, Luminaire};
+use crate::visibility::ray_scene::{Hit, RayScene};
 
 /// Relative rounding error of 32-bit numbers.
 const ROUNDING: f64 = f32::EPSILON as f64 / 2.0;
@@ -41,6 +47,13 @@ struct Passes {
     points: Vec<TracedPoint>,
 }
 
+/// Scenes for all passes.
+fn gathered_scenes() -> Vec<(&'static str, Mesh)> {
+    let mut scenes = traced_scenes();
+    scenes.push(("narrow gap", narrow_gap()));
+    scenes
+}
+
 /// Number of workgroups of a pass.
 #[derive(Clone, Copy, Debug)]
 enum Groups {
@@ -54,8 +67,9 @@ impl Passes {
     /// `count` points of `mesh`, with initially `rays` rays each and finally 16 times that.
     fn new(mesh: &Mesh, count: usize, rays: u32) -> Passes {
         let gpu = gpu();
-        let gather = TracedGather::with_noise(&gpu, mesh, rays, (1e-6, 0.0)).unwrap();
-        let mut slots = Slots::new(gpu.memory(), count as u32, 1).unwrap();
+        let gather =
+            TracedGather::with_noise(&gpu, mesh, rays, (1e-6, 0.0)).unwrap().with_near_field();
+        let mut slots = Slots::new(gpu.memory(), count as u32, [1; 2]).unwrap();
         let mut slot = slots.slots.remove(0);
         // Buffers that the tests read and write.
         let buffer = |bytes: u64, usage| {
@@ -100,7 +114,7 @@ impl Passes {
         let TracedGather { min_rays, max_rays, .. } = self.gather;
         let points = self.points.len() as u32;
         let (noise, dim) = (1e-6, 0.0);
-        GatherSettings { min_rays, max_rays, noise, dim, points, first, pass_rays, padding: 0 }
+        GatherSettings { min_rays, max_rays, noise, dim, points, first, pass_rays, near_field: 1 }
     }
 
     /// Settings of all rays of a half at once.
@@ -115,7 +129,9 @@ impl Passes {
         groups: Groups,
     ) {
         let slot = &self.slot;
-        self.gpu.queue.write_buffer(&slot.settings[0], 0, bytemuck::bytes_of(settings));
+        for buffer in [&slot.settings[0], &slot.path_settings[0]] {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(settings));
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         bound.set(&mut pass, pipeline, 0);
@@ -285,13 +301,14 @@ fn twin_ranks_lights_as_closed_forms_do() {
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn gather_passes_equal_their_twins() {
     let mut met = Met::default();
-    for (name, mesh) in traced_scenes() {
+    for (name, mesh) in gathered_scenes() {
         compare(name, &Passes::new(&mesh, 7, 256), &mut met);
     }
     println!("{met:?}");
     // All cases to compare have occurred.
     assert!(met.wide > 0 && met.folded > 0 && met.full > 0 && met.escaped > 0.0);
     assert!(met.back > 0.0 && met.lamps > 0.0 && met.dim > 0 && met.rounds >= 6);
+    assert!(met.covered > 20 && met.near_by_field > 0.0);
 }
 
 /// Cases that occurred in the scenes.
@@ -307,6 +324,9 @@ struct Met {
     escaped: f32,
     back: f32,
     lamps: f32,
+    /// Halves of points whose near surfaces are followed by paths, and rays to others that are not.
+    covered: usize,
+    near_by_field: f32,
     rounds: usize,
 }
 
@@ -350,6 +370,29 @@ fn compare(name: &str, passes: &Passes, met: &mut Met) {
             let after = passes.states();
             let what = format!("{what}, rays from {from}");
             compare_rays(&what, passes, &settings, &lists[0], [&states, &after]);
+            states = after;
+        }
+        let paths = match first {
+            true => (&bound.near_paths, &pipelines.near_paths, all),
+            false => (&bound.more_near_paths, &pipelines.more_near_paths, Groups::Rays),
+        };
+        for &p in &lists[0] {
+            let state = &states[p as usize];
+            for (covered, sums) in covered_halves(state).into_iter().zip(&state.rays) {
+                met.covered += usize::from(covered);
+                met.near_by_field += if covered { 0.0 } else { sums.near };
+            }
+        }
+        let path_rays = passes.gather.path_rays();
+        for from in (0..most).step_by(path_rays as usize) {
+            let settings = passes.settings(from, path_rays);
+            passes.run((paths.0, paths.1), &settings, paths.2);
+            let after = passes.states();
+            let what = format!("{what}, paths from {from}");
+            // Later rounds have more of the same, which takes minutes.
+            if round < 2 {
+                compare_paths(&what, passes, &settings, &lists[0], [&states, &after]);
+            }
             states = after;
         }
         if passes.gather.has_lights() {
@@ -449,9 +492,9 @@ fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint)
 // ---------------------------------------------------------------------------------------------
 // Rays over the hemisphere.
 
-/// Number of values in [`Found`], and the index of the largest ray.
+/// Number of values in [`Found`], and the indices of the largest rays, others and near ones.
 const NUMBERS: usize = size_of::<Found>() / 4;
-const LARGEST: usize = 9;
+const LARGEST: [usize; 2] = [9, 11];
 
 fn numbers(found: &Found) -> [f32; NUMBERS] {
     bytemuck::cast(*found)
@@ -460,15 +503,16 @@ fn numbers(found: &Found) -> [f32; NUMBERS] {
 /// Range of the possible results of rays.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
-    /// Width of the range of each value, over all rays; for the largest ray minimum and maximum.
+    /// Width of the range of each value, over all rays; for the largest rays minimum and maximum.
     widths: [f64; NUMBERS],
-    largest: [f32; 2],
+    largest: [[f32; 2]; 2],
     unsure: usize,
     rays: usize,
 }
 
 impl Spread {
-    const NONE: Spread = Spread { widths: [0.0; NUMBERS], largest: [0.0; 2], unsure: 0, rays: 0 };
+    const NONE: Spread =
+        Spread { widths: [0.0; NUMBERS], largest: [[0.0; 2]; 2], unsure: 0, rays: 0 };
 
     /// Adds one ray, whose result is within the range of these.
     fn add(&mut self, found: &[[f32; NUMBERS]]) {
@@ -486,7 +530,9 @@ impl Spread {
             self.widths[k] += f64::from(width);
             is_unsure |= width > 0.05 * high[k].abs();
         }
-        self.largest = [self.largest[0].max(low[LARGEST]), self.largest[1].max(high[LARGEST])];
+        for (largest, k) in self.largest.iter_mut().zip(LARGEST) {
+            *largest = [largest[0].max(low[k]), largest[1].max(high[k])];
+        }
         self.unsure += usize::from(is_unsure);
         self.rays += 1;
     }
@@ -533,17 +579,16 @@ fn compare_rays(
                 numbers(&found)
             };
             let (found, expected) = (of(is), of(&twin));
-            for k in (0..NUMBERS).filter(|&k| k != LARGEST) {
+            for k in (0..NUMBERS).filter(|k| !LARGEST.contains(k)) {
                 let name = || format!("{what}, half {half}, number {k}");
                 check(found[k], expected[k], (spread.widths[k], roundings), name);
             }
-            let [low, high] = spread.largest.map(|l| l.max(was.rays[half].largest));
-            let largest = found[LARGEST];
-            let slack = 40.0 * ROUNDING as f32 * high;
-            assert!(
-                largest >= low - slack && largest <= high + slack,
-                "{what}, half {half}: largest {largest}, not {low} to {high}"
-            );
+            let before = of(was);
+            for (range, k) in spread.largest.iter().zip(LARGEST) {
+                check_largest(found[k], range.map(|l| l.max(before[k])), || {
+                    format!("{what}, half {half}")
+                });
+            }
             // The test is only significant if few rays are near an edge: some hundred sides a
             // radian long, and the same number of lines between elements, cover 2e-4 of the
             // hemisphere, and those between pieces of a sky, 2⁻⁹ apart, 2⁻¹⁰ of it.
@@ -563,6 +608,199 @@ fn compare_rays(
         }
     };
     (0..passes.points.len()).into_par_iter().for_each(compare);
+}
+
+/// Checks that the largest ray is within these, but for 40 roundings.
+fn check_largest(largest: f32, [low, high]: [f32; 2], what: impl Fn() -> String) {
+    let slack = 40.0 * ROUNDING as f32 * high;
+    let is_within = largest >= low - slack && largest <= high + slack;
+    assert!(is_within, "{}: largest {largest}, not {low} to {high}", what());
+}
+
+// ---------------------------------------------------------------------------------------------
+// Paths from near surfaces.
+
+/// Sums over paths are those of the twin, except for paths that rounding may deflect at any vertex.
+fn compare_paths(
+    what: &str,
+    passes: &Passes,
+    settings: &GatherSettings,
+    list: &[u32],
+    [before, after]: [&[PointState]; 2],
+) {
+    let rays = passes.rays();
+    let shifts = shifts();
+    let compare = |p: usize| {
+        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
+        let what = format!("{what}, point {p}");
+        let covered = covered_halves(was);
+        if !list.contains(&(p as u32)) || covered == [false; 2] {
+            assert_eq!(was, is, "{what} is not listed, or not covered");
+            return;
+        }
+        let mut twin = *was;
+        near_paths::follow_paths(&rays, point, settings, &mut twin);
+        let [from, middle, to] = range(was.ray_count, was, settings);
+        let (mut widths, mut largest) = ([[0f64; 3]; 2], was.rays.map(|sums| [sums.largest; 2]));
+        let (mut unsure, mut all) = (0, 0);
+        for k in from..to {
+            let half = usize::from(k >= middle);
+            if !covered[half] {
+                continue;
+            }
+            let found = shifts.iter().map(|&(across, origin)| {
+                let shift = Shift { across, origin, turned: &turned_by };
+                near_paths::near_light(&rays, point, k, was, shift)
+            });
+            let found: Vec<Vec3> = found.collect();
+            let low = found.iter().fold(found[0], |low, f| low.min(*f));
+            let high = found.iter().fold(found[0], |high, f| high.max(*f));
+            for c in 0..3 {
+                // Rounding deflects every vertex in its own way, these all in the same way.
+                widths[half][c] += 2.0 * f64::from(high[c] - low[c]);
+            }
+            largest[half][0] = largest[half][0].max(low.length());
+            largest[half][1] = largest[half][1].max(high.length());
+            all += 1;
+            unsure += u32::from((high - low).max_element() > 0.05 * high.max_element());
+        }
+        for half in 0..2 {
+            // A term takes some 40 operations a vertex, of which there are some ten.
+            let roundings = 64.0 + 6.0 + 400.0;
+            let (found, expected) = (is.rays[half].light, twin.rays[half].light);
+            for ((found, expected), width) in found.into_iter().zip(expected).zip(widths[half]) {
+                let name = || format!("{what}, half {half}");
+                check(found, expected, (width, roundings), name);
+            }
+            let [low, high] = largest[half];
+            check_largest(is.rays[half].largest, [0.999 * low, 1.001 * high], || what.clone());
+        }
+        // A path has some ten vertices with three rays each.
+        assert!(unsure <= 3 + all / 20, "{what}: {unsure} of {all} are unsure");
+        let mut rest = *was;
+        for (out, sums) in rest.rays.iter_mut().zip(&is.rays) {
+            (out.light, out.largest) = (sums.light, sums.largest);
+        }
+        assert_eq!(*is, rest, "{what}: nothing else is written");
+    };
+    (0..passes.points.len()).into_par_iter().for_each(compare);
+}
+
+/// Lights are chosen as often as the balance assumes.
+#[test]
+fn paths_choose_lights_with_their_chance() {
+    for (name, mesh) in gathered_scenes() {
+        let lights = Lights::new(mesh.shared_scene());
+        let arrays = TracedArrays::new(&lights);
+        if arrays.info.lights == 0 {
+            continue;
+        }
+        let settings = GatherSettings { min_rays: 256, ..Default::default() };
+        for place in places(&mesh, 5) {
+            let state = rank_lights(&arrays, &traced(&arrays, &place), &settings);
+            let mut counts = vec![0u32; arrays.info.lights as usize];
+            let all = 1 << 14;
+            for k in 0..all {
+                let at = (k as f32 + 0.5) / all as f32;
+                counts[choose_light(&arrays, &state, at) as usize] += 1;
+            }
+            for (light, count) in (0..).zip(counts) {
+                let chance = f64::from(chance_of(&arrays, &state, light)) * f64::from(all);
+                // Each light has at most two ranges of numbers, with two ends each.
+                let off = (f64::from(count) - chance).abs();
+                assert!(off <= 4.1, "{name}, light {light}: {count}, not {chance}");
+            }
+        }
+    }
+}
+
+/// Between plates that are closer than their elements are wide the device's light is that of rays
+/// on the CPU, within the noise of the paths: at each place there are many points so close together
+/// that they differ in nothing but their random numbers, and their spread tells the noise of their
+/// mean.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
+    const POINTS: usize = 32;
+    let (gpu, mesh) = (gpu(), narrow_gap());
+    let (corners, reflected) = random_radiosity(&mesh);
+    let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+    let mut device = TracedGather::new(&gpu, &mesh, 1024).unwrap().with_near_field();
+    let mut cpu = RayGather::new(&mesh, 1024).unwrap().with_near_field();
+    let normals = [DVec3::Z, -DVec3::Z];
+    let places = [
+        ([1.0, 1.0, 1e-4], 0),
+        ([1.8, 0.6, 1e-4], 0),
+        ([0.3, 1.3, 0.1499], 1),
+        ([1.5, 1.5, 0.1499], 1),
+        ([0.55, 1.0, 1e-4], 0),
+        ([1.4, 0.5, 1e-4], 0),
+        ([1.3, 0.6, 0.1499], 1),
+    ];
+    let (mut squares, mut numbers) = (0.0, 0);
+    for (place, side) in places {
+        let near_by = |k: usize| {
+            let random = |j: usize| unit_interval(split_mix64_nth((3 * k + j) as u64)) - 0.5;
+            let shift = 1e-5 * DVec3::new(random(0), random(1), 0.0);
+            let position = DVec3::from_array(place) + shift;
+            GatherPoint { position, normal: normals[side], near: 2.5e-5 }
+        };
+        let points: Vec<GatherPoint> = (0..POINTS).map(near_by).collect();
+        let traced: Vec<TracedPoint> = points.iter().map(|p| device.traced_point(p)).collect();
+        let buffers = device.gpu.field_buffers(&device.scene, &field).unwrap();
+        let found = device.gather_all(&buffers, &traced, MAX_POINTS).unwrap();
+        assert!(found.iter().all(|(_, is_covered)| *is_covered), "{place:?} is covered");
+        let found: Vec<IrradianceSample> = found.into_iter().map(|(sample, _)| sample).collect();
+        let expected = cpu.gather(&field, &points).unwrap();
+        let [found, expected] = [&found, &expected].map(|samples| {
+            // Without what lights bring by themselves.
+            let reflected = samples.iter().map(|s| s.irradiance - s.direct);
+            let mean = reflected.clone().sum::<Rgb>() / POINTS as f64;
+            let sum: Rgb = reflected.map(|light| (light - mean) * (light - mean)).sum();
+            (mean, sum / (POINTS * (POINTS - 1)) as f64)
+        });
+        let off = found.0 - expected.0;
+        let error = (found.1 + expected.1).map(f64::sqrt);
+        println!("{place:?}: {:.4} and {:.4}: {:.2} σ", found.0, expected.0, off / error);
+        // Of 21 numbers with 31 degrees of freedom each one in 2000 goes beyond this by chance.
+        assert!((off.abs() / error).max_element() < 4.8, "{place:?}: {off} of {error}");
+        assert!(error.max_element() < 0.03 * expected.0.min_element(), "{place:?}: {error}");
+        squares += (off / error).length_squared();
+        numbers += 3;
+    }
+    // The channels of a place depend on each other: as few as a third of all are free.
+    println!("mean square {:.2}", squares / f64::from(numbers));
+    assert!(squares / f64::from(numbers) < 2.5);
+}
+
+/// Paths on the device meet no luminaires: of a scene with some, points that near surfaces cover
+/// are gathered on the CPU, and the others are not.
+#[test]
+#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
+fn covered_points_under_luminaires_are_gathered_on_the_cpu() {
+    let (gpu, mesh) = (gpu(), narrow_gap());
+    let intensity = IntensityDistribution::isotropic(1.0).unwrap();
+    let luminaire = Luminaire::new(intensity, DVec3::new(1.2, 0.7, 0.1), -DVec3::Z);
+    let scene = mesh.scene().clone().with_luminaires(vec![luminaire]).unwrap();
+    let mesh = mesh.with_scene(scene).unwrap();
+    let (corners, reflected) = random_radiosity(&mesh);
+    let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
+    let above = [([1.0, 1.0, 1e-4], DVec3::Z), ([1.0, 1.0, 0.2], DVec3::Z)];
+    let points = above.map(|(position, normal)| GatherPoint {
+        position: DVec3::from_array(position),
+        normal,
+        near: 2.5e-5,
+    });
+    for noise in [f64::INFINITY, 0.05] {
+        let device = TracedGather::with_noise(&gpu, &mesh, 256, (noise, 0.1)).unwrap();
+        let mut device = device.with_near_field();
+        let mut cpu = RayGather::new(&mesh, 256).unwrap().with_noise(noise, 0.1).with_near_field();
+        let found = device.gather(&field, &points).unwrap();
+        let expected = cpu.gather(&field, &points).unwrap();
+        assert_eq!(found[0], expected[0]);
+        assert_ne!(found[1], expected[1]);
+        assert!(found[1].irradiance.distance(expected[1].irradiance) < 1e-3);
+    }
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -600,7 +838,7 @@ fn compare_shadow_rays(
                     let low = (Vec3::from(point.position_low) + origin).to_array();
                     let shifted = TracedPoint { position_low: low, ..*point };
                     if source == SUN {
-                        let direction = turned_by(light_rays::towards_sun(arrays, at), across);
+                        let direction = turned_by(towards_sun(arrays, at), across);
                         return light_rays::to_sun(arrays, &shifted, direction);
                     }
                     let moved = (at + across).clamp(Vec2::ZERO, Vec2::ONE);
@@ -741,7 +979,7 @@ fn compare_samples(what: &str, found: &Sample, settled: &Settled) {
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn settle_equals_its_twin_from_any_state() {
     let mut decided = [0; 4];
-    for (name, mesh) in traced_scenes() {
+    for (name, mesh) in gathered_scenes() {
         let passes = Passes::new(&mesh, 150, 64);
         let settings = GatherSettings { noise: 0.05, dim: 0.3, ..passes.whole() };
         let lights = passes.arrays.info.lights;
@@ -796,6 +1034,10 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
         (sums.escaped, sums.back) = (term(0.1).floor(), term(0.1).floor());
         sums.inverse_distance = term(1.0);
         sums.largest = random();
+        // Of some halves more than half of the rays, which are half of all.
+        sums.near = (rays * random()).floor();
+        sums.near_light = [(); 3].map(|_| sums.near * random());
+        sums.near_largest = random();
     }
     for visible in &mut state.visible {
         visible.all = 1.0 + random();
@@ -816,17 +1058,19 @@ fn gathered(
 ) -> Vec<IrradianceSample> {
     let traced: Vec<TracedPoint> = points.iter().map(|p| gather.traced_point(p)).collect();
     let buffers = gather.gpu.field_buffers(&gather.scene, field).unwrap();
-    gather.gather_all(&buffers, &traced, most).unwrap()
+    let samples = gather.gather_all(&buffers, &traced, most).unwrap();
+    samples.into_iter().map(|(sample, _)| sample).collect()
 }
 
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn gathers_have_the_same_bits_in_any_batches() {
     let gpu = gpu();
-    for (name, mesh) in traced_scenes() {
+    for (name, mesh) in gathered_scenes() {
         let (corners, reflected) = random_radiosity(&mesh);
         let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
-        let new = || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap();
+        let new =
+            || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap().with_near_field();
         // More batches of 64 than are in flight at once.
         let points = places(&mesh, 200);
         let mut gather = new();

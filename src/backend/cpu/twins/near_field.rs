@@ -1,0 +1,21 @@
+//! Twin of `shaders/shared/near_field.wgsl`: near surfaces.
+
+use glam::Vec3;
+
+use super::trace::Hit;
+use crate::backend::gpu::traced_scene::TracedArrays;
+
+const MIN_COVERED: f32 = 0.5;
+
+/// Whether a hit is nearer than its element is wide, on an element of which there are `side` along an edge of the triangle.
+pub fn is_near(scene: &TracedArrays, hit: &Hit, side: u32) -> bool {
+    let t = &scene.triangles[hit.triangle as usize];
+    let count = side as f32;
+    let square = Vec3::from(t.edge_u).cross(t.edge_v.into()).length() / (count * count);
+    hit.distance * hit.distance < square
+}
+
+/// Whether paths find the light of as many `near` rays of all.
+pub fn is_covered(near: f32, rays: f32) -> bool {
+    near > MIN_COVERED * rays
+}

@@ -1,0 +1,311 @@
+//! Twin of `shaders/near_paths.wgsl`: light that near surfaces reflect, by paths.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::gather_state::{LANES, PointState, RankedLight, added_up};
+use super::hemisphere_rays::{HemisphereRays, range};
+use super::lights::{ANY_LIGHT, passed, ray_from, to_light};
+use super::near_field::{is_covered, is_near};
+use super::sky::{from_sky, towards_sun};
+use super::trace::{FAR, Hit, is_hidden, nearest, nearest_but, turned};
+use crate::backend::gpu::layout::{
+    GatherSettings, NOTHING, ROW_OF_FLAGS, TracedPoint, TracedTriangle,
+};
+use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::gather::lights::NO_LIGHT;
+
+const MAX_VERTICES: u32 = 128;
+const MAX_SURVIVAL: f32 = 0.999;
+/// Height of a vertex above its triangle.
+const LIFT: f32 = 9.536_743e-7;
+
+/// Random numbers of one path.
+#[derive(Clone, Copy, Debug)]
+pub struct Random(u32);
+
+/// A hash of 32 bits: PCG-RXS-M-XS (Jarzynski and Olano 2020).
+fn scrambled(bits: u32) -> u32 {
+    let state = bits.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+impl Random {
+    /// Of ray `k` from a point: of nothing but where the point is.
+    pub fn of_ray(point: &TracedPoint, k: u32) -> Random {
+        let [x, y, z] = point.position.map(f32::to_bits);
+        Random(scrambled(scrambled(scrambled(scrambled(x) ^ y) ^ z) ^ k))
+    }
+
+    /// The next one in (0, 1).
+    pub fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        ((scrambled(self.0) >> 8) as f32 + 0.5) * 2f32.powi(-24)
+    }
+}
+
+/// Deviations that rounding may cause: of directions, of places on lights, and of origins. Of the
+/// twin itself none.
+#[derive(Clone, Copy)]
+pub struct Shift<'a> {
+    pub across: Vec2,
+    pub origin: Vec3,
+    pub turned: &'a dyn Fn(Vec3, Vec2) -> Vec3,
+}
+
+impl Shift<'_> {
+    /// No deviation.
+    pub const NONE: Shift<'static> =
+        Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
+
+    fn direction(&self, direction: Vec3) -> Vec3 {
+        (self.turned)(direction, self.across)
+    }
+
+    fn place(&self, at: Vec2) -> Vec2 {
+        (at + self.across).clamp(Vec2::ZERO, Vec2::ONE)
+    }
+
+    fn point(&self, point: TracedPoint) -> TracedPoint {
+        let position_low = (Vec3::from(point.position_low) + self.origin).to_array();
+        TracedPoint { position_low, ..point }
+    }
+}
+
+/// The paths of one pass from a point.
+pub fn follow_paths(
+    rays: &HemisphereRays,
+    point: &TracedPoint,
+    settings: &GatherSettings,
+    state: &mut PointState,
+) {
+    let [from, middle, to] = range(state.ray_count, state, settings);
+    let covered = covered_halves(state);
+    let mut lanes = [[Vec4::ZERO; LANES as usize]; 2];
+    for k in from..to {
+        let half = usize::from(k >= middle);
+        if covered[half] {
+            let found = near_light(rays, point, k, state, Shift::NONE);
+            let lane = &mut lanes[half][((k - from) % LANES) as usize];
+            *lane = (lane.truncate() + found).extend(lane.w.max(found.length()));
+        }
+    }
+    for (out, lanes) in state.rays.iter_mut().zip(lanes) {
+        let sum = added_up(lanes);
+        out.light = (Vec3::from(out.light) + sum.truncate()).to_array();
+        out.largest = lanes.iter().map(|lane| lane.w).fold(out.largest, f32::max);
+    }
+}
+
+/// Of which halves paths find the light of near surfaces.
+pub fn covered_halves(state: &PointState) -> [bool; 2] {
+    let half = if state.pending == 3 { state.ray_count / 2 } else { state.ray_count };
+    state.rays.map(|sums| is_covered(sums.near, half as f32))
+}
+
+/// What ray `k` meets of the light that near surfaces reflect, by one path.
+pub fn near_light(
+    rays: &HemisphereRays,
+    point: &TracedPoint,
+    k: u32,
+    state: &PointState,
+    shift: Shift,
+) -> Vec3 {
+    let direction = shift.direction(rays.direction(k, point));
+    let ray = ray_from(&shift.point(*point), direction);
+    let hit = nearest(rays.scene, &ray);
+    if hit.triangle == NOTHING || !hit.front {
+        return Vec3::ZERO;
+    }
+    let there = rays.field_at(&hit);
+    if !is_near(rays.scene, &hit, there.side) {
+        return Vec3::ZERO;
+    }
+    let passed = passed(rays.scene, &ray, hit.distance);
+    let path = Path { rays, state, shift, random: Random::of_ray(point, k) };
+    passed * path.light(hit, there.reflectance)
+}
+
+struct Path<'a> {
+    rays: &'a HemisphereRays<'a>,
+    state: &'a PointState,
+    shift: Shift<'a>,
+    random: Random,
+}
+
+impl Path<'_> {
+    /// Radiosity that a front with this reflectance reflects at a hit, without its emission.
+    fn light(mut self, mut hit: Hit, mut reflectance: Vec3) -> Vec3 {
+        let scene = self.rays.scene;
+        let mut found = Vec3::ZERO;
+        let mut throughput = Vec3::ONE;
+        for vertex in 1..=MAX_VERTICES {
+            let t = &scene.triangles[hit.triangle as usize];
+            let through = transmittance(scene, t, reflectance);
+            if vertex > 1 {
+                let survival = (reflectance + through).max_element().min(MAX_SURVIVAL);
+                if self.random.next() >= survival {
+                    return found;
+                }
+                throughput /= survival;
+            }
+            let (mut side, mut leaves) = (1.0, reflectance);
+            let sum_through = through.element_sum();
+            if sum_through > 0.0 {
+                let chance = sum_through / (sum_through + reflectance.element_sum());
+                (side, leaves) = match self.random.next() < chance {
+                    true => (-1.0, through / chance),
+                    false => (1.0, reflectance / (1.0 - chance)),
+                };
+            }
+            throughput *= leaves;
+            let at = self.shift.point(on_triangle(t, hit.u, hit.v, side));
+            found += throughput * self.irradiance_of_lights(&at);
+            if scene.info.has_sun != 0 {
+                found += throughput * self.irradiance_of_sun(&at);
+            }
+            let (square, turn) = (self.random.next(), self.random.next());
+            let local = Vec3::new(square.sqrt(), 0.0, (1.0 - square).sqrt());
+            let direction = self.shift.direction(turned(local, at.normal.into(), turn));
+            let ray = ray_from(&at, direction);
+            hit = nearest_but(scene, &ray, t.index);
+            if hit.triangle == NOTHING {
+                return found + throughput * passed(scene, &ray, FAR) * from_sky(scene, direction);
+            }
+            if !hit.front {
+                return found;
+            }
+            throughput *= passed(scene, &ray, hit.distance);
+            let met = &scene.triangles[hit.triangle as usize];
+            if met.light != NO_LIGHT {
+                let light = &scene.lights[met.light as usize];
+                let facing = (-normal_of(met).dot(direction)).max(0.0);
+                let above = Vec3::from(at.normal).dot(direction).max(0.0);
+                let factor = light.area * facing * above / (PI * hit.distance * hit.distance);
+                let share = balance(factor, chance_of(scene, self.state, met.light));
+                found += throughput * Vec3::from(light.exitance) * share;
+            }
+            let there = self.rays.field_at(&hit);
+            if vertex == MAX_VERTICES || !is_near(scene, &hit, there.side) {
+                return found + throughput * there.radiosity;
+            }
+            reflectance = there.reflectance;
+        }
+        found
+    }
+
+    /// Irradiance at a vertex from one point of a light, with the share that the balance leaves to
+    /// it.
+    fn irradiance_of_lights(&mut self, at: &TracedPoint) -> Vec3 {
+        let scene = self.rays.scene;
+        if scene.info.lights == 0 {
+            return Vec3::ZERO;
+        }
+        let number = choose_light(scene, self.state, self.random.next());
+        let place = Vec2::new(self.random.next(), self.random.next());
+        let light = &scene.lights[number as usize];
+        let to = to_light(scene, light, at, self.shift.place(place));
+        if to.factor <= 0.0 || !to.is_solid || is_hidden(scene, &to.ray, to.distance, ANY_LIGHT) {
+            return Vec3::ZERO;
+        }
+        let share = balance(to.factor, chance_of(scene, self.state, number));
+        passed(scene, &to.ray, to.distance) * Vec3::from(light.exitance) * share
+    }
+
+    /// Irradiance at a vertex from one point of the sun.
+    fn irradiance_of_sun(&mut self, at: &TracedPoint) -> Vec3 {
+        let scene = self.rays.scene;
+        let place = Vec2::new(self.random.next(), self.random.next());
+        let direction = self.shift.direction(towards_sun(scene, place));
+        let cosine = Vec3::from(at.normal).dot(direction);
+        let ray = ray_from(at, direction);
+        if cosine <= 0.0 || is_hidden(scene, &ray, FAR, ANY_LIGHT) {
+            return Vec3::ZERO;
+        }
+        passed(scene, &ray, FAR) * Vec3::from(scene.info.sun) * cosine
+    }
+}
+
+/// What of the light that arrives at a triangle leaves its other side, where it has this
+/// reflectance.
+fn transmittance(scene: &TracedArrays, t: &TracedTriangle, reflectance: Vec3) -> Vec3 {
+    let row = (t.flags >> ROW_OF_FLAGS) as usize;
+    if row == 0 {
+        return Vec3::ZERO;
+    }
+    let whole = Vec3::from(scene.lights[row].exitance);
+    let relative = reflectance / whole.max(Vec3::splat(1e-37));
+    let relative = Vec3::select(whole.cmpgt(Vec3::ZERO), relative, Vec3::ONE);
+    Vec3::from(scene.lights[row - 1].exitance) * relative
+}
+
+fn normal_of(t: &TracedTriangle) -> Vec3 {
+    let edge = |edge: [f32; 3]| Vec3::from(edge) / t.extent;
+    edge(t.edge_u).cross(edge(t.edge_v)).normalize()
+}
+
+/// A point on a side of a triangle: the front is 1, the back -1.
+fn on_triangle(t: &TracedTriangle, u: f32, v: f32, side: f32) -> TracedPoint {
+    let normal = side * normal_of(t);
+    let [corner, corner_low, edge_u, edge_v] =
+        [t.corner, t.corner_low, t.edge_u, t.edge_v].map(Vec3::from);
+    let along = edge_u * u + edge_v * v + normal * LIFT;
+    let position = corner + along;
+    let low = (along - (position - corner)) + corner_low;
+    TracedPoint {
+        position: position.to_array(),
+        near: 0.25 * LIFT,
+        position_low: low.to_array(),
+        normal: normal.to_array(),
+        ..Default::default()
+    }
+}
+
+/// Share of a sample of one of two densities in their sum.
+fn balance(factor: f32, chance: f32) -> f32 {
+    let bounded = factor.min(1e30);
+    bounded / (bounded + chance).max(1e-37)
+}
+
+/// How much a light counts among those of a gather point.
+fn weight_of(scene: &TracedArrays, ranked: &RankedLight) -> f32 {
+    ranked.factor * Vec3::from(scene.lights[ranked.light as usize].exitance).max_element()
+}
+
+fn weight_of_ranked(scene: &TracedArrays, state: &PointState) -> f32 {
+    state.ranked().iter().map(|ranked| weight_of(scene, ranked)).sum()
+}
+
+/// The probability that [`choose_light`] chooses a light.
+pub fn chance_of(scene: &TracedArrays, state: &PointState, light: u32) -> f32 {
+    let ends = |light: u32| scene.lights[light as usize].power_end;
+    let by_power = ends(light) - if light > 0 { ends(light - 1) } else { 0.0 };
+    let all = weight_of_ranked(scene, state);
+    if all <= 0.0 {
+        return by_power;
+    }
+    let ranked = state.ranked().iter().find(|ranked| ranked.light == light);
+    0.5 * (by_power + ranked.map_or(0.0, |ranked| weight_of(scene, ranked) / all))
+}
+
+/// A light: half of the time one of the gather point's, otherwise any, in proportion to its power.
+pub fn choose_light(scene: &TracedArrays, state: &PointState, at: f32) -> u32 {
+    let all = weight_of_ranked(scene, state);
+    let mut remaining = at;
+    if all > 0.0 {
+        if at < 0.5 {
+            let mut weight = 2.0 * at * all;
+            let passes = |ranked: &&RankedLight| {
+                weight -= weight_of(scene, ranked);
+                weight < 0.0
+            };
+            let chosen = state.ranked().iter().find(passes).or(state.ranked().last());
+            return chosen.map_or(0, |ranked| ranked.light);
+        }
+        remaining = 2.0 * at - 1.0;
+    }
+    let last = scene.info.lights - 1;
+    (0..last).find(|&k| scene.lights[k as usize].power_end > remaining).unwrap_or(last)
+}
