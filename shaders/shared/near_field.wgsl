@@ -4,7 +4,8 @@
 
 const MIN_COVERED: f32 = 0.5;         // share of the hemisphere above which paths find the light
 
-// Whether a hit is nearer than its element is wide, on an element of which there are `side` along an edge of the triangle.
+// Whether a hit is nearer than its element is wide, of which there are `side` along an edge of the
+// triangle.
 fn is_near(hit: Hit, side: u32) -> bool {
     let t = triangles[hit.triangle];
     let count = f32(side);

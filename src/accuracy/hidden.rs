@@ -1,5 +1,5 @@
-//! Hidden points, at which no error is counted: inside solids, under what stands on them, in cracks,
-//! or in the open.
+//! Hidden points, at which no error is counted: inside solids, under what stands on them, in
+//! cracks, or in the open.
 //!
 //! | condition | threshold | reason |
 //! |---|---|---|

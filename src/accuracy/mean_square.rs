@@ -90,9 +90,9 @@ impl TrimmedSquare {
                 points.iter().map(|p| (p.area, p.error.splits[split].rank)).collect();
             let shares = trimmed(&ranks, tail).kept;
             let value = |k: usize| points[k].error.splits[split].value;
-            // The error at the cut, without noise: the mean over the next points of as much area.
-            let beyond = trimmed(&ranks, 2.0 * tail).kept;
-            let at_cut = |k: usize| points[k].area * (shares[k] - beyond[k]);
+            // The error at the cut, without noise: the mean over as much area around it.
+            let [above, below] = [0.5, 1.5].map(|share| trimmed(&ranks, share * tail).kept);
+            let at_cut = |k: usize| points[k].area * (above[k] - below[k]);
             let area_at_cut: f64 = (0..points.len()).map(at_cut).sum();
             let cut = (0..points.len()).map(|k| at_cut(k) * value(k)).sum::<f64>()
                 / area_at_cut.max(f64::MIN_POSITIVE);

@@ -80,7 +80,9 @@ pub fn gather_at_vertices(
 ) -> Result<GatheredMesh, Error> {
     settings.check()?;
     source.check_scene(mesh)?;
-    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region, Measure::default());
+    // The error of the settings is over all of the area.
+    let measure = Measure { tail: 0.0, ..Measure::default() };
+    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region, measure);
     let stop = state.run_passes(settings, gatherer, None, (None, None), &mut progress)?;
     let result = if stop == StopReason::Cancelled {
         state.to_gathered_mesh()

@@ -46,8 +46,8 @@ const NEEDED: usize = 6;
 ///
 /// # Errors
 /// - [`ErrorKind::File`] when the file cannot be read, or has more than 4 GiB.
-/// [`ErrorKind::Scene`] when it is malformed, a property is missing, a number is not finite, or a
-/// face has fewer than three vertices or one that does not exist.
+/// - [`ErrorKind::Scene`] when it is malformed, a property is missing, a number is not finite, or
+///   a face has fewer than three vertices or one that does not exist.
 pub fn read_ply(path: impl AsRef<Path>) -> Result<VertexMesh, Error> {
     let path = path.as_ref();
     let bytes = files::read_bytes(path, MAX_BYTES).map_err(|e| {

@@ -207,8 +207,8 @@ impl<'a> PathTracer<'a> {
 
     /// Radiosity that the front at `hit`, at `position`, reflects, by one path that ends at the
     /// first surface that `ends` it: what arrives on the way, W/m², and the end with the share of
-    /// the radiosity reflected there that arrives. Emitters are met by the path alone or, `by_area`,
-    /// sampled too.
+    /// the radiosity reflected there that arrives. Emitters are met by the path alone or,
+    /// `by_area`, sampled too.
     pub(crate) fn path_to(
         &self,
         hit: &Hit,

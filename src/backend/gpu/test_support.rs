@@ -314,7 +314,8 @@ pub fn room_with_doubled_leaf() -> Mesh {
 
 /// Two bright plates with a gap between them that is narrower than their elements. Light comes in
 /// on one side, from a lamp and a low sun through a pane, and from the sky all around; in the gap
-/// there are two small lamps, one of which has a fold, and a translucent leaf. Quadtrees are uneven.
+/// there are two small lamps, one of which has a fold, and a translucent leaf. Quadtrees are
+/// uneven.
 pub fn narrow_gap() -> Mesh {
     let x = [0.0, 2.0];
     let white =

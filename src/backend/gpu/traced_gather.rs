@@ -324,7 +324,10 @@ impl TracedGather {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let has_lights = self.has_lights();
         let passes = |rays: u32| rays.div_ceil(PASS_RAYS) as usize;
-        let path_passes = |rays: u32| rays.div_ceil(self.path_rays()) as usize;
+        let path_passes = |rays: u32| match self.near_field {
+            true => rays.div_ceil(self.path_rays()) as usize,
+            false => 0,
+        };
         let shadow_rays = |rays: u32| (rays / RAYS_PER_SHADOW_RAY).max(2);
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());

@@ -163,8 +163,8 @@ const KINDS: Names<AdapterKind> = &[
 /// Which errors count.
 #[derive(Args, Clone, Copy)]
 pub struct MeasureOptions {
-    /// Share of the area, where errors are largest, that does not count and has an error of its own;
-    /// 0 for the plain root mean square [default: 0.01]
+    /// Share of the area, where errors are largest, that does not count and has an error of its
+    /// own; 0 for the plain root mean square [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
     tail: Option<f64>,
     /// Points darker than this share of the mean reflected radiosity count as that bright [default:

@@ -303,7 +303,8 @@ const WORST_GROUPS: usize = 4;
 /// The parts of an estimate.
 fn parts(error: &ErrorEstimate) -> Value {
     json!({
-        "total": error.total, "uncertainty": error.uncertainty, "tail": error.tail, "mesh": error.mesh,
+        "total": error.total, "uncertainty": error.uncertainty, "tail": error.tail,
+        "mesh": error.mesh,
         "gaps": error.gaps, "sampling": error.sampling, "settling": error.truncation,
         "unshot": error.unshot, "sources": error.sources, "places": error.samples,
         "paths": error.paths,

@@ -34,7 +34,8 @@ const MAX_PRINTED: usize = 20;
 #[command(after_help = "\
 Path traces the scene at random points of its surfaces and prints for each group, and for all, the \
 root mean square over the area, less its tail, of |B - true B| / max(|true B|, 5 % of its mean): B \
-is reflected radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json has, the \
+is reflected radiosity, lengths are over the channels. Beside it is the error that SOLUTION.json \
+has, the \
 report of the bake, where there is one; the last line compares them. The options of the scene and \
 its light have to be those of the bake. After Ctrl-C the points so far count.")]
 pub struct Options {

@@ -108,7 +108,7 @@ impl RayGather {
                 emits: light == NO_LIGHT || !has_entry(light),
             });
         });
-        // What is emitted on the way is in no row: rows with lights leave near surfaces as they are.
+        // Emission on the way is in no row: rows with lights leave near surfaces as they are.
         if direct.is_none()
             && let Some(near_field) = &self.near_field
             && NearField::is_covered(near.len(), range.len())

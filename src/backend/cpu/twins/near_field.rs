@@ -7,7 +7,8 @@ use crate::backend::gpu::traced_scene::TracedArrays;
 
 const MIN_COVERED: f32 = 0.5;
 
-/// Whether a hit is nearer than its element is wide, on an element of which there are `side` along an edge of the triangle.
+/// Whether a hit is nearer than its element is wide, of which there are `side` along an edge of the
+/// triangle.
 pub fn is_near(scene: &TracedArrays, hit: &Hit, side: u32) -> bool {
     let t = &scene.triangles[hit.triangle as usize];
     let count = side as f32;
