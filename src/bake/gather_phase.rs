@@ -114,6 +114,7 @@ impl<'a> GatherPhase<'a> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
+        let mut previous_sources = f64::INFINITY;
         loop {
             let stop = self.gather(step, reporter)?;
             let mut estimated = self.estimate(stop, reporter, clock)?;
@@ -128,7 +129,10 @@ impl<'a> GatherPhase<'a> {
             if next.is_err() {
                 // Gathers find nothing more to do, or were stopped; paths may find more.
                 estimated = self.judge(estimated, reporter, clock);
-                next = self.next_step(&estimated, rounds_left)?;
+                let sources = estimated.found.whole.sources;
+                let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
+                previous_sources = sources;
+                next = self.next_step(&estimated, if in_vain { 0 } else { rounds_left })?;
             }
             match next {
                 Ok(next) => step = next,
@@ -191,7 +195,7 @@ impl<'a> GatherPhase<'a> {
     /// What makes the rows by which vertices exchange all further bounces.
     fn bounce_rows(&self) -> Result<RayGather, Error> {
         let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
-        Ok(RayGather::new(&self.shot.mesh, rays)?.with_near_field())
+        RayGather::new(&self.shot.mesh, rays)
     }
 
     /// Takes `step`, and says why it ended.

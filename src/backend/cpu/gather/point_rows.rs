@@ -96,9 +96,8 @@ impl RayGather {
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
             let light = self.lights.of_triangle[hit.triangle];
-            let passed = passed(hit.distance);
+            let passed = Rgb::splat(passed(hit.distance));
             if self.near_field.is_some() && NearField::is_near(mesh, element, &hit) {
-                let passed = Rgb::splat(passed);
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
             row.hits.push(SurfaceHit {
@@ -116,7 +115,7 @@ impl RayGather {
             for (k, ray) in near {
                 let NearLight { end, .. } = near_field.light(mesh, point, &ray, false);
                 let hit = &mut row.hits[k];
-                hit.passed *= end.map_or(0.0, |(share, _)| mean(share));
+                hit.passed *= end.map_or(Rgb::ZERO, |(share, _)| share);
                 if let Some((_, end)) = end {
                     let (element, barycentric) = mesh.element_at(end.triangle, end.u, end.v);
                     (hit.element, hit.barycentric) = (element as u32, barycentric);
