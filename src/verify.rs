@@ -125,7 +125,7 @@ impl<'a> Verifier<'a> {
         let start = Instant::now();
         self.points = self.points.max(solution.places() / VERTICES_PER_POINT);
         sampler.forget();
-        let mut verification = sampler.verification();
+        let (mut verification, _) = sampler.verification();
         verification.stop = loop {
             sampler.add_points(self.points);
             sampler.tell(solution)?;
@@ -133,8 +133,8 @@ impl<'a> Verifier<'a> {
             if sampler.trace(self.paths, round).is_break() {
                 break Stop::Cancelled;
             }
-            verification = sampler.verification();
-            let all = sampler.mean_square(settings.hidden);
+            let all;
+            (verification, all) = sampler.verification();
             let error = all.root();
             // What a biased mean square adds to its root.
             let biased = all.bias > settings.precision * all.value;

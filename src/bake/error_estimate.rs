@@ -27,9 +27,9 @@
 use glam::DVec3;
 
 use crate::accuracy::hidden;
-use crate::accuracy::tail::{Trimmed, trimmed};
+use crate::accuracy::tail::{Ranking, Trimmed};
 use crate::bake::model;
-use crate::gather::refinement_indicator::GAP_DIMNESS;
+use crate::gather::refinement_indicator::DIM_SHARE;
 use crate::scene::Rgb;
 
 /// An estimate of the error of vertex radiosity.
@@ -283,7 +283,7 @@ fn split_off_tail(strata: &mut [StratumDeviations], further: &FurtherBounces, ta
     let point = |d: &Deviation| (d.area, further.error_square(d));
     let points: Vec<(f64, f64)> =
         strata.iter().flat_map(|s| s.deviations.iter().map(point)).collect();
-    let Trimmed { kept, cut } = trimmed(&points, tail);
+    let Trimmed { kept, cut } = Ranking::new(&points).trimmed(tail);
     let deviations = strata.iter_mut().flat_map(|s| &mut s.deviations);
     deviations.zip(kept).for_each(|(deviation, kept)| deviation.kept = kept);
     cut
@@ -382,8 +382,8 @@ impl Observation {
         let floor = conditions.radiosity_floor;
         let [first, second] = self.gathered;
         let truth = (first + second) / 2.0;
-        let dim_or_behind =
-            truth.length() < GAP_DIMNESS * floor || self.backface > hidden::NEAR_BACKS;
+        let dim_or_behind = truth.length() < DIM_SHARE / conditions.floor * floor
+            || self.backface > hidden::NEAR_BACKS;
         let scale = truth.length().max(floor);
         Some(Deviation {
             area: self.weight,

@@ -35,7 +35,7 @@ use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
-use crate::accuracy::tail::trimmed;
+use crate::accuracy::tail::Ranking;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::{BatchSizer, StopReason};
@@ -519,7 +519,7 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
         (share.area, if is_known { share.square / share.area } else { 0.0 })
     };
     let errors: Vec<(f64, f64)> = shares.iter().map(error).collect();
-    let kept = trimmed(&errors, tail).kept;
+    let kept = Ranking::new(&errors).trimmed(tail).kept;
     let known = |of: &dyn Fn(usize) -> f64| -> f64 {
         let squares = shares.iter().enumerate().filter(|(_, share)| share.square.is_finite());
         squares.map(|(k, share)| of(k) * share.square).sum()

@@ -63,7 +63,7 @@ impl GatheredFrom<'_> {
         for (share, side) in rows.shares_of_sides(v).into_iter().zip(sides) {
             for row in side {
                 for hit in &row.hits {
-                    let share = share * row.share * hit.passed;
+                    let share = share * (row.share * hit.passed);
                     difference += share * self.difference_at(hit);
                     let e = hit.element as usize;
                     if let Some(corner) = self.nearest_corner(hit) {

@@ -9,7 +9,6 @@
 
 use super::GatherPoint;
 use crate::mesh::Mesh;
-use crate::scene::Rgb;
 
 /// Where the light that arrives at a point comes from.
 #[derive(Clone, Debug, Default)]
@@ -41,9 +40,8 @@ pub(crate) struct SurfaceHit {
     pub element: u32,
     /// Weights of its second and third corner.
     pub barycentric: [f64; 2],
-    /// Share that arrives from there: of panes the mean of the channels; by way of near surfaces
-    /// each channel's own.
-    pub passed: Rgb,
+    /// Share that panes on the way let through: the mean of the channels.
+    pub passed: f64,
     /// Whether what the element emits is in no entry of [`PointRow::emitters`].
     pub emits: bool,
 }

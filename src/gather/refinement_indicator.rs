@@ -65,14 +65,16 @@ const NEAR_GROWTH: f64 = 2.0;
 /// whatever their corners say: a beam of light may fall between them.
 const SCOUTED_SIZE: f64 = 4.0;
 
-/// A vertex is dim if it reflects less than this many times the floor: a quarter of the mean.
-pub(crate) const GAP_DIMNESS: f64 = 5.0;
+/// A vertex is dim if it reflects less than this share of the mean.
+pub(crate) const DIM_SHARE: f64 = 0.25;
 
 /// What errors are relative to, found once at the start of a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
+    /// Multiple of that below which a vertex is dim.
+    dimness: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
@@ -97,6 +99,7 @@ impl ErrorScale {
             touching: hidden::NEAR * diagonal,
             crack: hidden::CRACK * diagonal,
             radiosity_floor: field.radiosity_floor(measure.floor),
+            dimness: DIM_SHARE / measure.floor,
             tail: measure.tail,
             region,
         }
@@ -150,7 +153,7 @@ pub(super) fn squared_error(
     let group_factor = settings.group_factor(samples.mesh.group(node));
     // Half a gap's distance from its mouth, parallel plates see the half of what they see there
     // (Hottel's crossed strings): elements as long as the distance follow that.
-    let nearest = samples.nearest_dim(e, GAP_DIMNESS * scale.radiosity_floor);
+    let nearest = samples.nearest_dim(e, scale.dimness * scale.radiosity_floor);
     let gap_factor = settings.gap_factor * group_factor;
     let in_gap = edge * nearest > gap_factor && nearest * scale.crack < 1.0;
     // What is far from the light has no sharp shadows.

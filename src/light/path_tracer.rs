@@ -218,10 +218,7 @@ impl<'a> PathTracer<'a> {
         rng: &mut Rng,
     ) -> (Rgb, Option<(Rgb, Hit)>) {
         let mut at = SurfacePoint { triangle: hit.triangle, position };
-        let place = [hit.u, hit.v];
-        let reflectance = self.scene.reflectance_at(hit.triangle, place);
-        let transmittance = self.scene.albedo_around(hit.triangle, place, 0.0) - reflectance;
-        let mut throughput = self.scatter(&mut at, [reflectance, transmittance], rng);
+        let mut throughput = self.scatter_all(&mut at, hit, self.albedo_at(hit), rng);
         let mut reflected = Rgb::ZERO;
         while let Some(hit) = self.advance(&mut at, &mut throughput, by_area, &mut reflected, rng) {
             if ends(&hit) {
@@ -317,15 +314,23 @@ impl<'a> PathTracer<'a> {
     /// Moves `at`, already at the place of `hit`, to the triangle and side that a path goes on from
     /// there: by what share of the light, over its chance to go on; none if it ends.
     fn scatter_at(&self, at: &mut SurfacePoint, hit: &Hit, rng: &mut Rng) -> Option<Rgb> {
-        let place = [hit.u, hit.v];
-        let albedo = self.scene.albedo_around(hit.triangle, place, 0.0);
+        let albedo = self.albedo_at(hit);
         let survival = albedo.max_element().min(MAX_SURVIVAL);
         if rng.f64() >= survival {
             return None;
         }
+        Some(self.scatter_all(at, hit, albedo, rng) / survival)
+    }
+
+    fn albedo_at(&self, hit: &Hit) -> Rgb {
+        self.scene.albedo_around(hit.triangle, [hit.u, hit.v], 0.0)
+    }
+
+    /// As [`PathTracer::scatter_at`], for a path that goes on from `hit` in any case.
+    fn scatter_all(&self, at: &mut SurfacePoint, hit: &Hit, albedo: Rgb, rng: &mut Rng) -> Rgb {
         at.triangle = hit.triangle;
-        let reflectance = self.scene.reflectance_at(hit.triangle, place);
-        Some(self.scatter(at, [reflectance, albedo - reflectance], rng) / survival)
+        let reflectance = self.scene.reflectance_at(hit.triangle, [hit.u, hit.v]);
+        self.scatter(at, [reflectance, albedo - reflectance], rng)
     }
 
     /// Chooses the side that a path goes on from: that of `at`, or the one behind it, to which it

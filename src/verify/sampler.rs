@@ -273,17 +273,12 @@ impl<'a> Sampler<'a> {
         counting.iter().map(|group| Some(TrimmedSquare::new(group, tail)?.mean)).collect()
     }
 
-    /// The error of all that reflects.
-    pub fn mean_square(&self, hidden: bool) -> MeanSquare {
-        self.trimmed(&self.counting(hidden)).mean
-    }
-
     fn trimmed(&self, counting: &[Vec<MeasuredPoint>]) -> TrimmedSquare {
         TrimmedSquare::new(&counting.concat(), self.settings.measure.tail).unwrap_or_default()
     }
 
-    /// What is known so far.
-    pub fn verification(&self) -> Verification {
+    /// What is known so far, and the mean square error that is its error.
+    pub fn verification(&self) -> (Verification, MeanSquare) {
         let hidden = self.settings.hidden;
         let mean_reflected = self.mean_reflected(hidden);
         let floor = self.settings.measure.floor * mean_reflected;
@@ -324,19 +319,26 @@ impl<'a> Sampler<'a> {
             }
         }
         let is_told = self.paths > 0 && self.missing() < self.drawn();
-        Verification {
+        let hidden_share: f64 =
+            self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum();
+        let with_hidden = match hidden || hidden_share == 0.0 {
+            true => all.mean,
+            false => self.trimmed(&self.counting(true)).mean,
+        };
+        let verification = Verification {
             error: is_told.then(|| all.mean.root()),
             tail: is_told.then(|| all.tail.max(0.0).sqrt()),
             bias: all.mean.bias,
-            error_with_hidden: is_told.then(|| self.mean_square(true).root()),
-            hidden_share: self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum(),
+            error_with_hidden: is_told.then(|| with_hidden.root()),
+            hidden_share,
             groups,
             points,
             mean_reflected,
             paths: self.paths,
             missing: self.missing(),
             stop: Stop::Cancelled,
-        }
+        };
+        (verification, all.mean)
     }
 }
 

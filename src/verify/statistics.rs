@@ -30,7 +30,8 @@ impl Sample {
 
     /// The square of |told − true| / max(|true|, `floor`).
     pub fn square_error(&self, floor: f64) -> SquareError {
-        let splits = splits(self.told, &self.parts, floor);
+        let mut splits = [Split::default(); SPLITS];
+        splits.iter_mut().zip(splits_of(self.told, &self.parts, floor)).for_each(|(s, of)| *s = of);
         let value = splits.iter().map(|split| split.value).sum::<f64>() / SPLITS as f64;
         // Jackknife (Tukey 1958): what the estimate is without each part.
         let without = |k: usize| {
@@ -49,36 +50,27 @@ impl Sample {
     }
 }
 
-/// All splits of the parts in two pairs: two parts in the product (told − true)·(told − true), the
-/// others in the length that divides it, so that no noise is multiplied with itself.
-fn splits(told: Rgb, parts: &[Rgb; PARTS], floor: f64) -> [Split; SPLITS] {
-    let pairs = (0..PARTS).flat_map(|j| (0..j).map(move |i| (i, j)));
-    let mut all = [Split::default(); SPLITS];
-    for (split, (i, j)) in all.iter_mut().zip(pairs) {
-        let others = (0..PARTS).filter(|&k| k != i && k != j).map(|k| parts[k]);
-        let other = others.sum::<Rgb>() / (PARTS - 2) as f64;
+/// The squares by all pairs of `parts`, of any number from three on: two parts in the product
+/// (told − true)·(told − true), the others in the length that divides it, so that no noise is
+/// multiplied with itself.
+fn splits_of(told: Rgb, parts: &[Rgb], floor: f64) -> impl Iterator<Item = Split> {
+    let count = parts.len();
+    let pairs = (0..count).flat_map(|j| (0..j).map(move |i| (i, j)));
+    pairs.map(move |(i, j)| {
+        let others = (0..count).filter(|&k| k != i && k != j).map(|k| parts[k]);
+        let other = others.sum::<Rgb>() / (count - 2) as f64;
         let size = other.length_squared().max(floor * floor);
         let product = (told - parts[i]).dot(told - parts[j]);
         // In a scene without light no light is right.
         let ratio = |square: f64| if square == 0.0 { 0.0 } else { square / size };
-        *split = Split { value: ratio(product), rank: ratio(told.distance_squared(other)) };
-    }
-    all
+        Split { value: ratio(product), rank: ratio(told.distance_squared(other)) }
+    })
 }
 
-/// The mean over all pairs of `parts`, of any number from three on.
+/// The mean over all pairs of `parts`.
 fn square_error(told: Rgb, parts: &[Rgb], floor: f64) -> f64 {
-    let (mut sum, mut pairs) = (0.0, 0.0);
-    for j in 0..parts.len() {
-        for i in 0..j {
-            let others = (0..parts.len()).filter(|&k| k != i && k != j).map(|k| parts[k]);
-            let size = others.sum::<Rgb>() / (parts.len() - 2) as f64;
-            let product = (told - parts[i]).dot(told - parts[j]);
-            let size = size.length_squared().max(floor * floor);
-            sum += if product == 0.0 { 0.0 } else { product / size };
-            pairs += 1.0;
-        }
-    }
+    let values = splits_of(told, parts, floor).map(|split| split.value);
+    let (sum, pairs) = values.fold((0.0, 0.0), |(sum, pairs), value| (sum + value, pairs + 1.0));
     sum / pairs
 }
 

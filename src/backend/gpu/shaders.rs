@@ -25,29 +25,26 @@ macro_rules! ray_shader {
     };
 }
 
+/// A pass whose rays look light up in a field.
+macro_rules! field_shader {
+    ($file:literal) => {
+        ray_shader!(
+            $file,
+            "sky.wgsl",
+            "gather_state.wgsl",
+            "hemisphere.wgsl",
+            "near_field.wgsl",
+            "work_list.wgsl",
+            "lattice.wgsl",
+            "element.wgsl",
+            "field.wgsl"
+        )
+    };
+}
+
 pub const RANK_LIGHTS_WGSL: &str = ray_shader!("rank_lights.wgsl", "gather_state.wgsl");
-pub const HEMISPHERE_RAYS_WGSL: &str = ray_shader!(
-    "hemisphere_rays.wgsl",
-    "sky.wgsl",
-    "gather_state.wgsl",
-    "hemisphere.wgsl",
-    "near_field.wgsl",
-    "work_list.wgsl",
-    "lattice.wgsl",
-    "element.wgsl",
-    "field.wgsl"
-);
-pub const NEAR_PATHS_WGSL: &str = ray_shader!(
-    "near_paths.wgsl",
-    "sky.wgsl",
-    "gather_state.wgsl",
-    "hemisphere.wgsl",
-    "near_field.wgsl",
-    "work_list.wgsl",
-    "lattice.wgsl",
-    "element.wgsl",
-    "field.wgsl"
-);
+pub const HEMISPHERE_RAYS_WGSL: &str = field_shader!("hemisphere_rays.wgsl");
+pub const NEAR_PATHS_WGSL: &str = field_shader!("near_paths.wgsl");
 pub const LIGHT_RAYS_WGSL: &str =
     ray_shader!("light_rays.wgsl", "sky.wgsl", "gather_state.wgsl", "work_list.wgsl");
 pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl", "near_field.wgsl");
