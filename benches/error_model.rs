@@ -26,6 +26,7 @@ use std::time::Instant;
 
 use common::{keep_going, truth};
 use glam::DVec3;
+use radiosity::accuracy::Measure;
 use radiosity::backend::cpu::RayGather;
 use radiosity::bake::GatherSettings;
 use radiosity::bake::model::{self, PowerLaw};
@@ -253,7 +254,7 @@ fn compare(baked: &BakeResult, reference: &BakeResult) -> Result<Comparison, Err
     let pairs = pairs(&baked.light, &reference.light.surface)?;
     let count = pairs.len().max(1) as f64;
     let mean = pairs.iter().map(|pair| pair.reference.length()).sum::<f64>() / count;
-    let floor = model::RADIOSITY_FLOOR * mean;
+    let floor = Measure::default().floor * mean;
     let square = pairs.iter().map(|pair| pair.relative_square(floor)).sum::<f64>() / count;
     // Points that only emit are exact, and have no standard error.
     let uncertain = pairs.iter().filter(|pair| pair.standard_error > 0.0);

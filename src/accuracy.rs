@@ -1,5 +1,4 @@
-//! The measure of error: one definition for bakes, [`verify`](crate::verify()), trade-offs and
-//! light maps.
+//! The measure of error: one definition for bakes, [`verify`](mod@crate::verify) and light maps.
 //!
 //! At a point x of the surfaces that reflect (reflectance above 0),
 //!
@@ -42,8 +41,7 @@ pub struct Measure {
 }
 
 impl Default for Measure {
-    /// A floor of 5 % and a tail of 1 %. Both are plain choices; `radiosity trade-off --tail` and
-    /// `--floor` show their effect.
+    /// A floor of 5 % and a tail of 1 %. Both are plain choices.
     fn default() -> Measure {
         Measure { floor: 0.05, tail: 0.01 }
     }

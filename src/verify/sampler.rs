@@ -287,11 +287,15 @@ impl<'a> Sampler<'a> {
         let errors = self.by_group(&counting);
         // Those of the points that count, in the order of all.
         let mut tails = all.in_tail.iter().copied();
+        // Noise may take the sum of a group below zero, where it has no part in the tail.
         let mut squares = all.tail_squares.iter().copied();
-        let tail_squares: f64 = all.tail_squares.iter().sum();
+        let of_group =
+            |group: &Vec<MeasuredPoint>| squares.by_ref().take(group.len()).sum::<f64>().max(0.0);
+        let tails_of_groups: Vec<f64> = counting.iter().map(of_group).collect();
+        let tail_squares: f64 = tails_of_groups.iter().sum();
         let (mut groups, mut points) = (vec![], vec![]);
-        for ((s, counting), error) in self.strata.iter().zip(&counting).zip(errors) {
-            let of_tail: f64 = squares.by_ref().take(counting.len()).sum();
+        let errors = errors.into_iter().zip(tails_of_groups);
+        for ((s, counting), (error, of_tail)) in self.strata.iter().zip(&counting).zip(errors) {
             groups.push(GroupError {
                 group: s.surface.group,
                 area_share: s.surface.share,
