@@ -59,12 +59,15 @@ pub(crate) struct GatherRays {
     /// See [`RayGather::with_noise`].
     pub noise: f64,
     pub dim: f64,
+    /// Whether the light that is gathered is a solution of its scene, known on elements that may be
+    /// too large for it near a point: see [`RayGather::with_near_field`].
+    pub near_field: bool,
 }
 
 impl GatherRays {
     /// As many for each point, of any light.
     pub fn evenly(rays: u32) -> GatherRays {
-        GatherRays { rays, noise: f64::INFINITY, dim: 0.0 }
+        GatherRays { rays, noise: f64::INFINITY, dim: 0.0, near_field: false }
     }
 }
 
@@ -222,7 +225,7 @@ impl Backend {
         }
         let (rays, noise) = rays_for_noise(noise);
         let dim = light.radiosity_field().radiosity_floor(Measure::default().floor);
-        let rays = GatherRays { rays, noise, dim };
+        let rays = GatherRays { rays, noise, dim, near_field: false };
         self.gather_or_cast_rays(&light.mesh, rays, |_| ())
     }
 
@@ -255,14 +258,18 @@ impl Backend {
     pub(crate) fn gather_evenly(
         &self,
         mesh: &Mesh,
-        GatherRays { rays, noise, dim }: GatherRays,
+        GatherRays { rays, noise, dim, near_field }: GatherRays,
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
-                Ok(Box::new(TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?))
+                let gather = TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?;
+                Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
-            _ => Ok(Box::new(RayGather::new(mesh, rays)?.with_noise(noise, dim))),
+            _ => {
+                let gather = RayGather::new(mesh, rays)?.with_noise(noise, dim);
+                Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
+            }
         }
     }
 }

@@ -79,7 +79,7 @@ impl<'a> ResilientBackend<'a> {
         }))
     }
 
-    /// A gatherer: see [`Backend::gather_or_cast_rays`]. A device that
+    /// A gatherer of a solution of the scene: see [`Backend::gather_or_cast_rays`]. A device that
     /// cannot start one has failed too: light was shot by now.
     pub fn gather(
         &self,
@@ -88,7 +88,15 @@ impl<'a> ResilientBackend<'a> {
         noise: f64,
         dim: f64,
     ) -> Result<Box<dyn Gather + '_>, Error> {
-        let rays = GatherRays { rays, noise, dim };
+        self.gather_by(mesh, GatherRays { rays, noise, dim, near_field: std::env::var_os("R_G").is_some() })
+    }
+
+    /// A gatherer of any light, with as many rays for each point.
+    pub fn gather_evenly(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather + '_>, Error> {
+        self.gather_by(mesh, GatherRays::evenly(rays))
+    }
+
+    fn gather_by(&self, mesh: &Mesh, rays: GatherRays) -> Result<Box<dyn Gather + '_>, Error> {
         self.backend.gather_or_cast_rays(mesh, rays, |error| self.record(error))
     }
 }

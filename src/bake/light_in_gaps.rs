@@ -133,11 +133,11 @@ impl GatheringElements<'_> {
         let seen_from = |point: &TwoSidedPoint| {
             let mut seen = vec![];
             for (point, share) in point.sides() {
-                let row = rays.surface_row(mesh, &point);
+                let row = rays.surface_row(mesh, mesh, &point);
                 let in_gap = |hit: &&SurfaceHit| number[hit.element as usize] != IN_NO_GAP;
                 seen.extend(row.hits.iter().filter(in_gap).map(|hit| {
                     let e = hit.element as usize;
-                    let factor = row.share * hit.passed * mesh.relative_reflectance(e);
+                    let factor = row.share * hit.passed.x * mesh.relative_reflectance(e);
                     (number[e], share * factor)
                 }));
             }

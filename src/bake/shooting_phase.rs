@@ -144,7 +144,7 @@ fn received(
     let corners = vec![[0; 3]; mesh.element_count()];
     let all_points = points.concat();
     let rays = model::received_rays(all_points.len());
-    let mut gatherer = backend.gather(mesh, rays, f64::INFINITY, 0.0)?;
+    let mut gatherer = backend.gather_evenly(mesh, rays)?;
     let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &all_points)?;
     let mut irradiance = vec![Rgb::ZERO; mesh.element_count()];
     let mut samples = samples.iter();

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 use super::spectra::Bands;
 use crate::gather::point_row::PointRow;
 use crate::mesh::Mesh;
+use crate::scene::Rgb;
 
 /// Material index of elements that do not emit in any band.
 const NO_EMISSION: u32 = u32::MAX;
@@ -42,7 +43,7 @@ impl<'a> Lookup<'a> {
             let material = self.emission[hit.element as usize];
             if material != NO_EMISSION {
                 let exitance = &self.bands.materials[material as usize].exitance;
-                add(irradiance, row.share * hit.passed, exitance);
+                add(irradiance, row.share * mean(hit.passed), exitance);
             }
         }
         for &(k, factor) in &row.luminaires {
@@ -69,7 +70,7 @@ impl<'a> Lookup<'a> {
     /// The vertices around each hit of `row`, and the form factor of each.
     pub fn weights(&self, row: &PointRow) -> impl Iterator<Item = ([u32; 3], [f64; 3])> {
         row.hits.iter().map(move |hit| {
-            let ([u, v], factor) = (hit.barycentric, row.share * hit.passed);
+            let ([u, v], factor) = (hit.barycentric, row.share * mean(hit.passed));
             let weights = [(1.0 - u - v) * factor, u * factor, v * factor];
             (self.corners[hit.element as usize], weights)
         })
@@ -81,4 +82,9 @@ pub(super) fn add(sums: &mut [f64], factor: f64, values: &[f64]) {
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum += factor * value;
     }
+}
+
+/// Mean of the channels.
+fn mean(channels: Rgb) -> f64 {
+    channels.element_sum() / 3.0
 }

@@ -34,7 +34,7 @@ impl GatheredFrom<'_> {
         progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Option<Vec<Rgb>> {
         let SampledMesh { mesh, vertices, .. } = self.samples;
-        let maker = SurfaceRows(maker);
+        let maker = SurfaceRows { maker, source: self.source.mesh };
         let rows = VertexRows::new(mesh, vertices, touching, &maker);
         let all = 0..vertices.positions.len() as u32;
         let gathering: Vec<u32> = all.filter(|&v| rows.albedo(v) != Rgb::ZERO).collect();
@@ -63,7 +63,7 @@ impl GatheredFrom<'_> {
         for (share, side) in rows.shares_of_sides(v).into_iter().zip(sides) {
             for row in side {
                 for hit in &row.hits {
-                    let share = share * (row.share * hit.passed);
+                    let share = share * row.share * hit.passed;
                     difference += share * self.difference_at(hit);
                     let e = hit.element as usize;
                     if let Some(corner) = self.nearest_corner(hit) {

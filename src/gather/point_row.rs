@@ -9,6 +9,7 @@
 
 use super::GatherPoint;
 use crate::mesh::Mesh;
+use crate::scene::Rgb;
 
 /// Where the light that arrives at a point comes from.
 #[derive(Clone, Debug, Default)]
@@ -40,8 +41,9 @@ pub(crate) struct SurfaceHit {
     pub element: u32,
     /// Weights of its second and third corner.
     pub barycentric: [f64; 2],
-    /// Share that panes on the way let through: the mean of the channels.
-    pub passed: f64,
+    /// Share that arrives from there: of panes the mean of the channels; by way of near surfaces
+    /// each channel's own.
+    pub passed: Rgb,
     /// Whether what the element emits is in no entry of [`PointRow::emitters`].
     pub emits: bool,
 }
@@ -52,19 +54,24 @@ pub(crate) trait PointRows: Sync {
     /// `mesh`. Their mean is the row by all of them.
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow>;
 
-    /// The row of what surfaces reflect to `point`: no ray is sent to a light or to the sun.
-    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow;
+    /// The row of what surfaces reflect to `point`, over the elements of `mesh`: no ray is sent to a
+    /// light or to the sun. The light on them was gathered from elements of `source`.
+    fn surface_row(&self, mesh: &Mesh, source: &Mesh, point: &GatherPoint) -> PointRow;
 }
 
 /// Makes rows of what surfaces reflect, and of no more.
-pub(crate) struct SurfaceRows<'a>(pub &'a dyn PointRows);
+pub(crate) struct SurfaceRows<'a> {
+    pub maker: &'a dyn PointRows,
+    /// Elements that what surfaces reflect was gathered from.
+    pub source: &'a Mesh,
+}
 
 impl PointRows for SurfaceRows<'_> {
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, _parts: u32) -> Vec<PointRow> {
-        vec![self.surface_row(mesh, point)]
+        vec![self.surface_row(mesh, self.source, point)]
     }
 
-    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
-        self.0.surface_row(mesh, point)
+    fn surface_row(&self, mesh: &Mesh, source: &Mesh, point: &GatherPoint) -> PointRow {
+        self.maker.surface_row(mesh, source, point)
     }
 }

@@ -60,6 +60,11 @@ impl NearField {
         hit.distance * hit.distance < square
     }
 
+    /// Whether `hit` is nearer than the element of `mesh` there is wide.
+    pub fn is_near_at(mesh: &Mesh, hit: &Hit) -> bool {
+        NearField::is_near(mesh, mesh.element_at(hit.triangle, hit.u, hit.v).0, hit)
+    }
+
     /// Whether paths find the light of as many `near` rays of all.
     pub fn is_covered(near: usize, rays: usize) -> bool {
         near as f64 > MIN_COVERED * rays as f64
@@ -78,10 +83,7 @@ impl NearField {
         let [x, y, z] = point.position.to_array().map(f64::to_bits);
         let mut rng = random_numbers(&[x, y, z, u64::from(ray.ray)]);
         let position = point.position + ray.hit.distance * ray.direction;
-        let ends = |hit: &Hit| {
-            let (element, _) = mesh.element_at(hit.triangle, hit.u, hit.v);
-            !NearField::is_near(mesh, element, hit)
-        };
+        let ends = |hit: &Hit| !NearField::is_near_at(mesh, hit);
         let (light, end) = paths.path_to(&ray.hit, position, by_area, ends, &mut rng);
         NearLight { light, end }
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::direct_light::DirectLight;
+use super::near_field::{NearField, NearLight, NearRay};
 use super::visible::Visible;
 use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
@@ -25,8 +26,8 @@ impl PointRows for RayGather {
         parts.map(row).collect()
     }
 
-    fn surface_row(&self, mesh: &Mesh, point: &GatherPoint) -> PointRow {
-        self.row_of_surfaces(mesh, point, None, 0..self.min_rays)
+    fn surface_row(&self, mesh: &Mesh, source: &Mesh, point: &GatherPoint) -> PointRow {
+        self.row_of_surfaces([mesh, source], point, None, 0..self.min_rays)
     }
 }
 
@@ -39,7 +40,7 @@ impl RayGather {
         direct: &DirectLight,
         range: Range<u32>,
     ) -> PointRow {
-        let mut row = self.row_of_surfaces(mesh, point, Some(direct), range.clone());
+        let mut row = self.row_of_surfaces([mesh, mesh], point, Some(direct), range.clone());
         let scene = mesh.scene();
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
         for &(light, unoccluded) in direct.lights() {
@@ -61,7 +62,7 @@ impl RayGather {
     /// `direct`, lights are treated like any surface.
     fn row_of_surfaces(
         &self,
-        mesh: &Mesh,
+        [mesh, source]: [&Mesh; 2],
         point: &GatherPoint,
         direct: Option<&DirectLight>,
         range: Range<u32>,
@@ -70,6 +71,7 @@ impl RayGather {
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
         row.hits.reserve_exact((range.end - range.start) as usize);
+        let (mut ray, mut near) = (range.start, vec![]);
         let wide = direct.map_or(&[][..], DirectLight::wide);
         let has_entry = |light: u32| direct.is_some_and(|direct| direct.knows(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
@@ -82,6 +84,7 @@ impl RayGather {
             if let Some(direct) = direct {
                 direct.add_to_wide(&mut of_wide, direction, hit, |end| Rgb::splat(passed(end)));
             }
+            ray += 1;
             let Some(hit) = hit else {
                 row.sky += share * passed(f64::INFINITY);
                 return;
@@ -93,13 +96,32 @@ impl RayGather {
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
             let light = self.lights.of_triangle[hit.triangle];
+            let passed = Rgb::splat(passed(hit.distance));
+            if self.near_field.is_some() && NearField::is_near_at(source, &hit) {
+                near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
+            }
             row.hits.push(SurfaceHit {
                 element: element as u32,
                 barycentric,
-                passed: passed(hit.distance),
+                passed,
                 emits: light == NO_LIGHT || !has_entry(light),
             });
         });
+        // Emission on the way is in no row: rows with lights leave near surfaces as they are.
+        if direct.is_none()
+            && let Some(near_field) = &self.near_field
+            && NearField::is_covered(near.len(), range.len())
+        {
+            for (k, ray) in near {
+                let NearLight { end, .. } = near_field.light(source, point, &ray, false);
+                let hit = &mut row.hits[k];
+                hit.passed *= end.map_or(Rgb::ZERO, |(share, _)| share);
+                if let Some((_, end)) = end {
+                    let (element, barycentric) = mesh.element_at(end.triangle, end.u, end.v);
+                    (hit.element, hit.barycentric) = (element as u32, barycentric);
+                }
+            }
+        }
         for (wide, visible) in wide.iter().zip(&of_wide) {
             row.emitters.push((self.material_of(wide.light), mean(wide.form_factor(visible))));
         }
