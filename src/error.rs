@@ -1,15 +1,5 @@
 //! The crate's one error: place, finding and remedy.
 
-/// XX
-pub(crate) fn xx(word: &str) -> bool {
-    use std::sync::OnceLock;
-    static W: OnceLock<Vec<String>> = OnceLock::new();
-    W.get_or_init(|| {
-        std::env::var("R_X").unwrap_or_default().split(',').map(String::from).collect()
-    })
-    .iter()
-    .any(|w| w == word)
-}
 use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;

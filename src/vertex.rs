@@ -3,8 +3,6 @@
 //! ```text
 //!   elements ── keys: which vertices, shared over each smooth surface
 //!            ── area-weighted means ── boundary_fit: at the boundary of a smooth surface
-//!            │                      └─ corner_singularity: where surfaces meet there
-//!            ── one step of van Cittert deconvolution, against the smoothing
 //!            ── hanging_nodes: no cracks where element sizes differ ── VertexMesh
 //! ```
 //!
@@ -12,7 +10,6 @@
 //! vertex: [`gather_at_vertices`](crate::gather::gather_at_vertices).
 
 mod boundary_fit;
-mod corner_singularity;
 mod face_at;
 pub(crate) mod hanging_nodes;
 mod irradiance;
@@ -70,12 +67,9 @@ impl VertexMesh {
     /// Radiosity at the vertices of `mesh` from that of its elements: one value an element, W/m²
     /// per channel.
     ///
-    /// First the area-weighted mean of the elements around each vertex (Cohen and Greenberg 1985).
-    /// At the boundary of a smooth surface a linear fit to them takes its place, from which the
-    /// part is subtracted that is known not to be linear: light from surfaces that meet this one
-    /// there. Means smooth: the mean over an element's corners is no longer the element's value.
-    /// One step of van Cittert's (1931) iteration restores most of it, by adding the area-weighted
-    /// mean of the differences. No value is below zero.
+    /// The area-weighted mean of the elements around each vertex; at the boundary of a smooth
+    /// surface a linear fit to them (Cohen and Greenberg 1985). No value is below zero. Means
+    /// smooth: errors are of first order in the size of the elements where light is not linear.
     ///
     /// Elements of a textured material are averaged as if all of it reflected alike.
     pub fn new(mesh: &Mesh, element_radiosity: &[Rgb]) -> VertexMesh {
@@ -97,24 +91,15 @@ impl VertexMesh {
         let average = VertexAverage::new(mesh, &vertices);
         let normals = average.mean(|e, _| mesh.normal(mesh.element(e)));
         let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
-        let mut smoothed = average.mean(|e, _| element_radiosity[e]);
+        let mut radiosity = average.mean(|e, _| element_radiosity[e]);
         let positions = &vertices.positions;
-        if !crate::error::xx("nocorner") {
-            for (v, value) in
-                boundary_values(mesh, outlines, positions, &normals, element_radiosity, &smoothed)
-            {
-                smoothed[v] = value;
-            }
+        let at_boundary =
+            boundary_values(mesh, outlines, positions, &normals, element_radiosity, &radiosity);
+        for (v, value) in at_boundary {
+            radiosity[v] = value.max(Rgb::ZERO);
         }
-        let lost = average.mean(|e, outline| {
-            let corners = outline.iter().map(|&v| smoothed[v as usize]).sum::<Rgb>();
-            element_radiosity[e] - corners / outline.len() as f64
-        });
-        let restored = smoothed.iter().zip(lost).map(|(&b, lost)| {
-            (b + if crate::error::xx("novc") { Rgb::ZERO } else { lost }).max(Rgb::ZERO)
-        });
         let mut out = VertexMesh {
-            radiosity: restored.collect(),
+            radiosity,
             normals,
             positions: positions.clone(),
             sky: mesh.scene().sky().clone(),
@@ -240,8 +225,8 @@ impl VertexAverage<'_> {
 }
 
 /// Radiosity at the vertices on boundaries of smooth surfaces, W/m² per channel, with the index of
-/// each: a linear fit to the elements there, corrected where surfaces meet. Vertices with too few
-/// elements, or all of them on a line, keep what they have in `averaged`.
+/// each: a linear fit to the elements there. Vertices with too few elements, or all of them on a
+/// line, keep what they have in `averaged`.
 fn boundary_values(
     mesh: &Mesh,
     outlines: &ElementLoops,
@@ -251,12 +236,10 @@ fn boundary_values(
     averaged: &[Rgb],
 ) -> Vec<(usize, Rgb)> {
     let boundary = boundary_fit::boundary_vertices(mesh, outlines, positions, normals);
-    let fitted: Vec<Rgb> =
-        boundary.iter().map(|b| b.fitted(element_radiosity, averaged[b.vertex])).collect();
-    let corrected =
-        corner_singularity::correct_corner_exchange(mesh, &boundary, element_radiosity, &fitted);
-    let values = boundary.iter().map(|b| b.vertex).zip(corrected);
-    values.filter(|(_, value)| value.is_finite()).collect()
+    let value = |b: &boundary_fit::BoundaryVertex| {
+        (b.vertex, b.fitted(element_radiosity, averaged[b.vertex]))
+    };
+    boundary.iter().map(value).filter(|(_, value)| value.is_finite()).collect()
 }
 
 #[cfg(test)]

@@ -133,9 +133,6 @@ pub(super) fn refined(
     let worst = if by_light.total > whole.total { by_light } else { whole };
     if worst.total > model::SAFETY * target.error {
         steps = Steps::to(&with_what_elements_miss(worst, whole.sources), allowed);
-        if let Some(step) = steps.gaps {
-            refined.refinement.gap_factor *= step;
-        }
         if let Some(step) = steps.mesh {
             refined.refinement.mesh_error *= step;
             refined.refinement.min_edge *= step;
@@ -152,7 +149,7 @@ pub(super) fn refined(
         let missed = sources.hypot(uncertain);
         let own = Steps::to(&with_what_elements_miss(&group.estimate, missed), allowed);
         steps = steps.both(own);
-        if let Some(step) = own.mesh.or(own.gaps) {
+        if let Some(step) = own.mesh {
             let factors = &mut refined.refinement.group_factors;
             let k = group.group as usize;
             factors.resize(factors.len().max(k + 1), 1.0);
@@ -181,8 +178,8 @@ pub(super) fn with_bounces(
     target: &ErrorTarget,
 ) -> GatherSettings {
     let needs_bounces = |estimate: &ErrorEstimate| {
-        let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
-        let (bounces, rest) = (truncation.hypot(unshot), mesh.hypot(gaps).hypot(sampling));
+        let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
+        let (bounces, rest) = (truncation.hypot(unshot), mesh.hypot(sampling));
         let allowed = model::allowed_error(target.error);
         bounces > model::water_filling_cap([bounces], rest, allowed)
     };
@@ -207,8 +204,6 @@ struct Steps {
     sampling: Option<(f64, f64)>,
     /// Factor of the tolerances and of the smallest edge.
     mesh: Option<f64>,
-    /// Factor of the resolution of gaps.
-    gaps: Option<f64>,
     /// Whether all vertices are to gather once more.
     bounce: bool,
 }
@@ -216,16 +211,16 @@ struct Steps {
 impl Steps {
     /// What brings `estimate` to `allowed`. A further bounce shoots what was left unshot, too.
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
-        let ErrorEstimate { sampling, mesh, gaps, truncation, unshot, .. } = *estimate;
+        let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
         let bounces = truncation.hypot(unshot);
         // Where sampling is lowered too, and where it stays.
         let caps = |bounces: f64| {
-            let all = model::water_filling_cap([sampling, mesh, gaps, bounces], 0.0, allowed);
-            (all, model::water_filling_cap([mesh, gaps, bounces], sampling, allowed))
+            let all = model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed);
+            (all, model::water_filling_cap([mesh, bounces], sampling, allowed))
         };
         let (cap_of_all, cap_of_rest) = caps(bounces);
         // More rays have every vertex gather again; what is left of the error may cost less.
-        let growth = |cap: f64| model::vertex_growth(mesh.max(gaps), cap);
+        let growth = |cap: f64| model::vertex_growth(mesh, cap);
         let all = growth(cap_of_all) * model::ray_factor(sampling, cap_of_all);
         let rest = growth(cap_of_rest) - 1.0;
         let leaves_enough = model::leaves_budget(sampling, allowed);
@@ -239,7 +234,6 @@ impl Steps {
             sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
             mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
-            gaps: (gaps > cap).then(|| model::mesh_step(gaps, cap)),
             bounce: bounces > cap || saved > model::BOUNCE_COST,
         }
     }
@@ -329,8 +323,8 @@ mod tests {
     fn bounces_come_where_they_cost_less_than_the_elements_they_save() {
         let gather = settings();
         let target = target(0.1, false);
-        // Allowed are 0.0765. Bounces of 0.04 stay, where mesh and gaps have 0.065 left; without
-        // them these have 0.0765: a mesh of 0.09 takes (0.09/0.065)^1.6 = 1.68 times the vertices
+        // Allowed are 0.0765. Bounces of 0.04 stay, where the mesh has 0.065 left; without
+        // them it has 0.0765: a mesh of 0.09 takes (0.09/0.065)^1.6 = 1.68 times the vertices
         // or 1.30 times, and bounces a quarter of what these cost. Of 0.02, next to nothing.
         for (truncation, wanted) in [(0.04, Step::Bounces), (0.02, Step::Split)] {
             let estimate =

@@ -19,17 +19,14 @@
 //! sampling is the first, plus one standard error of that mean, less half the noise. Truncation is
 //! the change of all further bounces: the next one times a growth that paths through the change
 //! find, since light that is off in a gap of bright walls stays there. Light not shot is
-//! added as if it fell like the ambient term. Dim points that see surfaces nearer than their
-//! element is large are a part of their own, the gaps: what no mesh resolves is mostly there. This
+//! added as if it fell like the ambient term. This
 //! file does no gathering: see [`estimator`](super::estimator). Where the light that is gathered is
 //! itself off, no gather shows it; the [`judge`](super::judge) has paths for that.
 
 use glam::DVec3;
 
-use crate::accuracy::hidden;
 use crate::accuracy::tail::{Ranking, Trimmed};
 use crate::bake::model;
-use crate::gather::refinement_indicator::DIM_SHARE;
 use crate::scene::Rgb;
 
 /// An estimate of the error of vertex radiosity.
@@ -47,9 +44,6 @@ pub struct ErrorEstimate {
     pub tail: f64,
     /// Radiosity is linear over the faces of the mesh, and light is not.
     pub mesh: f64,
-    /// The same at dim points that see surfaces nearer than their element is large, in a gap or at
-    /// its mouth: light changes there over lengths that a mesh of the whole scene does not resolve.
-    pub gaps: f64,
     /// Gathers take a finite number of pixels or rays: half the mean squared difference of two
     /// independently rotated gathers.
     pub sampling: f64,
@@ -113,12 +107,6 @@ pub(super) struct Observation {
     pub excluded: bool,
     /// Share of the hemisphere in which nothing is seen.
     pub escaped: f64,
-    /// Share in which back faces are seen.
-    pub backface: f64,
-    /// Mean of 1/distance over the hemisphere, per scene unit.
-    pub inverse_distance: f64,
-    /// Square root of the element's area, scene unit.
-    pub size: f64,
 }
 
 /// A part of the surfaces that reflect, over which points are spread evenly.
@@ -188,8 +176,6 @@ struct Deviation {
     later: DVec3,
     /// Squared element residual.
     residual: f64,
-    /// Whether the point is in a gap.
-    in_gap: bool,
     /// Reflected radiosity, W/m²: a length over the channels.
     reflected: f64,
     /// What all is relative to: that, or the floor where this is more, W/m².
@@ -270,10 +256,8 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     let groups = groups.collect();
     let residual = Means(&all).of(|d| d.residual);
     let even = whole.sampling.powi(2) + whole.truncation.powi(2) + whole.unshot.powi(2);
-    let spread = ErrorSpread {
-        per_residual: whole.mesh.hypot(whole.gaps) / residual.max(1e-30).sqrt(),
-        even: even.sqrt(),
-    };
+    let spread =
+        ErrorSpread { per_residual: whole.mesh / residual.max(1e-30).sqrt(), even: even.sqrt() };
     Estimate { groups, whole, by_light, spread }
 }
 
@@ -334,16 +318,11 @@ fn parts(
     conditions: &Conditions,
 ) -> ErrorEstimate {
     let means = Means(strata);
-    let share_of = |in_gap: bool| {
-        let noise = means.of(|d| if d.in_gap == in_gap { d.noise } else { 0.0 });
-        let square =
-            |d: &Deviation| if d.in_gap == in_gap { d.interpolation.length_squared() } else { 0.0 };
-        // The largest errors are at rare points.
-        let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
-        ((squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares), noise)
-    };
-    let (interpolation, noise) = share_of(false);
-    let (gaps, _) = share_of(true);
+    let noise = means.of(|d| d.noise);
+    let square = |d: &Deviation| d.interpolation.length_squared();
+    // The largest errors are at rare points.
+    let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
+    let interpolation = (squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares);
     let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
     let mesh = interpolation - sampling;
     let area: f64 = strata.iter().map(StratumDeviations::area).sum();
@@ -353,7 +332,7 @@ fn parts(
     let unshot = ambient * passed * passed;
     // Light that was not shot is a part of what further bounces add.
     let truncation = (means.of(|d| further.square(d)) - unshot).max(0.0);
-    let total = (interpolation + gaps + truncation + unshot).sqrt();
+    let total = (interpolation + truncation + unshot).sqrt();
     let scatter = means.standard_error(cut, |d| further.error_square(d));
     let tails: f64 = strata.iter().map(|stratum| tail_square(stratum, &further)).sum();
     let tail_area = conditions.tail * area;
@@ -362,7 +341,6 @@ fn parts(
         uncertainty: if total > 0.0 { scatter / (2.0 * total) } else { 0.0 },
         tail: if tail_area > 0.0 { (tails / tail_area).sqrt() } else { 0.0 },
         mesh: mesh.sqrt(),
-        gaps: gaps.sqrt(),
         sampling: sampling.sqrt(),
         truncation: truncation.sqrt(),
         unshot: unshot.sqrt(),
@@ -382,8 +360,6 @@ impl Observation {
         let floor = conditions.radiosity_floor;
         let [first, second] = self.gathered;
         let truth = (first + second) / 2.0;
-        let dim_or_behind = truth.length() < DIM_SHARE / conditions.floor * floor
-            || self.backface > hidden::NEAR_BACKS;
         let scale = truth.length().max(floor);
         Some(Deviation {
             area: self.weight,
@@ -395,7 +371,6 @@ impl Observation {
             residual: (self.element_residual / scale).powi(2),
             reflected: truth.length(),
             scale,
-            in_gap: dim_or_behind && self.inverse_distance * self.size > 1.0,
         })
     }
 }

@@ -465,9 +465,6 @@ impl Sample {
             element_residual: estimator.residual(self.element),
             excluded: outlook([first, second]).is_hidden(estimator.diagonal),
             escaped: first.escaped,
-            backface: first.backface,
-            inverse_distance: first.inverse_distance,
-            size: self.size,
         }
     }
 

@@ -130,7 +130,7 @@ impl<'a> GatherPhase<'a> {
                 // Gathers find nothing more to do, or were stopped; paths may find more.
                 estimated = self.judge(estimated, reporter, clock);
                 let sources = estimated.found.whole.sources;
-                let in_vain = std::env::var_os("R_V").is_none() && sources > model::MIN_SOURCES_STEP * previous_sources;
+                let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
                 previous_sources = sources;
                 next = self.next_step(&estimated, if in_vain { 0 } else { rounds_left })?;
             }
@@ -195,8 +195,7 @@ impl<'a> GatherPhase<'a> {
     /// What makes the rows by which vertices exchange all further bounces.
     fn bounce_rows(&self) -> Result<RayGather, Error> {
         let rays = model::rays_of_rows(self.gather.rays, self.state.vertices());
-        let maker = RayGather::new(&self.shot.mesh, rays)?;
-        Ok(if std::env::var_os("R_K").is_some() { maker.with_near_field() } else { maker })
+        Ok(RayGather::new(&self.shot.mesh, rays)?.with_near_field())
     }
 
     /// Takes `step`, and says why it ended.

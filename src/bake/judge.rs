@@ -172,7 +172,6 @@ impl ErrorEstimate {
             total: told,
             uncertainty: standard_error,
             mesh: share * self.mesh,
-            gaps: share * self.gaps,
             sampling: share * self.sampling,
             truncation: share * self.truncation,
             unshot: share * self.unshot,
@@ -198,9 +197,8 @@ mod tests {
         };
         let told = |value, standard_error| {
             let told = parts.held_against(Measured { value, standard_error }, SURELY, (0.0, 64));
-            let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, sources, .. } =
-                told;
-            let squares = [mesh, gaps, sampling, truncation, unshot, sources].map(|p| p * p);
+            let ErrorEstimate { total, mesh, sampling, truncation, unshot, sources, .. } = told;
+            let squares = [mesh, sampling, truncation, unshot, sources].map(|p| p * p);
             assert!((squares.iter().sum::<f64>().sqrt() - total).abs() < 1e-15, "parts add up");
             total
         };

@@ -6,7 +6,6 @@
 //! | part | follows | as | cost of it |
 //! |---|---|---|---|
 //! | mesh | predicted error t of elements | t | vertices: 1/t to 1/t² |
-//! | gaps | factor of tolerance and size there | the same | vertices in gaps |
 //! | sampling | rays n a vertex | n^−[`RQMC_EXPONENT`] | rays: n |
 //! | truncation | one more gather by few rays | nothing is left | a quarter of the gathers |
 //! | unshot | share u of the flux not yet shot | u | shots: ln 1/u; after that, gather passes |
@@ -193,9 +192,6 @@ pub(super) fn received_rays(points: usize) -> u32 {
     clamped(RECEIVED_RAYS_OF_ALL as f64 / points.max(1) as f64, RECEIVED_RAYS) as u32
 }
 
-/// Rays with which elements gather in gaps: what they give is averaged by those that gather next.
-pub const GAP_RAYS: u32 = 32;
-
 /// Pixels along an edge of a hemicube's top face for `error`.
 pub(super) fn hemicube_resolution(error: f64) -> u32 {
     let [.., (_, finest)] = HEMICUBE_RESOLUTIONS;
@@ -203,25 +199,15 @@ pub(super) fn hemicube_resolution(error: f64) -> u32 {
     step.map_or(finest, |(_, resolution)| resolution)
 }
 
-/// Distance of what a patch lights, share of the diagonal, for the footprint of a pixel. Chosen by
-/// hand, at the low end: smaller footprints leave more noise, larger ones blur more light. A hall
-/// with finely tessellated bodies came out alike from 0.06 to 0.5.
-pub const FOOTPRINT_DISTANCE: f64 = 0.125;
-
-/// Edge of a pixel's footprint for hemicubes of `resolution`, share of the diagonal: a pixel of the
-/// top face is 2/N of the distance.
-pub(super) fn pixel_footprint(resolution: u32) -> f64 {
-    FOOTPRINT_DISTANCE * 2.0 / f64::from(resolution)
-}
-
-/// Levels by which elements that shoot are split at contacts, for `error`.
-pub(super) fn shooting_contact_levels(error: f64) -> u32 {
-    if error < FINE_CONTACTS_BELOW { CONTACT_LEVELS + 1 } else { CONTACT_LEVELS }
-}
-
 /// Levels by which elements whose corners gather are split at contacts, for `error`.
 pub(super) fn gathering_contact_levels(error: f64) -> u32 {
-    if error > COARSE_CONTACTS_ABOVE { 1 } else { shooting_contact_levels(error) }
+    if error > COARSE_CONTACTS_ABOVE {
+        1
+    } else if error < FINE_CONTACTS_BELOW {
+        CONTACT_LEVELS + 1
+    } else {
+        CONTACT_LEVELS
+    }
 }
 
 /// Times that all vertices gather, for `error`.

@@ -32,8 +32,6 @@ pub enum Obstacle {
     Settings,
     /// After all rounds light still changes within elements, as at the edge of a shadow.
     Edges,
-    /// After all rounds most of the error is in gaps, which no mesh resolves.
-    Gaps,
     /// After all rounds, with as many rays as allowed, gathers still disagree.
     Rays,
     /// After all rounds a further bounce would still change the light.
@@ -46,10 +44,9 @@ pub enum Obstacle {
 impl Obstacle {
     /// What most of `estimate` is from, after all rounds.
     pub(super) fn largest_part(estimate: &ErrorEstimate) -> Obstacle {
-        let ErrorEstimate { mesh, gaps, sampling, truncation, unshot, sources, .. } = *estimate;
+        let ErrorEstimate { mesh, sampling, truncation, unshot, sources, .. } = *estimate;
         let parts = [
             (mesh, Obstacle::Edges),
-            (gaps, Obstacle::Gaps),
             (sampling, Obstacle::Rays),
             (truncation.hypot(unshot), Obstacle::Bounces),
             (sources, Obstacle::Sources),
@@ -69,7 +66,6 @@ impl Obstacle {
             Obstacle::Time => "give it more time, or allow a larger error".into(),
             Obstacle::Settings => "leave settings to the bake".into(),
             Obstacle::Edges => "allow a larger error, or look at the worst groups".into(),
-            Obstacle::Gaps => "look at surfaces that nearly touch".into(),
             Obstacle::Rays => "look for small bright sources that are no emitters".into(),
             Obstacle::Bounces => "lower reflectances that are near one".into(),
             Obstacle::Sources => "smaller errors have finer elements, which may resolve it".into(),
@@ -85,7 +81,6 @@ impl fmt::Display for Obstacle {
             Obstacle::Time => "the time was up",
             Obstacle::Settings => "settings made by hand",
             Obstacle::Edges => "edges of light that the mesh does not resolve",
-            Obstacle::Gaps => "gaps between surfaces that no mesh resolves",
             Obstacle::Rays => "noise, with as many rays as allowed",
             Obstacle::Bounces => "light that is still on its way",
             Obstacle::Sources => "light that elements blur, as behind slits",

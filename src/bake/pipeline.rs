@@ -7,15 +7,13 @@ use crate::backend::Backend;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::fallback::ResilientBackend;
 use crate::bake::gather_phase::GatherPhase;
-use crate::bake::light_in_gaps::light_in_gaps;
 use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
-use crate::bake::resolved_light::resolved_light;
 use crate::bake::result::BakeResult;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
-use crate::bake::shooting_phase::{self, ShotLight};
+use crate::bake::shooting_phase;
 use crate::error::Error;
-use crate::gather::{GatheredMesh, Progress};
+use crate::gather::GatheredMesh;
 use crate::mesh::{Mesh, cut_at_contacts, cut_large_triangles};
 use crate::progress::StopReason;
 use crate::scene::Scene;
@@ -67,8 +65,10 @@ pub(super) fn run(
     let scene = &cut_at_contacts(scene, finest);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
     let source = match &settings.gather {
-        Some(_) => light_to_gather(&settings.solve, &shot, &mut reporter)?,
-        None => None,
+        Some(_) if shot.solution.stop != StopReason::Cancelled => {
+            Some(GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?)
+        }
+        _ => None,
     };
     let baked = match (&settings.gather, &source) {
         (Some(gather), Some(source)) => {
@@ -109,32 +109,6 @@ fn with_creases(scene: &Arc<Scene>, degrees: f64) -> Arc<Scene> {
     match scene.triangles().iter().any(|t| t.smoothing.is_none()) {
         true => Arc::new(scene.with_crease_degrees(degrees)),
         false => scene.clone(),
-    }
-}
-
-/// What was shot, as vertices gather it; none if the bake was cancelled.
-fn light_to_gather(
-    solve: &SolveSettings,
-    shot: &ShotLight,
-    reporter: &mut Reporter,
-) -> Result<Option<GatheredMesh>, Error> {
-    if shot.solution.stop == StopReason::Cancelled {
-        return Ok(None);
-    }
-    let diagonal = solve.light_diagonal(shot.mesh.scene());
-    let footprint = model::pixel_footprint(solve.hemicube_resolution) * diagonal;
-    let resolved = if crate::error::xx("nores") {
-        shot.solution.radiosity.clone()
-    } else {
-        resolved_light(&shot.mesh, &shot.solution.radiosity, footprint)
-    };
-    if crate::error::xx("nogaps") {
-        return Ok(Some(GatheredMesh::from_elements(&shot.mesh, &resolved)?));
-    }
-    let mut progress = |p: &Progress| reporter.report(BakeProgress::Gathering(*p));
-    match light_in_gaps(&shot.mesh, &resolved, footprint, &mut progress)? {
-        Some(light) => Ok(Some(GatheredMesh::from_elements(&shot.mesh, &light)?)),
-        None => Ok(None),
     }
 }
 

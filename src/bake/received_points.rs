@@ -30,7 +30,7 @@ pub(super) fn received_points(
     let distances = mesh.scene().luminaires().iter().map(nearest);
     let distance = distances.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
     let levels = (width / (MAX_WIDTH * distance)).log2().ceil().clamp(0.0, f64::from(MAX_LEVELS));
-    if levels == 0.0 || crate::error::xx("onepoint") {
+    if levels == 0.0 {
         return vec![above.above_element(mesh, node)];
     }
     let (normal, size) = (mesh.normal(node), mesh.area(node).sqrt() / levels.exp2());

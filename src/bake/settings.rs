@@ -192,15 +192,6 @@ impl BakeSettings {
     fn by_survey(error: f64, survey: &LightSurvey, scene: &Scene) -> BakeSettings {
         let e = model::clamped(error, model::ERRORS);
         let diagonal = survey.diagonal;
-        let f = if crate::error::xx("edge2") {
-            2.0
-        } else if crate::error::xx("edge4") {
-            4.0
-        } else if crate::error::xx("edge8") {
-            8.0
-        } else {
-            1.0
-        };
         let solver = Solver {
             unshot: e / model::ERROR_OVER_UNSHOT,
             patch_tolerance: model::patch_tolerance(e),
@@ -208,19 +199,14 @@ impl BakeSettings {
         };
         let mut solve = SolveSettings {
             element_size: diagonal
-                * model::SHOOTING_EDGE.setting(e).max(model::COARSE_SHOOTING_EDGE.setting(e))
-                * f,
+                * model::SHOOTING_EDGE.setting(e).max(model::COARSE_SHOOTING_EDGE.setting(e)),
             region: survey.region,
             gathered_materials: survey.gathered_materials.clone(),
-            contact_levels: if crate::error::xx("nocont") {
-                0
-            } else {
-                model::shooting_contact_levels(e)
-            },
+            contact_levels: 0,
             hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
             rotations: NonZeroU32::MIN,
-            near_reach: if crate::error::xx("nonear") { -1.0 } else { model::NEAR_REACH },
+            near_reach: model::NEAR_REACH,
             viewpoint_tolerance: None,
             solver,
             gmres_if_bright: true,
@@ -238,7 +224,6 @@ impl BakeSettings {
             mesh_error: model::MESH_ERROR.setting(e),
             interpolation_tolerance: model::INTERPOLATION_TOLERANCE.setting(e),
             gather_passes: model::gather_passes(e),
-            gap_factor: if crate::error::xx("nogapf") { f64::INFINITY } else { 1.0 },
             region: survey.region,
             max_elements: model::max_elements(scene.triangles().len()),
             ..RefinementSettings::new(model::MIN_EDGE.times(diagonal).setting(e))

@@ -412,10 +412,7 @@ impl<'a> AdaptiveGather<'a> {
         for (pool, share) in shares {
             by_pool[pool].push(share);
         }
-        let (allowed, tail) = (
-            settings.mesh_error.powi(2),
-            if crate::error::xx("nomark") { 0.0 } else { self.scale.tail },
-        );
+        let (allowed, tail) = (settings.mesh_error.powi(2), self.scale.tail);
         let mut marked: Vec<(f64, usize)> =
             by_pool.into_iter().flat_map(|shares| bulk_above(shares, allowed, tail)).collect();
         marked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -432,15 +429,8 @@ impl<'a> AdaptiveGather<'a> {
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
-        let SampledMesh {
-            mesh,
-            vertices: mesh_vertices,
-            reflected,
-            noise,
-            buried,
-            inverse_distance,
-            ..
-        } = &mut self.samples;
+        let SampledMesh { mesh, vertices: mesh_vertices, reflected, noise, buried, .. } =
+            &mut self.samples;
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
         let source = self.source.field();
         let gathers = |&v: &u32| points.albedo(v) != Rgb::ZERO;
@@ -460,11 +450,7 @@ impl<'a> AdaptiveGather<'a> {
                 let unresolved = batch.unresolved(&points, attempt);
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
-                batch.apply(
-                    &points,
-                    attempt,
-                    &mut VertexValues { reflected, noise, buried, inverse_distance },
-                );
+                batch.apply(&points, attempt, &mut VertexValues { reflected, noise, buried });
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {
                     pass: self.pass,

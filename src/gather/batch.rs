@@ -21,8 +21,6 @@ pub(super) struct VertexValues<'s> {
     /// Standard errors of that, W/m²: lengths over the channels.
     pub noise: &'s mut [f64],
     pub buried: &'s mut [bool],
-    /// Mean of 1/distance, per scene unit.
-    pub inverse_distance: &'s mut [f64],
 }
 
 /// Gathers one point for each of `vertices`.
@@ -55,16 +53,15 @@ impl Batch<'_> {
             // (ρ + τ) E, which is darkness at a buried vertex.
             let albedo = points.albedo(v);
             let noise = reflected_noise(albedo, sample);
-            Some((v, albedo * sample.irradiance, noise, is_buried, sample.inverse_distance))
+            Some((v, albedo * sample.irradiance, noise, is_buried))
         };
         let pairs = self.vertices.par_iter().zip(&self.samples);
-        let found: Vec<(u32, Rgb, f64, bool, f64)> = pairs.filter_map(value).collect();
-        for (v, reflected, noise, is_buried, inverse_distance) in found {
+        let found: Vec<(u32, Rgb, f64, bool)> = pairs.filter_map(value).collect();
+        for (v, reflected, noise, is_buried) in found {
             let v = v as usize;
             values.reflected[v] = reflected;
             values.noise[v] = noise;
             values.buried[v] = is_buried;
-            values.inverse_distance[v] = inverse_distance;
         }
     }
 }

@@ -36,12 +36,6 @@ const MAX_SWEEPS: u32 = 1000;
 /// Chosen by hand between these: ten blocks for every 40 000 places.
 const BLOCK: usize = 4096;
 
-/// Whether what a point sees, at a mean of 1/distance of `inverse_distance` (1/scene unit), is
-/// nearer than `size` (scene unit): of its element, or of what is resolved of light that is shot.
-pub(crate) fn is_in_gap(inverse_distance: f64, size: f64) -> bool {
-    inverse_distance * size > 1.0
-}
-
 /// A place that exchanges light with others.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Place {

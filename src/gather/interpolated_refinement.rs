@@ -13,7 +13,6 @@
 //! | split onto the interpolant | s/8 |
 //! | at a boundary of its surface or next to buried vertices | 2.5 · s/4 |
 //! | without a parent | how far the source light is from linear |
-//! | in a gap, or at its mouth | a quarter of its radiosity, at least |
 
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
@@ -36,11 +35,6 @@ const BOUNDARY_FACTOR: f64 = 2.5;
 /// interpolant. Chosen by hand; no measurement kept.
 const FOLLOWED_SHARE: f64 = 0.5;
 
-/// Error of an element whose corners see surfaces nearer than the element is large, over its
-/// radiosity, at least: light changes there between the corners, which say nothing of it. Chosen by
-/// hand: half of it is lost on average across the mouth of a gap, at half of the element's places.
-const GAP_ERROR: f64 = 0.25;
-
 /// The refined mesh, and an estimate of the error that remains in each of its elements, W/m²: a
 /// length over the channels.
 pub(super) struct InterpolatedRefinement {
@@ -59,7 +53,7 @@ pub(super) fn interpolated_refinement(
     let split = to_be_split(samples, scale, settings);
     let (mut refined, new) = samples.with_split(&split)?;
     put_on_interpolants(&mut refined, &new, samples, &split);
-    let residual_error = residual_errors(samples, source, scale, &split);
+    let residual_error = residual_errors(samples, source, &split);
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }
 
@@ -133,12 +127,7 @@ fn put_on_interpolants(
 }
 
 /// Error that remains in each element after `split` (ascending) were split, W/m².
-fn residual_errors(
-    samples: &SampledMesh,
-    source: &RadiosityField,
-    scale: &ErrorScale,
-    split: &[usize],
-) -> Vec<f64> {
+fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usize]) -> Vec<f64> {
     let at_boundary = boundary_vertices(samples);
     let is_split = |e: usize| split.binary_search(&e).is_ok();
     let error = |e: usize| {
@@ -153,7 +142,7 @@ fn residual_errors(
         } else {
             1.0
         };
-        (factor * error).max(gap_error(samples, scale, e))
+        factor * error
     };
     let own: Vec<f64> = (0..samples.mesh.element_count()).into_par_iter().map(error).collect();
     let mut errors = Vec::with_capacity(own.len() + 3 * split.len());
@@ -162,19 +151,6 @@ fn residual_errors(
         errors.resize(errors.len() + children, error);
     }
     errors
-}
-
-/// Least error of element `e` if it is in a gap that can be looked into, W/m²; 0 elsewhere.
-fn gap_error(samples: &SampledMesh, scale: &ErrorScale, e: usize) -> f64 {
-    let corners = samples.corners()[e].map(|v| v as usize);
-    let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
-    let nearest = largest(corners.map(|v| samples.inverse_distance[v]));
-    let is_hidden = nearest * scale.crack > 1.0 || corners.iter().any(|&v| samples.buried[v]);
-    if !is_hidden && nearest * samples.mesh.area(samples.mesh.element(e)).sqrt() > 1.0 {
-        GAP_ERROR * largest(corners.map(|v| samples.reflected[v].length()))
-    } else {
-        0.0
-    }
 }
 
 /// Whether each vertex lies on the boundary of a smooth surface, or on an element with a buried

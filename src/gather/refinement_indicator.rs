@@ -65,22 +65,15 @@ const NEAR_GROWTH: f64 = 2.0;
 /// whatever their corners say: a beam of light may fall between them.
 const SCOUTED_SIZE: f64 = 4.0;
 
-/// A vertex is dim if it reflects less than this share of the mean.
-pub(crate) const DIM_SHARE: f64 = 0.25;
-
 /// What errors are relative to, found once at the start of a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
-    /// Multiple of that below which a vertex is dim.
-    dimness: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
     pub touching: f64,
-    /// Distance below which a gap is a crack that nobody looks into; scene unit.
-    pub crack: f64,
     /// Where most of the light is: elements grow with the distance from it.
     region: Option<Aabb>,
 }
@@ -97,9 +90,7 @@ impl ErrorScale {
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
             touching: hidden::NEAR * diagonal,
-            crack: hidden::CRACK * diagonal,
             radiosity_floor: field.radiosity_floor(measure.floor),
-            dimness: DIM_SHARE / measure.floor,
             tail: measure.tail,
             region,
         }
@@ -151,19 +142,13 @@ pub(super) fn squared_error(
     let growth = scale.growth(&samples.mesh, node);
     let size = edge / growth / group_scale;
     let group_factor = settings.group_factor(samples.mesh.group(node));
-    // Half a gap's distance from its mouth, parallel plates see the half of what they see there
-    // (Hottel's crossed strings): elements as long as the distance follow that.
-    let nearest = samples.nearest_dim(e, scale.dimness * scale.radiosity_floor);
-    let gap_factor = settings.gap_factor * group_factor;
-    let in_gap = edge * nearest > gap_factor && nearest * scale.crack < 1.0;
     // What is far from the light has no sharp shadows.
     let finest = if growth > NEAR_GROWTH { 1.0 } else { FINEST };
-    if size <= finest * settings.min_edge * group_factor && !in_gap {
+    if size <= finest * settings.min_edge * group_factor {
         return 0.0;
     }
     let emitted = samples.mesh.material(node).exitance;
-    let factor = if in_gap { gap_factor } else { group_factor };
-    let weight = counted_area(samples, scale, settings, e) / (factor * factor);
+    let weight = counted_area(samples, scale, settings, e) / (group_factor * group_factor);
     let open = samples.corners()[e].into_iter().map(|v| v as usize);
     let darkest = open
         .filter(|&v| !samples.buried[v])
@@ -210,9 +195,6 @@ pub(super) fn squared_error(
             };
             own.max(extrapolated)
         }
-        // Every corner sees something much nearer than the others are: what lies between is
-        // unknown.
-        None if settings.gap_factor.is_finite() && samples.is_narrow(e) => return UNKNOWN,
         // Corners far apart say little of what lies between them.
         None if !is_scouted => return UNKNOWN,
         None => {

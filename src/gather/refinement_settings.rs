@@ -23,11 +23,6 @@ pub struct RefinementSettings {
     pub max_elements: usize,
     /// Uniform subdivisions of all elements before adaptive refinement starts.
     pub initial_subdivisions: u32,
-    /// In gaps, elements may be as small as this times the mean distance to what is seen there,
-    /// whatever the smallest edge, and the tolerance is this times what it is elsewhere. A gap is
-    /// where a vertex is dim and sees mostly what is near; light changes over such lengths at its
-    /// mouth. Above 0; infinity for as elsewhere.
-    pub gap_factor: f64,
     /// How often all vertices gather: in the first pass the light given, in each further one what
     /// the pass before it found, so each adds a bounce. 0 counts as 1.
     pub gather_passes: u32,
@@ -56,7 +51,7 @@ impl RefinementSettings {
     /// Default of [`RefinementSettings::max_elements`], chosen by hand; no measurement kept.
     pub const DEFAULT_MAX_ELEMENTS: usize = 1 << 19;
 
-    /// Refines down to elements with edges of `min_edge` (scene unit), in gaps too, with the
+    /// Refines down to elements with edges of `min_edge` (scene unit), with the
     /// default tolerances, no uniform subdivision and one pass.
     pub fn new(min_edge: f64) -> RefinementSettings {
         RefinementSettings {
@@ -65,7 +60,6 @@ impl RefinementSettings {
             interpolation_tolerance: RefinementSettings::DEFAULT_INTERPOLATION_TOLERANCE,
             max_elements: RefinementSettings::DEFAULT_MAX_ELEMENTS,
             initial_subdivisions: 0,
-            gap_factor: f64::INFINITY,
             gather_passes: 1,
             region: None,
             group_scales: vec![],
@@ -104,10 +98,6 @@ impl RefinementSettings {
         if self.interpolation_tolerance.is_nan() || self.interpolation_tolerance <= 0.0 {
             let place = format!("interpolation tolerance {}", self.interpolation_tolerance);
             return bad(place, "not above 0", "use a share above 0, or infinity for none");
-        }
-        if self.gap_factor.is_nan() || self.gap_factor <= 0.0 {
-            let place = format!("factor {} of gaps", self.gap_factor);
-            return bad(place, "not above 0", "use 1 for no change");
         }
         for factors in [&self.group_factors, &self.group_scales] {
             if let Some(k) = factors.iter().position(|f| f.is_nan() || *f <= 0.0) {

@@ -30,13 +30,7 @@ pub(crate) struct SampledMesh {
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
-    /// Mean of 1/distance to what each vertex sees, per scene unit; 0 where it has not gathered.
-    pub inverse_distance: Vec<f64>,
 }
-
-/// An element is narrow where its longest edge is this many times the mean distance to what its
-/// corners see.
-const MIN_NARROWNESS: f64 = 4.0;
 
 impl SampledMesh {
     /// `mesh` with the values that `field`, of the same scene, has at its vertices.
@@ -48,8 +42,7 @@ impl SampledMesh {
         let reflected: Vec<Rgb> = places.par_iter().map(value).collect();
         let noise = vec![0.0; reflected.len()];
         let buried = vec![false; reflected.len()];
-        let inverse_distance = vec![0.0; reflected.len()];
-        SampledMesh { mesh, topology, vertices, reflected, noise, buried, inverse_distance }
+        SampledMesh { mesh, topology, vertices, reflected, noise, buried }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -67,23 +60,6 @@ impl SampledMesh {
     pub fn is_splittable(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
         self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.scatters(node)
-    }
-
-    /// Mean of 1/distance to what is seen from those corners of element `e` that reflect less than
-    /// `floor` (W/m²) without being buried, per scene unit; the largest, 0 where there are none.
-    pub fn nearest_dim(&self, e: usize, floor: f64) -> f64 {
-        let corners = self.vertices.corners[e].map(|v| v as usize);
-        let dim =
-            corners.into_iter().filter(|&v| !self.buried[v] && self.reflected[v].length() < floor);
-        dim.map(|v| self.inverse_distance[v]).fold(0.0, f64::max)
-    }
-
-    /// Whether all corners of element `e` see mostly what is nearer than a quarter of its longest
-    /// edge.
-    pub fn is_narrow(&self, e: usize) -> bool {
-        let edge = self.mesh.longest_edge(self.mesh.element(e));
-        let corners = self.vertices.corners[e].map(|v| v as usize);
-        corners.into_iter().all(|v| self.inverse_distance[v] * edge > MIN_NARROWNESS)
     }
 
     /// Splits `elements` (ascending) into four each, which are in the place of the one. Values of
@@ -120,7 +96,6 @@ impl SampledMesh {
             reflected,
             noise: kept(&self.noise, &old_numbers),
             buried: kept(&self.buried, &old_numbers),
-            inverse_distance: kept(&self.inverse_distance, &old_numbers),
         };
         Ok((split, new))
     }

@@ -58,13 +58,6 @@ impl TwoSidedPoint {
         [Rgb::ONE - self.behind, self.behind]
     }
 
-    /// The sides from which light counts, each as a point and its share per channel.
-    pub fn sides(&self) -> impl Iterator<Item = (GatherPoint, Rgb)> {
-        let [own, behind] = self.shares();
-        let other = (behind != Rgb::ZERO).then(|| (self.other_side(), behind));
-        [(self.point, own)].into_iter().chain(other)
-    }
-
     /// The same a `step` higher above the surface, scene unit.
     pub fn raised_by(self, step: f64) -> TwoSidedPoint {
         let raised = self.moved_by(step * self.point.normal);

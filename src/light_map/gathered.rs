@@ -147,7 +147,7 @@ pub(super) fn gatherer<'a>(
         Some(settings) => (settings.rays, settings.noise_tolerance),
         None => (RAYS, f64::INFINITY),
     };
-    let rays = GatherRays { rays, noise, dim, near_field: false };
+    let rays = GatherRays { rays, noise, dim, near_field: true };
     backend.gather_or_cast_rays(&baked.light.mesh, rays, |_| ())
 }
 

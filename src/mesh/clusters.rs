@@ -111,11 +111,6 @@ impl Clusters {
         (cluster as usize).checked_sub(triangles).map(|k| self.parts[k])
     }
 
-    /// Area of `cluster`, square of the scene's unit.
-    pub fn area(&self, cluster: u32) -> f64 {
-        self.clusters[cluster as usize].area
-    }
-
     /// The triangles of `cluster`, ascending.
     pub fn triangles(&self, cluster: u32) -> Vec<u32> {
         let (mut open, mut triangles) = (vec![cluster], vec![]);

@@ -43,12 +43,8 @@ const MAX_VALENCE: usize = 256;
 pub(super) struct BoundaryVertex {
     /// Index of the vertex.
     pub vertex: usize,
-    /// Its position, scene unit.
-    pub position: DVec3,
     /// Elements and their weights in the linear fit, which sum to one; empty where there is no fit.
     pub fit: Vec<(u32, f64)>,
-    /// Elements of this surface within three rings, ascending.
-    pub neighbourhood: Vec<u32>,
 }
 
 impl BoundaryVertex {
@@ -71,10 +67,8 @@ pub(super) fn boundary_vertices(
     let around = Incidence::new(positions.len(), || outlines.iter());
     let boundary_vertex = |vertex: usize| {
         let near = ring(outlines, &around, around.at(vertex as u32));
-        let neighbourhood = ring(outlines, &around, &near);
-        let position = positions[vertex];
-        let fit = linear_fit(mesh, near, position, normals[vertex]);
-        BoundaryVertex { vertex, position, fit, neighbourhood }
+        let fit = linear_fit(mesh, near, positions[vertex], normals[vertex]);
+        BoundaryVertex { vertex, fit }
     };
     vertices_on_boundary(outlines).into_par_iter().map(boundary_vertex).collect()
 }

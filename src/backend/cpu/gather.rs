@@ -108,18 +108,6 @@ impl RayGather {
         RayGather { near_field: Some(NearField::default()), ..self }
     }
 
-    /// Mean of 1/distance over the hemisphere above `point`, per scene unit, by the minimum number
-    /// of rays; directions without a hit count 0. No light is looked up.
-    pub(crate) fn inverse_distance(&self, point: &GatherPoint) -> f64 {
-        let rotation = self.rotations.at(point.position, point.near);
-        let directions = self.samples.directions_in(0..self.min_rays, point.normal, rotation);
-        let mut sum = 0.0;
-        self.scene.closest_hits(point.position, directions, point.near, None, |_, hit| {
-            sum += hit.map_or(0.0, |hit| 1.0 / hit.distance);
-        });
-        sum / f64::from(self.min_rays)
-    }
-
     /// Irradiance at `point` from each of `fields`, all of one scene, with the same rays; the
     /// number is set by the first.
     fn irradiance<const FIELDS: usize>(

@@ -31,7 +31,6 @@ fn exact() -> Observation {
         excluded: false,
         escaped: 0.0,
         backface: 0.0,
-        inverse_distance: 1.0,
         size: 0.1,
     }
 }
@@ -297,7 +296,7 @@ fn a_change_at_one_point_is_as_uncertain_as_it_is_large() {
 #[test]
 fn where_nothing_is_judged_there_is_no_error() {
     let hidden = estimate_of(|_| Observation { excluded: true, ..exact() });
-    let ErrorEstimate { total, mesh, gaps, sampling, truncation, unshot, samples, .. } = hidden;
-    let parts = [total, mesh, gaps, sampling, truncation, unshot];
+    let ErrorEstimate { total, mesh, sampling, truncation, unshot, samples, .. } = hidden;
+    let parts = [total, mesh, sampling, truncation, unshot];
     assert_eq!((parts.map(f64::to_bits), samples), ([0; 6], 0), "{parts:?}");
 }

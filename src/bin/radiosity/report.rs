@@ -257,11 +257,10 @@ impl Report {
                 share(ledger.unshot)
             ),
             format!(
-                "error      about {:.2} %: mesh {:.2}, gaps {:.2}, sampling {:.2}, \
+                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, \
                  truncation {:.2}, unshot {:.2}, sources {:.2}; tail {:.2}",
                 100.0 * error.total,
                 100.0 * error.mesh,
-                100.0 * error.gaps,
                 100.0 * error.sampling,
                 100.0 * error.truncation,
                 100.0 * error.unshot,
@@ -305,7 +304,7 @@ fn parts(error: &ErrorEstimate) -> Value {
     json!({
         "total": error.total, "uncertainty": error.uncertainty, "tail": error.tail,
         "mesh": error.mesh,
-        "gaps": error.gaps, "sampling": error.sampling, "settling": error.truncation,
+        "sampling": error.sampling, "settling": error.truncation,
         "unshot": error.unshot, "sources": error.sources, "places": error.samples,
         "paths": error.paths,
     })

@@ -164,9 +164,6 @@ const SETTINGS: &[Setting] = &[
         "maximum number of elements [524288; of large scenes 20 a triangle, up to 4 million]"),
     setting!(gather.refinement.initial_subdivisions,
         "subdivisions of all elements before refinement; --gather sets it [0]"),
-    setting!(gather.refinement.gap_factor,
-        "smallest element in a gap over the mean distance of what is visible; inf for as elsewhere \
-         [1]"),
     setting!(gather.refinement.gather_passes,
         "passes in which all vertices gather, each the light of the pass before [by the error]"),
 ];
