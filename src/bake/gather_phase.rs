@@ -210,7 +210,7 @@ impl<'a> GatherPhase<'a> {
                     _ => None,
                 };
                 let mut coarse = match refinement.gather_passes {
-                    0 | 1 => None,
+                    0 | 1 if self.target.is_none() => None,
                     _ => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
                 };
                 self.state.run_passes(

@@ -230,14 +230,18 @@ impl<'a> AdaptiveGather<'a> {
                 Some(scout) => Some(&mut **scout),
                 None => None,
             };
-            let stop = self.gather_pass(&coarse, gatherer, look, progress)?;
+            let stop = match &mut coarse_gatherer {
+                Some(first) => self.gather_pass(&coarse, *first, look, progress)?,
+                None => self.gather_pass(&coarse, gatherer, look, progress)?,
+            };
             if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
             if self.add_further_bounces(maker, progress) == StopReason::Cancelled {
                 return Ok(StopReason::Cancelled);
             }
-            return self.refine(settings, gatherer, scout, progress);
+            // Of what vertices exchanged, which is nearer to the solution than what was shot.
+            return self.gather_pass(settings, gatherer, scout, progress);
         }
         self.gather_pass(settings, gatherer, scout, progress)
     }
@@ -396,7 +400,11 @@ impl<'a> AdaptiveGather<'a> {
             let (samples, scale) = (&self.samples, &self.scale);
             let found = self.scouts.error(element);
             let square = squared_error(samples, &shot, scale, settings, (element, found));
-            let area = counted_area(samples, scale, settings, element);
+            // The measure leaves out what is hidden.
+            let area = match samples.is_hidden(element) {
+                true => 0.0,
+                false => counted_area(samples, scale, settings, element),
+            };
             let node = mesh.element(element);
             let pool = match settings.group_scales.is_empty() {
                 true => usize::from(scale.is_far(mesh, node)),
@@ -429,7 +437,7 @@ impl<'a> AdaptiveGather<'a> {
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
-        let SampledMesh { mesh, vertices: mesh_vertices, reflected, noise, buried, .. } =
+        let SampledMesh { mesh, vertices: mesh_vertices, reflected, noise, buried, hidden, .. } =
             &mut self.samples;
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
         let source = self.source.field();
@@ -450,7 +458,11 @@ impl<'a> AdaptiveGather<'a> {
                 let unresolved = batch.unresolved(&points, attempt);
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
-                batch.apply(&points, attempt, &mut VertexValues { reflected, noise, buried });
+                batch.apply(
+                    &points,
+                    (attempt, self.scale.diagonal),
+                    &mut VertexValues { reflected, noise, buried, hidden },
+                );
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {
                     pass: self.pass,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::gather_points::VertexGatherPoints;
+use super::gather_points::{VertexGatherPoints, outlook};
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
@@ -21,6 +21,7 @@ pub(super) struct VertexValues<'s> {
     /// Standard errors of that, W/m²: lengths over the channels.
     pub noise: &'s mut [f64],
     pub buried: &'s mut [bool],
+    pub hidden: &'s mut [bool],
 }
 
 /// Gathers one point for each of `vertices`.
@@ -44,7 +45,13 @@ impl Batch<'_> {
     }
 
     /// Writes what was gathered at this `attempt` to the values of the vertices that it resolves.
-    pub fn apply(&self, points: &VertexGatherPoints, attempt: usize, values: &mut VertexValues) {
+    /// The light is in a box of this `diagonal`, scene unit.
+    pub fn apply(
+        &self,
+        points: &VertexGatherPoints,
+        (attempt, diagonal): (usize, f64),
+        values: &mut VertexValues,
+    ) {
         let value = |(&v, sample): (&u32, &IrradianceSample)| {
             let is_buried = points.is_buried(v, sample);
             if is_buried && points.has_more(v, attempt) {
@@ -53,15 +60,17 @@ impl Batch<'_> {
             // (ρ + τ) E, which is darkness at a buried vertex.
             let albedo = points.albedo(v);
             let noise = reflected_noise(albedo, sample);
-            Some((v, albedo * sample.irradiance, noise, is_buried))
+            let is_hidden = outlook([sample; 2]).is_hidden(diagonal);
+            Some((v, albedo * sample.irradiance, noise, is_buried, is_hidden))
         };
         let pairs = self.vertices.par_iter().zip(&self.samples);
-        let found: Vec<(u32, Rgb, f64, bool)> = pairs.filter_map(value).collect();
-        for (v, reflected, noise, is_buried) in found {
+        let found: Vec<(u32, Rgb, f64, bool, bool)> = pairs.filter_map(value).collect();
+        for (v, reflected, noise, is_buried, is_hidden) in found {
             let v = v as usize;
             values.reflected[v] = reflected;
             values.noise[v] = noise;
             values.buried[v] = is_buried;
+            values.hidden[v] = is_hidden;
         }
     }
 }

@@ -70,6 +70,8 @@ const SCOUTED_SIZE: f64 = 4.0;
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
+    /// Diagonal of where the light is, scene unit.
+    pub diagonal: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
     /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
@@ -89,6 +91,7 @@ impl ErrorScale {
     ) -> ErrorScale {
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
+            diagonal,
             touching: hidden::NEAR * diagonal,
             radiosity_floor: field.radiosity_floor(measure.floor),
             tail: measure.tail,

@@ -30,6 +30,8 @@ pub(crate) struct SampledMesh {
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
+    /// Whether a vertex has gathered and is [hidden](crate::accuracy::hidden): no error counts there.
+    pub hidden: Vec<bool>,
 }
 
 impl SampledMesh {
@@ -41,8 +43,8 @@ impl SampledMesh {
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = places.par_iter().map(value).collect();
         let noise = vec![0.0; reflected.len()];
-        let buried = vec![false; reflected.len()];
-        SampledMesh { mesh, topology, vertices, reflected, noise, buried }
+        let [buried, hidden] = [(); 2].map(|()| vec![false; reflected.len()]);
+        SampledMesh { mesh, topology, vertices, reflected, noise, buried, hidden }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -60,6 +62,11 @@ impl SampledMesh {
     pub fn is_splittable(&self, e: usize) -> bool {
         let node = self.mesh.element(e);
         self.mesh.cell(node).level < Mesh::MAX_DEPTH && self.mesh.scatters(node)
+    }
+
+    /// Whether all corners of element `e` are hidden.
+    pub fn is_hidden(&self, e: usize) -> bool {
+        self.corners()[e].iter().all(|&v| self.hidden[v as usize])
     }
 
     /// Splits `elements` (ascending) into four each, which are in the place of the one. Values of
@@ -96,6 +103,7 @@ impl SampledMesh {
             reflected,
             noise: kept(&self.noise, &old_numbers),
             buried: kept(&self.buried, &old_numbers),
+            hidden: kept(&self.hidden, &old_numbers),
         };
         Ok((split, new))
     }
