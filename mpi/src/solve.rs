@@ -5,7 +5,6 @@
 //! the others    rows                           points
 //! ```
 
-use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -58,7 +57,7 @@ pub fn run(parser: &mut lexopt::Parser, world: &mut World) -> Result<(), Failure
     let size = size.unwrap_or_else(|| BakeSettings::elements_only(&scene).solve.element_size);
     let mesh = Mesh::new(scene, size)?.split_at_contacts(2);
     let backend = if on_cpu { Backend::Cpu } else { device()? };
-    let source = backend.rows(&mesh, hemicube, NonZeroU32::MIN)?;
+    let source = backend.rows(&mesh, hemicube)?;
     let mut source = ProximityCorrection::new(source, &mesh, 1.0);
     if world.rank() != 0 {
         SharedRows::<ProximityCorrection<BackendRows>>::serve(&mut source, &mesh, world);

@@ -589,8 +589,7 @@ fn bad_settings_are_refused() {
     with(&["--set", "full_resolution_share=much"], &["much"]);
     with(&["--exposure", "0"], &["exposure 0", "above 0"]);
     with(&["--error", "10%"], &["'10%'", "0.1 for 10 %"]);
-    with(&["--set", "rotations=0"], &["zero"]);
-    with(&["--set", "viewpoint_tolerance=much"], &["much"]);
+    with(&["--set", "near_reach=much"], &["much"]);
     with(&["--gather", "some"], &["'some'", "none, needed, all"]);
     with(&["--set", "mesh_error=much"], &["much"]);
     with(&["--set", "max_elements=-1"], &["-1"]);

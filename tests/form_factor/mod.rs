@@ -3,4 +3,3 @@ mod proximity;
 pub mod resolution_policy;
 mod row_check;
 mod shared;
-mod viewpoints;

@@ -5,7 +5,6 @@ mod files;
 pub mod merge;
 mod rows;
 
-use std::num::NonZeroU32;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -177,7 +176,7 @@ impl Options {
         let default = || BakeSettings::elements_only(scene).solve.element_size;
         let mesh = Mesh::new(scene.clone(), self.element_size.unwrap_or_else(default))?;
         let device = self.device.open()?;
-        let mut rows = device.rows(&mesh, self.hemicube, NonZeroU32::MIN)?;
+        let mut rows = device.rows(&mesh, self.hemicube)?;
         let AdapterInfo { name, kind, .. } = device.adapter();
         say!("{} elements, {name} ({kind})", mesh.element_count());
         let matrix = progress::of_count("elements", |report| {
