@@ -61,8 +61,7 @@ impl Camera {
         let framing = Framing { rays: &RayScene::of_scene(scene), bounds, up: up_axis(scene) };
         let from = |elevation: f64, first: f64| {
             let view = |k: u32| framing.forward(elevation, first + f64::from(k) / 4.0);
-            let side = |a: &DVec3, b: &DVec3| b.dot(flux).total_cmp(&a.dot(flux));
-            (0..4).rev().map(view).max_by(side).expect("four views")
+            (1..4).map(view).fold(view(0), |a, b| if b.dot(flux) < a.dot(flux) { b } else { a })
         };
         let level = from(0.0, 0.0);
         let camera = match framing.middle_of_room() {

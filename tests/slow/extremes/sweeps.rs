@@ -6,12 +6,13 @@ use std::path::Path;
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::TracedGather;
-use radiosity::form_factor::ProximityCorrection;
+use radiosity::form_factor::{ProximityCorrection, Row};
 use radiosity::gather::{GatherPoint, RefinementSettings, gather_at_vertices};
+use radiosity::mesh::NodeId;
 use radiosity::solver::Method;
 use radiosity::{
-    Backend, BakeTarget, Error, Gather, GatheredMesh, Mesh, Rgb, Scene, Solution, Solver,
-    VertexMesh, ViewFactors, write_ply,
+    Backend, BakeTarget, Error, FormFactors, Gather, GatheredMesh, Mesh, Rgb, Scene, Solution,
+    Solver, VertexMesh, ViewFactors, write_ply,
 };
 
 use super::sweep::Sweep;
@@ -222,16 +223,31 @@ fn shift_of_plates(ask: &Ask) -> Swept {
 /// of some hundred has a tenth; over F, six times as much is 3e-3.
 const PATCHES: f64 = 9e-3;
 
+/// Factors between groups 0 and 1, both ways: means of the rows of their elements by area.
+fn factors_of_plates(mesh: &Mesh, rows: &mut dyn FormFactors) -> Result<[f64; 2], Error> {
+    let group = |node: NodeId| mesh.scene().triangles()[mesh.triangle(node)].group;
+    let nodes: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
+    let (mut areas, mut sums) = ([0.0; 2], [0.0; 2]);
+    for (row, &from) in rows.rows(mesh, &nodes, 1.0)?.iter().zip(&nodes) {
+        row.check(mesh, from)?;
+        let Some(area) = areas.get_mut(group(from) as usize) else { continue };
+        *area += mesh.area(from);
+        for entry in &row.entries {
+            if group(mesh.element(entry.element as usize)) == 1 - group(from) {
+                sums[group(from) as usize] += mesh.area(from) * Row::form_factor(entry.share);
+            }
+        }
+    }
+    Ok([sums[0] / areas[0], sums[1] / areas[1]])
+}
+
 fn rows_of_plates(ask: &Ask) -> Swept {
     let mut sweep = Sweep::new("scale", SCALES, "plates, F = 0.19982", PATCHES);
     sweep.by("rows");
     for frame in ask.scales() {
         let mesh = Mesh::new(scenes::plates(frame), 0.1 * frame.scale)?;
         let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
-        let matrix = matrix.expect("nobody cancels");
-        let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
-        sweep.step(&both, &[scenes::PLATES; 2]);
+        sweep.step(&factors_of_plates(&mesh, &mut rows)?, &[scenes::PLATES; 2]);
     }
     Ok(sweep)
 }
@@ -248,10 +264,7 @@ fn rows_of_small_plates(ask: &Ask) -> Swept {
             mesh = mesh.split(&(0..far).collect::<Vec<_>>())?;
         }
         let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
-        let matrix = matrix.expect("nobody cancels");
-        let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
-        sweep.step(&both, &[scenes::PLATES; 2]);
+        sweep.step(&factors_of_plates(&mesh, &mut rows)?, &[scenes::PLATES; 2]);
     }
     Ok(sweep)
 }
