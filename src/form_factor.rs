@@ -14,13 +14,11 @@ pub mod closed_form;
 pub(crate) mod proximity;
 pub(crate) mod resolution_policy;
 mod row;
-mod shared;
 
 use crate::error::{Error, ErrorKind};
 use crate::mesh::{Mesh, NodeId};
 pub use proximity::ProximityCorrection;
 pub use row::{Entry, Row};
-pub use shared::SharedRows;
 
 /// A source of rows: hemicubes on a GPU, rays on the CPU, closed forms.
 ///
