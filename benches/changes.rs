@@ -11,7 +11,6 @@
 
 mod common;
 
-use std::num::NonZeroU32;
 use std::time::Instant;
 
 use common::keep_going;
@@ -79,7 +78,7 @@ fn main() -> Result<(), Error> {
 }
 
 fn rows(device: &Backend, mesh: &Mesh) -> Result<Rows, Error> {
-    let rows = device.rows(mesh, HEMICUBE, NonZeroU32::MIN)?;
+    let rows = device.rows(mesh, HEMICUBE)?;
     Ok(ProximityCorrection::new(rows, mesh, 1.0))
 }
 

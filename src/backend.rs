@@ -23,8 +23,6 @@ pub mod gpu;
 mod row_maker;
 mod rows;
 
-use std::num::NonZeroU32;
-
 pub use adapter::{AdapterInfo, AdapterKind};
 pub use fallback::Fallback;
 pub use row_maker::RowMaker;
@@ -92,26 +90,21 @@ impl Backend {
         }
     }
 
-    /// Rows over `mesh`, each from `rotations` hemicubes with `resolution` pixels along an edge of
-    /// the top face, or from `rotations`·`resolution`² rays in a scene with clear panes or
-    /// cut-outs, which hemicubes do not support, and without a device.
+    /// Rows over `mesh`, each from a hemicube with `resolution` pixels along an edge of the top
+    /// face, or from `resolution`² rays in a scene with clear panes or cut-outs, which hemicubes do
+    /// not support, and without a device.
     ///
     /// A device draws hemicubes here even where rays would take less time, which is the case with
     /// many triangles and few pixels: bakes ask [`Backend::row_maker`] first.
     ///
     /// # Errors
     /// Those of [`Backend::rows_by`].
-    pub fn rows(
-        &self,
-        mesh: &Mesh,
-        resolution: u32,
-        rotations: NonZeroU32,
-    ) -> Result<BackendRows, Error> {
+    pub fn rows(&self, mesh: &Mesh, resolution: u32) -> Result<BackendRows, Error> {
         let maker = match self.row_makers(mesh.scene()) {
             [RowMaker::Hemicubes, ..] => RowMaker::Hemicubes,
             _ => self.row_maker(mesh.scene(), resolution),
         };
-        self.rows_by(maker, mesh, resolution, rotations)
+        self.rows_by(maker, mesh, resolution)
     }
 
     /// The same with this row maker, if the backend has it; else with rays on the CPU.
@@ -124,15 +117,13 @@ impl Backend {
         maker: RowMaker,
         mesh: &Mesh,
         resolution: u32,
-        rotations: NonZeroU32,
     ) -> Result<BackendRows, Error> {
         crate::hemicube::check_resolution(resolution)?;
-        let rays = (resolution * resolution).saturating_mul(rotations.get());
+        let rays = resolution * resolution;
         match (self, maker) {
             #[cfg(feature = "gpu")]
             (Backend::Gpu(gpu), RowMaker::Hemicubes) => {
-                let hemicubes = HemicubeRows::new(gpu, mesh, resolution)?;
-                Ok(hemicubes.with_rotations(rotations).into())
+                Ok(HemicubeRows::new(gpu, mesh, resolution)?.into())
             }
             #[cfg(feature = "gpu")]
             (Backend::Gpu(gpu), RowMaker::DeviceRays) => {

@@ -16,7 +16,6 @@ mod optics;
 mod second_pass;
 mod textured;
 mod up_axis;
-mod view_score;
 
 pub use up_axis::up_axis;
 

@@ -3,8 +3,7 @@
 //! ```text
 //! row source        RayRows, HemicubeRows, your own: a patch seen from its centroid
 //!   └ ProximityCorrection   near receivers: closed forms of the whole patch
-//!       └ AdaptiveViewpoints   occluders that split a patch: the mean over its parts
-//!           └ Solver, view factors: checked rows
+//!       └ Solver, view factors: checked rows
 //! ```
 //!
 //! Each layer is a [`FormFactors`] again and can be omitted. Sources are in
@@ -15,15 +14,11 @@ pub mod closed_form;
 pub(crate) mod proximity;
 pub(crate) mod resolution_policy;
 mod row;
-mod shared;
-pub(crate) mod viewpoints;
 
 use crate::error::{Error, ErrorKind};
 use crate::mesh::{Mesh, NodeId};
 pub use proximity::ProximityCorrection;
 pub use row::{Entry, Row};
-pub use shared::SharedRows;
-pub use viewpoints::AdaptiveViewpoints;
 
 /// A source of rows: hemicubes on a GPU, rays on the CPU, closed forms.
 ///

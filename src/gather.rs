@@ -28,14 +28,12 @@ pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
 pub(crate) mod scouts;
-mod shared;
 mod source_light;
 mod surplus;
 pub(crate) mod two_sided;
 pub(crate) mod vertex_rows;
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -45,10 +43,9 @@ pub use gathered_mesh::GatheredMesh;
 pub use point_irradiance::{PointIrradiance, irradiance_at};
 pub use progress::Progress;
 pub use refinement_settings::RefinementSettings;
-pub use shared::SharedGather;
 
 /// A point at which light is gathered, on a surface or in the air.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherPoint {
     /// Position, scene unit: a little above the surface if there is one, so that it does not hide
     /// anything from the point.
@@ -62,7 +59,7 @@ pub struct GatherPoint {
 /// What arrives at a [`GatherPoint`].
 ///
 /// All shares are form factors from the point: cosine-weighted and 1 for the whole hemisphere.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
     /// reflected, and the sky where there is no surface.

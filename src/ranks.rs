@@ -1,17 +1,7 @@
 //! Work distributed over processes that all have the whole input, as with MPI.
-//!
-//! Where all run alike, each calls [`Ranks::all_gather`] itself. Where process 0 drives and others
-//! serve:
-//!
-//! ```text
-//! process 0        ask ─ request ─→ all      own share ─┐
-//! the others       serve ←──────────┘        own share ─┴─→ process 0
-//! ```
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-
-use crate::error::{Error, ErrorKind};
 
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
@@ -47,61 +37,11 @@ impl Ranks for Alone {
     }
 }
 
-/// Requests the results for `items` from all processes, each of which computes its share; returns
-/// them in order. The other processes [`serve`].
-///
-/// # Errors
-/// The errors of `own`, in any process.
-pub(crate) fn ask<Q: Serialize, R: Serialize + DeserializeOwned>(
-    ranks: &mut dyn Ranks,
-    request: &Q,
-    items: usize,
-    own: impl FnOnce(&Q, Share) -> Result<Vec<R>, Error>,
-) -> Result<Vec<R>, Error> {
-    let share = Share::of(ranks);
-    if share.size == 1 {
-        return own(request, share);
-    }
-    ranks.all_gather(&encoded(request));
-    let own = own(request, share).map_err(|e| e.to_string());
-    let mut of_ranks = vec![];
-    for (bytes, rank) in ranks.all_gather(&encoded(&own)).iter().zip(0..) {
-        let results = decoded::<Result<Vec<R>, String>>(bytes).map_err(|found| {
-            let remedy = "see to that process, and go on from the last checkpoint";
-            Error::new(ErrorKind::Device, format!("work of process {rank}"), found, remedy)
-        })?;
-        of_ranks.push(results);
-    }
-    Ok(in_order(of_ranks, items))
-}
-
 /// Results of all ranks in the order of the `items`, which were assigned round-robin.
 pub(crate) fn in_order<R>(of_ranks: Vec<Vec<R>>, items: usize) -> Vec<R> {
     let size = of_ranks.len();
     let mut of_ranks: Vec<_> = of_ranks.into_iter().map(Vec::into_iter).collect();
     (0..items).filter_map(|k| of_ranks[k % size].next()).collect()
-}
-
-/// Computes this process's share of all that process 0 [`ask`]s for, until it [`dismiss`]es.
-pub(crate) fn serve<Q: DeserializeOwned, R: Serialize>(
-    ranks: &mut dyn Ranks,
-    mut own: impl FnMut(&Q, Share) -> Result<Vec<R>, Error>,
-) {
-    loop {
-        let requests = ranks.all_gather(&[]);
-        if requests[0].is_empty() {
-            return;
-        }
-        let own = own(&decoded(&requests[0]), Share::of(ranks)).map_err(|e| e.to_string());
-        ranks.all_gather(&encoded(&own));
-    }
-}
-
-/// Ends the service of all other processes.
-pub(crate) fn dismiss(ranks: &mut dyn Ranks) {
-    if ranks.size() > 1 {
-        ranks.all_gather(&[]);
-    }
 }
 
 /// Selects the items of one process: they are assigned round-robin.

@@ -1,8 +1,8 @@
 //! View factors between whole groups of surfaces, as used in heat transfer.
 //!
 //! F_ij is the fraction of the flux leaving group i that arrives at fronts of group j, averaged
-//! over the area of i. There are three methods; [`ViewFactors::new`] selects one of the first two
-//! by the predicted time of the first:
+//! over the area of i. There are two methods; [`ViewFactors::new`] selects one by the predicted
+//! time of the first:
 //!
 //! ```text
 //! ViewFactors::exact     error far below the requested one; time ~ polygons², and more with many
@@ -18,9 +18,6 @@
 //!   rays from each polygon ─→ pairs that matter
 //!     small          the count of rays
 //!     others         the cheapest of shadow rays, closed forms, or visible parts from points
-//!
-//! ViewFactors::sampled   means over the rows of a mesh's elements, hemicubes or rays; time ~
-//!                        elements; the error is estimated, not requested
 //! ```
 //!
 //! [`ViewFactors::checks`] measures closure, reciprocity and bounds of any matrix, and
@@ -42,7 +39,6 @@ mod partial_matrix;
 mod point_visibility;
 mod polygon_points;
 mod ray_rows;
-mod sampled;
 mod scene_polygons;
 mod shadow_rays;
 mod shaft;
@@ -59,8 +55,6 @@ use self::assembler::Assembler;
 use self::partial_matrix::{Making, Method};
 use self::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
-use crate::form_factor::FormFactors;
-use crate::mesh::Mesh;
 use crate::ranks::{Alone, Ranks};
 use crate::scene::Scene;
 
@@ -198,25 +192,6 @@ impl ViewFactors {
             }
         }
         Ok(Some(rows))
-    }
-
-    /// Averages the rows of all elements of `mesh` over their groups, weighted by area: for scenes
-    /// too large for [`ViewFactors::new`].
-    ///
-    /// `progress` is called with the number of elements done and their total, and may cancel: then
-    /// there is no matrix. Each element is seen from its centroid: elements must be small compared
-    /// with the distance to what they see, or the error is that of the proximity assumption (Baum,
-    /// Rushmeier, Winget 1989). The standard error is estimated by leaving out three elements of
-    /// four; for undivided triangles that is impossible, and their whole value counts as error.
-    ///
-    /// # Errors
-    /// Those of `form_factors`, or [`ErrorKind::FormFactor`] for a row that breaks its contract.
-    pub fn sampled(
-        mesh: &Mesh,
-        form_factors: &mut dyn FormFactors,
-        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> Result<Option<ViewFactors>, Error> {
-        sampled::sample(mesh, form_factors, progress)
     }
 
     /// Measures closure, reciprocity and bounds: [`MatrixChecks::of`].

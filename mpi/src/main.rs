@@ -1,16 +1,13 @@
-//! View factors and radiosity of a scene on many machines, by MPI.
+//! View factors of a scene on many machines, by MPI.
 //!
 //! ```text
 //! mpirun -n 4 radiosity-mpi view-factors CITY.obj --facets --error 1e-4 --out city.npz
-//! mpirun -n 4 radiosity-mpi solve ROOM.obj --element-size 50 --out room.ply
 //! ```
 //!
-//! Every process reads the scene. Rays, pairs and exact rows of view factors are dealt out one by
-//! one and exchanged; rows of a solve are made by all for process 0. The numbers are the same for
-//! any number of processes. A process that dies ends the run; view factors go on from their
-//! checkpoint, and a solve from its state.
+//! Every process reads the scene. Rays, pairs and exact rows are dealt out one by one and exchanged.
+//! The numbers are the same for any number of processes. A process that dies ends the run, and the
+//! same command goes on from its checkpoint.
 
-mod solve;
 mod view_factors;
 mod world;
 
@@ -23,18 +20,8 @@ use world::World;
 const USAGE: &str = "\
 usage: mpirun -n N radiosity-mpi view-factors SCENE [--facets] [--error E] [--two-sided NAME]…
                                  [--checkpoint FILE] --out FILE.npz
-       mpirun -n N radiosity-mpi solve SCENE.obj [--element-size X] [--hemicube N] [--cpu]
-                                 [--unshot U] [--gather E] [--state FILE] --out FILE.ply
 
-  view-factors     as `radiosity view-factors`, to an .npz file
-  solve            the light between the elements of a scene, by hemicubes on a device a process,
-                   as radiosity at the vertices
-  --element-size X longest edge of an element [diagonal / 32]
-  --hemicube N     pixels along an edge of a hemicube's top face, even [128]
-  --cpu            rays on the CPU instead, N squared a row
-  --unshot U       share of the light that may be left unshot [1e-3]
-  --gather E       then vertices gather that light, as many as a bake to the error E begins with
-  --state FILE     keep the solve there, and go on from it if it is there";
+  view-factors     as `radiosity view-factors`, to an .npz file";
 
 /// Why a command ends early.
 type Failure = Box<dyn std::error::Error>;
@@ -59,7 +46,6 @@ fn run(world: &mut World) -> Result<(), Failure> {
     let mut parser = lexopt::Parser::from_env();
     match parser.next()? {
         Some(Value(name)) if name == "view-factors" => view_factors::run(&mut parser, world),
-        Some(Value(name)) if name == "solve" => solve::run(&mut parser, world),
         _ => {
             if world.0.rank() == 0 {
                 println!("{USAGE}");

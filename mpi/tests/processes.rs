@@ -30,15 +30,10 @@ fn written(processes: usize, args: &[&str]) -> Vec<u8> {
 
 #[test]
 fn any_number_of_processes_write_the_same_bytes() {
-    for args in [
-        &["view-factors", CORNELL_BOX, "--facets", "--two-sided", "light"][..],
-        &["solve", CORNELL_BOX, "--cpu", "--hemicube", "32", "--element-size", "100"],
-        &["solve", CORNELL_BOX, "--cpu", "--element-size", "200", "--gather", "0.2"],
-    ] {
-        let alone = written(1, args);
-        for processes in [2, 4] {
-            assert!(written(processes, args) == alone, "{processes} processes");
-        }
+    let args = ["view-factors", CORNELL_BOX, "--facets", "--two-sided", "light"];
+    let alone = written(1, &args);
+    for processes in [2, 4] {
+        assert!(written(processes, &args) == alone, "{processes} processes");
     }
 }
 

@@ -56,7 +56,7 @@ impl<'a> ResilientBackend<'a> {
     ) -> Result<ResilientRows<'m>, Error> {
         let resolution = settings.hemicube_resolution;
         let rows = move |maker: RowMaker| -> Result<BackendRows, Error> {
-            let rows = self.backend.rows_by(maker, mesh, resolution, settings.rotations)?;
+            let rows = self.backend.rows_by(maker, mesh, resolution)?;
             Ok(match settings.full_resolution_share {
                 Some(share) => rows.with_full_share(share),
                 None => rows,

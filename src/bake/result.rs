@@ -30,7 +30,7 @@ pub struct BakeResult {
     pub outcome: Outcome,
     /// The settings that were used in the end.
     pub settings: BakeSettings,
-    /// Hemicubes drawn, or rows of rays cast: those of all rotations and viewpoints.
+    /// Hemicubes drawn, or rows of rays cast.
     pub hemicubes: u64,
     /// Which of the two: what [`Backend::row_maker`](crate::Backend::row_maker) chose, or rays
     /// where the mesh does not fit the device. Where a device failed on the way, what it began

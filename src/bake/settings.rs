@@ -1,6 +1,5 @@
 //! All settings of a bake, and which of them an error asks for.
 
-use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use crate::accuracy::Measure;
@@ -56,15 +55,9 @@ pub struct SolveSettings {
     /// A patch that shoots at least this share of the emitted light gets the full resolution; 0 for
     /// all patches; with none, the backend's own.
     pub full_resolution_share: Option<f64>,
-    /// Hemicubes a viewpoint, averaged, each turned further about the normal.
-    pub rotations: NonZeroU32,
     /// Receivers within this many patch diameters get closed-form factors
     /// ([`crate::form_factor::ProximityCorrection`]); below 0 none.
     pub near_reach: f64,
-    /// Patches of whose light more than this share lands on other elements when it is sent from
-    /// their parts are seen from those ([`crate::form_factor::AdaptiveViewpoints`]); with none,
-    /// each from its centroid alone.
-    pub viewpoint_tolerance: Option<f64>,
     /// How light is spread, how far, and from how large patches.
     pub solver: Solver,
     /// Whether GMRES takes the place of `solver.method` in scenes for which [`Solver::for_mesh`]
@@ -205,9 +198,7 @@ impl BakeSettings {
             contact_levels: 0,
             hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
-            rotations: NonZeroU32::MIN,
             near_reach: model::NEAR_REACH,
-            viewpoint_tolerance: None,
             solver,
             gmres_if_bright: true,
             checkpoint: None,

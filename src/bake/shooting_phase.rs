@@ -1,12 +1,11 @@
 //! The first phase of a bake: light is shot on elements.
 //!
 //! The scene is cut into elements, more finely where surfaces touch. Rows of form factors come from
-//! the backend, are corrected for near receivers and, if asked for, averaged over several
-//! viewpoints of a patch; a solver sends light along them. Given a checkpoint file the solve goes
-//! on from it.
+//! the backend and are corrected for near receivers; a solver sends light along them. Given a
+//! checkpoint file the solve goes on from it.
 //!
 //! ```text
-//! backend ─► ProximityCorrection ─► AdaptiveViewpoints ─► Solver ─► radiosity of elements
+//! backend ─► ProximityCorrection ─► Solver ─► radiosity of elements
 //! ```
 
 use std::ops::ControlFlow;
@@ -30,7 +29,6 @@ use crate::bake::strata::SampleCounts;
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
-use crate::form_factor::viewpoints::AdaptiveViewpoints;
 use crate::gather::GatherPoint;
 use crate::gather::GatheredMesh;
 use crate::gather::gather_points::SurfaceOffset;
@@ -47,7 +45,7 @@ const CHECKPOINT_INTERVAL: u32 = 10;
 pub(super) struct ShotLight {
     pub mesh: Mesh,
     pub solution: Solution,
-    /// Rows drawn or cast, those of all rotations and viewpoints.
+    /// Rows drawn or cast.
     pub hemicubes: u64,
     pub row_maker: RowMaker,
     pub hemicubes_by_resolution: Vec<(u32, u64)>,
@@ -66,11 +64,8 @@ pub(super) fn shoot(
     let sizing = settings.sizing(scene, settings.element_size);
     let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?
         .split_at_contacts(settings.contact_levels);
-    let near = ProximityCorrection::new(backend.rows(&mesh, settings)?, &mesh, settings.near_reach);
-    let mut rows = match settings.viewpoint_tolerance {
-        Some(tolerance) => AdaptiveViewpoints::new(near, tolerance, u32::MAX),
-        None => AdaptiveViewpoints::new(near, 1.0, 0),
-    };
+    let rows = backend.rows(&mesh, settings)?;
+    let mut rows = ProximityCorrection::new(rows, &mesh, settings.near_reach);
     clock.timings.mesh = clock.lap();
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Shooting(*p));
     let received = received(settings, &mesh, backend)?;
@@ -78,16 +73,15 @@ pub(super) fn shoot(
     if settings.ambient {
         solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
     }
-    let sources: &ResilientRows = rows.inner().inner();
+    let sources: &ResilientRows = rows.inner();
     let mut row_seconds = 0.0;
     for source in [sources.first()].into_iter().chain(sources.second()) {
         clock.timings += source.timings();
         row_seconds += source.seconds();
     }
     clock.timings.solve = clock.lap() - row_seconds;
-    let rotations = u64::from(settings.rotations.get());
-    let hemicubes = (solution.rows_made + rows.extra_rows()) * rotations;
-    let mean_near_correction = rows.inner().mean_correction();
+    let hemicubes = solution.rows_made;
+    let mean_near_correction = rows.mean_correction();
     let row_maker = sources.first().maker();
     let hemicubes_by_resolution = sources.first().drawn_by_resolution();
     drop(rows);

@@ -83,19 +83,8 @@ impl<M: FormFactors> ProximityCorrection<M> {
         if self.rows == 0 { 0.0 } else { self.total_correction / self.rows as f64 }
     }
 
-    /// The uncorrected rows of the source; checked, since the correction of a row that breaks its
-    /// contract may panic.
-    pub(super) fn uncorrected(
-        &mut self,
-        mesh: &Mesh,
-        patches: &[NodeId],
-        weight: f64,
-    ) -> Result<Vec<Row>, Error> {
-        checked_rows(&mut self.source, mesh, patches, weight)
-    }
-
     /// Corrects `rows`, seen from the centroids of `patches`.
-    pub(super) fn correct(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
+    fn correct(&mut self, mesh: &Mesh, patches: &[NodeId], rows: &mut [Row]) {
         if self.near_field.reach < 0.0 {
             return;
         }
@@ -110,7 +99,8 @@ impl<M: FormFactors> ProximityCorrection<M> {
 
 impl<M: FormFactors> FormFactors for ProximityCorrection<M> {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
-        let mut rows = self.uncorrected(mesh, patches, weight)?;
+        // The correction of a row that breaks its contract may panic.
+        let mut rows = checked_rows(&mut self.source, mesh, patches, weight)?;
         self.correct(mesh, patches, &mut rows);
         Ok(rows)
     }

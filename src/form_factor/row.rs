@@ -9,8 +9,6 @@
 //! So a row conserves light, its sum does not depend on the order, and a solve with it conserves
 //! energy whatever the errors of the single shares are.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind};
@@ -104,58 +102,6 @@ impl Row {
         self.entries.retain(|e| e.share > 0);
     }
 
-    /// The mean of `rows`, each of which sums to [`Row::TOTAL`]: so does the mean, exactly, and the
-    /// error of every share is less than one unit. The mean of no rows is an empty row.
-    pub(crate) fn mean(rows: &[&Row]) -> Row {
-        let count = rows.len().max(1) as u64;
-        if rows.iter().any(|row| !row.passed.is_empty()) {
-            return Row::mean_through_panes(rows);
-        }
-        let mut entries: Vec<Entry> = rows.iter().flat_map(|r| r.entries.iter().copied()).collect();
-        // The rows are in order already: a stable sort merges them.
-        entries.sort_by_key(|e| e.element);
-        let mut sum = 0;
-        let mut means = Apportion::default();
-        let mut mean_of = |shares: &mut dyn Iterator<Item = u32>| {
-            sum += shares.map(u64::from).sum::<u64>();
-            means.part_up_to((sum / count) as u32)
-        };
-        let runs = entries.chunk_by(|a, b| a.element == b.element);
-        let mean = |run: &[Entry]| Entry {
-            element: run[0].element,
-            share: mean_of(&mut run.iter().map(|e| e.share)),
-        };
-        let entries = runs.map(mean).filter(|e| e.share > 0).collect();
-        let escaped = mean_of(&mut rows.iter().map(|r| r.escaped));
-        let backface = mean_of(&mut rows.iter().map(|r| r.backface));
-        Row { entries, escaped, backface, passed: vec![] }
-    }
-
-    /// The mean of rows some of which go through panes: transmittances are weighted by shares.
-    fn mean_through_panes(rows: &[&Row]) -> Row {
-        // By element; escaped and back-face light come last, as in `passed`.
-        let (escaped, backface) = (u64::from(u32::MAX) + 1, u64::from(u32::MAX) + 2);
-        let mut sums: BTreeMap<u64, (f64, Rgb)> = BTreeMap::new();
-        for row in rows {
-            let entries = row.entries.iter().map(|e| (u64::from(e.element), e.share));
-            let all = entries.chain([(escaped, row.escaped), (backface, row.backface)]);
-            for (k, (slot, share)) in all.enumerate() {
-                let passed = row.passed.get(k).map_or(Rgb::ONE, |&p| Row::transmittance(p));
-                let sum = sums.entry(slot).or_default();
-                sum.0 += f64::from(share);
-                sum.1 += f64::from(share) * passed;
-            }
-        }
-        let bare: Vec<Row> = rows.iter().map(|&r| Row { passed: vec![], ..r.clone() }).collect();
-        let mean = Row::mean(&bare.iter().collect::<Vec<_>>());
-        let slots = mean.entries.iter().map(|e| u64::from(e.element)).chain([escaped, backface]);
-        let passed = slots.map(|slot| match sums.get(&slot) {
-            Some(&(share, passed)) if share > 0.0 => Row::passed(passed / share),
-            _ => [Row::TOTAL; 3],
-        });
-        Row { passed: passed.collect(), ..mean }
-    }
-
     /// Checks the contract: shares sum to [`Row::TOTAL`], elements ascend and exist in `mesh`.
     ///
     /// # Errors
@@ -192,62 +138,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mean_of_rows_is_exact() {
-        let row = |entries: &[(u32, u32)], open: u32| {
-            let entries = entries.iter().map(|&(element, share)| Entry { element, share });
-            let row = Row { entries: entries.collect(), escaped: open, ..Row::default() };
-            Row { backface: (u64::from(Row::TOTAL) - row.sum()) as u32, ..row }
-        };
-        // Remainders of 1, 2 and 3 in four, an entry that is in one row only, one that is lost.
-        let rows = [
-            row(&[(1, 5), (3, 7), (4, 1)], 9),
-            row(&[(1, 4), (7, 1 << 31)], 0),
-            row(&[(0, 2), (3, 4)], u32::MAX - 6),
-            row(&[(3, 4)], 3),
-        ];
-        let mean = Row::mean(&rows.each_ref());
-        assert_eq!(mean.sum(), u64::from(Row::TOTAL));
-        assert!(mean.entries.windows(2).all(|w| w[0].element < w[1].element));
-        assert!(mean.entries.iter().all(|e| e.share > 0));
-        let share =
-            |r: &Row, k: u32| r.entries.iter().find(|e| e.element == k).map_or(0, |e| e.share);
-        let near = |got: u32, all: [u32; 4]| {
-            let want = all.iter().map(|&s| f64::from(s)).sum::<f64>() / 4.0;
-            assert!((f64::from(got) - want).abs() < 1.0, "{got} {want}");
-        };
-        (0..8).for_each(|k| near(share(&mean, k), rows.each_ref().map(|r| share(r, k))));
-        near(mean.escaped, rows.each_ref().map(|r| r.escaped));
-        near(mean.backface, rows.each_ref().map(|r| r.backface));
-        // The mean of equal rows is the row.
-        assert_eq!(Row::mean(&[&rows[0]; 3]), rows[0]);
-    }
-
-    #[test]
-    fn mean_through_panes_is_weighted_by_shares() {
-        let row = |entries: &[(u32, u32)], passed: &[u32]| {
-            let entries = entries.iter().map(|&(element, share)| Entry { element, share });
-            let row = Row { entries: entries.collect(), ..Row::default() };
-            let backface = (u64::from(Row::TOTAL) - row.sum()) as u32;
-            Row { backface, passed: passed.iter().map(|&p| [p; 3]).collect(), ..row }
-        };
+    fn entry_rounded_to_zero_loses_its_transmittance() {
         let (all, half) = (Row::TOTAL, Row::TOTAL / 2);
-        // The second has no panes.
-        let rows =
-            [row(&[(1, 3 << 20), (5, 1 << 20)], &[0, half, all, half]), row(&[(1, 1 << 20)], &[])];
-        let mean = Row::mean(&rows.each_ref());
-        assert_eq!(mean.sum(), u64::from(Row::TOTAL));
-        assert_eq!(mean.entries.iter().map(|e| e.element).collect::<Vec<_>>(), [1, 5]);
-        let passed: Vec<f64> = mean.passed.iter().map(|p| Row::transmittance(*p).x).collect();
-        // A quarter of the light of element 1 is of the second row; so is about half of that on
-        // backs.
-        let backs = rows.each_ref().map(|row| f64::from(row.backface));
-        let of_backs = (backs[0] / 2.0 + backs[1]) / (backs[0] + backs[1]);
-        for (found, want) in passed.iter().zip([0.25, 0.5, 1.0, of_backs]) {
-            assert!((found - want).abs() < 1e-9, "{passed:?}");
-        }
-        // An entry that is rounded to 0 loses its transmittance too.
-        let mut row = rows[0].clone();
+        let entry = |element, share| Entry { element, share };
+        let passed = vec![[0; 3], [half; 3], [all; 3], [half; 3]];
+        let mut row = Row {
+            entries: vec![entry(1, 3 << 20), entry(5, 1 << 20)],
+            backface: all - (4 << 20),
+            passed: passed.clone(),
+            ..Row::default()
+        };
         row.set_factors(&[0.0, 0.25, 0.0, 0.75]);
-        assert_eq!((row.entries.len(), &row.passed[..]), (1, &rows[0].passed[1..]));
+        assert_eq!((row.entries.len(), &row.passed[..]), (1, &passed[1..]));
     }
 }

@@ -6,7 +6,7 @@
 //! | `standard_error` | as `data` | of each factor |
 //! | `area`, `open`, `open_error`, `back`, `back_error` | one per group | |
 //! | `names` | bytes | of all groups, UTF-8, a line feed between |
-//! | `absent` | 1 | meaning of a missing pair: 0, 1 or 2 as in [`Missing`] |
+//! | `absent` | 1 | meaning of a missing pair: 0 for zero, 2 for unmet ([`Missing`]) |
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek};
@@ -43,7 +43,10 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
     let count = row_starts[matrix.factors.len()] as u64;
     let names: Vec<String> = matrix.names.iter().map(|n| n.replace('\n', " ")).collect();
     let names = names.join("\n");
-    let absent = ABSENT.iter().position(|absent| *absent == matrix.absent).unwrap_or(0) as u8;
+    let absent = match matrix.absent {
+        Missing::Zero => 0u8,
+        Missing::Unmet => 2,
+    };
     write_file(path.as_ref(), |out| {
         let mut archive = Archive(ZipWriter::new(out));
         archive.add_format("csr")?;
@@ -65,9 +68,6 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
         Ok(())
     })
 }
-
-/// Meaning of the numbers of `absent`.
-const ABSENT: [Missing; 3] = [Missing::Zero, Missing::NotSeen, Missing::Unmet];
 
 /// An `.npz` file: a zip archive of `.npy` files, none of them compressed.
 struct Archive<'a>(ZipWriter<&'a mut BufWriter<File>>);
@@ -174,8 +174,10 @@ fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
         false => vec![0],
         true => arrays.numbers("absent", Some(1))?,
     };
-    let Some(&absent) = ABSENT.get(usize::from(absent[0])) else {
-        return Err(wrong("absent", absent[0].to_string(), "it is 0, 1 or 2"));
+    let absent = match absent[0] {
+        0 => Missing::Zero,
+        2 => Missing::Unmet,
+        other => return Err(wrong("absent", other.to_string(), "it is 0 or 2")),
     };
     check_range("data", &values, |value| value.is_finite() && value >= 0.0, "at least 0")?;
     check_range("standard_error", &errors, is_size, "finite and at least 0")?;

@@ -123,7 +123,7 @@ pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resu
             "% that arrives at group j (column); what is absent is {}",
             match matrix.absent {
                 Missing::Zero => "zero",
-                Missing::NotSeen | Missing::Unmet => "not seen, zero or small",
+                Missing::Unmet => "not seen, zero or small",
             }
         )?;
         writeln!(out, "% group area open back name")?;

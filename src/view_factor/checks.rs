@@ -10,7 +10,7 @@
 //! The open share of a row indicates faults of the scene: if above its error, the enclosure has a
 //! gap; if below minus its error, surfaces coincide.
 
-use super::matrix::{Missing, ViewFactors};
+use super::matrix::ViewFactors;
 
 /// Deviations of a matrix from the laws. A correct row sum does not prove correct entries: that of
 /// a hemicube is exact while its entries have errors. Dimensionless, as form factors are.
@@ -79,12 +79,8 @@ impl MatrixChecks {
 }
 
 fn closure_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
-    let is_left_over = m.absent != Missing::NotSeen;
-    let rows = (0..m.areas.len()).filter(move |&i| !is_left_over || is_closed(m, i));
-    rows.map(move |i| {
-        let open = if is_left_over { 0.0 } else { m.open[i].value };
-        ((i, i), row_sum(m, i) + open - 1.0)
-    })
+    let rows = (0..m.areas.len()).filter(|&i| is_closed(m, i));
+    rows.map(|i| ((i, i), row_sum(m, i) - 1.0))
 }
 
 /// Share of the flux of group `i` that arrives at fronts and backs.

@@ -30,8 +30,6 @@ pub struct ViewFactors {
 pub enum Missing {
     /// The factor is zero: one is behind the other, or occluded entirely.
     Zero,
-    /// No pixel or ray from one has hit the other; the factor may be small.
-    NotSeen,
     /// No ray from either has hit the other; the factor is below the requested error, with few
     /// exceptions.
     Unmet,

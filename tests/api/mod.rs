@@ -5,7 +5,7 @@ use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::{GpuLimits, TracedGather, TracedRows};
 use radiosity::backend::{AdapterInfo, BackendRows, RowMaker};
 use radiosity::bake::{GatherSettings, SolveSettings};
-use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
+use radiosity::form_factor::{Entry, ProximityCorrection, Row};
 use radiosity::gather::{
     GatherPoint, IrradianceSample, Progress as GatherProgress, RadiosityField, RefinementSettings,
 };
@@ -31,7 +31,6 @@ fn public_types_are_send_and_sync() {
     macro_rules! check_all { ($($type:ty),* $(,)?) => { $(check::<$type>();)* } }
     check_all![
         AdapterInfo,
-        AdaptiveViewpoints<RayRows>,
         Backend,
         BackendRows,
         BakeProgress,

@@ -418,9 +418,8 @@ fn devices_leave_scenes_with_panes_to_rays() {
     assert_eq!(HemicubeRows::new(&gpu, &mesh, 16).unwrap_err().kind(), ErrorKind::Device);
     let backend = Backend::Gpu(gpu);
     let patches = [mesh.root(12)];
-    let once = std::num::NonZeroU32::MIN;
     let [device, cpu] = [&backend, &Backend::Cpu]
-        .map(|b| b.rows(&mesh, 16, once).unwrap().rows(&mesh, &patches, 1.0).unwrap());
+        .map(|b| b.rows(&mesh, 16).unwrap().rows(&mesh, &patches, 1.0).unwrap());
     assert!(device == cpu && !device[0].passed.is_empty());
     let scene = mesh.scene().clone();
     let baked = BakeTarget::Error(0.3).bake(scene, &backend, keep_going).unwrap();

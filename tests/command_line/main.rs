@@ -418,11 +418,7 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["bake", "a.obj", "--write", "ply,gif"], &["--write", "'ply,gif'", "json, exr"]),
         (&["view-factors", "--error", "1e-3"], &["<SCENE.obj>", "Usage: radiosity view-factors"]),
         (&["view-factors", "a.obj", "--format", "xls"], &["'xls'", "csv, list, mtx, npy, npz"]),
-        (&["view-factors", "a.obj", "--cpu"], &["not provided", "--sampled"]),
-        (
-            &["view-factors", "a.obj", "--sampled", "--error", "1"],
-            &["--error", "cannot be used with", "--sampled"],
-        ),
+        (&["view-factors", "a.obj", "--cpu"], &["'--cpu'"]),
         (&["heat", "a.obj"], &["not provided", "--boundaries <FILE.csv>"]),
         (&["heat", "a.obj", "--boundaries", "b", "--bands", "1,x"], &["'1,x'", "µm"]),
         (&["merge"], &["not provided", "<FILE.rows>"]),
@@ -589,8 +585,7 @@ fn bad_settings_are_refused() {
     with(&["--set", "full_resolution_share=much"], &["much"]);
     with(&["--exposure", "0"], &["exposure 0", "above 0"]);
     with(&["--error", "10%"], &["'10%'", "0.1 for 10 %"]);
-    with(&["--set", "rotations=0"], &["zero"]);
-    with(&["--set", "viewpoint_tolerance=much"], &["much"]);
+    with(&["--set", "near_reach=much"], &["much"]);
     with(&["--gather", "some"], &["'some'", "none, needed, all"]);
     with(&["--set", "mesh_error=much"], &["much"]);
     with(&["--set", "max_elements=-1"], &["-1"]);

@@ -2,5 +2,3 @@ mod batches;
 mod proximity;
 pub mod resolution_policy;
 mod row_check;
-mod shared;
-mod viewpoints;

@@ -1,14 +1,14 @@
 //! Rows that break the contract of `FormFactors` are refused, whoever asked for them.
 
-use radiosity::form_factor::{AdaptiveViewpoints, Entry, ProximityCorrection, Row};
+use radiosity::form_factor::{Entry, ProximityCorrection, Row};
 use radiosity::mesh::NodeId;
 use radiosity::solver::Method;
-use radiosity::{Error, ErrorKind, FormFactors, Mesh, Solver, ViewFactors};
+use radiosity::{Error, ErrorKind, FormFactors, Mesh, Solver};
 
 use crate::common::closed_forms::exact;
 use crate::common::fakes::GivenRows;
 use crate::common::scenes::paint;
-use crate::common::{cube, keep_counting, keep_going};
+use crate::common::{cube, keep_going};
 
 /// The same row for every patch, but `missing` rows too few.
 struct RepeatedRow {
@@ -45,8 +45,6 @@ fn every_user_rejects_invalid_rows() {
         let errors = [
             Solver::new(Method::ALL[0]).solve(&mesh, &mut given(), keep_going).unwrap_err(),
             near().rows(&mesh, &patch, 1.0).unwrap_err(),
-            AdaptiveViewpoints::new(near(), 0.0, 9).rows(&mesh, &patch, 1.0).unwrap_err(),
-            ViewFactors::sampled(&mesh, &mut given(), keep_counting).unwrap_err(),
         ];
         for e in errors {
             assert_eq!(e.kind(), ErrorKind::FormFactor, "{e}");

@@ -1,2 +1,1 @@
 mod point_irradiance;
-mod shared;

@@ -1,5 +1,4 @@
 mod checks;
 mod exact;
 mod partial;
-mod sampled;
 mod sparse;

@@ -3,14 +3,13 @@
 //! ```text
 //! patches ─► views (frame, rotated by a hash of patch id; 5 faces) ─► item buffer ─► reduce
 //!                                                                                      │
-//! rows ◄─ mean over rotations ◄─ sum checked ◄─ readback of entries ◄─ compact ◄───────┘
+//! rows ◄─ sum checked ◄─ readback of entries ◄─ compact ◄──────────────────────────────┘
 //! ```
 //!
 //! A batch holds as many hemicubes as [`BATCH_BYTES`], [`CompactedRows::MAX_BATCH`] and the limits
 //! of the device allow, and a half or a quarter of them where memory is short.
 
 use std::f64::consts::FRAC_PI_2;
-use std::num::NonZeroU32;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -56,7 +55,6 @@ pub struct HemicubeRows {
     /// Preferred number of rows per request, independent of the available memory, since it
     /// determines the order of shots.
     preferred_batch: u32,
-    rotations: NonZeroU32,
     pub(crate) full_share: f64,
     timings: Timings,
 }
@@ -142,21 +140,9 @@ impl HemicubeRows {
             coordinates,
             slots,
             preferred_batch,
-            rotations: NonZeroU32::MIN,
             full_share: HemicubeRows::FULL_SHARE,
             timings: Timings::default(),
         })
-    }
-
-    /// Computes a row as the mean of this number of hemicubes at the patch's centroid, each rotated
-    /// a further 90°/`rotations` about the normal; one by default.
-    ///
-    /// This is for the aliasing assumption of Baum, Rushmeier and Winget (1989): a pixel is in an
-    /// element or not, by its centre. Errors of pixels that straddle a border are independent
-    /// between rotations, so the error of an entry falls with the square root of `rotations`, and
-    /// the time grows in proportion to them. The error due to the single viewpoint remains.
-    pub fn with_rotations(self, rotations: NonZeroU32) -> HemicubeRows {
-        HemicubeRows { rotations, ..self }
     }
 
     /// Full resolution for patches that shoot at least this share of the emitted flux, in [0, 1];
@@ -172,7 +158,7 @@ impl HemicubeRows {
         self.timings
     }
 
-    /// Hemicubes drawn so far, each rotation counted.
+    /// Hemicubes drawn so far.
     pub fn drawn(&self) -> u64 {
         self.batches.resolutions.iter().map(|r| r.drawn).sum()
     }
@@ -183,9 +169,9 @@ impl HemicubeRows {
         self.batches.resolutions.iter().map(|r| (r.pixels, r.drawn)).collect()
     }
 
-    /// The faces of the hemicube over `patch`, rotated by `angle` (radians).
-    fn views(&self, mesh: &Mesh, patch: NodeId, angle: f64) -> [View; 5] {
-        let frame = Frame::new(mesh.normal(patch), angle);
+    /// The faces of the hemicube over `patch`.
+    fn views(&self, mesh: &Mesh, patch: NodeId) -> [View; 5] {
+        let frame = Frame::new(mesh.normal(patch), rotation(patch));
         let near = self.coordinates.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
         let centre = mesh.centroid(patch);
         let [eye, eye_low] = self.coordinates.parts(centre);
@@ -207,17 +193,16 @@ impl HemicubeRows {
         })
     }
 
-    /// One hemicube a patch, each turned by its angle, of resolution number `at`; none where there
-    /// is no room for their entries.
+    /// One hemicube a patch, of resolution number `at`; none where there is no room for their
+    /// entries.
     fn draw_batch(
         &mut self,
         mesh: &Mesh,
-        patches: &[(NodeId, f64)],
+        patches: &[NodeId],
         at: usize,
     ) -> Result<Option<Vec<Row>>, Error> {
         let start = Instant::now();
-        let views: Vec<[View; 5]> =
-            patches.par_iter().map(|&(p, angle)| self.views(mesh, p, angle)).collect();
+        let views: Vec<[View; 5]> = patches.par_iter().map(|&p| self.views(mesh, p)).collect();
         let count = patches.len() as u32;
         let (gpu, slots) = (&self.gpu, self.slots);
         let Batches { item_buffer, reduce, resolutions, compacted, clock, .. } = &mut self.batches;
@@ -293,28 +278,18 @@ impl FormFactors for HemicubeRows {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
         let halvings = resolution_policy::halvings_for_importance(weight, self.full_share) as usize;
         let at = halvings.min(self.batches.resolutions.len() - 1);
-        let count = self.rotations.get();
-        let step = FRAC_PI_2 / f64::from(count);
-        let turns = |&p: &NodeId| (0..count).map(move |k| (p, rotation(p) + f64::from(k) * step));
-        let turned: Vec<(NodeId, f64)> = patches.iter().flat_map(turns).collect();
         let (gpu, batch_len) = (self.gpu.clone(), self.batches.max_hemicubes);
         let draw = |batch: &[_]| self.draw_batch(mesh, batch, at);
-        let rows = CompactedRows::in_batches(&gpu, &turned, batch_len, draw)?;
-        if count == 1 {
-            return Ok(rows);
-        }
-        let mean = |turns: &[Row]| Row::mean(&turns.iter().collect::<Vec<_>>());
-        Ok(rows.par_chunks(count as usize).map(mean).collect())
+        CompactedRows::in_batches(&gpu, patches, batch_len, draw)
     }
 
     fn preferred_batch_len(&self) -> usize {
-        (self.preferred_batch / self.rotations.get()).max(1) as usize
+        self.preferred_batch as usize
     }
 
     fn fingerprint(&self) -> String {
-        let HemicubeRows { rotations, full_share, .. } = self;
         let resolution = self.batches.resolutions[0].pixels;
-        format!("{rotations} hemicubes of {resolution}, all from {full_share}")
+        format!("hemicubes of {resolution}, all from {}", self.full_share)
     }
 }
 
@@ -325,9 +300,9 @@ fn rotation(patch: NodeId) -> f64 {
 }
 
 /// The rows of `patches` by the entries of all; or what is wrong with these.
-fn rows_of(entries: &[RowEntry], patches: &[(NodeId, f64)]) -> Result<Vec<Row>, String> {
+fn rows_of(entries: &[RowEntry], patches: &[NodeId]) -> Result<Vec<Row>, String> {
     let rows = by_row(entries, patches.len())?;
-    rows.par_iter().zip(patches).map(|(row, &(patch, _))| row_of(row, patch)).collect()
+    rows.par_iter().zip(patches).map(|(row, &patch)| row_of(row, patch)).collect()
 }
 
 /// The row of `patch` by its entries; or what is wrong with these.

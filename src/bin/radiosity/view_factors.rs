@@ -5,20 +5,18 @@ mod files;
 pub mod merge;
 mod rows;
 
-use std::num::NonZeroU32;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 use files::MatrixOptions;
-use radiosity::backend::AdapterInfo;
 use radiosity::io::SpecularSurfaces;
 use radiosity::scene::WarningKind;
 use radiosity::view_factor::{ErrorStats, Estimate};
-use radiosity::{BakeSettings, Error, ErrorKind, Mesh, ObjSettings, Scene, ViewFactors, Warning};
+use radiosity::{Error, ErrorKind, ObjSettings, Scene, ViewFactors, Warning};
 
-use crate::args::{self, DeviceOptions, Stop, value};
+use crate::args::{self, Stop, value};
 use crate::progress;
 
 /// Groups whose factors are printed at most.
@@ -29,8 +27,6 @@ const ROUNDING_OF_SUMS: f64 = 1e-12;
 
 /// Makes view factors between the groups of scenes
 #[derive(Args)]
-#[command(mut_arg("cpu", |arg| arg.requires("sampled")))]
-#[command(mut_arg("adapter", |arg| arg.requires("sampled")))]
 #[command(after_help = "\
 Writes the view factors of each file and prints them, with standard errors and with closure, \
 reciprocity and bounds of the raw numbers. F[i, j] is the share of the flux leaving group i (row) \
@@ -57,21 +53,6 @@ pub struct Options {
     /// Folder for the files [default: that of each scene]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Sample the factors, with hemicubes or rays at each element: for scenes of more than some ten
-    /// thousand polygons; the error is not controlled
-    #[arg(long)]
-    #[arg(conflicts_with_all = ["error", "two_sided", "check", "memory", "rows", "checkpoint"])]
-    sampled: bool,
-    /// Longest edge of the elements that are sampled, scene unit [default: diagonal / 32]
-    #[arg(long, value_name = "X", requires = "sampled", value_parser = value::<f64>("a number"))]
-    element_size: Option<f64>,
-    /// Pixels along an edge of a hemicube's top face, even; of rays on the CPU, the square root of
-    /// their number
-    #[arg(long, value_name = "N", requires = "sampled", default_value = "128")]
-    #[arg(value_parser = value::<u32>("a whole number of pixels"))]
-    hemicube: u32,
-    #[command(flatten)]
-    device: DeviceOptions,
 }
 
 /// View factors to an error that is asked for.
@@ -156,7 +137,7 @@ impl Options {
             return self.to_error.write_rows(&scene, rows.clone(), &stem);
         }
         let start = Instant::now();
-        let mut matrix = self.factors(&scene)?;
+        let mut matrix = self.to_error.matrix(&scene)?;
         let seconds = start.elapsed().as_secs_f64();
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
         let groups = matrix.names.len();
@@ -167,23 +148,6 @@ impl Options {
             matrix = enforce(&matrix);
         }
         Ok(write_all(&formats, &stem, &matrix)?)
-    }
-
-    /// The view factors between the groups of `scene`.
-    fn factors(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
-        if !self.sampled {
-            return self.to_error.matrix(scene);
-        }
-        let default = || BakeSettings::elements_only(scene).solve.element_size;
-        let mesh = Mesh::new(scene.clone(), self.element_size.unwrap_or_else(default))?;
-        let device = self.device.open()?;
-        let mut rows = device.rows(&mesh, self.hemicube, NonZeroU32::MIN)?;
-        let AdapterInfo { name, kind, .. } = device.adapter();
-        say!("{} elements, {name} ({kind})", mesh.element_count());
-        let matrix = progress::of_count("elements", |report| {
-            ViewFactors::sampled(&mesh, &mut rows, report)
-        })?;
-        matrix.ok_or(Stop::Interrupted)
     }
 
     /// Compares rows of `matrix` with exact ones, if that was asked for.

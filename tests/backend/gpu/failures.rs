@@ -2,7 +2,6 @@
 //! error or by smaller batches; what was solved by then stays.
 
 use std::cell::RefCell;
-use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
@@ -105,7 +104,7 @@ fn lost_device_is_an_error_everywhere() {
         HemicubeRows::new(&gpu, &mesh, 64).unwrap_err(),
         TracedGather::new(&gpu, &mesh, 64).unwrap_err(),
         TracedRows::new(&gpu, &mesh, 64).unwrap_err(),
-        Backend::Gpu(gpu.clone()).rows(&mesh, 64, NonZeroU32::MIN).unwrap_err(),
+        Backend::Gpu(gpu.clone()).rows(&mesh, 64).unwrap_err(),
         drawn.bake(mesh.scene().clone(), &Backend::Gpu(gpu.clone()), keep_going).unwrap_err(),
     ];
     for e in errors {

@@ -1,7 +1,6 @@
 //! Rows from hemicubes: against closed forms, against rays, and against themselves.
 
 use std::f64::consts::PI;
-use std::num::NonZeroU32;
 
 use glam::DVec3;
 use radiosity::form_factor::Row;
@@ -197,42 +196,4 @@ fn rejects_bad_resolutions_and_adapters() {
     let e = Gpu::new(Some("no such adapter")).unwrap_err();
     assert_eq!(e.kind(), ErrorKind::Device);
     assert!(e.to_string().contains(&gpu.adapter().name), "lists what there is: {e}");
-}
-
-#[test]
-#[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
-fn rotations_average_pixel_errors() {
-    let gpu = gpu();
-    let mesh = Mesh::new(cube(&grey()), 0.1).unwrap();
-    // Elements of the walls, some 20 pixels each.
-    let patches: Vec<NodeId> = (0..20).map(|k| mesh.element(k * 150 + 7)).collect();
-    let make = |k: u32| {
-        let k = NonZeroU32::new(k).unwrap();
-        let mut maker = HemicubeRows::new(&gpu, &mesh, 128).unwrap().with_rotations(k);
-        let rows = maker.rows(&mesh, &patches, 1.0).unwrap();
-        rows.iter().zip(&patches).for_each(|(row, &p)| row.check(&mesh, p).unwrap());
-        assert_eq!(maker.drawn(), u64::from(k.get()) * patches.len() as u64);
-        rows
-    };
-    let rms = |rows: &[Row]| {
-        let (mut squares, mut count) = (0.0, 0.0);
-        for (row, &patch) in rows.iter().zip(&patches) {
-            let (eye, normal) = (mesh.centroid(patch), mesh.normal(patch));
-            for e in &row.entries {
-                let corners = mesh.corners(mesh.element(e.element as usize));
-                let exact = point_to_polygon(eye, normal, &corners);
-                squares += (Row::form_factor(e.share) - exact).powi(2);
-                count += 1.0;
-            }
-        }
-        f64::sqrt(squares / count)
-    };
-    assert!(make(1) == hemicube_rows(&gpu, &mesh, 128, &patches), "one rotation is none");
-    let (one, four) = (make(1), make(4));
-    assert!(four == make(4), "the same bits again");
-    let ratio = rms(&four) / rms(&one);
-    println!("error {:.2e}, with four rotations {ratio:.3} of it", rms(&one));
-    // Independent errors would leave 1/2; the RMS of some 50 000 entries is known to well below a
-    // tenth of itself.
-    assert!(ratio < 0.6, "{ratio}");
 }

@@ -1,18 +1,18 @@
 //! The sweeps, and how far off each may be.
 
 use std::f64::consts::PI;
-use std::num::NonZeroU32;
 use std::path::Path;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
 use radiosity::backend::gpu::TracedGather;
-use radiosity::form_factor::{AdaptiveViewpoints, ProximityCorrection};
+use radiosity::form_factor::{ProximityCorrection, Row};
 use radiosity::gather::{GatherPoint, RefinementSettings, gather_at_vertices};
+use radiosity::mesh::NodeId;
 use radiosity::solver::Method;
 use radiosity::{
-    Backend, BakeTarget, Error, Gather, GatheredMesh, Mesh, Rgb, Scene, Solution, Solver,
-    VertexMesh, ViewFactors, write_ply,
+    Backend, BakeTarget, Error, FormFactors, Gather, GatheredMesh, Mesh, Rgb, Scene, Solution,
+    Solver, VertexMesh, ViewFactors, write_ply,
 };
 
 use super::sweep::Sweep;
@@ -166,7 +166,7 @@ fn sphere(mut sweep: Sweep, steps: Vec<(Frame, f64)>, ask: &Ask) -> Swept {
     for (frame, rho) in steps {
         let scene = scenes::sphere(frame, 2, grey(rho, 1.0), grey(rho, 0.0));
         let mesh = Mesh::new(scene, f64::INFINITY)?;
-        let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
+        let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
         let s = Solver { unshot: 1e-9, ..Solver::for_mesh(&mesh) }
             .solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
@@ -223,16 +223,31 @@ fn shift_of_plates(ask: &Ask) -> Swept {
 /// of some hundred has a tenth; over F, six times as much is 3e-3.
 const PATCHES: f64 = 9e-3;
 
+/// Factors between groups 0 and 1, both ways: means of the rows of their elements by area.
+fn factors_of_plates(mesh: &Mesh, rows: &mut dyn FormFactors) -> Result<[f64; 2], Error> {
+    let group = |node: NodeId| mesh.scene().triangles()[mesh.triangle(node)].group;
+    let nodes: Vec<NodeId> = (0..mesh.element_count()).map(|e| mesh.element(e)).collect();
+    let (mut areas, mut sums) = ([0.0; 2], [0.0; 2]);
+    for (row, &from) in rows.rows(mesh, &nodes, 1.0)?.iter().zip(&nodes) {
+        row.check(mesh, from)?;
+        let Some(area) = areas.get_mut(group(from) as usize) else { continue };
+        *area += mesh.area(from);
+        for entry in &row.entries {
+            if group(mesh.element(entry.element as usize)) == 1 - group(from) {
+                sums[group(from) as usize] += mesh.area(from) * Row::form_factor(entry.share);
+            }
+        }
+    }
+    Ok([sums[0] / areas[0], sums[1] / areas[1]])
+}
+
 fn rows_of_plates(ask: &Ask) -> Swept {
     let mut sweep = Sweep::new("scale", SCALES, "plates, F = 0.19982", PATCHES);
     sweep.by("rows");
     for frame in ask.scales() {
         let mesh = Mesh::new(scenes::plates(frame), 0.1 * frame.scale)?;
-        let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
-        let matrix = matrix.expect("nobody cancels");
-        let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
-        sweep.step(&both, &[scenes::PLATES; 2]);
+        let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
+        sweep.step(&factors_of_plates(&mesh, &mut rows)?, &[scenes::PLATES; 2]);
     }
     Ok(sweep)
 }
@@ -248,20 +263,17 @@ fn rows_of_small_plates(ask: &Ask) -> Swept {
             let far = mesh.elements_of(mesh.root(4)).start;
             mesh = mesh.split(&(0..far).collect::<Vec<_>>())?;
         }
-        let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-        let matrix = ViewFactors::sampled(&mesh, &mut rows, keep_counting)?;
-        let matrix = matrix.expect("nobody cancels");
-        let both = [matrix.factor(0, 1).value, matrix.factor(1, 0).value];
-        sweep.step(&both, &[scenes::PLATES; 2]);
+        let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
+        sweep.step(&factors_of_plates(&mesh, &mut rows)?, &[scenes::PLATES; 2]);
     }
     Ok(sweep)
 }
 
-/// Light of `scene` by all stages: rows with all repairs, and the solver that the mesh asks for.
+/// Light of `scene` by all stages: corrected rows, and the solver that the mesh asks for.
 fn settle(scene: Scene, size: f64, ask: &Ask) -> Result<(Mesh, Solution), Error> {
     let mesh = Mesh::new(scene, size)?.split_at_contacts(1);
-    let rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
-    let mut rows = AdaptiveViewpoints::new(ProximityCorrection::new(rows, &mesh, 1.0), 0.05, 1);
+    let rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
+    let mut rows = ProximityCorrection::new(rows, &mesh, 1.0);
     let solution = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, keep_going)?;
     Ok((mesh, solution))
 }
@@ -371,7 +383,7 @@ fn lamps_apart(ask: &Ask) -> Swept {
         let mesh = Mesh::new(scenes::rooms(0.5, ratio, 1.0), 0.8)?;
         let (mut found, mut known) = (vec![], vec![]);
         for method in Method::ALL {
-            let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
+            let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
             let s = Solver { unshot: 0.0, ..Solver::new(method) }
                 .solve(&mesh, &mut rows, keep_going)?;
             sweep.solved(&s);
@@ -394,7 +406,7 @@ fn lamps_together(ask: &Ask) -> Swept {
     let mut sweep = Sweep::new("flux ratio", RATIOS, "one lamp, plus the other", ROUNDING);
     let room = |first, second, sweep: &mut Sweep| -> Result<Vec<f64>, Error> {
         let mesh = Mesh::new(scenes::room(HERE, first, second), 0.5)?;
-        let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
+        let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
         let solver = Solver { unshot: 0.0, ..Solver::new(Method::Gmres { restart: 50 }) };
         let s = solver.solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
@@ -483,7 +495,7 @@ fn areas(ask: &Ask) -> Swept {
     for side in ask.steps((0..=12).map(|k| 0.5 * 10f64.powf(-f64::from(k) / 2.0))) {
         let scene = scenes::panelled(HERE, side, grey(0.5, 1.0), grey(0.5, 1.0));
         let mesh = Mesh::new(scene, 0.5)?;
-        let mut rows = ask.device.rows(&mesh, PIXELS, NonZeroU32::MIN)?.with_full_share(0.0);
+        let mut rows = ask.device.rows(&mesh, PIXELS)?.with_full_share(0.0);
         let s = Solver::for_mesh(&mesh).solve(&mesh, &mut rows, keep_going)?;
         sweep.solved(&s);
         let areas = (0..mesh.element_count()).map(|k| mesh.area(mesh.element(k)));

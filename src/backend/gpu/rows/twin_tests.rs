@@ -29,7 +29,7 @@ fn item_buffer_and_reduce_equal_their_twins() {
     // One word of padding a line and none; strips that end early; more than one workgroup across.
     for n in [8, 30, 64, 72] {
         let mut rows = HemicubeRows::new(&gpu, &mesh, n).unwrap();
-        let patches = [(mesh.element(0), 0.3), (mesh.element(2), 1.1), (mesh.root(1), 0.7)];
+        let patches = [mesh.element(0), mesh.element(2), mesh.root(1)];
         let drawn = rows.draw_batch(&mesh, &patches, 0).unwrap().unwrap();
         let order = &rows.draw_list.order;
         let corners = rows.coordinates.corners(mesh.scene(), order);
@@ -41,8 +41,8 @@ fn item_buffer_and_reduce_equal_their_twins() {
         let left: Vec<u32> = read_buffer(&gpu, &rows.batches.reduce.rows);
         assert!(left.iter().all(|&share| share == 0), "rows are 0 for the next batch");
         let mut lines = vec![];
-        for (k, &(patch, angle)) in (0..).zip(&patches) {
-            let views = rows.views(&mesh, patch, angle).map(|v| v.face);
+        for (k, &patch) in (0..).zip(&patches) {
+            let views = rows.views(&mesh, patch).map(|v| v.face);
             let twins: Vec<Vec<_>> =
                 offsets().into_iter().map(|offset| twin.draw(&views, n, offset).pixels).collect();
             let texture = &rows.batches.resolutions[0].targets.texture;

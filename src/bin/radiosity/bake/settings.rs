@@ -1,6 +1,5 @@
 //! The settings of a bake that `--set` sets and the report has, by their names in the library.
 
-use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use clap::CommandFactory;
@@ -51,7 +50,6 @@ field! {
     u32, "a whole number of at least zero", value => value;
     u64, "a whole number of at least zero", value => value;
     usize, "a whole number of at least zero", value => value;
-    NonZeroU32, "a whole number above zero", value => value.get();
     Method, "shooting, overshoot, jacobi, gauss-seidel, gmres or direct", it => it.to_string();
 }
 
@@ -109,13 +107,8 @@ const SETTINGS: &[Setting] = &[
     setting!(solve.full_resolution_share,
         "share of the emitted light from which on a patch shoots much; 0 for all patches [by the \
          device]"),
-    setting!(solve.rotations,
-        "hemicubes a viewpoint, each turned further about the normal, averaged [1]"),
     setting!(solve.near_reach,
         "closed forms for receivers within this many patch diameters; below 0 for none [1]"),
-    setting!(solve.viewpoint_tolerance,
-        "share of a patch's light that may land on other elements when it is sent from the parts \
-         of the patch, above which rows are made at the parts [none: one viewpoint a patch]"),
     Setting {
         name: "solve.solver.method",
         meaning: "how light is spread: shooting, overshoot, jacobi, gauss-seidel, gmres or direct \

@@ -1,8 +1,6 @@
 //! The runs: one setting at a time is varied around those meant for one error, and some errors are
 //! asked for as targets.
 
-use std::num::NonZeroU32;
-
 use radiosity::bake::GatherSettings;
 use radiosity::{BakeSettings, Scene};
 
@@ -61,11 +59,10 @@ struct Variation {
 /// Title, note and variations of a panel.
 type PanelPlan = (&'static str, &'static str, &'static [Variation]);
 
-const PANELS: [PanelPlan; 6] = [
+const PANELS: [PanelPlan; 5] = [
     ("Resolution", "hemicube pixels an edge; rays as their square", &[RESOLUTION]),
     ("Element size", "edge of those that shoot; others with it", &[ELEMENT_SIZE]),
     ("Unshot share", "of the light, at which shooting stops", &[UNSHOT]),
-    ("Rotations", "hemicubes a viewpoint, averaged", &[ROTATIONS]),
     ("Near field", "closed forms within so many patch diameters", &[NEAR_FIELD]),
     ("Gather", "none; how often; how much elements may be off", &[NO_GATHER, SWEEPS, MESH_ERROR]),
 ];
@@ -107,17 +104,6 @@ const UNSHOT: Variation = Variation {
     quick_values: &[16.0, 4.0, 1.0],
     change: |settings, factor| settings.solve.solver.unshot *= factor,
     label: |settings| percent(settings.solve.solver.unshot),
-};
-
-const ROTATIONS: Variation = Variation {
-    knob: "rotations",
-    name: "",
-    values: &[1.0, 2.0, 4.0],
-    quick_values: &[1.0, 2.0],
-    change: |settings, rotations| {
-        settings.solve.rotations = NonZeroU32::new(rotations as u32).expect("not zero");
-    },
-    label: |settings| settings.solve.rotations.to_string(),
 };
 
 const NEAR_FIELD: Variation = Variation {

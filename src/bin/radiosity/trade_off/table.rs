@@ -37,7 +37,6 @@ impl Results {
             ("element_size", format!("{:.6}", solve.element_size)),
             ("contacts", solve.contact_levels.to_string()),
             ("hemicube", solve.hemicube_resolution.to_string()),
-            ("rotations", solve.rotations.to_string()),
             ("near", solve.near_reach.to_string()),
             ("unshot", solve.solver.unshot.to_string()),
             ("patch_tolerance", solve.solver.patch_tolerance.to_string()),
