@@ -26,10 +26,11 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 pub use crate::accuracy::Estimate;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 pub use crate::light::{PathTracer, Reflected, SurfacePoint};
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
+use crate::visibility::lit_sides::is_resolved;
 use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;
@@ -71,17 +72,15 @@ pub fn verify(
     scene: &Scene,
     solution: &VertexMesh,
     settings: &Settings,
-    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+    progress: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Verification, Error> {
-    settings.check()?;
-    let scene = scene.resolve_sides();
-    let mut verifier = Verifier::new(&scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))?;
-    let solution = SolutionLookup::new(solution, &scene)?;
-    verifier.measure(&solution, Limits::default(), &mut progress)
+    Verifier::new(&scene.resolve_sides(), settings)?.measure(solution, progress)
 }
 
-/// Measures one solution of a scene after the other at the same points: paths are traced once.
-pub(crate) struct Verifier<'a> {
+/// Random points of a scene with the light that paths find there, at which solutions of the scene
+/// are measured, one after the other: paths are traced once for all of them.
+#[derive(Debug)]
+pub struct Verifier<'a> {
     sampler: Sampler<'a>,
     settings: Settings,
     /// Points over all, before those that groups have at least; and paths at each.
@@ -103,9 +102,25 @@ pub(crate) struct Limits {
 }
 
 impl<'a> Verifier<'a> {
-    /// For solutions of `scene`, with so many `points` in the first round, or more if there are
-    /// many vertices, and so many `paths` at each.
-    pub fn new(
+    /// For solutions of `scene`, which has its sides resolved ([`Scene::resolve_sides`]). There are
+    /// no points before the first [`measure`](Verifier::measure).
+    ///
+    /// # Errors
+    /// - [`Setting`](crate::ErrorKind::Setting) for a setting out of range.
+    /// - [`Scene`](crate::ErrorKind::Scene) when sides are not resolved, nothing in the scene
+    ///   reflects or nothing emits.
+    pub fn new(scene: &'a Scene, settings: &Settings) -> Result<Verifier<'a>, Error> {
+        settings.check()?;
+        if !is_resolved(scene) {
+            let remedy = "measure in the scene that `Scene::resolve_sides` gives";
+            return Err(Error::new(ErrorKind::Scene, "sides", "not resolved", remedy));
+        }
+        Verifier::starting_with(scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))
+    }
+
+    /// With so many `points` in the first round, or more if there are many vertices, and so many
+    /// `paths` at each.
+    pub(crate) fn starting_with(
         scene: &'a Scene,
         settings: Settings,
         (points, paths): (usize, usize),
@@ -114,11 +129,36 @@ impl<'a> Verifier<'a> {
         Ok(Verifier { sampler, settings, points, paths })
     }
 
-    /// See [`verify`].
+    /// Measures `solution`, with as many more points and paths as it takes: see [`verify`].
+    ///
+    /// # Errors
+    /// [`Scene`](crate::ErrorKind::Scene) as [`verify`] has it for a solution.
     pub fn measure(
         &mut self,
-        solution: &dyn Solution,
+        solution: &VertexMesh,
+        mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Verification, Error> {
+        let solution = SolutionLookup::new(solution, self.sampler.scene())?;
+        self.measure_within(Limits::default(), &solution, &mut progress)
+    }
+
+    /// Measures `solution` at the points that there are, by the paths that were traced there: as
+    /// exactly as these tell, and [`Stop::Rounds`].
+    ///
+    /// # Errors
+    /// Those of [`Verifier::measure`].
+    pub fn measure_at_same_points(&mut self, solution: &VertexMesh) -> Result<Verification, Error> {
+        let solution = SolutionLookup::new(solution, self.sampler.scene())?;
+        self.sampler.forget();
+        self.sampler.tell(&solution)?;
+        Ok(Verification { stop: Stop::Rounds, ..self.sampler.verification().0 })
+    }
+
+    /// As [`Verifier::measure`], no further than `limits`.
+    pub(crate) fn measure_within(
+        &mut self,
         limits: Limits,
+        solution: &dyn Solution,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Verification, Error> {
         let (sampler, settings) = (&mut self.sampler, &self.settings);
@@ -273,11 +313,12 @@ mod tests {
                 time: None,
                 ..Default::default()
             };
-            let mut verifier = Verifier::new(&scene, settings, (64, 2048)).unwrap();
+            let mut verifier = Verifier::starting_with(&scene, settings, (64, 2048)).unwrap();
             let paths = Some(paths);
             let limits = Limits { error: Some(limit), each_group, paths, paths_in_doubt: paths };
             let solution = SolutionLookup::new(&told, &scene).unwrap();
-            let found = verifier.measure(&solution, limits, &mut |_| ControlFlow::Continue(()));
+            let go = &mut |_: &Progress| ControlFlow::Continue(());
+            let found = verifier.measure_within(limits, &solution, go);
             found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()
         };
         let most = 1 << 22;

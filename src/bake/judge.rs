@@ -71,7 +71,7 @@ impl<'a> Judge<'a> {
         };
         let mut stopped = false;
         let measured = self.verifier().and_then(|verifier| {
-            verifier.measure(light, limits, &mut |p: &Progress| {
+            verifier.measure_within(limits, light, &mut |p: &Progress| {
                 let flow = progress(p.done, p.of);
                 stopped |= flow.is_break();
                 flow
@@ -92,7 +92,7 @@ impl<'a> Judge<'a> {
             Some(verifier) => verifier,
             None => {
                 let first = (model::JUDGE_POINTS, model::JUDGE_FIRST_PATHS);
-                Verifier::new(self.scene, self.settings(), first)?
+                Verifier::starting_with(self.scene, self.settings(), first)?
             }
         };
         Ok(self.verifier.insert(verifier))

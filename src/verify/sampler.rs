@@ -33,6 +33,7 @@ const TRIMMED_SHARE: f64 = 0.01;
 const MIN_CONCENTRATION: f64 = 4.0;
 
 /// Points of groups, and what was traced at them so far.
+#[derive(Debug)]
 pub(super) struct Sampler<'a> {
     scene: &'a Scene,
     settings: Settings,
@@ -43,6 +44,7 @@ pub(super) struct Sampler<'a> {
 }
 
 /// A group, and its points.
+#[derive(Debug)]
 struct Stratum {
     surface: ReflectingGroup,
     points: Vec<TracedPoint>,
@@ -53,7 +55,7 @@ struct Stratum {
 }
 
 /// A point, and the paths that began there.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct TracedPoint {
     /// Number among those of its group.
     index: usize,
@@ -81,6 +83,10 @@ impl<'a> Sampler<'a> {
             settings: settings.clone(),
             paths: 0,
         })
+    }
+
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
     }
 
     /// Adds points until there are about `points` of them, spread over the area that counts as far
@@ -329,10 +335,15 @@ impl<'a> Sampler<'a> {
             true => all.mean,
             false => self.trimmed(&self.counting(true)).mean,
         };
+        let plain = match self.settings.measure.tail {
+            0.0 => all.mean,
+            _ => TrimmedSquare::new(&counting.concat(), 0.0).unwrap_or_default().mean,
+        };
         let verification = Verification {
             error: is_told.then(|| all.mean.root()),
             tail: is_told.then(|| all.tail.max(0.0).sqrt()),
             bias: all.mean.bias,
+            error_with_tail: is_told.then(|| plain.root()),
             error_with_hidden: is_told.then(|| with_hidden.root()),
             hidden_share,
             groups,

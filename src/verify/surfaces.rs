@@ -13,6 +13,7 @@ use crate::sampling::octaves::{Octaves, Part};
 use crate::scene::Scene;
 
 /// The part of a group that reflects.
+#[derive(Debug)]
 pub(super) struct ReflectingGroup {
     /// Index of the group in the scene.
     pub group: usize,
@@ -22,6 +23,7 @@ pub(super) struct ReflectingGroup {
 }
 
 /// A part of a triangle.
+#[derive(Debug)]
 struct Cell {
     triangle: usize,
     part: Part,

@@ -42,6 +42,8 @@ pub struct Verification {
     /// Root mean square of the errors in the tail, the share of the area that
     /// [`Measure::tail`](crate::accuracy::Measure) leaves out, where they are largest.
     pub tail: Option<f64>,
+    /// The error with the tail: the plain root mean square.
+    pub error_with_tail: Option<Estimate>,
     /// About how much too large the square of the error is: see the statistics.
     pub(crate) bias: f64,
     /// The error with what is hidden.

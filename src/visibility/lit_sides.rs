@@ -112,7 +112,7 @@ pub(crate) fn resolved(scene: Arc<Scene>) -> Arc<Scene> {
 }
 
 /// Whether all materials have one side, and translucent triangles another behind them.
-fn is_resolved(scene: &Scene) -> bool {
+pub(crate) fn is_resolved(scene: &Scene) -> bool {
     let is_missing = |t: usize| scene.material(t).is_translucent() && !scene.is_back_covered(t);
     scene.materials().iter().all(|material| material.sides == Sides::Front)
         && !(0..scene.triangles().len()).any(is_missing)

@@ -8,6 +8,7 @@ mod light_map;
 mod luminaires;
 mod output;
 mod sky;
+mod trade_off;
 mod usage;
 mod view_factors;
 
@@ -435,6 +436,7 @@ fn wrong_usage_has_status_2_and_says_what_would_be_right() {
         (&["probes", "a.obj"], &["not provided", "--spacing <X>"]),
         (&["probes", "a.obj", "--counts", "2,2"], &["'2,2'", "three whole numbers"]),
         (&["trade-off", "--slow"], &["'--slow'", "Usage: radiosity trade-off"]),
+        (&["trade-off", "a.obj", "--tail", "some"], &["--tail", "'some'", "a share"]),
     ] {
         let out = run(args[0], &args[1..]);
         let error = String::from_utf8_lossy(&out.stderr);

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::DVec3;
-use radiosity::verify::{Progress, Settings, Stop, Verification, verify};
-use radiosity::{ErrorKind, Material, Rgb, Scene, Triangle, VertexMesh};
+use radiosity::verify::{Progress, Settings, Stop, Verification, Verifier, verify};
+use radiosity::{ErrorKind, Material, Rgb, Scene, Sides, Triangle, VertexMesh};
 
 use crate::common::keep_going;
 use crate::common::scenes::{
@@ -119,6 +119,51 @@ fn groups_weigh_by_their_area() {
         assert!((group.area_share - share).abs() < 1e-12 && group.hidden_share == 0.0);
         assert!((group.points as f64 / found.points.len() as f64 - share).abs() < 0.01);
     }
+}
+
+/// A two hundredth of the area is off by 200 %, all else by 10 %: the tail of 1 % holds the former.
+#[test]
+fn the_tail_does_not_count_and_is_told_with_the_error() {
+    let side = (0.005f64 / 0.995).sqrt();
+    let scene = cubes(&[(1.0, paint(0.5, 1.0)), (side, paint(0.5, 1.0))]);
+    let wrong = solution(&scene, |t| furnace(&scene, t, if t.group == 0 { 1.1 } else { 3.0 }));
+    let plain = (0.995 * 0.1f64.powi(2) + 0.005 * 2f64.powi(2)).sqrt();
+    let found = verify(&scene, &wrong, &settings(0.05), keep_going).unwrap();
+    check(found.error, 0.1, 0.006);
+    check(found.error_with_tail, plain, 0.04);
+    let mut without_tail = settings(0.05);
+    without_tail.measure.tail = 0.0;
+    let all = verify(&scene, &wrong, &without_tail, keep_going).unwrap();
+    check(all.error, plain, 0.04);
+    assert_eq!((all.error, all.tail), (all.error_with_tail, Some(0.0)));
+}
+
+#[test]
+fn solutions_are_measured_at_the_same_points() {
+    let scene = cubes(&[(1.0, paint(0.5, 1.0))]);
+    let off_by = |factor: f64| solution(&scene, |t| furnace(&scene, t, factor));
+    let mut verifier = Verifier::new(&scene, &settings(0.05)).unwrap();
+    let none = verifier.measure_at_same_points(&off_by(1.1)).unwrap();
+    assert_eq!((none.error, none.points.len()), (None, 0));
+    let first = verifier.measure(&off_by(1.1), keep_going).unwrap();
+    assert_eq!(
+        first.error,
+        verify(&scene, &off_by(1.1), &settings(0.05), keep_going).unwrap().error
+    );
+    for factor in [0.7, 1.2] {
+        let other = verifier.measure_at_same_points(&off_by(factor)).unwrap();
+        check(other.error, (factor - 1.0).abs(), 0.01);
+        assert_eq!((other.stop, other.paths), (Stop::Rounds, first.paths));
+        let points = |of: &Verification| -> Vec<(DVec3, Rgb)> {
+            of.points.iter().map(|p| (p.position, p.found)).collect()
+        };
+        assert!(points(&other) == points(&first));
+    }
+    assert_eq!(verifier.measure_at_same_points(&off_by(1.1)).unwrap().error, first.error);
+    let both = cubes(&[(1.0, Material { sides: Sides::Both, ..paint(0.5, 1.0) })]);
+    let error = Verifier::new(&both, &settings(0.05)).unwrap_err();
+    assert!(error.to_string().contains("resolve_sides"), "{error}");
+    assert!(Verifier::new(&both.resolve_sides(), &settings(0.05)).is_ok());
 }
 
 #[test]

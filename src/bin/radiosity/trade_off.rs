@@ -2,55 +2,49 @@
 //! a table and a chart.
 //!
 //! ```text
-//! Grid: settings to try ──> bake each ──> Measured: seconds, error against a Reference
-//!                                              │
-//!                      CSV: all runs; SVG and PNG: error over time;
-//!                      summary: error targets against the best of the fixed settings
+//! Grid: settings to try ──> bake each ──> Measured: seconds, error at points that are path traced
+//!                                              │    once, with the finest run
+//!                     CSV and text: all runs; SVG and PNG: error over time
 //! ```
 
 mod chart;
-mod face;
 mod grid;
-mod measure;
 mod plot;
-mod reference;
-mod surface_points;
 mod table;
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 use clap::Args;
 use grid::{Grid, Run, Target};
-use measure::Measured;
+use radiosity::accuracy::Measure;
+use radiosity::verify::{Estimate, Settings, Verification, Verifier};
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene};
-use reference::Reference;
-use surface_points::SurfacePoints;
 
-use crate::args::{self, DeviceOptions, Stop};
-use crate::interrupt;
+use crate::args::{self, DeviceOptions, MeasureOptions, Stop, value};
 use crate::scene_options::{Input, SceneOptions};
+use crate::{interrupt, progress};
 
 /// Measures time and error of bakes of a scene, over their settings
 #[derive(Args)]
 #[command(after_help = "\
 Bakes the scene with many settings, one varied at a time around those for an error of 2 %, and to \
 errors that are asked for. Writes STEM.csv (a row a run), STEM.svg and STEM.png (error over time), \
-and prints the time of a bake to an error beside that of the fastest settings that are as exact. \
-Seconds are those of the stages of a bake and of the estimate of its error, without reading the \
-file and opening the device; short runs are timed three times, and the least time counts. Errors \
-are root mean squares over the area, as shares of radiosity. After Ctrl-C the table of the \
-finished runs is written.")]
+and prints the runs by time. Seconds are those of the stages of a bake and of the estimate of its \
+error, without reading the file and opening the device; short runs are timed three times, and the \
+least time counts. Errors are measured as `radiosity verify` does, all at the same points: these \
+are path traced once, until the error of the finest run is known well enough, or for 120 s. \
+After Ctrl-C the table of the finished runs is written.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
-    /// Points with their radiosity, a JSON file; errors are those at its points of kind "area"
-    /// [default: a run three times finer than the finest, at 4096 points, without narrow gaps]
-    #[arg(long, value_name = "FILE.json")]
-    truth: Option<PathBuf>,
+    #[command(flatten)]
+    measure: MeasureOptions,
+    /// Standard error at which there are enough points and paths, as a share of the error of the
+    /// finest run
+    #[arg(long, value_name = "X", default_value = "0.1", value_parser = value::<f64>("a number"))]
+    precision: f64,
     /// Fewer and coarser runs, around the settings for 5 %
     #[arg(long)]
     quick: bool,
@@ -67,6 +61,21 @@ pub struct Options {
     stem: PathBuf,
 }
 
+/// What came out of one bake.
+struct Measured {
+    /// All stages of the bake; neither reading the file nor opening the device.
+    seconds: f64,
+    /// By the measure.
+    error: Estimate,
+    /// The plain root mean square: with the tail.
+    error_with_tail: Estimate,
+    /// The error that the bake itself estimates.
+    told: f64,
+    vertices: usize,
+    /// The settings used in the end.
+    settings: BakeSettings,
+}
+
 /// All that was measured.
 struct Results {
     grid: Grid,
@@ -74,7 +83,7 @@ struct Results {
     /// Fixed settings that no others are both faster and better than, by time; choices of an error
     /// target are not among them.
     front: Vec<usize>,
-    reference: Reference,
+    measure: Measure,
     scene: String,
     adapter: String,
 }
@@ -89,8 +98,15 @@ const ROUNDS: u32 = 3;
 /// The error of the run before all others, which compiles shaders and is not timed.
 const WARM_UP_ERROR: f64 = 0.3;
 
-/// How many times finer than the finest run the reference is, where there is no truth.
-const REFERENCE_FINER: f64 = 3.0;
+/// What bakes are made of and with.
+struct Bench {
+    scene: Arc<Scene>,
+    device: Backend,
+    measure: Measure,
+}
+
+/// Errors below this are all alike: 0.0001 %.
+const LEAST_ERROR: f64 = 1e-6;
 
 impl Options {
     /// Runs the command.
@@ -99,97 +115,43 @@ impl Options {
         stem.push("_trade_off");
         let formats = [("csv", ()), ("svg", ()), ("png", ())];
         self.stem = args::stem(self.out.take(), stem.into(), &formats);
-        say!("{}", self.results()?.summary());
-        args::end()
-    }
-
-    fn results(&self) -> Result<Results, Error> {
         args::check_writable(&self.stem)?;
-        let truth = self.read_truth()?;
         let Input { scene, .. } = self.reading.read(&self.scene)?;
-        let scene = Arc::new(scene);
-        let device = self.device.open()?;
-        let mut grid = Grid::new(&scene, self.quick);
-        interrupt::catch();
-        BakeSettings::for_error(WARM_UP_ERROR, &scene).bake(scene.clone(), &device, go)?;
-        let reference = match truth {
-            Some(truth) => truth,
-            None => finest_run(&grid, &scene, &device)?,
-        };
-        let measured = self.measure(&grid, &reference, &scene, &device)?;
-        grid.runs.truncate(measured.len());
-        let results = Results {
-            front: front(&grid.runs, &measured),
-            grid,
-            measured,
-            reference,
-            scene: self.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            adapter: device.adapter().name,
-        };
+        let results = self.results(Arc::new(scene))?;
         if !results.measured.is_empty() {
+            say!("{}", results.text());
             self.write("csv", results.csv().as_bytes())?;
         }
         if interrupt::stopped() {
-            let runs = results.measured.len();
-            eprintln!("stopped: the table has {runs} of the runs; no chart is drawn of a part");
-            return Ok(results);
+            eprintln!("stopped: the table has the runs that were finished; there is no chart");
+        } else {
+            self.write("svg", chart::svg(&results).map_err(|e| self.bad_chart(&e))?.as_bytes())?;
+            self.write("png", &chart::png(&results).map_err(|e| self.bad_chart(&e))?)?;
         }
-        self.write("svg", chart::svg(&results).map_err(|e| self.bad_chart(&e))?.as_bytes())?;
-        self.write("png", &chart::png(&results).map_err(|e| self.bad_chart(&e))?)?;
-        Ok(results)
+        progress::print_written();
+        args::end()
     }
 
-    /// Bakes and measures every run of `grid`.
-    fn measure(
-        &self,
-        grid: &Grid,
-        reference: &Reference,
-        scene: &Arc<Scene>,
-        device: &Backend,
-    ) -> Result<Vec<Measured>, Error> {
-        let (count, start) = (grid.runs.len(), Instant::now());
-        let mut all: Vec<Measured> = vec![];
-        for (k, Run { knob, value, target }) in grid.runs.iter().enumerate() {
-            eprint!("run {} of {count}: {knob} {value}", k + 1);
-            let baked = bake(target, scene, device)?;
-            if interrupt::stopped() {
-                eprintln!(": stopped");
-                return Ok(all);
-            }
-            let one = Measured::new(&baked, reference).map_err(|found| self.bad_truth(&found))?;
-            eprintln!(": {:.2} s, error {:.2} %", one.seconds, 100.0 * one.errors.area);
-            all.push(one);
-        }
-        for round in 1..ROUNDS {
-            eprintln!("short runs again, {} of {ROUNDS} times", round + 1);
-            for (run, one) in grid.runs.iter().zip(&mut all) {
-                if one.seconds < SHORT_RUN {
-                    let seconds = bake(&run.target, scene, device)?.timings.total();
-                    if interrupt::stopped() {
-                        return Ok(all);
-                    }
-                    one.seconds = one.seconds.min(seconds);
-                }
-            }
-        }
-        eprintln!("all runs took {:.0} s", start.elapsed().as_secs_f64());
-        Ok(all)
-    }
-
-    fn read_truth(&self) -> Result<Option<Reference>, Error> {
-        let Some(path) = &self.truth else { return Ok(None) };
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            let place = path.display().to_string();
-            Error::new(ErrorKind::File, place, e.to_string(), "give a file that can be read")
-                .with_source(e)
-        })?;
-        Reference::truth(&text).map(Some).map_err(|found| self.bad_truth(&found))
-    }
-
-    fn bad_truth(&self, found: &str) -> Error {
-        let path = self.truth.as_deref().unwrap_or(&self.scene);
-        let remedy = "give points as in tests/data/cornell_box.truth.json, of this scene";
-        Error::new(ErrorKind::File, path.display().to_string(), found, remedy)
+    fn results(&self, scene: Arc<Scene>) -> Result<Results, Error> {
+        let measure = self.measure.measure();
+        let mut settings = Settings::default();
+        settings.measure = measure;
+        settings.precision = self.precision;
+        let mut verifier = Verifier::new(&scene, &settings)?;
+        let mut grid = Grid::new(&scene, self.quick);
+        let bench = Bench { scene: scene.clone(), device: self.device.open()?, measure };
+        interrupt::catch();
+        bench.bake("warming up", &Target::Error(WARM_UP_ERROR))?;
+        let measured = bench.measure_all(&grid.runs, &mut verifier)?;
+        grid.runs.truncate(measured.len());
+        Ok(Results {
+            front: front(&grid.runs, &measured),
+            grid,
+            measured,
+            measure,
+            scene: self.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            adapter: bench.device.adapter().name,
+        })
     }
 
     fn bad_chart(&self, found: &str) -> Error {
@@ -199,34 +161,82 @@ impl Options {
 
     fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
         let path = self.stem.with_added_extension(ending);
-        args::write_file(&path, bytes)?;
-        eprintln!("wrote {}", path.display());
-        Ok(())
+        progress::of_writing(&path, |path| args::write_file(path, bytes))
     }
 }
 
-/// A run finer than all of `grid`, to compare them with.
-fn finest_run(grid: &Grid, scene: &Arc<Scene>, device: &Backend) -> Result<Reference, Error> {
-    let error = grid.finest / REFERENCE_FINER;
-    eprintln!("for reference: settings meant for {}", grid::percent(error));
-    let mut settings = BakeSettings::for_error(error, scene);
-    if let Some(gather) = &mut settings.gather {
-        gather.refinement.gather_passes += 1;
+impl Bench {
+    /// Bakes and measures all `runs`, or those before Ctrl-C. The first adds the points at which
+    /// all are measured.
+    fn measure_all(&self, runs: &[Run], verifier: &mut Verifier) -> Result<Vec<Measured>, Error> {
+        let mut all: Vec<Measured> = vec![];
+        for (k, run) in runs.iter().enumerate() {
+            let name = format!("run {} of {}: {} {}", k + 1, runs.len(), run.knob, run.value);
+            let baked = self.bake(&name, &run.target)?;
+            let surface = &baked.light.surface;
+            let found = match k {
+                0 => progress::of_count("points", |report| {
+                    verifier.measure(surface, |progress| {
+                        report(progress.done, progress.of)?;
+                        interrupt::flow()
+                    })
+                }),
+                _ => verifier.measure_at_same_points(surface),
+            }?;
+            if interrupt::stopped() {
+                return Ok(all);
+            }
+            let one = Measured::new(&baked, &found);
+            eprintln!("{name}: {:.2} s, error {:.2} %", one.seconds, 100.0 * one.error.value);
+            all.push(one);
+        }
+        for round in 1..ROUNDS {
+            let name = format!("short runs again, {} of {ROUNDS} times", round + 1);
+            eprintln!("{name}");
+            for (run, one) in runs.iter().zip(&mut all).filter(|(_, one)| one.seconds < SHORT_RUN) {
+                let seconds = self.bake(&name, &run.target)?.timings.total();
+                if interrupt::stopped() {
+                    return Ok(all);
+                }
+                one.seconds = one.seconds.min(seconds);
+            }
+        }
+        Ok(all)
     }
-    let baked = settings.bake(scene.clone(), device, go)?;
-    Ok(Reference::Finest(SurfacePoints::new(&baked.light, device)?))
+
+    /// Bakes with `name` shown; Ctrl-C stops it.
+    fn bake(&self, name: &str, target: &Target) -> Result<BakeResult, Error> {
+        let (scene, go) = (self.scene.clone(), |_: &_| interrupt::flow());
+        progress::of_stage(name, || match target {
+            Target::Settings(settings) => {
+                let mut settings = settings.clone();
+                settings.measure = self.measure;
+                settings.bake(scene, &self.device, go)
+            }
+            Target::Error(error) => {
+                let by_measure = |settings: &mut BakeSettings| settings.measure = self.measure;
+                BakeTarget::Error(*error).bake_with(scene, &self.device, by_measure, go)
+            }
+        })
+    }
 }
 
-fn bake(target: &Target, scene: &Arc<Scene>, device: &Backend) -> Result<BakeResult, Error> {
-    match target {
-        Target::Settings(settings) => settings.bake(scene.clone(), device, go),
-        Target::Error(error) => BakeTarget::Error(*error).bake(scene.clone(), device, go),
+impl Measured {
+    fn new(baked: &BakeResult, found: &Verification) -> Measured {
+        Measured {
+            seconds: baked.timings.total(),
+            error: found.error.unwrap_or_default(),
+            error_with_tail: found.error_with_tail.unwrap_or_default(),
+            told: baked.estimate.total,
+            vertices: baked.light.surface.positions.len(),
+            settings: baked.settings.clone(),
+        }
     }
-}
 
-/// Progress that stops the work on Ctrl-C.
-fn go<T>(_: &T) -> ControlFlow<()> {
-    interrupt::flow()
+    /// The error, or its standard error where that is larger: a smaller error is not told from it.
+    fn known_error(&self) -> f64 {
+        self.error.value.max(self.error.standard_error).max(LEAST_ERROR)
+    }
 }
 
 /// Fixed settings that no others are both faster and better than, by time.
@@ -236,8 +246,8 @@ fn front(runs: &[Run], measured: &[Measured]) -> Vec<usize> {
     order.sort_by(|&a, &b| measured[a].seconds.total_cmp(&measured[b].seconds));
     let mut least = f64::INFINITY;
     order.retain(|&k| {
-        let better = measured[k].errors.area < least;
-        least = least.min(measured[k].errors.area);
+        let better = measured[k].known_error() < least;
+        least = least.min(measured[k].known_error());
         better
     });
     order

@@ -6,7 +6,6 @@ use plotters::style::text_anchor::HPos;
 use super::Results;
 use super::grid::{Panel, Target, percent};
 use super::plot::{Axes, range};
-use super::reference::Reference;
 use crate::canvas::{self, BLACK, Canvas, Drawn, Font, GREY, LIGHT, Mark};
 
 const WIDTH: u32 = 1200;
@@ -29,13 +28,8 @@ impl Results {
         let middle = f64::from(WIDTH) / 2.0;
         let title = format!("What a bake of {} costs and how far it is off", self.scene);
         canvas.text(&title, (middle, 32.0), Font::new(30.0, BLACK).bold().anchor(HPos::Center))?;
-        let against = match &self.reference {
-            Reference::Truth(points) => {
-                let count = points.iter().filter(|p| p.is_over_area()).count();
-                format!("errors against truth, at {count} points spread over the area")
-            }
-            Reference::Finest(_) => "errors against a finer run, which has its own".into(),
-        };
+        let tail = 100.0 * self.measure.tail;
+        let against = format!("root mean square errors without a tail of {tail} % of the area");
         let line = format!("{}; {against}", self.adapter);
         canvas.text(&line, (middle, 68.0), Font::new(19.0, GREY).anchor(HPos::Center))?;
         self.legend(canvas, 104.0)?;
@@ -43,7 +37,7 @@ impl Results {
 
         let runs = || self.grid.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.runs);
         let seconds = range(runs().map(|r| self.measured[r.1].seconds), 0.1);
-        let errors = range(runs().map(|r| self.measured[r.1].errors.area), 0.12);
+        let errors = range(runs().map(|r| self.measured[r.1].known_error()), 0.12);
         let heading = format!(
             "One knob at a time, around the settings meant for {} (ringed)",
             percent(self.grid.base_error)
@@ -59,7 +53,7 @@ impl Results {
     }
 
     fn at(&self, axes: &Axes, run: usize) -> (f64, f64) {
-        axes.at(self.measured[run].seconds, self.measured[run].errors.area)
+        axes.at(self.measured[run].seconds, self.measured[run].known_error())
     }
 
     fn legend<B: DrawingBackend>(&self, canvas: &Canvas<B>, y: f64) -> Drawn {
@@ -86,7 +80,11 @@ impl Results {
         };
         let targets: Vec<(usize, f64)> =
             (0..runs.len()).filter_map(|k| Some((k, asked(k)?))).collect();
-        let errors = self.measured.iter().map(|m| m.errors.area).chain(targets.iter().map(|d| d.1));
+        let errors = self
+            .measured
+            .iter()
+            .map(super::Measured::known_error)
+            .chain(targets.iter().map(|d| d.1));
         let seconds = range(self.measured.iter().map(|m| m.seconds), 0.07);
         let mut axes = Axes::new(frame, seconds, range(errors, 0.07));
         axes.draw(canvas, 20.0, true)?;

@@ -33,15 +33,13 @@ pub struct Panel {
     pub series: Vec<Series>,
 }
 
-/// All runs; none twice.
+/// All runs; none twice, and first that of fixed settings for the least error.
 pub struct Grid {
     pub runs: Vec<Run>,
     pub panels: Vec<Panel>,
     /// The run around which settings are varied, and the error that it is meant for.
     pub base: usize,
     pub base_error: f64,
-    /// The finest error of fixed settings.
-    pub finest: f64,
 }
 
 /// A setting that is varied: the values that `change` is called with, and the label of what comes
@@ -170,11 +168,10 @@ fn element_size(settings: &BakeSettings) -> String {
 
 impl Grid {
     pub fn new(scene: &Scene, quick: bool) -> Grid {
-        let all = [0.1, 0.05, 0.02, 0.01];
+        let all = [0.01, 0.02, 0.05, 0.1];
         let (errors, base_error, targets) =
-            if quick { (&all[..3], 0.05, &all[..2]) } else { (&all[..], 0.02, &all[..]) };
-        let finest = errors.iter().copied().fold(1.0, f64::min);
-        let mut grid = Grid { runs: vec![], panels: vec![], base: 0, base_error, finest };
+            if quick { (&all[1..], 0.05, &all[2..]) } else { (&all[..], 0.02, &all[..]) };
+        let mut grid = Grid { runs: vec![], panels: vec![], base: 0, base_error };
         for &error in errors {
             let run = grid.add("effort", percent(error), BakeSettings::for_error(error, scene));
             if error == base_error {
