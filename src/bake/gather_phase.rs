@@ -114,7 +114,6 @@ impl<'a> GatherPhase<'a> {
         let mut step = Step::AllPasses;
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
-        let mut previous_sources = f64::INFINITY;
         loop {
             let stop = self.gather(step, reporter)?;
             let mut estimated = self.estimate(stop, reporter, clock)?;
@@ -129,10 +128,7 @@ impl<'a> GatherPhase<'a> {
             if next.is_err() {
                 // Gathers find nothing more to do, or were stopped; paths may find more.
                 estimated = self.judge(estimated, reporter, clock);
-                let sources = estimated.found.whole.sources;
-                let in_vain = sources > model::MIN_SOURCES_STEP * previous_sources;
-                previous_sources = sources;
-                next = self.next_step(&estimated, if in_vain { 0 } else { rounds_left })?;
+                next = self.next_step(&estimated, rounds_left)?;
             }
             match next {
                 Ok(next) => step = next,

@@ -454,9 +454,6 @@ pub const JUDGE_POINTS: usize = 1024;
 /// Paths at each of them, to begin with: few show whether more of them are worth their time.
 pub const JUDGE_FIRST_PATHS: usize = 16;
 
-/// Rounds that leave more than this share of the error of the sources were in vain.
-pub const MIN_SOURCES_STEP: f64 = 0.8;
-
 /// Points on each group at which paths measure a result, at least.
 pub const JUDGE_POINTS_PER_GROUP: usize = 2;
 
