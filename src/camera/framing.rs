@@ -137,8 +137,10 @@ impl Framing<'_> {
     fn inside(&self, middle: DVec3) -> Camera {
         let eye = |k: u32| {
             let forward = self.forward(INSIDE_ELEVATION, f64::from(k) / f64::from(AZIMUTHS));
-            let free = self.hit(middle, -forward).map_or(f64::INFINITY, |hit| hit.distance);
-            middle - forward * (STEP_BACK * free.min(self.bounds.diagonal() / 2.0))
+            // Not far out of a window.
+            let [open, most] = [0.1, 0.5].map(|share| share * self.bounds.diagonal());
+            let free = self.hit(middle, -forward).map_or(open, |hit| hit.distance.min(most));
+            middle - forward * (STEP_BACK * free)
         };
         let farther = |a: &DVec3, b: &DVec3| a.distance(middle).total_cmp(&b.distance(middle));
         let eye = (0..AZIMUTHS).map(eye).max_by(farther).expect("some azimuths");
