@@ -1,4 +1,6 @@
-//! Shapes and text in pixels, on whatever plotters draws on, with fonts that come along.
+//! Shapes, text and axes in pixels, as a PNG image, with fonts that come along.
+
+pub mod scale;
 
 use std::io::Cursor;
 
@@ -7,22 +9,17 @@ use image::{RgbImage, imageops};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use scale::Scale;
 
 pub const BLACK: RGBColor = RGBColor(30, 30, 30);
 pub const GREY: RGBColor = RGBColor(95, 95, 95);
 pub const LIGHT: RGBColor = RGBColor(196, 196, 196);
-pub const FAINT: RGBColor = RGBColor(232, 232, 232);
 
 /// A place in pixels.
 pub type At = (f64, f64);
 
-/// A drawing area of any size: `scale` of its pixels are one here.
-pub struct Canvas<'a, B: DrawingBackend> {
-    area: &'a DrawingArea<B, Shift>,
-    scale: f64,
-    /// Share of a font's size by which text is drawn too high.
-    high: f64,
-}
+/// A drawing area [`FINER`] times as large in pixels.
+pub struct Canvas<'a>(DrawingArea<BitMapBackend<'a>, Shift>);
 
 /// How text looks and where its anchor is.
 #[derive(Clone, Copy)]
@@ -47,45 +44,44 @@ impl Font {
     }
 }
 
-#[derive(Clone, Copy)]
-pub enum Mark {
-    Dot(f64),
-    Ring(f64),
-    Diamond(f64),
+/// On which side of its line an axis has its numbers.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Side {
+    Left,
+    Right,
+    Below,
 }
 
 /// Whether it could be drawn and, if not, why.
 pub type Drawn = Result<(), String>;
 
-/// A bitmap is drawn so many times larger, and then made smaller: smooth edges.
+/// The image is drawn so many times larger, and then made smaller: smooth edges.
 const FINER: u32 = 3;
 
-/// An SVG image of this width and height with what `draw` draws.
-pub fn svg(
-    size: (u32, u32),
-    draw: impl FnOnce(&Canvas<SVGBackend>) -> Drawn,
-) -> Result<String, String> {
-    fonts()?;
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
-    draw(&Canvas::new(&area, 1.0, 0.04)?)?;
-    area.present().map_err(|e| e.to_string())?;
-    drop(area);
-    Ok(text)
-}
+/// Share of a font's size by which plotters draws text too high.
+const TEXT_TOO_HIGH: f64 = 0.17;
 
-/// The same as a PNG image.
+/// Length of a tick, and the least distance of numbers on an axis, in pixels.
+const TICK: f64 = 5.0;
+const NUMBERS_APART: f64 = 16.0;
+
+/// A PNG image of this width and height with what `draw` draws.
 pub fn png(
     (width, height): (u32, u32),
-    draw: impl FnOnce(&Canvas<BitMapBackend>) -> Drawn,
+    draw: impl FnOnce(&Canvas) -> Drawn,
 ) -> Result<Vec<u8>, String> {
-    fonts()?;
+    // Fonts that come along: there may be none on the system.
+    for (style, bytes) in
+        [(FontStyle::Normal, dejavu::sans::regular()), (FontStyle::Bold, dejavu::sans::bold())]
+    {
+        plotters::style::register_font("sans-serif", style, bytes).map_err(|_| "no font")?;
+    }
     let large = (FINER * width, FINER * height);
-    let mut pixels = vec![0; 3 * (large.0 * large.1) as usize];
-    let area = BitMapBackend::with_buffer(&mut pixels, large).into_drawing_area();
-    draw(&Canvas::new(&area, f64::from(FINER), 0.17)?)?;
-    area.present().map_err(|e| e.to_string())?;
-    drop(area);
+    let mut pixels = vec![255; 3 * (large.0 * large.1) as usize];
+    let canvas = Canvas(BitMapBackend::with_buffer(&mut pixels, large).into_drawing_area());
+    draw(&canvas)?;
+    canvas.0.present().map_err(|e| e.to_string())?;
+    drop(canvas);
     let large = RgbImage::from_raw(large.0, large.1, pixels).expect("as many pixels");
     let image = imageops::resize(&large, width, height, imageops::FilterType::Triangle);
     let mut bytes = Cursor::new(vec![]);
@@ -95,81 +91,77 @@ pub fn png(
     Ok(bytes.into_inner())
 }
 
-/// Fonts that come along: there may be none on the system.
-fn fonts() -> Result<(), String> {
-    for (style, bytes) in
-        [(FontStyle::Normal, dejavu::sans::regular()), (FontStyle::Bold, dejavu::sans::bold())]
-    {
-        plotters::style::register_font("sans-serif", style, bytes).map_err(|_| "no font")?;
-    }
-    Ok(())
+fn pixels((x, y): At) -> (i32, i32) {
+    let scaled = |v: f64| (v * f64::from(FINER)).round() as i32;
+    (scaled(x), scaled(y))
 }
 
-impl<'a, B: DrawingBackend> Canvas<'a, B> {
-    fn new(area: &'a DrawingArea<B, Shift>, scale: f64, high: f64) -> Result<Self, String> {
-        area.fill(&WHITE).map_err(|e| e.to_string())?;
-        Ok(Canvas { area, scale, high })
-    }
-
-    fn place(&self, (x, y): At) -> (i32, i32) {
-        ((x * self.scale).round() as i32, (y * self.scale).round() as i32)
-    }
-
-    fn style<'f>(&self, font: &'f Font) -> TextStyle<'f> {
-        let style = if font.bold { FontStyle::Bold } else { FontStyle::Normal };
-        let pos = Pos::new(font.anchor, VPos::Center);
-        TextStyle::from(("sans-serif", font.size * self.scale, style).into_font())
-            .color(&font.colour)
-            .pos(pos)
-    }
-
+impl Canvas<'_> {
     /// Text whose anchor is at half its height.
     pub fn text(&self, text: &str, (x, y): At, font: Font) -> Drawn {
-        let at = self.place((x, y + self.high * font.size));
-        self.area.draw_text(text, &self.style(&font), at).map_err(|e| e.to_string())
+        self.write(text, (x, y + TEXT_TOO_HIGH * font.size), font, FontTransform::None)
     }
 
     /// Text that is read from below.
     pub fn upright(&self, text: &str, (x, y): At, font: Font) -> Drawn {
-        let at = self.place((x + self.high * font.size, y));
-        let style = self.style(&font).transform(FontTransform::Rotate270);
-        self.area.draw_text(text, &style, at).map_err(|e| e.to_string())
+        self.write(text, (x + TEXT_TOO_HIGH * font.size, y), font, FontTransform::Rotate270)
     }
 
-    pub fn text_width(&self, text: &str, font: Font) -> Result<f64, String> {
-        let size = self.area.estimate_text_size(text, &self.style(&font));
-        size.map(|(width, _)| f64::from(width) / self.scale).map_err(|e| e.to_string())
+    fn write(&self, text: &str, at: At, font: Font, turned: FontTransform) -> Drawn {
+        let style = if font.bold { FontStyle::Bold } else { FontStyle::Normal };
+        let style =
+            TextStyle::from(("sans-serif", font.size * f64::from(FINER), style).into_font())
+                .color(&font.colour)
+                .pos(Pos::new(font.anchor, VPos::Center))
+                .transform(turned);
+        self.0.draw_text(text, &style, pixels(at)).map_err(|e| e.to_string())
     }
 
     pub fn line(&self, points: &[At], colour: RGBColor, width: f64) -> Drawn {
-        let points: Vec<(i32, i32)> = points.iter().map(|&p| self.place(p)).collect();
-        let style = colour.stroke_width((width * self.scale).round().max(1.0) as u32);
-        self.area.draw(&PathElement::new(points, style)).map_err(|e| e.to_string())
+        let points: Vec<(i32, i32)> = points.iter().map(|&p| pixels(p)).collect();
+        let style = colour.stroke_width((width * f64::from(FINER)).round().max(1.0) as u32);
+        self.0.draw(&PathElement::new(points, style)).map_err(|e| e.to_string())
     }
 
     /// A rectangle, given left, top, right and bottom.
     pub fn fill(&self, [left, top, right, bottom]: [f64; 4], colour: RGBColor) -> Drawn {
-        let corners = [self.place((left, top)), self.place((right, bottom))];
-        self.area.draw(&Rectangle::new(corners, colour.filled())).map_err(|e| e.to_string())
+        let corners = [pixels((left, top)), pixels((right, bottom))];
+        self.0.draw(&Rectangle::new(corners, colour.filled())).map_err(|e| e.to_string())
     }
 
-    pub fn mark(&self, mark: Mark, at: At, colour: RGBColor) -> Drawn {
-        let radius = |r: f64| (r * self.scale).round() as i32;
-        let drawn = match mark {
-            Mark::Dot(r) => {
-                self.area.draw(&Circle::new(self.place(at), radius(r), colour.filled()))
-            }
-            Mark::Ring(r) => {
-                let style = colour.stroke_width((2.0 * self.scale) as u32);
-                self.area.draw(&Circle::new(self.place(at), radius(r), style))
-            }
-            Mark::Diamond(r) => {
-                let (x, y) = at;
-                let corners = [(x - r, y), (x, y - r), (x + r, y), (x, y + r)];
-                let corners = corners.map(|c| self.place(c));
-                self.area.draw(&Polygon::new(corners.to_vec(), colour.filled()))
-            }
+    pub fn dot(&self, at: At, radius: f64, colour: RGBColor) -> Drawn {
+        let radius = (radius * f64::from(FINER)).round() as i32;
+        self.0.draw(&Circle::new(pixels(at), radius, colour.filled())).map_err(|e| e.to_string())
+    }
+
+    pub fn diamond(&self, (x, y): At, r: f64, colour: RGBColor) -> Drawn {
+        let corners = [(x - r, y), (x, y - r), (x + r, y), (x, y + r)].map(pixels);
+        self.0.draw(&Polygon::new(corners.to_vec(), colour.filled())).map_err(|e| e.to_string())
+    }
+
+    /// An axis from the `low` end of `scale` to its `high` one: ticks and, where there is room,
+    /// their numbers. Each tick goes on by `across` pixels on the side without numbers.
+    pub fn axis(&self, scale: &Scale, [low, high]: [At; 2], side: Side, across: f64) -> Drawn {
+        self.line(&[low, high], BLACK, 1.0)?;
+        let (dx, dy, anchor) = match side {
+            Side::Left => (-1.0, 0.0, HPos::Right),
+            Side::Right => (1.0, 0.0, HPos::Left),
+            Side::Below => (0.0, 1.0, HPos::Center),
         };
-        drawn.map_err(|e| e.to_string())
+        let mut last = f64::NEG_INFINITY;
+        for (value, text) in scale.ticks() {
+            let share = scale.share(value);
+            let (x, y) = (low.0 + share * (high.0 - low.0), low.1 + share * (high.1 - low.1));
+            let along = |d: f64| (x + d * dx, y + d * dy);
+            self.line(&[along(-across), (x, y)], LIGHT, 1.0)?;
+            self.line(&[(x, y), along(TICK)], BLACK, 1.0)?;
+            let way = share * (high.0 - low.0).hypot(high.1 - low.1);
+            if way - last >= NUMBERS_APART {
+                let away = if side == Side::Below { 12.0 } else { 4.0 };
+                self.text(&text, along(TICK + away), Font::new(14.0, GREY).anchor(anchor))?;
+                last = way;
+            }
+        }
+        Ok(())
     }
 }

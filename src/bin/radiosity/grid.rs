@@ -1,8 +1,6 @@
 //! `radiosity grid`: irradiance or illuminance on measuring grids, as a table and as pictures.
 
-mod field;
 mod picture;
-mod scale;
 mod table;
 
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@
 //! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
 //! radiosity grid          SCENE.obj    light on measuring grids  -> CSV, PNG
 //! radiosity probes        SCENE.obj    spherical harmonics       -> JSON, CSV
-//! radiosity trade-off     SCENE.obj    error over time         -> CSV, SVG, PNG
+//! radiosity trade-off     SCENE.obj    error over time         -> CSV, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
 //! ```
 //!

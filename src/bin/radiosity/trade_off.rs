@@ -2,24 +2,23 @@
 //! a table and a chart.
 //!
 //! ```text
-//! Grid: settings to try ──> bake each ──> Measured: seconds, error at points that are path traced
+//! runs: settings to try ──> bake each ──> Measured: seconds, error at points that are path traced
 //!                                              │    once, with the finest run
-//!                     CSV and text: all runs; SVG and PNG: error over time
+//!                        CSV and text: all runs; PNG: error over time
 //! ```
 
-mod chart;
-mod grid;
 mod plot;
+mod runs;
 mod table;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use grid::{Grid, Run, Target};
 use radiosity::accuracy::Measure;
 use radiosity::verify::{Estimate, Settings, Verification, Verifier};
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene};
+use runs::{Run, Target};
 
 use crate::args::{self, DeviceOptions, MeasureOptions, Stop, value};
 use crate::scene_options::{Input, SceneOptions};
@@ -29,8 +28,8 @@ use crate::{interrupt, progress};
 #[derive(Args)]
 #[command(after_help = "\
 Bakes the scene with many settings, one varied at a time around those for an error of 2 %, and to \
-errors that are asked for. Writes STEM.csv (a row a run), STEM.svg and STEM.png (error over time), \
-and prints the runs by time. Seconds are those of the stages of a bake and of the estimate of its \
+errors that are asked for. Writes STEM.csv (a row a run) and STEM.png (error over time), and \
+prints the runs by time. Seconds are those of the stages of a bake and of the estimate of its \
 error, without reading the file and opening the device; short runs are timed three times, and the \
 least time counts. Errors are measured as `radiosity verify` does, all at the same points: these \
 are path traced once, until the error of the finest run is known well enough, or for 120 s. \
@@ -78,10 +77,8 @@ struct Measured {
 
 /// All that was measured.
 struct Results {
-    grid: Grid,
-    measured: Vec<Measured>,
-    /// Fixed settings that no others are both faster and better than, by time; choices of an error
-    /// target are not among them.
+    runs: Vec<(Run, Measured)>,
+    /// Indices of the fixed settings that no others are both faster and better than, by time.
     front: Vec<usize>,
     measure: Measure,
     scene: String,
@@ -113,20 +110,23 @@ impl Options {
     pub fn run(mut self) -> Result<(), Stop> {
         let mut stem = self.scene.with_extension("").into_os_string();
         stem.push("_trade_off");
-        let formats = [("csv", ()), ("svg", ()), ("png", ())];
+        let formats = [("csv", ()), ("png", ())];
         self.stem = args::stem(self.out.take(), stem.into(), &formats);
         args::check_writable(&self.stem)?;
         let Input { scene, .. } = self.reading.read(&self.scene)?;
         let results = self.results(Arc::new(scene))?;
-        if !results.measured.is_empty() {
+        if !results.runs.is_empty() {
             say!("{}", results.text());
             self.write("csv", results.csv().as_bytes())?;
         }
         if interrupt::stopped() {
             eprintln!("stopped: the table has the runs that were finished; there is no chart");
         } else {
-            self.write("svg", chart::svg(&results).map_err(|e| self.bad_chart(&e))?.as_bytes())?;
-            self.write("png", &chart::png(&results).map_err(|e| self.bad_chart(&e))?)?;
+            let bad = |found| {
+                let remedy = "the table of all runs has been written";
+                Error::new(ErrorKind::File, "the chart", found, remedy)
+            };
+            self.write("png", &results.png().map_err(bad)?)?;
         }
         progress::print_written();
         args::end()
@@ -138,25 +138,18 @@ impl Options {
         settings.measure = measure;
         settings.precision = self.precision;
         let mut verifier = Verifier::new(&scene, &settings)?;
-        let mut grid = Grid::new(&scene, self.quick);
+        let runs = runs::runs(&scene, self.quick);
         let bench = Bench { scene: scene.clone(), device: self.device.open()?, measure };
         interrupt::catch();
         bench.bake("warming up", &Target::Error(WARM_UP_ERROR))?;
-        let measured = bench.measure_all(&grid.runs, &mut verifier)?;
-        grid.runs.truncate(measured.len());
+        let runs = bench.measure_all(runs, &mut verifier)?;
         Ok(Results {
-            front: front(&grid.runs, &measured),
-            grid,
-            measured,
+            front: front(&runs),
+            runs,
             measure,
             scene: self.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             adapter: bench.device.adapter().name,
         })
-    }
-
-    fn bad_chart(&self, found: &str) -> Error {
-        let remedy = "the table of all runs has been written";
-        Error::new(ErrorKind::File, format!("chart {}", self.stem.display()), found, remedy)
     }
 
     fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
@@ -166,12 +159,16 @@ impl Options {
 }
 
 impl Bench {
-    /// Bakes and measures all `runs`, or those before Ctrl-C. The first adds the points at which
-    /// all are measured.
-    fn measure_all(&self, runs: &[Run], verifier: &mut Verifier) -> Result<Vec<Measured>, Error> {
-        let mut all: Vec<Measured> = vec![];
-        for (k, run) in runs.iter().enumerate() {
-            let name = format!("run {} of {}: {} {}", k + 1, runs.len(), run.knob, run.value);
+    /// All `runs`, or those before Ctrl-C, with what was measured. The first adds the points at
+    /// which all are measured.
+    fn measure_all(
+        &self,
+        runs: Vec<Run>,
+        verifier: &mut Verifier,
+    ) -> Result<Vec<(Run, Measured)>, Error> {
+        let (count, mut all) = (runs.len(), vec![]);
+        for (k, run) in runs.into_iter().enumerate() {
+            let name = format!("run {} of {count}: {}", k + 1, run.name());
             let baked = self.bake(&name, &run.target)?;
             let surface = &baked.light.surface;
             let found = match k {
@@ -188,12 +185,12 @@ impl Bench {
             }
             let one = Measured::new(&baked, &found);
             eprintln!("{name}: {:.2} s, error {:.2} %", one.seconds, 100.0 * one.error.value);
-            all.push(one);
+            all.push((run, one));
         }
         for round in 1..ROUNDS {
             let name = format!("short runs again, {} of {ROUNDS} times", round + 1);
             eprintln!("{name}");
-            for (run, one) in runs.iter().zip(&mut all).filter(|(_, one)| one.seconds < SHORT_RUN) {
+            for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < SHORT_RUN) {
                 let seconds = self.bake(&name, &run.target)?.timings.total();
                 if interrupt::stopped() {
                     return Ok(all);
@@ -239,15 +236,16 @@ impl Measured {
     }
 }
 
-/// Fixed settings that no others are both faster and better than, by time.
-fn front(runs: &[Run], measured: &[Measured]) -> Vec<usize> {
-    let mut order: Vec<usize> =
-        (0..runs.len()).filter(|&k| matches!(runs[k].target, Target::Settings(_))).collect();
-    order.sort_by(|&a, &b| measured[a].seconds.total_cmp(&measured[b].seconds));
+/// Indices of the fixed settings that no others are both faster and better than, by time.
+fn front(runs: &[(Run, Measured)]) -> Vec<usize> {
+    let is_fixed = |&k: &usize| runs[k].0.target.error().is_none();
+    let mut order: Vec<usize> = (0..runs.len()).filter(is_fixed).collect();
+    order.sort_by(|&a, &b| runs[a].1.seconds.total_cmp(&runs[b].1.seconds));
     let mut least = f64::INFINITY;
     order.retain(|&k| {
-        let better = measured[k].known_error() < least;
-        least = least.min(measured[k].known_error());
+        let error = runs[k].1.known_error();
+        let better = error < least;
+        least = least.min(error);
         better
     });
     order

@@ -249,12 +249,12 @@ pub fn report(settings: &BakeSettings) -> Map<String, Value> {
 }
 
 /// All settings by name, for a table: empty where one is of vertices that gather and none does.
-pub fn cells(settings: &BakeSettings) -> impl Iterator<Item = (String, String)> {
+pub fn cells(settings: &BakeSettings) -> impl Iterator<Item = (&'static str, String)> {
     let cell = |value: Value| match value {
         Value::String(text) => text,
         value => value.to_string(),
     };
-    SETTINGS.iter().map(move |s| (s.name.into(), (s.get)(settings).map_or(String::new(), cell)))
+    SETTINGS.iter().map(move |s| (s.name, (s.get)(settings).map_or(String::new(), cell)))
 }
 
 #[cfg(test)]

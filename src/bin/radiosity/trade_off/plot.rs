@@ -1,156 +1,112 @@
-//! Double logarithmic axes, and labels beside points.
+//! The chart: error over time of all runs.
 
-use plotters::prelude::*;
+use plotters::prelude::RGBColor;
 use plotters::style::text_anchor::HPos;
 
-use super::grid::short;
-use crate::canvas::{At, Canvas, Drawn, FAINT, Font, GREY, LIGHT};
+use super::Results;
+use super::runs::percent;
+use crate::canvas::scale::Scale;
+use crate::canvas::{self, At, BLACK, Canvas, Drawn, Font, GREY, LIGHT, Side};
 
-/// A rectangle with seconds from left to right and an error from below, both logarithmic.
-pub struct Axes {
-    pub left: f64,
-    pub top: f64,
-    pub right: f64,
-    pub bottom: f64,
-    pub seconds: [f64; 2],
-    pub errors: [f64; 2],
-    taken: Vec<Taken>,
-    crossed: Vec<At>,
-}
+const SIZE: (u32, u32) = (1200, 820);
 
-/// What is covered: left, top, right, bottom.
-type Taken = [f64; 4];
+/// Left, top, right and bottom of the axes, in pixels.
+const FRAME: [f64; 4] = [95.0, 124.0, 1180.0, 750.0];
 
-impl Axes {
-    pub fn new(frame: [f64; 4], seconds: [f64; 2], errors: [f64; 2]) -> Axes {
-        let [left, top, right, bottom] = frame;
-        Axes { left, top, right, bottom, seconds, errors, taken: vec![], crossed: vec![] }
+const FRONT: RGBColor = RGBColor(31, 95, 168);
+const TARGET: RGBColor = RGBColor(205, 72, 20);
+
+/// Factor by which the axis of time begins before the fastest run: room for its label.
+const ROOM: f64 = 1.5;
+
+/// Distance of a label from its mark, and least distance of labels: down, or else across; in pixels.
+const AWAY: f64 = 12.0;
+const LABELS_APART: f64 = 17.0;
+const LABEL_WIDTH: f64 = 150.0;
+
+impl Results {
+    /// The chart as a PNG file.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
+        canvas::png(SIZE, |canvas| self.draw(canvas))
     }
 
-    pub fn at(&self, seconds: f64, error: f64) -> At {
-        let share = |v: f64, [low, high]: [f64; 2]| (v / low).ln() / (high / low).ln();
-        let x = self.left + (self.right - self.left) * share(seconds, self.seconds);
-        (x, self.bottom - (self.bottom - self.top) * share(error, self.errors))
-    }
+    fn draw(&self, canvas: &Canvas) -> Drawn {
+        let [left, top, right, bottom] = FRAME;
+        let title = format!("What a bake of {} costs and how far it is off", self.scene);
+        canvas.text(&title, (left, 28.0), Font::new(26.0, BLACK).bold())?;
+        let tail = 100.0 * self.measure.tail;
+        let line = format!(
+            "{}; errors are root mean squares, without the {tail} % of the area where they are \
+             largest",
+            self.adapter
+        );
+        canvas.text(&line, (left, 62.0), Font::new(17.0, GREY))?;
+        legend(canvas, 94.0)?;
 
-    pub fn holds(&self, (x, y): At) -> bool {
-        x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
-    }
+        let (seconds, errors) = self.scales();
+        let corner = (left, bottom);
+        canvas.axis(&seconds, [corner, (right, bottom)], Side::Below, bottom - top)?;
+        canvas.axis(&errors, [corner, (left, top)], Side::Left, right - left)?;
+        let font = Font::new(16.0, BLACK).anchor(HPos::Center);
+        canvas.text("seconds", ((left + right) / 2.0, bottom + 46.0), font)?;
+        canvas.upright("error, % of radiosity", (left - 62.0, (top + bottom) / 2.0), font)?;
 
-    /// Grid lines, numbers and names of the axes.
-    pub fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, size: f64, named: bool) -> Drawn {
-        let font = Font::new(size, GREY);
-        for s in ticks(self.seconds) {
-            let (x, _) = self.at(s, 1.0);
-            canvas.line(&[(x, self.top), (x, self.bottom)], FAINT, 1.0)?;
-            let below = (x, self.bottom + 0.9 * size);
-            canvas.text(&short(s), below, font.anchor(HPos::Center))?;
+        let at = |time: f64, error: f64| {
+            let x = left + (right - left) * seconds.share(time);
+            (x, bottom - (bottom - top) * errors.share(100.0 * error))
+        };
+        let of_run = |k: usize| at(self.runs[k].1.seconds, self.runs[k].1.known_error());
+        let asked = |k: usize| self.runs[k].0.target.error();
+        let runs = 0..self.runs.len();
+        for error in runs.clone().filter_map(asked) {
+            let y = at(1.0, error).1;
+            canvas.line(&[(left, y), (right, y)], TARGET, 1.0)?;
+            let font = Font::new(15.0, TARGET).anchor(HPos::Right);
+            canvas.text(&format!("{} asked", percent(error)), (right - 6.0, y - 11.0), font)?;
         }
-        for e in ticks(self.errors.map(|e| 100.0 * e)) {
-            let (_, y) = self.at(1.0, e / 100.0);
-            canvas.line(&[(self.left, y), (self.right, y)], FAINT, 1.0)?;
-            canvas.text(&short(e), (self.left - 7.0, y), font.anchor(HPos::Right))?;
+        for k in runs.clone().filter(|&k| asked(k).is_none()) {
+            canvas.dot(of_run(k), 5.0, LIGHT)?;
         }
-        let (l, t, r, b) = (self.left, self.top, self.right, self.bottom);
-        canvas.line(&[(l, t), (r, t), (r, b), (l, b), (l, t)], LIGHT, 1.0)?;
-        let font = Font::new(size, BLACK).anchor(HPos::Center);
-        canvas.text("seconds", ((l + r) / 2.0, b + 2.3 * size), font)?;
-        if named {
-            let at = (l - 3.4 * size, (t + b) / 2.0);
-            canvas.upright("RMS error, % of radiosity", at, font)?;
+        let front: Vec<At> = self.front.iter().map(|&k| of_run(k)).collect();
+        canvas.line(&front, FRONT, 2.0)?;
+        // Below the front, where no fixed settings are.
+        let font = Font::new(15.0, FRONT).anchor(HPos::Right);
+        let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for (&k, &(x, y)) in self.front.iter().zip(&front) {
+            canvas.dot((x, y), 6.0, FRONT)?;
+            let is_apart = x - last.0 >= LABEL_WIDTH;
+            last = (x, if is_apart { y + AWAY } else { f64::max(y + AWAY, last.1 + LABELS_APART) });
+            canvas.text(&self.runs[k].0.name(), (x - AWAY / 2.0, last.1), font)?;
+        }
+        for k in runs.filter(|&k| asked(k).is_some()) {
+            let (x, y) = of_run(k);
+            canvas.diamond((x, y), 11.0, TARGET)?;
+            let font = Font::new(16.0, TARGET).bold();
+            canvas.text(&self.runs[k].0.name(), (x + AWAY, y - AWAY), font)?;
         }
         Ok(())
     }
 
-    /// Keeps labels off a mark.
-    pub fn take(&mut self, (x, y): At, radius: f64) {
-        let r = radius + 4.0;
-        self.taken.push([x - r, y - r, x + r, y + r]);
-    }
-
-    /// Keeps labels off a line, where there is another place for them.
-    pub fn cross(&mut self, points: &[At]) {
-        for pair in points.windows(2) {
-            let ((a, b), (c, d)) = (pair[0], pair[1]);
-            let steps = ((c - a).hypot(d - b) / 4.0).ceil().max(1.0);
-            let step = |k: usize| k as f64 / steps;
-            let between = (0..=steps as usize).map(step);
-            self.crossed.extend(between.map(|s| (a + s * (c - a), b + s * (d - b))));
-        }
-    }
-
-    /// Writes a label where it covers least, near what it is for.
-    pub fn label<B: DrawingBackend>(
-        &mut self,
-        canvas: &Canvas<B>,
-        text: &str,
-        (x, y): At,
-        font: Font,
-    ) -> Drawn {
-        let (width, height) = (canvas.text_width(text, font)?, 0.95 * font.size);
-        let mut best = (f64::INFINITY, [0.0; 4], 0.0);
-        for away in [10.0, 14.0, 20.0, 28.0, 38.0, 50.0, 64.0, 80.0, 98.0] {
-            for turn in 0..16 {
-                let (sin, cos) = (f64::from(turn) * std::f64::consts::TAU / 16.0).sin_cos();
-                // The nearest point of the box lies that far away.
-                let middle_x =
-                    x + cos * away + cos.signum() * f64::min(1.0, 2.0 * cos.abs()) * width / 2.0;
-                let middle_y = y + sin * (away + height / 2.0);
-                let rect = [
-                    middle_x - width / 2.0,
-                    middle_y - height / 2.0,
-                    middle_x + width / 2.0,
-                    middle_y + height / 2.0,
-                ];
-                let outside = rect[0] < self.left + 2.0
-                    || rect[1] < self.top + 2.0
-                    || rect[2] > self.right - 2.0
-                    || rect[3] > self.bottom - 2.0;
-                let covered: f64 = self.taken.iter().map(|&t| overlap(t, rect)).sum();
-                let inside = |&&(a, b): &&At| {
-                    a > rect[0] - 2.0 && a < rect[2] + 2.0 && b > rect[1] && b < rect[3]
-                };
-                let crossed = self.crossed.iter().filter(inside).count() as f64;
-                let cost = if outside { 1e9 } else { 0.0 } + 50.0 * covered + 6.0 * crossed + away;
-                if cost < best.0 {
-                    best = (cost, rect, away);
-                }
-            }
-        }
-        let (_, rect, away) = best;
-        if away > 20.0 {
-            let end = (x.clamp(rect[0], rect[2]), y.clamp(rect[1], rect[3]));
-            canvas.line(&[(x, y), end], font.colour, 1.0)?;
-            self.cross(&[(x, y), end]);
-        }
-        self.taken.push(rect);
-        let at = ((rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0);
-        canvas.text(text, at, font.anchor(HPos::Center))
+    /// Of seconds and of errors in per cent, with all runs and targets on them.
+    fn scales(&self) -> (Scale, Scale) {
+        let ends = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)))
+        };
+        let (fastest, slowest) = ends(&mut self.runs.iter().map(|(_, m)| m.seconds));
+        let targets = self.runs.iter().filter_map(|(run, _)| run.target.error());
+        let errors = self.runs.iter().map(|(_, m)| m.known_error()).chain(targets);
+        let (least, largest) = ends(&mut errors.map(|error| 100.0 * error));
+        (Scale::logarithmic(fastest / ROOM, slowest), Scale::logarithmic(least, largest))
     }
 }
 
-fn overlap(a: Taken, b: Taken) -> f64 {
-    let width = a[2].min(b[2]) - a[0].max(b[0]);
-    let height = a[3].min(b[3]) - a[1].max(b[1]);
-    width.max(0.0) * height.max(0.0)
-}
-
-/// Round numbers in a range: 1, 2 and 5 times powers of ten, or these powers alone.
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
-    let digits: &[f64] = if high / low < 1000.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
-    let all = powers.flat_map(|p| digits.iter().map(move |d| d * 10f64.powi(p)));
-    all.filter(|&v| v >= low && v <= high).collect()
-}
-
-/// The range of `values`, and some more on both sides.
-pub fn range(values: impl Iterator<Item = f64>, more: f64) -> [f64; 2] {
-    let values = values.filter(|v| v.is_finite() && *v > 0.0);
-    let (low, high) =
-        values.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    if low > high {
-        return [0.1, 10.0];
-    }
-    let more = (high / low).powf(more).max(1.3);
-    [low / more, high * more]
+fn legend(canvas: &Canvas, y: f64) -> Drawn {
+    let font = Font::new(16.0, BLACK);
+    let [_, best, asked] = [100.0, 245.0, 585.0].map(|x| (x, y));
+    canvas.dot((100.0, y), 5.0, LIGHT)?;
+    canvas.text("fixed settings", (114.0, y), font)?;
+    canvas.dot(best, 6.0, FRONT)?;
+    canvas.text("the best of them, and what was changed", (259.0, y), font)?;
+    canvas.diamond(asked, 10.0, TARGET)?;
+    canvas.text("chosen for the error at the line", (602.0, y), font)
 }
