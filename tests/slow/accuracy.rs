@@ -50,7 +50,7 @@ fn error_target_is_reached_and_estimated() {
         // share of 95 % scatter by 1.5 %, twice.
         assert!(within as f64 >= 0.92 * points.len() as f64);
         // The squares of the parts are that of the whole, rounded a few times each.
-        let parts = [said.mesh, said.sampling, said.truncation, said.unshot];
+        let parts = [said.mesh, said.sampling, said.truncation, said.unshot, said.sources];
         let sum: f64 = parts.iter().map(|p| p * p).sum();
         assert!((sum.sqrt() - said.total).abs() < 1e-12, "{said:?}");
         assert_eq!(surface.error.len(), surface.positions.len());
