@@ -4,7 +4,8 @@
 //! mpirun -n 4 radiosity-mpi view-factors CITY.obj --facets --error 1e-4 --out city.npz
 //! ```
 //!
-//! Every process reads the scene. Rays, pairs and exact rows are dealt out one by one and exchanged.
+//! Every process reads the scene. Rays, pairs and exact rows are dealt out one by one and
+//! exchanged.
 //! The numbers are the same for any number of processes. A process that dies ends the run, and the
 //! same command goes on from its checkpoint.
 

@@ -54,8 +54,8 @@ pub(crate) trait PointRows: Sync {
     /// `mesh`. Their mean is the row by all of them.
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow>;
 
-    /// The row of what surfaces reflect to `point`, over the elements of `mesh`: no ray is sent to a
-    /// light or to the sun. The light on them was gathered from elements of `source`.
+    /// The row of what surfaces reflect to `point`, over the elements of `mesh`: no ray is sent to
+    /// a light or to the sun. The light on them was gathered from elements of `source`.
     fn surface_row(&self, mesh: &Mesh, source: &Mesh, point: &GatherPoint) -> PointRow;
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct SampledMesh {
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
-    /// Whether a vertex has gathered and is [hidden](crate::accuracy::hidden): no error counts there.
+    /// Whether a vertex has gathered and is [hidden](crate::accuracy::hidden): it has no error.
     pub hidden: Vec<bool>,
 }
 

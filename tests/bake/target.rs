@@ -57,7 +57,9 @@ fn estimate_covers_unshot_light() {
             // A share of what is there, not of what there would be.
             let share = missing / (1.0 - missing);
             let bound = baked.estimate.unshot_bound;
-            assert!((bound / share - 1.0).abs() < 1e-6, "exact here: {bound} {share}");
+            // That of vertices, whose mean is not exactly that of the elements: these differ by
+            // what single shots left, some 1e-4 of all.
+            assert!((bound / share - 1.0).abs() < 1e-3, "{bound} {share}");
             let estimated = baked.estimate.total;
             println!(
                 "{reflectance} {unshot}: missing {missing:.4}, estimated {:?}",

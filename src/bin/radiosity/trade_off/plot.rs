@@ -19,7 +19,7 @@ const TARGET: RGBColor = RGBColor(205, 72, 20);
 /// Factor by which the axis of time begins before the fastest run: room for its label.
 const ROOM: f64 = 1.5;
 
-/// Distance of a label from its mark, and least distance of labels: down, or else across; in pixels.
+/// Distance of a label from its mark, and least distance of labels: down, or else across; pixels.
 const AWAY: f64 = 12.0;
 const LABELS_APART: f64 = 17.0;
 const LABEL_WIDTH: f64 = 150.0;
