@@ -214,7 +214,7 @@ impl RayGather {
             let reflected = if let Some(near_field) = covered {
                 let by_area = !direct.lights().is_empty();
                 let NearLight { light, end } =
-                    near_field.light(fields[0].mesh, point, &ray, by_area);
+                    near_field.light(fields[0].mesh, (point, rotation), &ray, by_area);
                 fields.map(|field| match &end {
                     Some((share, end)) => light + *share * reflected_at(field, end),
                     None => light,

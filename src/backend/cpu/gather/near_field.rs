@@ -71,17 +71,17 @@ impl NearField {
     }
 
     /// The light of a near surface at the end of a `ray` from `point`, where light is known on the
-    /// elements of `mesh`. Paths look for emitters `by_area` too where some are small from there.
+    /// elements of `mesh`. Numbers of the path follow from the `rotation` of the point's rays, which is
+    /// the same at every scale of the scene. Paths look for emitters `by_area` too where some are small from there.
     pub fn light(
         &self,
         mesh: &Mesh,
-        point: &GatherPoint,
+        (point, rotation): (&GatherPoint, f64),
         ray: &NearRay,
         by_area: bool,
     ) -> NearLight {
         let paths = self.paths.get_or_init(|| PathTracer::of_shared(mesh.shared_scene()));
-        let [x, y, z] = point.position.to_array().map(f64::to_bits);
-        let mut rng = random_numbers(&[x, y, z, u64::from(ray.ray)]);
+        let mut rng = random_numbers(&[rotation.to_bits(), u64::from(ray.ray)]);
         let position = point.position + ray.hit.distance * ray.direction;
         let ends = |hit: &Hit| !NearField::is_near_at(mesh, hit);
         let (light, end) = paths.path_to(&ray.hit, position, by_area, ends, &mut rng);
