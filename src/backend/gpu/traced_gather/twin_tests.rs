@@ -741,7 +741,8 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
     for (place, side) in places {
         let near_by = |k: usize| {
             let random = |j: usize| unit_interval(split_mix64_nth((3 * k + j) as u64)) - 0.5;
-            let shift = 1e-5 * DVec3::new(random(0), random(1), 0.0);
+            // Over some hundred cells, each of which has rays and paths of its own.
+            let shift = 4e-3 * DVec3::new(random(0), random(1), 0.0);
             let position = DVec3::from_array(place) + shift;
             GatherPoint { position, normal: normals[side], near: 2.5e-5 }
         };
