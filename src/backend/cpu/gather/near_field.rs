@@ -71,8 +71,9 @@ impl NearField {
     }
 
     /// The light of a near surface at the end of a `ray` from `point`, where light is known on the
-    /// elements of `mesh`. Numbers of the path follow from the `rotation` of the point's rays, which is
-    /// the same at every scale of the scene. Paths look for emitters `by_area` too where some are small from there.
+    /// elements of `mesh`. Numbers of the path follow from the `rotation` of the point's rays,
+    /// which is the same at every scale of the scene. Paths look for emitters `by_area` too where
+    /// some are small from there.
     pub fn light(
         &self,
         mesh: &Mesh,
