@@ -236,10 +236,9 @@ fn boundary_values(
     averaged: &[Rgb],
 ) -> Vec<(usize, Rgb)> {
     let boundary = boundary_fit::boundary_vertices(mesh, outlines, positions, normals);
-    let value = |b: &boundary_fit::BoundaryVertex| {
-        (b.vertex, b.fitted(element_radiosity, averaged[b.vertex]))
-    };
-    boundary.iter().map(value).filter(|(_, value)| value.is_finite()).collect()
+    let values =
+        boundary.iter().map(|b| (b.vertex, b.fitted(element_radiosity, averaged[b.vertex])));
+    values.filter(|(_, value)| value.is_finite()).collect()
 }
 
 #[cfg(test)]

@@ -18,10 +18,10 @@
 //! squares are the tail; all that follows is over the others. The squared error of mesh and
 //! sampling is the first, plus one standard error of that mean, less half the noise. Truncation is
 //! the change of all further bounces: the next one times a growth that paths through the change
-//! find, since light that is off in a gap of bright walls stays there. Light not shot is
-//! added as if it fell like the ambient term. This
-//! file does no gathering: see [`estimator`](super::estimator). Where the light that is gathered is
-//! itself off, no gather shows it; the [`judge`](super::judge) has paths for that.
+//! find, since light that is off in a gap of bright walls stays there. Light not shot is added as
+//! if it fell like the ambient term. This file does no gathering: see
+//! [`estimator`](super::estimator). Where the light that is gathered is itself off, no gather shows
+//! it; the [`judge`](super::judge) has paths for that.
 
 use glam::DVec3;
 

@@ -213,12 +213,8 @@ impl<'a> AdaptiveGather<'a> {
     ) -> Result<StopReason, Error> {
         for remaining in (1..settings.gather_passes).rev() {
             let coarse = coarser(settings, remaining);
-            let stop = match &mut coarse_gatherer {
-                Some(coarse_gatherer) => {
-                    self.gather_pass(&coarse, *coarse_gatherer, None, progress)?
-                }
-                None => self.gather_pass(&coarse, gatherer, None, progress)?,
-            };
+            let coarse_gatherer = either(&mut coarse_gatherer, gatherer);
+            let stop = self.gather_pass(&coarse, coarse_gatherer, None, progress)?;
             if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
@@ -230,10 +226,8 @@ impl<'a> AdaptiveGather<'a> {
                 Some(scout) => Some(&mut **scout),
                 None => None,
             };
-            let stop = match &mut coarse_gatherer {
-                Some(first) => self.gather_pass(&coarse, *first, look, progress)?,
-                None => self.gather_pass(&coarse, gatherer, look, progress)?,
-            };
+            let coarse_gatherer = either(&mut coarse_gatherer, gatherer);
+            let stop = self.gather_pass(&coarse, coarse_gatherer, look, progress)?;
             if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
@@ -280,7 +274,7 @@ impl<'a> AdaptiveGather<'a> {
         let elements = self.samples.mesh.element_count();
         let found = gathered.further_bounces(
             maker,
-            (self.scale.touching, self.scale.radiosity_floor),
+            (self.scale.touching(), self.scale.radiosity_floor),
             |gathered| progress(&Progress { pass, refinements, elements, gathered, total }),
         );
         let Some(added) = found else { return StopReason::Cancelled };
@@ -353,7 +347,7 @@ impl<'a> AdaptiveGather<'a> {
         };
         let unseen: Vec<usize> = (0..elements).filter(matters).collect();
         let source = self.source.field();
-        let scale = (self.scale.radiosity_floor, self.scale.touching);
+        let scale = (self.scale.radiosity_floor, self.scale.touching());
         let mut queue = &unseen[..];
         let mut batch_sizer = BatchSizer::new(scout.preferred_batch_len());
         while !queue.is_empty() {
@@ -439,7 +433,7 @@ impl<'a> AdaptiveGather<'a> {
     ) -> Result<ControlFlow<()>, Error> {
         let SampledMesh { mesh, vertices: mesh_vertices, reflected, noise, buried, hidden, .. } =
             &mut self.samples;
-        let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching);
+        let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching());
         let source = self.source.field();
         let gathers = |&v: &u32| points.albedo(v) != Rgb::ZERO;
         let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
@@ -484,6 +478,17 @@ impl<'a> AdaptiveGather<'a> {
 
     fn all_vertices(&self) -> Vec<u32> {
         (0..self.samples.reflected.len() as u32).collect()
+    }
+}
+
+/// The first if there is one, else the other.
+fn either<'g>(
+    first: &'g mut Option<&mut dyn Gather>,
+    other: &'g mut dyn Gather,
+) -> &'g mut dyn Gather {
+    match first {
+        Some(first) => &mut **first,
+        None => other,
     }
 }
 

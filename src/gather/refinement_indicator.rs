@@ -74,8 +74,6 @@ pub(crate) struct ErrorScale {
     pub diagonal: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
-    /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
-    pub touching: f64,
     /// Where most of the light is: elements grow with the distance from it.
     region: Option<Aabb>,
 }
@@ -92,11 +90,15 @@ impl ErrorScale {
         let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
             diagonal,
-            touching: hidden::NEAR * diagonal,
             radiosity_floor: field.radiosity_floor(measure.floor),
             tail: measure.tail,
             region,
         }
+    }
+
+    /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
+    pub fn touching(&self) -> f64 {
+        hidden::NEAR * self.diagonal
     }
 
     /// Whether `node` of `mesh` is far from the light.

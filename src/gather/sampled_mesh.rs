@@ -43,7 +43,8 @@ impl SampledMesh {
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = places.par_iter().map(value).collect();
         let noise = vec![0.0; reflected.len()];
-        let [buried, hidden] = [(); 2].map(|()| vec![false; reflected.len()]);
+        let buried = vec![false; reflected.len()];
+        let hidden = buried.clone();
         SampledMesh { mesh, topology, vertices, reflected, noise, buried, hidden }
     }
 

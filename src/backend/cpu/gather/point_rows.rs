@@ -71,6 +71,8 @@ impl RayGather {
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
         row.hits.reserve_exact((range.end - range.start) as usize);
+        // Emission on the way is in no row: rows with lights leave near surfaces as they are.
+        let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
         let (mut ray, mut near) = (range.start, vec![]);
         let wide = direct.map_or(&[][..], DirectLight::wide);
         let has_entry = |light: u32| direct.is_some_and(|direct| direct.knows(light));
@@ -97,7 +99,7 @@ impl RayGather {
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
             let light = self.lights.of_triangle[hit.triangle];
             let passed = Rgb::splat(passed(hit.distance));
-            if self.near_field.is_some() && NearField::is_near_at(source, &hit) {
+            if near_field.is_some() && NearField::is_near_at(source, &hit) {
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
             row.hits.push(SurfaceHit {
@@ -107,9 +109,7 @@ impl RayGather {
                 emits: light == NO_LIGHT || !has_entry(light),
             });
         });
-        // Emission on the way is in no row: rows with lights leave near surfaces as they are.
-        if direct.is_none()
-            && let Some(near_field) = &self.near_field
+        if let Some(near_field) = near_field
             && NearField::is_covered(near.len(), range.len())
         {
             for (k, ray) in near {
