@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn settings_go_by_the_end_of_their_names() {
-        for name in ["gather.rays", "rays", "refinement.min_edge", "unshot", "gap-factor"] {
+        for name in ["gather.rays", "rays", "refinement.min_edge", "unshot", "mesh-error"] {
             assert!(adjustment(&format!("{name}=1")).is_ok(), "{name}");
         }
         assert_eq!(wrong("element_size=1"), "give solve.element_size or gather.element_size");
