@@ -422,8 +422,11 @@ pub const MIN_ERROR_SHARE: f64 = 0.1;
 pub const MAX_SAMPLING_SHARE: f64 = 0.7;
 
 /// The standard errors of vertices are multiplied by this, so that 95 % of them are off by no more
-/// than twice as much: errors have heavier tails than a normal distribution.
-pub const TAIL_FACTOR: f64 = 1.8;
+/// than twice as much: errors have heavier tails than a normal distribution. It was 1.8 for
+/// estimates over all of the area. Those of vertices are in proportion to an estimate that leaves
+/// out the tail, but vertices may be in it: with it the error of the Cornell box at 5 % is 3.53 %,
+/// without 3.14 %, 1.12 times less.
+pub const TAIL_FACTOR: f64 = 2.0;
 
 /// Points on each group, at least: enough to see an error that is everywhere.
 pub const SAMPLES_PER_GROUP: usize = 8;
