@@ -14,6 +14,7 @@
 pub(crate) mod adaptive;
 mod batch;
 mod buried;
+mod directional_light;
 pub(crate) mod exchange;
 mod further_bounces;
 pub(crate) mod gather_points;
@@ -28,6 +29,7 @@ pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
 pub(crate) mod scouts;
+mod shadow_edges;
 mod source_light;
 mod surplus;
 pub(crate) mod two_sided;

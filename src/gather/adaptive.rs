@@ -16,21 +16,24 @@
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::batch::{VertexValues, gather_batch};
 use super::buried::extrapolate_into_buried;
+use super::directional_light::DirectionalLight;
 use super::further_bounces::GatheredFrom;
 use super::gather_points::VertexGatherPoints;
 use super::gathered_mesh::GatheredMesh;
-use super::interpolated_refinement::interpolated_refinement;
+use super::interpolated_refinement::{InterpolatedRefinement, interpolated_refinement};
 use super::point_row::PointRows;
 use super::progress::Progress;
 use super::refinement_indicator::{ErrorScale, counted_area, has_buried_node, squared_error};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::{SampledMesh, after_split};
 use super::scouts::{self, Scouts};
+use super::shadow_edges::resolve_shadow_edges;
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
 use super::{Gather, RadiosityField};
@@ -99,6 +102,8 @@ pub(crate) struct AdaptiveGather<'a> {
     source: SourceLight<'a>,
     samples: SampledMesh,
     scouts: Scouts,
+    /// Whose shadows have sharp edges.
+    directional_light: Option<Arc<DirectionalLight>>,
     scale: ErrorScale,
     /// Change of the values by the last pass, relative.
     relative_change: f64,
@@ -125,6 +130,7 @@ impl<'a> AdaptiveGather<'a> {
         let scale = ErrorScale::new(&mesh, &field, region, measure);
         AdaptiveGather {
             scouts: Scouts::new(mesh.element_count()),
+            directional_light: DirectionalLight::of_scene(mesh.shared_scene()).map(Arc::new),
             samples: SampledMesh::new(mesh, &field),
             source: SourceLight::new(field),
             scale,
@@ -174,7 +180,14 @@ impl<'a> AdaptiveGather<'a> {
     ) -> Result<(GatheredMesh, Vec<f64>), Error> {
         let source = self.source.field();
         let refined = interpolated_refinement(&self.samples, &source, &self.scale, settings)?;
-        Ok((self.gathered_mesh_of(Cow::Owned(refined.samples)), refined.residual_error))
+        let InterpolatedRefinement { samples, residual_error } = refined;
+        let (samples, residual_error) = match &self.directional_light {
+            Some(light) => {
+                resolve_shadow_edges(samples, residual_error, light, &self.scale, settings)?
+            }
+            None => (samples, residual_error),
+        };
+        Ok((self.gathered_mesh_of(Cow::Owned(samples)), residual_error))
     }
 
     fn gathered_mesh_of(&self, samples: Cow<SampledMesh>) -> GatheredMesh {
@@ -221,13 +234,12 @@ impl<'a> AdaptiveGather<'a> {
             self.promote_to_source();
         }
         if let Some(maker) = bounces {
-            let coarse = coarser(settings, 1);
             let look: Option<&mut dyn Gather> = match &mut scout {
                 Some(scout) => Some(&mut **scout),
                 None => None,
             };
             let coarse_gatherer = either(&mut coarse_gatherer, gatherer);
-            let stop = self.gather_pass(&coarse, coarse_gatherer, look, progress)?;
+            let stop = self.gather_pass(settings, coarse_gatherer, look, progress)?;
             if stop == StopReason::Cancelled {
                 return Ok(stop);
             }
@@ -431,8 +443,17 @@ impl<'a> AdaptiveGather<'a> {
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
-        let SampledMesh { mesh, vertices: mesh_vertices, reflected, noise, buried, hidden, .. } =
-            &mut self.samples;
+        let SampledMesh {
+            mesh,
+            vertices: mesh_vertices,
+            reflected,
+            noise,
+            buried,
+            hidden,
+            direct,
+            ..
+        } = &mut self.samples;
+        let light = self.directional_light.as_deref();
         let points = VertexGatherPoints::new(mesh, mesh_vertices, self.scale.touching());
         let source = self.source.field();
         let gathers = |&v: &u32| points.albedo(v) != Rgb::ZERO;
@@ -455,7 +476,8 @@ impl<'a> AdaptiveGather<'a> {
                 batch.apply(
                     &points,
                     (attempt, self.scale.diagonal),
-                    &mut VertexValues { reflected, noise, buried, hidden },
+                    light,
+                    &mut VertexValues { reflected, noise, buried, hidden, direct },
                 );
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {

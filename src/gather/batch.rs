@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::directional_light::{Direct, DirectionalLight};
 use super::gather_points::{VertexGatherPoints, outlook};
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
@@ -22,6 +23,8 @@ pub(super) struct VertexValues<'s> {
     pub noise: &'s mut [f64],
     pub buried: &'s mut [bool],
     pub hidden: &'s mut [bool],
+    /// Empty where there is no directional light.
+    pub direct: &'s mut [Direct],
 }
 
 /// Gathers one point for each of `vertices`.
@@ -45,11 +48,13 @@ impl Batch<'_> {
     }
 
     /// Writes what was gathered at this `attempt` to the values of the vertices that it resolves.
-    /// The light is in a box of this `diagonal`, scene unit.
+    /// All light is in a box of this
+    /// `diagonal`, scene unit; what `light` adds to it is kept by itself, too.
     pub fn apply(
         &self,
         points: &VertexGatherPoints,
         (attempt, diagonal): (usize, f64),
+        light: Option<&DirectionalLight>,
         values: &mut VertexValues,
     ) {
         let value = |(&v, sample): (&u32, &IrradianceSample)| {
@@ -61,16 +66,23 @@ impl Batch<'_> {
             let albedo = points.albedo(v);
             let noise = reflected_noise(albedo, sample);
             let is_hidden = outlook([sample; 2]).is_hidden(diagonal);
-            Some((v, albedo * sample.irradiance, noise, is_buried, is_hidden))
+            let direct = match light {
+                Some(light) if !is_buried => light.reflected(albedo, &points.point(v, attempt)),
+                _ => Direct::default(),
+            };
+            Some((v, albedo * sample.irradiance, noise, [is_buried, is_hidden], direct))
         };
         let pairs = self.vertices.par_iter().zip(&self.samples);
-        let found: Vec<(u32, Rgb, f64, bool, bool)> = pairs.filter_map(value).collect();
-        for (v, reflected, noise, is_buried, is_hidden) in found {
+        let found: Vec<(u32, Rgb, f64, [bool; 2], Direct)> = pairs.filter_map(value).collect();
+        for (v, reflected, noise, [is_buried, is_hidden], direct) in found {
             let v = v as usize;
             values.reflected[v] = reflected;
             values.noise[v] = noise;
             values.buried[v] = is_buried;
             values.hidden[v] = is_hidden;
+            if light.is_some() {
+                values.direct[v] = direct;
+            }
         }
     }
 }

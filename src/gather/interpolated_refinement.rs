@@ -20,7 +20,7 @@ use rustc_hash::FxHashSet;
 use super::RadiosityField;
 use super::refinement_indicator::{ErrorScale, counted_area, source_nonlinearity};
 use super::refinement_settings::RefinementSettings;
-use super::sampled_mesh::SampledMesh;
+use super::sampled_mesh::{SampledMesh, new_vertices};
 use super::surplus::HierarchicalSurplus;
 use crate::error::Error;
 use crate::scene::Rgb;
@@ -51,8 +51,8 @@ pub(super) fn interpolated_refinement(
     settings: &RefinementSettings,
 ) -> Result<InterpolatedRefinement, Error> {
     let split = to_be_split(samples, scale, settings);
-    let (mut refined, new) = samples.with_split(&split)?;
-    put_on_interpolants(&mut refined, &new, samples, &split);
+    let (mut refined, old_numbers) = samples.with_split(&split)?;
+    put_on_interpolants(&mut refined, &new_vertices(&old_numbers), samples, &split);
     let residual_error = residual_errors(samples, source, &split);
     Ok(InterpolatedRefinement { samples: refined, residual_error })
 }

@@ -51,6 +51,12 @@ impl LuminaireLight<'_> {
         self.luminaires.iter().map(|luminaire| luminaire.scale * self.of(luminaire, point)).sum()
     }
 
+    /// The same where nothing hides them.
+    pub fn unoccluded(&self, point: &GatherPoint) -> Rgb {
+        let of = |l: &Luminaire| l.scale * unoccluded(l, point.position, point.normal);
+        self.luminaires.iter().map(of).sum()
+    }
+
     /// The luminaires that `point` sees, by their indices, and what they light it with in units of
     /// their scales, W/m²: a mean of the channels where panes let through less of one.
     pub fn unscaled(&self, point: &GatherPoint) -> Vec<(u32, f64)> {

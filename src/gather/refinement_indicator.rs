@@ -129,6 +129,32 @@ pub(super) fn counted_area(
     mesh.solid_area(node) / (lengths * lengths)
 }
 
+/// Longest edge of element `e` over the scales of lengths where it is, scene unit.
+fn relative_size(
+    samples: &SampledMesh,
+    scale: &ErrorScale,
+    settings: &RefinementSettings,
+    e: usize,
+) -> f64 {
+    let mesh = &samples.mesh;
+    let node = mesh.element(e);
+    mesh.longest_edge(node) / scale.growth(mesh, node) / settings.group_scale(mesh.group(node))
+}
+
+/// Whether element `e` is too small to be split, whatever it may be off by.
+pub(super) fn is_finest(
+    samples: &SampledMesh,
+    scale: &ErrorScale,
+    settings: &RefinementSettings,
+    e: usize,
+) -> bool {
+    let node = samples.mesh.element(e);
+    // What is far from the light has no sharp shadows.
+    let finest = if scale.is_far(&samples.mesh, node) { 1.0 } else { FINEST };
+    let min_edge = settings.min_edge * settings.group_factor(samples.mesh.group(node));
+    relative_size(samples, scale, settings, e) <= finest * min_edge
+}
+
 /// Squared relative error that element `e` is predicted to have, times the area that it counts
 /// with; 0 where it may not be split. `source` is the light that the vertices gathered.
 pub(super) fn squared_error(
@@ -142,16 +168,11 @@ pub(super) fn squared_error(
     if !samples.is_splittable(e) {
         return 0.0;
     }
-    let edge = samples.mesh.longest_edge(node);
-    let group_scale = settings.group_scale(samples.mesh.group(node));
-    let growth = scale.growth(&samples.mesh, node);
-    let size = edge / growth / group_scale;
-    let group_factor = settings.group_factor(samples.mesh.group(node));
-    // What is far from the light has no sharp shadows.
-    let finest = if growth > NEAR_GROWTH { 1.0 } else { FINEST };
-    if size <= finest * settings.min_edge * group_factor {
+    if is_finest(samples, scale, settings, e) {
         return 0.0;
     }
+    let size = relative_size(samples, scale, settings, e);
+    let group_factor = settings.group_factor(samples.mesh.group(node));
     let emitted = samples.mesh.material(node).exitance;
     let weight = counted_area(samples, scale, settings, e) / (group_factor * group_factor);
     let open = samples.corners()[e].into_iter().map(|v| v as usize);

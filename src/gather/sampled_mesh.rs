@@ -10,6 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::RadiosityField;
+use super::directional_light::Direct;
 use crate::error::Error;
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::scene::Rgb;
@@ -30,6 +31,8 @@ pub(crate) struct SampledMesh {
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
+    /// What the sun and luminaires add to `reflected`; empty in scenes without.
+    pub direct: Vec<Direct>,
     /// Whether a vertex has gathered and is [hidden](crate::accuracy::hidden): it has no error.
     pub hidden: Vec<bool>,
 }
@@ -45,7 +48,11 @@ impl SampledMesh {
         let noise = vec![0.0; reflected.len()];
         let buried = vec![false; reflected.len()];
         let hidden = buried.clone();
-        SampledMesh { mesh, topology, vertices, reflected, noise, buried, hidden }
+        let direct = match mesh.scene().has_directional_light() {
+            true => vec![Direct::default(); reflected.len()],
+            false => vec![],
+        };
+        SampledMesh { mesh, topology, vertices, reflected, noise, buried, direct, hidden }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -73,13 +80,14 @@ impl SampledMesh {
     /// Splits `elements` (ascending) into four each, which are in the place of the one. Values of
     /// old vertices are kept; gives those that were not there before, ascending.
     pub fn split(&mut self, elements: &[usize]) -> Result<Vec<u32>, Error> {
-        let (finer, new) = self.with_split(elements)?;
+        let (finer, old_numbers) = self.with_split(elements)?;
         *self = finer;
-        Ok(new)
+        Ok(new_vertices(&old_numbers))
     }
 
-    /// The same as a mesh of its own.
-    pub fn with_split(&self, elements: &[usize]) -> Result<(SampledMesh, Vec<u32>), Error> {
+    /// The same as a mesh of its own, and of each of its vertices the number among these; none of
+    /// one that was not there before.
+    pub fn with_split(&self, elements: &[usize]) -> Result<(SampledMesh, Vec<Option<u32>>), Error> {
         let mesh = self.mesh.split(elements)?;
         let (vertices, old_numbers) = self.vertices.split(&mesh, &self.topology, elements);
         let mut reflected = kept(&self.reflected, &old_numbers);
@@ -95,8 +103,6 @@ impl SampledMesh {
                 }
             }
         }
-        let is_new = |v: &u32| old_numbers[*v as usize].is_none();
-        let new = (0..old_numbers.len() as u32).filter(is_new).collect();
         let split = SampledMesh {
             mesh,
             topology: self.topology.clone(),
@@ -104,9 +110,13 @@ impl SampledMesh {
             reflected,
             noise: kept(&self.noise, &old_numbers),
             buried: kept(&self.buried, &old_numbers),
+            direct: match self.direct.is_empty() {
+                true => vec![],
+                false => kept(&self.direct, &old_numbers),
+            },
             hidden: kept(&self.hidden, &old_numbers),
         };
-        Ok((split, new))
+        Ok((split, old_numbers))
     }
 
     /// Root mean square over the elements of how far the values at their corners are from
@@ -154,6 +164,12 @@ impl SampledMesh {
         });
         out
     }
+}
+
+/// The vertices that were not there before, by the `old_numbers` of all, ascending.
+pub(super) fn new_vertices(old_numbers: &[Option<u32>]) -> Vec<u32> {
+    let numbered = (0..).zip(old_numbers);
+    numbered.filter(|(_, old)| old.is_none()).map(|(v, _)| v).collect()
 }
 
 /// One value an element when each of `split` (ascending) has become four, for which it is `new`.
