@@ -15,7 +15,7 @@ const NO_EMISSION: u32 = u32::MAX;
 
 /// The data that rows are looked up in.
 pub(super) struct Lookup<'a> {
-    bands: &'a Bands,
+    pub bands: &'a Bands,
     /// The vertices at the corners of each element.
     corners: &'a [[u32; 3]],
     /// The material of each element that emits, else [`NO_EMISSION`].

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use super::balance::{GroupHeat, HeatBalance};
 use super::black_body::{Bands, emission, temperature};
-use super::gmres;
 use super::surface::{Boundary, HeatSettings, Surface, of_group};
 use crate::error::{Error, ErrorKind};
+use crate::linear::gmres;
 use crate::view_factor::{Estimate, ViewFactors};
 
 /// Maximum relative change of converged emissions.
