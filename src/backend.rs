@@ -254,7 +254,7 @@ impl Backend {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
-                let gather = TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?;
+                let gather = TracedGather::with_noise(gpu, mesh, rays, noise, dim)?;
                 Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
             _ => {

@@ -14,28 +14,28 @@ mod direct_light;
 mod doubled;
 mod near_field;
 mod point_rows;
+mod scene_rays;
 mod visible;
 mod wide_light;
 
 use std::f64::consts::PI;
 use std::ops::Range;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::lights::{Lights, NO_LIGHT};
+use crate::gather::lights::NO_LIGHT;
 use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
-use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
-use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::visibility::ray_scene::Hit;
 use direct_light::DirectLight;
 use doubled::{Doubled, Found};
 use near_field::{NearField, NearLight, NearRay};
+pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
+use scene_rays::SceneRays;
 use visible::Visible;
 use wide_light::WideLight;
 
@@ -47,10 +47,7 @@ use wide_light::WideLight;
 /// hemisphere where the light fills much of it.
 #[derive(Debug)]
 pub struct RayGather {
-    scene: Arc<RayScene>,
-    panes: Panes,
-    lights: Lights,
-    rotations: CellRotation,
+    scene: SceneRays,
     /// None where interpolated light counts however near it is.
     near_field: Option<NearField>,
     samples: HemisphereSamples,
@@ -66,9 +63,6 @@ pub struct RayGather {
 /// Maximum number of rays over the minimum. Plain choice; no recorded measurement.
 const MAX_OVERSAMPLING: u32 = 16;
 
-/// Rays over the hemisphere per shadow ray to each light. Plain choice; no recorded measurement.
-pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
-
 impl RayGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
@@ -77,10 +71,7 @@ impl RayGather {
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
         let min_rays = least_rays(count)?;
         Ok(RayGather {
-            scene: RayScene::of_scene(mesh.scene()),
-            panes: Panes::of_scene(mesh.scene()),
-            lights: Lights::new(mesh.shared_scene()),
-            rotations: CellRotation::new(&mesh.scene().bounds()),
+            scene: SceneRays::new(mesh),
             near_field: None,
             samples: samples(mesh.scene(), min_rays, min_rays),
             min_rays,
@@ -98,7 +89,7 @@ impl RayGather {
     /// those that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
         let max_rays = most_rays(self.min_rays, noise);
-        let samples = samples(self.lights.scene(), max_rays, self.min_rays);
+        let samples = samples(self.scene.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
@@ -115,11 +106,11 @@ impl RayGather {
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
-        let direct_light = DirectLight::new(self, point);
+        let direct_light = DirectLight::new(&self.scene, self.min_rays, point);
         let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.found(range));
         let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
-        let of_luminaires = self.luminaires().irradiance(point);
+        let of_luminaires = self.scene.luminaires().irradiance(point);
         loop {
             let all = hemisphere.mean() + direct.mean() + of_luminaires;
             let allowed = self.noise * all.length().max(self.dim);
@@ -147,12 +138,7 @@ impl RayGather {
 
     /// The light of luminaires.
     pub(crate) fn luminaires(&self) -> LuminaireLight<'_> {
-        LuminaireLight {
-            luminaires: self.lights.scene().luminaires(),
-            rays: &self.scene,
-            panes: &self.panes,
-            rotations: &self.rotations,
-        }
+        self.scene.luminaires()
     }
 
     /// Sums over the rays of `range`. They exclude the emission of lights that `direct` sends rays
@@ -164,17 +150,17 @@ impl RayGather {
         direct: &'d DirectLight,
         range: Range<u32>,
     ) -> HemisphereRays<'d, FIELDS> {
-        let rotation = self.rotations.at(point.position, point.near);
+        let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
+        let rotation = rotations.at(point.position, point.near);
         let mut found = HemisphereRays::none(direct.wide());
-        let sky = self.lights.scene().sky();
+        let sky = lights.scene().sky();
         let out = &mut found.of_all_fields;
         let of_wide = &mut found.of_wide;
         let (mut ray, rays) = (range.start, range.len());
         let mut near = vec![];
         let directions = self.samples.directions_in(range, point.normal, rotation);
-        self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
-            let passed =
-                |end: f64| self.panes.transmittance(point.position, direction, point.near..end);
+        surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+            let passed = |end: f64| panes.transmittance(point.position, direction, point.near..end);
             direct.add_to_wide(of_wide, direction, hit, passed);
             ray += 1;
             let Some(hit) = hit else {
@@ -201,9 +187,9 @@ impl RayGather {
                 };
                 add(&mut found.reflected, &mut found.largest, std::array::from_fn(reflected));
             }
-            let light = self.lights.of_triangle[hit.triangle];
+            let light = lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !direct.knows(light) {
-                out.direct += self.lights.lights[light as usize].exitance * passed;
+                out.direct += lights.lights[light as usize].exitance * passed;
             }
         });
         let covered = self.near_field.as_ref();
@@ -243,7 +229,7 @@ fn add<const FIELDS: usize>(sums: &mut [Rgb; FIELDS], largest: &mut f64, reflect
 /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
 pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
     if count == 0 || count > hemisphere::MAX_RAYS {
-        let place = format!("{count} rays a place");
+        let place = format!("{count} rays a point");
         let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
         return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
     }
@@ -344,18 +330,18 @@ impl<const FIELDS: usize> HemisphereRays<'_, FIELDS> {
 impl Gather for RayGather {
     fn gather(
         &mut self,
-        sources: &RadiosityField,
-        places: &[GatherPoint],
+        field: &RadiosityField,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        Ok(places.par_iter().map(|p| self.irradiance([sources], p)[0]).collect())
+        Ok(points.par_iter().map(|p| self.irradiance([field], p)[0]).collect())
     }
 
     fn gather_both(
         &mut self,
-        sources: [&RadiosityField; 2],
-        places: &[GatherPoint],
+        fields: [&RadiosityField; 2],
+        points: &[GatherPoint],
     ) -> Result<[Vec<IrradianceSample>; 2], Error> {
-        let both = places.par_iter().map(|p| self.irradiance(sources, p).into());
+        let both = points.par_iter().map(|p| self.irradiance(fields, p).into());
         let (first, second) = both.unzip::<IrradianceSample, IrradianceSample, _, _>();
         Ok([first, second])
     }

@@ -114,7 +114,7 @@ impl CompactedRows {
         rows: u32,
         through_panes: bool,
     ) {
-        let pipelines = gpu.row_pipelines();
+        let pipelines = gpu.tracing.row_pipelines(&gpu.device);
         let pipeline = match through_panes {
             true => &pipelines.compact_rows_through_panes,
             false => &pipelines.compact_rows,

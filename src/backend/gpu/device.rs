@@ -16,9 +16,12 @@ use super::adapters;
 use super::error::{device_error, invalid_result, message};
 use super::limits::{self, GpuLimits};
 use super::memory::{Memory, MemoryBudget};
+use super::traced_scene::TracedScene;
 use super::tracing::Tracing;
 use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
+use crate::gather::lights::Lights;
+use crate::scene::Scene;
 
 /// An open graphics device. Clones are the same device.
 #[derive(Clone, Debug)]
@@ -72,7 +75,12 @@ impl Gpu {
             record(&lost, format!("the device was lost: {why}"));
         });
         if gpu.assumed != AdapterKind::Cpu {
-            gpu.compile_ahead();
+            // All passes of rays are ready when the scene is loaded.
+            let (device, tracing) = (gpu.device.clone(), gpu.tracing.clone());
+            std::thread::spawn(move || {
+                tracing.gather_pipelines(&device);
+                tracing.row_pipelines(&device);
+            });
         }
         Ok(gpu)
     }
@@ -182,15 +190,30 @@ impl Gpu {
             match self.with_error_scopes(|| make(self.memory(), batch)) {
                 Err(e) if e.kind() == ErrorKind::Memory && batch > 1 => {
                     batch /= 2;
-                    // The memory of the failed attempt is freed once writes to it have completed.
-                    self.with_error_scopes(|| {
-                        self.queue.submit([]);
-                        self.wait()
-                    })?;
+                    self.free_unused()?;
                 }
                 made => return made,
             }
         }
+    }
+
+    /// Frees buffers and textures that have been dropped: once writes to them have completed.
+    pub(super) fn free_unused(&self) -> Result<(), Error> {
+        self.with_error_scopes(|| {
+            self.queue.submit([]);
+            self.wait()
+        })
+    }
+
+    /// The scene of `lights`, which is `scene`, on the device: uploaded unless it is the previous
+    /// one.
+    pub(super) fn traced_scene(
+        &self,
+        scene: &Arc<Scene>,
+        lights: &Lights,
+    ) -> Result<Arc<TracedScene>, Error> {
+        let upload = || self.with_error_scopes(|| TracedScene::new(self.memory(), lights));
+        self.tracing.scene(scene, upload)
     }
 
     /// Waits until all submitted work is done.

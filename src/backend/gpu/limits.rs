@@ -1,8 +1,10 @@
 //! Usable limits of a device, and the requirements of the passes.
 
 use super::error::place;
-use super::traced_gather::MAX_POINTS;
 use crate::error::{Error, ErrorKind};
+
+/// Maximum number of points of a batch: an H200 gets no faster beyond that.
+pub const MAX_POINTS: u32 = 32_768;
 
 /// Maximum limits requested of a device, where it has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -162,7 +162,7 @@ impl TracedRows {
         let Buffers { quadtrees, patches: patch_buffer, counts, compacted, .. } = &mut self.buffers;
         let gpu = &self.gpu;
         gpu.queue.write_buffer(patch_buffer, 0, bytemuck::cast_slice(patches));
-        let pipeline = &gpu.row_pipelines().row_rays;
+        let pipeline = &gpu.tracing.row_pipelines(&gpu.device).row_rays;
         let group = |group: u32, entries: &[(u32, wgpu::BindingResource)]| {
             let layout = pipeline.get_bind_group_layout(group);
             bind_group(&gpu.device, "rows", &layout, entries)
