@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::flux_state::{FluxState, ReceivedLight};
 use super::method_state::MethodState;
 use super::row_cache::RowCache;
+use super::shooting::Shooting;
 use super::staleness::tightened_unshot;
 use super::step::{Counters, MIN_UNSHOT_SHARE, StepContext};
 use super::{Ledger, Progress, Solution, Solver};
@@ -47,7 +48,7 @@ pub struct SolveSession<'m> {
     pub(super) solver: Solver,
     pub(super) state: FluxState<'m>,
     pub(super) rows: RowCache,
-    pub(super) method: MethodState<'m>,
+    pub(super) method: MethodState<Shooting<'m>>,
     pub(super) counters: Counters,
     pub(super) stop: Option<StopReason>,
     /// [`FormFactors::fingerprint`] of the source of the last rows.
