@@ -89,13 +89,18 @@ impl<T: Value, R> Cycle<T, R> {
     /// the next basis vector.
     pub fn extend(&mut self, mut product: Vec<T>) {
         // One pass of modified Gram–Schmidt is enough for GMRES (Paige, Rozložník and Strakoš 2006).
+        let whole = norm(&self.weights, &product);
         let mut column = vec![];
         for v in &self.basis {
             let along = dot(&self.weights, v, &product);
             product.par_iter_mut().zip(v).for_each(|(w, &v)| *w -= along * v);
             column.push(along);
         }
+        // Where the product is in the basis, only rounding is left, less than 8 steps of each
+        // vector; as a direction it would make R singular.
+        let rounding = 8.0 * column.len() as f64 * f64::EPSILON;
         let norm = norm(&self.weights, &product);
+        let norm = norm.zip(whole, |norm, whole| if norm <= rounding * whole { 0.0 } else { norm });
         column.push(norm);
         product.iter_mut().for_each(|w| *w = w.ratio(norm));
         self.basis.push(product);
