@@ -4,9 +4,6 @@ use super::lookup::Lookup;
 use super::spectra::Bands;
 use crate::gather::vertex_rows::VertexRow;
 
-/// Number of sets of rays that are compared with each other.
-pub(super) const HALVES: u32 = 2;
-
 /// Reflected light of one vertex, W/m² by band.
 pub(super) struct GatheredVertex {
     pub reflected: Vec<f64>,

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::cie::Observer;
 use super::error::{BandError, relative_noise};
-use super::final_gather::{GatheredVertex, HALVES};
+use super::final_gather::GatheredVertex;
 use super::lookup::{Lookup, add};
 use super::spectra::{Band, Bands};
 use super::surface_vertices::SurfaceVertices;
@@ -153,7 +153,7 @@ impl<'a> Gathering<'a> {
         };
         let many = many.map(
             &scattering,
-            HALVES,
+            2,
             |v, row| {
                 let material = materials[v as usize].unwrap_or_default();
                 let reflected = &converged.reflected;
