@@ -60,16 +60,13 @@ pub struct RayGather {
     dim: f64,
 }
 
-/// Maximum number of rays over the minimum. Plain choice; no recorded measurement.
-const MAX_OVERSAMPLING: u32 = 16;
-
 impl RayGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        let min_rays = least_rays(count)?;
+        let min_rays = min_rays(count)?;
         Ok(RayGather {
             scene: SceneRays::new(mesh),
             near_field: None,
@@ -88,7 +85,7 @@ impl RayGather {
     /// whose squares add up; those with the larger are doubled. Few points need more rays, such as
     /// those that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
-        let max_rays = most_rays(self.min_rays, noise);
+        let max_rays = max_rays(self.min_rays, noise);
         let samples = samples(self.scene.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
@@ -200,7 +197,7 @@ impl RayGather {
             let reflected = if let Some(near_field) = covered {
                 let by_area = !direct.lights().is_empty();
                 let NearLight { light, end } =
-                    near_field.light(fields[0].mesh, (point, rotation), &ray, by_area);
+                    near_field.light(fields[0].mesh, point, rotation, &ray, by_area);
                 fields.map(|field| match &end {
                     Some((share, end)) => light + *share * reflected_at(field, end),
                     None => light,
@@ -227,7 +224,7 @@ fn add<const FIELDS: usize>(sums: &mut [Rgb; FIELDS], largest: &mut f64, reflect
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
-pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
+pub(crate) fn min_rays(count: u32) -> Result<u32, Error> {
     if count == 0 || count > hemisphere::MAX_RAYS {
         let place = format!("{count} rays a point");
         let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
@@ -236,10 +233,11 @@ pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
     Ok(1 << f64::from(count).log2().round().max(1.0) as u32)
 }
 
-/// Maximum number of rays of a point with at least `min_rays`, and more only for a finite `noise`.
-pub(crate) fn most_rays(min_rays: u32, noise: f64) -> u32 {
+/// Maximum number of rays of a point with at least `min_rays`: 16 times as many for a finite
+/// `noise`. Plain choice; no recorded measurement.
+pub(crate) fn max_rays(min_rays: u32, noise: f64) -> u32 {
     match noise.is_finite() {
-        true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
+        true => (16 * min_rays).min(hemisphere::MAX_RAYS),
         false => min_rays,
     }
 }

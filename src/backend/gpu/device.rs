@@ -52,7 +52,7 @@ impl Gpu {
     /// [`ErrorKind::Device`] when there is no such adapter; the message lists the available ones,
     /// or names the packages that install one.
     pub fn new(name: Option<&str>) -> Result<Gpu, Error> {
-        Gpu::within(name, &GpuLimits::MOST)
+        Gpu::within(name, &GpuLimits::NONE)
     }
 
     /// As [`Gpu::new`], but as if the device had at most `limits`: to leave memory for other
@@ -400,10 +400,10 @@ mod tests {
         let own = gpu();
         let mesh = scene();
         let (device, queue) = callers_device(wgpu::Limits::default());
-        let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::MOST).unwrap();
+        let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::NONE).unwrap();
         assert_eq!(gpu.adapter(), own.adapter());
         assert_eq!(rows(&gpu, &mesh).unwrap(), rows(&own, &mesh).unwrap());
-        let limits = GpuLimits { memory: 1000, ..GpuLimits::MOST };
+        let limits = GpuLimits { memory: 1000, ..GpuLimits::NONE };
         let small = Gpu::from_wgpu(device.clone(), gpu.queue.clone(), &limits).unwrap();
         assert_eq!(rows(&small, &mesh).unwrap_err().kind(), ErrorKind::Memory);
         device.destroy();
@@ -414,7 +414,7 @@ mod tests {
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn from_wgpu_rejects_low_limits() {
         let (device, queue) = callers_device(wgpu::Limits::downlevel_webgl2_defaults());
-        let e = Gpu::from_wgpu(device, queue, &GpuLimits::MOST).unwrap_err();
+        let e = Gpu::from_wgpu(device, queue, &GpuLimits::NONE).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         let text = e.to_string();
         assert!(text.contains("max_storage_buffers_per_shader_stage = 0"), "{text}");

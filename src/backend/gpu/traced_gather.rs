@@ -27,7 +27,7 @@ use super::slots::{IN_FLIGHT, Slot, Slots};
 use super::traced_scene::TracedScene;
 use crate::backend::adapter::AdapterKind;
 use crate::backend::cpu::RayGather;
-use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, least_rays, most_rays, samples};
+use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, max_rays, min_rays, samples};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
@@ -84,10 +84,6 @@ fn path_rays(kind: AdapterKind) -> u32 {
     }
 }
 
-/// Maximum seconds of one dispatch: drivers abort those of seconds, and a desktop freezes
-/// meanwhile.
-const DISPATCH_SECONDS: f64 = 0.02;
-
 impl TracedGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
@@ -113,8 +109,8 @@ impl TracedGather {
         noise: f64,
         dim: f64,
     ) -> Result<TracedGather, Error> {
-        let min_rays = least_rays(count)?;
-        let max_rays = most_rays(min_rays, noise);
+        let min_rays = min_rays(count)?;
+        let max_rays = max_rays(min_rays, noise);
         check_textures(gpu.limits().texture)?;
         let scene = mesh.scene();
         let lights = Arc::new(Lights::new(mesh.shared_scene()));
@@ -207,28 +203,29 @@ impl TracedGather {
         if is_sound { Ok(sample) } else { Err(format!("{sample:?}")) }
     }
 
-    /// Number of points of one batch: limited by the time of a dispatch, and at most `most`.
-    fn batch_len(&self, most: u32) -> u32 {
+    /// Number of points of one batch: limited by the time of a dispatch, and at most `max`.
+    fn batch_len(&self, max: u32) -> u32 {
         let per_ray = match (self.gpu.adapter().kind, self.rays) {
             (AdapterKind::Cpu, 0) => 1e-6,
             (_, 0) => 2e-8,
             (_, rays) => self.seconds / rays as f64,
         };
         let seconds = per_ray * f64::from(self.min_rays.min(PASS_RAYS));
-        ((DISPATCH_SECONDS / seconds) as u32).max(64).min(most)
+        // A dispatch takes 20 ms: drivers abort those of seconds, and a desktop freezes meanwhile.
+        ((0.02 / seconds) as u32).max(64).min(max)
     }
 
-    /// The samples of `points`, in batches of at most `most`, and whether paths found the light of
+    /// The samples of `points`, in batches of at most `max_len`, and whether paths found the light of
     /// surfaces near them.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,
         points: &[TracedPoint],
-        most: u32,
+        max_len: u32,
     ) -> Result<Vec<(IrradianceSample, bool)>, Error> {
         let gpu = self.gpu.clone();
         let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let len = (self.batch_len(most) as usize).min(points.len());
+        let len = (self.batch_len(max_len) as usize).min(points.len());
         // For all rays of the first pass, or of the last doubling.
         let rays = self.min_rays.max(self.max_rays / 2);
         let passes = [PASS_RAYS, self.path_rays()].map(|of_pass| rays.div_ceil(of_pass));
@@ -523,16 +520,16 @@ impl Gather for TracedGather {
         field::check(self.gpu.limits(), field, self.triangles)?;
         let traced: Vec<TracedPoint> = points.par_iter().map(|p| self.traced_point(p)).collect();
         let gpu = self.gpu.clone();
-        let mut most = MAX_POINTS.min((points.len() as u32).next_power_of_two());
+        let mut max_len = MAX_POINTS.min((points.len() as u32).next_power_of_two());
         let samples = loop {
             let samples = gpu.with_error_scopes(|| {
                 let field = gpu.tracing.field(&self.scene, field, || gpu.memory())?;
-                self.gather_all(&field, &traced, most)
+                self.gather_all(&field, &traced, max_len)
             });
             match samples {
                 // Smaller batches leave memory for the field.
-                Err(e) if e.kind() == ErrorKind::Memory && most > 1 => {
-                    most /= 2;
+                Err(e) if e.kind() == ErrorKind::Memory && max_len > 1 => {
+                    max_len /= 2;
                     *gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner) = None;
                     gpu.free_unused()?;
                 }

@@ -16,10 +16,6 @@ use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
 use crate::scene::Scene;
 
-/// Number of fields stored on a device: the field that vertices gather from, and the gathered one,
-/// which an estimate of the error compares.
-const FIELDS: usize = 2;
-
 /// Stored with a device, for all users that cast rays on it.
 #[derive(Debug, Default)]
 pub struct Tracing {
@@ -172,7 +168,9 @@ impl Tracing {
         let buffers = match kept.iter().position(is_same) {
             Some(k) => kept.remove(k).buffers,
             None => {
-                if kept.len() >= FIELDS {
+                // Two are stored: the field that vertices gather from, and the gathered one, which an
+                // estimate of the error compares.
+                if kept.len() >= 2 {
                     kept.remove(0);
                 }
                 let new = || FieldBuffers::new(memory(), field, scene.radiance_unit);

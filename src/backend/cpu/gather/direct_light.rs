@@ -31,12 +31,8 @@ pub(super) struct DirectLight<'a> {
     rotation: f64,
 }
 
-/// Minimum cosine of the angle between the mean direction to a light and any direction to it, for
-/// points on it to sample it well: 60°. Plain choice.
-const MIN_AXIS_COSINE: f64 = 0.5;
-
-/// Whether the part of a light above the horizon of `point` is within a cone around its mean
-/// direction; false if there is none.
+/// Whether the part of a light above the horizon of `point` is within 60° of its mean direction, so
+/// that points on it sample it well (plain choice); false if there is none.
 fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
     let mut directions = vec![];
     for corners in triangles {
@@ -46,8 +42,7 @@ fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3
         }
     }
     let axis = directions.iter().map(|d| d.normalize_or_zero()).sum::<DVec3>().try_normalize();
-    let is_within =
-        |axis: DVec3| directions.iter().all(|d| d.dot(axis) > MIN_AXIS_COSINE * d.length());
+    let is_within = |axis: DVec3| directions.iter().all(|d| d.dot(axis) > 0.5 * d.length());
     axis.is_some_and(is_within)
 }
 
@@ -77,9 +72,9 @@ impl<'a> DirectLight<'a> {
         let (wide, lights): (Vec<_>, Vec<_>) = lights.into_iter().partition(|&(light, factor)| {
             WideLight::is_wide(&all[light as usize], factor, scene, point, min_rays)
         });
-        let wide = wide
-            .into_iter()
-            .map(|ranked| WideLight::new(&all[ranked.0 as usize], ranked, scene, point));
+        let wide = wide.into_iter().map(|(light, factor)| {
+            WideLight::new(&all[light as usize], light, factor, scene, point)
+        });
         let wide = wide.collect();
         let rotation = rays.rotations.at(point.position, point.near);
         DirectLight { scene: rays, point, lights, wide, sun: scene.sky().sun(), rotation }

@@ -115,8 +115,7 @@ impl RayGather {
             && NearField::is_covered(near.len(), range.len())
         {
             for (k, ray) in near {
-                let NearLight { end, .. } =
-                    near_field.light(source, (point, rotation), &ray, false);
+                let NearLight { end, .. } = near_field.light(source, point, rotation, &ray, false);
                 let hit = &mut row.hits[k];
                 hit.passed *= end.map_or(Rgb::ZERO, |(share, _)| share);
                 if let Some((_, end)) = end {

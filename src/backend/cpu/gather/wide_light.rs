@@ -42,7 +42,8 @@ impl WideLight {
     /// The light `light` with this number and unoccluded form factor, seen from `point`.
     pub fn new(
         light: &Light,
-        (number, unoccluded): (u32, f64),
+        number: u32,
+        unoccluded: f64,
         scene: &Scene,
         point: &GatherPoint,
     ) -> WideLight {
