@@ -209,7 +209,7 @@ impl<'a> Gathering<'a> {
             equations[v as usize] = VertexEquation::mean(&others);
         }
         let done = scattering.len();
-        VertexSystem::new(self.bands, materials, equations).solve(|| progress(done))
+        VertexSystem { bands: self.bands, materials, equations }.solve(|| progress(done))
     }
 
     /// Extends the `results` of the `scattering` vertices to all, with `dark` for the others;

@@ -32,10 +32,10 @@ pub(super) struct VertexEquation {
 
 /// The equations of all vertices.
 pub(super) struct VertexSystem<'a> {
-    bands: &'a Bands,
+    pub bands: &'a Bands,
     /// Material of each vertex; `None` where nothing reflects.
-    materials: &'a [Option<u32>],
-    equations: Vec<VertexEquation>,
+    pub materials: &'a [Option<u32>],
+    pub equations: Vec<VertexEquation>,
 }
 
 /// Reflected light of vertices, and statistics of the iteration.
@@ -98,15 +98,7 @@ fn merged(lookup: &Lookup, rows: &[PointRow]) -> Vec<(u32, f32)> {
     runs.map(|run| (run[0].0, run.iter().map(|&(_, weight)| weight).sum::<f64>() as f32)).collect()
 }
 
-impl<'a> VertexSystem<'a> {
-    pub fn new(
-        bands: &'a Bands,
-        materials: &'a [Option<u32>],
-        equations: Vec<VertexEquation>,
-    ) -> VertexSystem<'a> {
-        VertexSystem { bands, materials, equations }
-    }
-
+impl VertexSystem<'_> {
     /// Sweeps until every band has converged, or [`MAX_SWEEPS`] times; `None` if `progress` breaks,
     /// which is called after each sweep.
     pub fn solve(&self, mut progress: impl FnMut() -> ControlFlow<()>) -> Option<Converged> {

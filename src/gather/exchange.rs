@@ -1,7 +1,7 @@
 //! Light that vertices reflect to each other.
 //!
 //! ```text
-//!   x_k = c_k + ρ_k Σ_j w_kj x_j      c: reflected light from elsewhere    w: rays from k to near j
+//!   x_k = c_k + ρ_k Σ_j w_kj x_j    c: reflected light from elsewhere    w: rays from k to near j
 //! ```
 //!
 //! Rays are cast once; all bounces are arithmetic then. Light that enters a gap goes to and fro a
@@ -133,7 +133,8 @@ mod tests {
     ///
     /// The test fails if light from other blocks counts 0; if the third block, a short one, begins
     /// at its number times its own length; and if `converge` ends when the first block has
-    /// converged, or the last, or any: the second alone has light at first, and the others are dark for a sweep.
+    /// converged, or the last, or any: the second alone has light at first, and the others are dark
+    /// for a sweep.
     #[test]
     fn vertices_receive_light_from_other_blocks() {
         let (albedo, count) = (0.8, 2 * BLOCK + 1000);

@@ -16,7 +16,8 @@ use crate::error::{Error, ErrorKind};
 use crate::linear::gmres;
 use crate::view_factor::{Estimate, ViewFactors};
 
-/// Maximum number of Newton steps. Plain choice: a handful suffices, since convergence is quadratic.
+/// Maximum number of Newton steps. Plain choice: a handful suffices, since convergence is
+/// quadratic.
 const MAX_STEPS: usize = 100;
 
 pub(super) struct Exchange<'a> {

@@ -88,7 +88,8 @@ impl<T: Value, R> Cycle<T, R> {
     /// Appends the `product` of the newest basis vector: its component orthogonal to the basis is
     /// the next basis vector.
     pub fn extend(&mut self, mut product: Vec<T>) {
-        // One pass of modified Gram–Schmidt is enough for GMRES (Paige, Rozložník and Strakoš 2006).
+        // One pass of modified Gram–Schmidt is enough for GMRES (Paige, Rozložník and Strakoš
+        // 2006).
         let whole = norm(&self.weights, &product);
         let mut column = vec![];
         for v in &self.basis {

@@ -27,7 +27,7 @@ use crate::scene::Rgb;
 pub(super) struct Gmres {
     /// Products in a cycle.
     restart: usize,
-    cycle: Option<Cycle>,
+    cycle: Option<Box<Cycle>>,
     product: Option<Product>,
 }
 
@@ -72,7 +72,7 @@ impl Gmres {
             }
             let weights = inner_product_weights(step.state.mesh);
             let unshot = step.state.flux.unshot.clone();
-            self.cycle = Some(Cycle::new(unshot, weights, SentVectors::default()));
+            self.cycle = Some(Box::new(Cycle::new(unshot, weights, SentVectors::default())));
             return Ok(None);
         };
         if let Some(product) = &mut self.product {
@@ -107,7 +107,7 @@ impl Gmres {
             if left > 0.5 && cycle.products() >= self.restart {
                 self.restart = self.restart.saturating_mul(2);
             }
-            send_step(cycle, state, rows);
+            send_step(&cycle, state, rows);
         }
     }
 }
@@ -180,7 +180,7 @@ fn unshot_bound(cycle: &Cycle, state: &FluxState) -> f64 {
 }
 
 /// Sends the flux that minimizes the unshot flux.
-fn send_step(cycle: Cycle, state: &mut FluxState, rows: &mut RowCache) {
+fn send_step(cycle: &Cycle, state: &mut FluxState, rows: &mut RowCache) {
     let factors = cycle.step();
     cycle.subtract_product(&factors, &mut state.flux.unshot);
     let mut sent = vec![Rgb::ZERO; state.flux.unshot.len()];

@@ -63,8 +63,8 @@ impl<'m> Surfaces<'m> {
     }
 }
 
-/// Means of 1/r and 1/r² over all that a patch sees, r the distance of a receiver's centroid from the
-/// viewpoint.
+/// Means of 1/r and 1/r² over all that a patch sees, r the distance of a receiver's centroid from
+/// the viewpoint.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct InverseDistanceMoments {
     /// d₁, 1/length.

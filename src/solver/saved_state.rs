@@ -113,7 +113,7 @@ impl SavedSession {
             ("counts", are_counts),
         ] {
             if !is_valid {
-                return Err(refuse(part, "values that are not those of a solve here", DAMAGED));
+                return Err(refuse(part, "values that no solve of this mesh has", DAMAGED));
             }
         }
         Ok(())

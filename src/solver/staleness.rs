@@ -7,12 +7,12 @@
 //! 1. When objects move, rows are recomputed, those with most misplaced flux first, until the bound
 //!    is at most [`MAX_BOUND_OVER_UNSHOT`] × the requested unshot share. A remaining row stays in
 //!    use only if its stale fraction is at most [`MAX_STALE_FRACTION`].
-//! 2. While solving, the expected error of stale rows, a quarter of the bound, is subtracted from the
-//!    requested unshot share, down to half of it: with [`MAX_BOUND_OVER_UNSHOT`] = 2 each error gets
-//!    half.
+//! 2. While solving, the expected error of stale rows, a quarter of the bound, is subtracted from
+//!    the requested unshot share, down to half of it: with [`MAX_BOUND_OVER_UNSHOT`] = 2 each error
+//!    gets half.
 //!
-//! A vase and a chair moved in a furnished room misplaced a sixth to a half of the bound; a quarter is
-//! within that range.
+//! A vase and a chair moved in a furnished room misplaced a sixth to a half of the bound; a quarter
+//! is within that range.
 //!
 //! [`SolveSession::stale_flux_bound`]: super::SolveSession::stale_flux_bound
 

@@ -32,7 +32,7 @@ use crate::sampling::hemisphere::{self, HemisphereSamples};
 use crate::scene::{Rgb, Scene};
 use crate::visibility::ray_scene::Hit;
 use direct_light::DirectLight;
-use doubled::{Doubled, Found};
+use doubled::{Doubled, RaySums};
 use near_field::{NearField, NearLight, NearRay};
 pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
 use scene_rays::SceneRays;
@@ -104,7 +104,7 @@ impl RayGather {
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
         let direct_light = DirectLight::new(&self.scene, self.min_rays, point);
-        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.found(range));
+        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.cast(range));
         let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
         let of_luminaires = self.scene.luminaires().irradiance(point);
@@ -123,7 +123,7 @@ impl RayGather {
                 break;
             }
         }
-        let (rays, count) = (hemisphere.found(), hemisphere.count());
+        let (rays, count) = (hemisphere.sums(), hemisphere.count());
         let noise = direct.error().hypot(hemisphere.error());
         rays.samples(count, direct.mean() + of_luminaires, noise)
     }
@@ -149,10 +149,10 @@ impl RayGather {
     ) -> HemisphereRays<'d, FIELDS> {
         let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
         let rotation = rotations.at(point.position, point.near);
-        let mut found = HemisphereRays::none(direct.wide());
+        let mut sums = HemisphereRays::none(direct.wide());
         let sky = lights.scene().sky();
-        let out = &mut found.of_all_fields;
-        let of_wide = &mut found.of_wide;
+        let out = &mut sums.of_all_fields;
+        let of_wide = &mut sums.of_wide;
         let (mut ray, rays) = (range.start, range.len());
         let mut near = vec![];
         let directions = self.samples.directions_in(range, point.normal, rotation);
@@ -164,7 +164,7 @@ impl RayGather {
                 out.escaped += 1.0;
                 let radiosity = PI * sky.radiance(direction) * passed(f64::INFINITY);
                 out.irradiance += radiosity;
-                found.largest = found.largest.max(radiosity.length());
+                sums.largest = sums.largest.max(radiosity.length());
                 return;
             };
             out.inverse_distance += 1.0 / hit.distance;
@@ -182,10 +182,10 @@ impl RayGather {
                     0 => first * passed,
                     k => fields[k].reflected_at(hit.triangle, hit.u, hit.v) * passed,
                 };
-                add(&mut found.reflected, &mut found.largest, std::array::from_fn(reflected));
+                add(&mut sums.reflected, &mut sums.largest, std::array::from_fn(reflected));
             }
             let light = lights.of_triangle[hit.triangle];
-            if light != NO_LIGHT && !direct.knows(light) {
+            if light != NO_LIGHT && !direct.samples(light) {
                 out.direct += lights.lights[light as usize].exitance * passed;
             }
         });
@@ -206,9 +206,9 @@ impl RayGather {
                 fields.map(|field| reflected_at(field, &ray.hit))
             };
             let reflected = reflected.map(|radiosity| radiosity * ray.passed);
-            add(&mut found.reflected, &mut found.largest, reflected);
+            add(&mut sums.reflected, &mut sums.largest, reflected);
         }
-        found
+        sums
     }
 }
 
@@ -277,7 +277,7 @@ impl<'d, const FIELDS: usize> HemisphereRays<'d, FIELDS> {
     }
 }
 
-impl<const FIELDS: usize> Found for HemisphereRays<'_, FIELDS> {
+impl<const FIELDS: usize> RaySums for HemisphereRays<'_, FIELDS> {
     fn add(&mut self, other: &Self) {
         for (sum, term) in self.of_wide.iter_mut().zip(&other.of_wide) {
             sum.add(term);

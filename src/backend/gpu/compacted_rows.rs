@@ -71,8 +71,8 @@ impl CompactedRows {
     }
 
     /// All rows of `patches`, in their order. `make` makes those of up to `batch_len` patches at
-    /// once, or returns `None` where there is no room for their entries: then it is called with each
-    /// half of them.
+    /// once, or returns `None` where there is no room for their entries: then it is called with
+    /// each half of them.
     ///
     /// # Errors
     /// Those of `make`, and [`ErrorKind::Memory`] where there is no room for a single row.

@@ -215,8 +215,8 @@ impl TracedGather {
         ((0.02 / seconds) as u32).max(64).min(max)
     }
 
-    /// The samples of `points`, in batches of at most `max_len`, and whether paths found the light of
-    /// surfaces near them.
+    /// The samples of `points`, in batches of at most `max_len`, and whether paths found the light
+    /// of surfaces near them.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,

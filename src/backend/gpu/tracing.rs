@@ -168,8 +168,8 @@ impl Tracing {
         let buffers = match kept.iter().position(is_same) {
             Some(k) => kept.remove(k).buffers,
             None => {
-                // Two are stored: the field that vertices gather from, and the gathered one, which an
-                // estimate of the error compares.
+                // Two are stored: the field that vertices gather from, and the gathered one, which
+                // an estimate of the error compares.
                 if kept.len() >= 2 {
                     kept.remove(0);
                 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::doubled::Found;
+use super::doubled::RaySums;
 use super::scene_rays::SceneRays;
 use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
@@ -101,18 +101,18 @@ impl<'a> DirectLight<'a> {
     ) {
         let front = hit.filter(|hit| hit.front);
         for (wide, visible) in self.wide.iter().zip(visible) {
-            let is_met = |hit: &Hit| self.scene.lights.of_triangle[hit.triangle] == wide.light;
-            wide.add_ray(direction, front.filter(is_met).map(|hit| passed(hit.distance)), visible);
+            let is_hit = |hit: &Hit| self.scene.lights.of_triangle[hit.triangle] == wide.light;
+            wide.add_ray(direction, front.filter(is_hit).map(|hit| passed(hit.distance)), visible);
         }
     }
 
     /// Whether the direct light of `light` is counted separately from reflected light.
-    pub fn knows(&self, light: u32) -> bool {
+    pub fn samples(&self, light: u32) -> bool {
         self.lights.iter().any(|&(k, _)| k == light) || self.wide.iter().any(|w| w.light == light)
     }
 
-    /// Results of the rays of `range`.
-    pub fn found(&self, range: Range<u32>) -> ShadowRays<'_> {
+    /// Casts the rays of `range`.
+    pub fn cast(&self, range: Range<u32>) -> ShadowRays<'_> {
         let visible = |&(light, _): &(u32, f64)| self.rays_to(light, range.clone());
         let sun = |sun: &Sun| self.rays_to_sun(sun, range.clone());
         ShadowRays {
@@ -172,7 +172,7 @@ impl<'a> DirectLight<'a> {
     }
 }
 
-impl Found for ShadowRays<'_> {
+impl RaySums for ShadowRays<'_> {
     fn add(&mut self, other: &ShadowRays) {
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
             sum.add(term);

@@ -77,7 +77,7 @@ impl RayGather {
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
         let (mut ray, mut near) = (range.start, vec![]);
         let wide = direct.map_or(&[][..], DirectLight::wide);
-        let has_entry = |light: u32| direct.is_some_and(|direct| direct.knows(light));
+        let has_entry = |light: u32| direct.is_some_and(|direct| direct.samples(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
         let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
         surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {

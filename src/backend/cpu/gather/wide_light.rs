@@ -59,8 +59,8 @@ impl WideLight {
 
     /// Whether rays over the hemisphere estimate the visible share of `light` from `point` better
     /// than points on it, one per [`RAYS_PER_SHADOW_RAY`] of at least `min_rays` rays: whether more
-    /// of them go towards it than the effective number of such points. n points of weights w have the
-    /// effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
+    /// of them go towards it than the effective number of such points. n points of weights w have
+    /// the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     pub fn is_wide(
         light: &Light,
         unoccluded: f64,
