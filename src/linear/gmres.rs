@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Value;
 
-/// Default number of products in a cycle, which is that of stored vectors. Plain choice, on which
-/// results hardly depend: most solves take some 10.
+/// Default number of products in a cycle, and of stored vectors. Plain choice, on which results
+/// hardly depend: solves typically take some 10.
 pub const RESTART: usize = 50;
 
 /// Numbers summed sequentially in one chunk: the order does not depend on the number of threads.

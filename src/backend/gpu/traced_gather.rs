@@ -8,8 +8,8 @@
 //!
 //! The sums are those of [`RayGather`], in 32 bits. Lists of the points that need more rays are
 //! made on the device: the host waits for samples only. Rays to luminaires are cast on the CPU, and
-//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device meet
-//! no luminaires.
+//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device do
+//! not sample luminaires.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};
