@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
 
     // Both are handles: the program keeps its own.
-    let limits = GpuLimits { memory: 256 << 20, ..GpuLimits::MOST }; // leave the rest to others
+    let limits = GpuLimits { memory: 256 << 20, ..GpuLimits::NONE }; // leave the rest to others
     let gpu = Gpu::from_wgpu(device.clone(), queue.clone(), &limits)?;
     let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
     let target = BakeTarget::Error(0.05);

@@ -63,7 +63,7 @@ pub(crate) struct GatherRays {
 }
 
 impl GatherRays {
-    /// As many for each point, of any light.
+    /// The same number of rays for each point, of any light.
     pub fn evenly(rays: u32) -> GatherRays {
         GatherRays { rays, noise: f64::INFINITY, dim: 0.0, near_field: false }
     }
@@ -95,7 +95,7 @@ impl Backend {
     /// not support, and without a device.
     ///
     /// A device draws hemicubes here even where rays would take less time, which is the case with
-    /// many triangles and few pixels: bakes ask [`Backend::row_maker`] first.
+    /// many triangles and few pixels: bakes use [`Backend::row_maker`].
     ///
     /// # Errors
     /// Those of [`Backend::rows_by`].
@@ -194,7 +194,7 @@ impl Backend {
     /// Those of [`TracedGather::new`](crate::backend::gpu::TracedGather::new) and
     /// [`RayGather::new`].
     pub fn gather(&self, mesh: &Mesh, rays: u32) -> Result<Box<dyn Gather>, Error> {
-        self.gather_evenly(mesh, GatherRays::evenly(rays))
+        self.gather_with(mesh, GatherRays::evenly(rays))
     }
 
     /// A gatherer of `light` for [`irradiance_at`](crate::gather::irradiance_at): the number of
@@ -217,27 +217,27 @@ impl Backend {
         let (rays, noise) = rays_for_noise(noise);
         let dim = light.radiosity_field().radiosity_floor(Measure::default().floor);
         let rays = GatherRays { rays, noise, dim, near_field: false };
-        self.gather_or_cast_rays(&light.mesh, rays, |_| ())
+        self.gather_with_fallback(&light.mesh, rays, |_| ())
     }
 
-    /// As [`Backend::gather_evenly`], with rays on the CPU from the time when the device fails, or
+    /// As [`Backend::gather_with`], with rays on the CPU from the time when the device fails, or
     /// if it cannot start: `failed` receives the reason.
-    pub(crate) fn gather_or_cast_rays<'a>(
+    pub(crate) fn gather_with_fallback<'a>(
         &self,
         mesh: &Mesh,
         rays: GatherRays,
         mut failed: impl FnMut(Error) + 'a,
     ) -> Result<Box<dyn Gather + 'a>, Error> {
-        match self.gather_evenly(mesh, rays) {
+        match self.gather_with(mesh, rays) {
             Ok(first) if self.gathers_on_device() => {
                 let mesh = mesh.clone();
                 Ok(Box::new(Fallback::new(first, move |error| {
                     failed(error);
-                    Backend::Cpu.gather_evenly(&mesh, rays)
+                    Backend::Cpu.gather_with(&mesh, rays)
                 })))
             }
             Err(e) if e.is_device_error() || e.kind() == ErrorKind::Setting => {
-                let gather = Backend::Cpu.gather_evenly(mesh, rays)?;
+                let gather = Backend::Cpu.gather_with(mesh, rays)?;
                 failed(e);
                 Ok(gather)
             }
@@ -246,7 +246,7 @@ impl Backend {
     }
 
     /// As [`Backend::gather`], with more rays where they disagree: see [`RayGather::with_noise`].
-    pub(crate) fn gather_evenly(
+    pub(crate) fn gather_with(
         &self,
         mesh: &Mesh,
         GatherRays { rays, noise, dim, near_field }: GatherRays,
@@ -254,7 +254,7 @@ impl Backend {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
-                let gather = TracedGather::with_noise(gpu, mesh, rays, (noise, dim))?;
+                let gather = TracedGather::with_noise(gpu, mesh, rays, noise, dim)?;
                 Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
             _ => {

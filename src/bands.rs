@@ -5,7 +5,7 @@
 //! hits of these rays are stored as rows once, and all bands are looked up along the same rows:
 //!
 //! ```text
-//!   BakeResult ── vertices ──┬── few rays: rows stored ► Jacobi sweeps, each band to its own end
+//!   BakeResult ── vertices ──┬── few rays: rows stored ► sweeps until each band converges
 //!                            │                                  │ reflected light of vertices
 //!   Bands ───────────────────┴── many rays: looked up once ◄────┘
 //!   ρ, τ, E by material and band          │

@@ -19,7 +19,6 @@
 mod balance;
 mod black_body;
 mod exchange;
-mod gmres;
 mod surface;
 mod undetermined;
 

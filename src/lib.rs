@@ -116,6 +116,7 @@ pub mod io;
 mod light;
 #[cfg(feature = "light-map")]
 pub mod light_map;
+mod linear;
 pub mod mesh;
 pub mod probe;
 mod progress;

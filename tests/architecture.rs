@@ -10,6 +10,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("progress", "error"),
     ("ranks", "error"),
     ("geometry", ""),
+    ("linear", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
     ("accuracy", "error"),
@@ -18,16 +19,17 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
     ("form_factor", "error geometry mesh ranks scene"),
-    ("solver", "error form_factor geometry mesh progress scene visibility"),
+    ("solver", "error form_factor geometry linear mesh progress scene visibility"),
     ("vertex", "error form_factor geometry mesh scene"),
     (
         "gather",
-        "accuracy error form_factor geometry mesh progress ranks sampling scene vertex visibility",
+        "accuracy error form_factor geometry linear mesh progress ranks sampling scene vertex \
+         visibility",
     ),
     ("grid", "error gather geometry scene visibility"),
     ("probe", "error gather progress scene visibility"),
     ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),
-    ("heat", "error geometry view_factor"),
+    ("heat", "error geometry linear view_factor"),
     (
         "backend",
         "accuracy error form_factor gather geometry hemicube light mesh progress sampling scene \
@@ -40,7 +42,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy backend error form_factor gather geometry light mesh progress sampling scene \
          solver verify vertex visibility",
     ),
-    ("bands", "accuracy backend bake error gather mesh scene vertex visibility"),
+    ("bands", "accuracy backend bake error gather linear mesh scene vertex visibility"),
     (
         "light_map",
         "accuracy backend bake error gather geometry mesh progress sampling scene verify vertex \

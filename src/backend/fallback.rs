@@ -47,7 +47,7 @@ impl<'a, A, B> Fallback<'a, A, B> {
         self.second.as_ref()
     }
 
-    fn ask<T>(
+    fn request<T>(
         &mut self,
         first: impl FnOnce(&mut A) -> Result<T, Error>,
         second: impl FnOnce(&mut B) -> Result<T, Error>,
@@ -65,7 +65,7 @@ impl<'a, A, B> Fallback<'a, A, B> {
 
 impl<A: FormFactors, B: FormFactors> FormFactors for Fallback<'_, A, B> {
     fn rows(&mut self, mesh: &Mesh, patches: &[NodeId], weight: f64) -> Result<Vec<Row>, Error> {
-        self.ask(
+        self.request(
             |first| first.rows(mesh, patches, weight),
             |second| second.rows(mesh, patches, weight),
         )
@@ -89,20 +89,20 @@ impl<A: FormFactors, B: FormFactors> FormFactors for Fallback<'_, A, B> {
 impl<A: Gather, B: Gather> Gather for Fallback<'_, A, B> {
     fn gather(
         &mut self,
-        sources: &RadiosityField,
-        places: &[GatherPoint],
+        field: &RadiosityField,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        self.ask(|first| first.gather(sources, places), |second| second.gather(sources, places))
+        self.request(|first| first.gather(field, points), |second| second.gather(field, points))
     }
 
     fn gather_both(
         &mut self,
-        sources: [&RadiosityField; 2],
-        places: &[GatherPoint],
+        fields: [&RadiosityField; 2],
+        points: &[GatherPoint],
     ) -> Result<[Vec<IrradianceSample>; 2], Error> {
-        self.ask(
-            |first| first.gather_both(sources, places),
-            |second| second.gather_both(sources, places),
+        self.request(
+            |first| first.gather_both(fields, points),
+            |second| second.gather_both(fields, points),
         )
     }
 

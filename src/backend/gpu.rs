@@ -19,6 +19,7 @@ mod render_targets;
 mod resolution;
 mod rows;
 mod shaders;
+mod slots;
 mod split_float;
 #[cfg(test)]
 mod test_support;

@@ -79,7 +79,7 @@ impl<'a> ResilientBackend<'a> {
         }))
     }
 
-    /// A gatherer of a solution of the scene: see [`Backend::gather_or_cast_rays`]. A device that
+    /// A gatherer of a solution of the scene: see [`Backend::gather_with_fallback`]. A device that
     /// cannot start one has failed too: light was shot by now.
     pub fn gather(
         &self,
@@ -97,6 +97,6 @@ impl<'a> ResilientBackend<'a> {
     }
 
     fn gather_by(&self, mesh: &Mesh, rays: GatherRays) -> Result<Box<dyn Gather + '_>, Error> {
-        self.backend.gather_or_cast_rays(mesh, rays, |error| self.record(error))
+        self.backend.gather_with_fallback(mesh, rays, |error| self.record(error))
     }
 }

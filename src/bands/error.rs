@@ -12,25 +12,26 @@ pub struct BandError {
     /// Difference between two halves of the rays of a vertex.
     pub noise: f64,
     /// Upper bound of the omitted light of further bounces.
-    pub unsettled: f64,
+    pub remainder: f64,
     /// Estimated error of the bake in red, green and blue, mainly of its mesh, which is also that
     /// of the bands. It does not include light that only bands have.
     pub of_bake: f64,
 }
 
 impl BandError {
-    pub(super) fn new(noise: f64, unsettled: f64, of_bake: f64) -> BandError {
-        let total = noise.hypot(unsettled).hypot(of_bake);
-        BandError { total, noise, unsettled, of_bake }
+    pub(super) fn new(noise: f64, remainder: f64, of_bake: f64) -> BandError {
+        let total = noise.hypot(remainder).hypot(of_bake);
+        BandError { total, noise, remainder, of_bake }
     }
 }
 
 /// The root mean square of `noise` over that of `reflected`, by band: values of the vertices at the
-/// `corners` of the elements of `mesh`, bands side by side, weighted by area.
+/// `corners` of the elements of `mesh`, `count` bands side by side, weighted by area.
 pub(super) fn relative_noise(
     mesh: &Mesh,
     corners: &[[u32; 3]],
-    (reflected, noise): (&[f64], &[f64]),
+    reflected: &[f64],
+    noise: &[f64],
     count: usize,
 ) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); count];

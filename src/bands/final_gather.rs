@@ -4,9 +4,6 @@ use super::lookup::Lookup;
 use super::spectra::Bands;
 use crate::gather::vertex_rows::VertexRow;
 
-/// Number of sets of rays that are compared with each other.
-pub(super) const HALVES: u32 = 2;
-
 /// Reflected light of one vertex, W/m² by band.
 pub(super) struct GatheredVertex {
     pub reflected: Vec<f64>,
@@ -18,11 +15,12 @@ impl GatheredVertex {
     /// A vertex of `material` with a row from two halves of the rays; `reflected` is the reflected
     /// light of all vertices, W/m², bands side by side.
     pub fn new(
-        (lookup, bands): (&Lookup, &Bands),
+        lookup: &Lookup,
         material: u32,
         row: &VertexRow,
         reflected: &[f64],
     ) -> GatheredVertex {
+        let bands = lookup.bands;
         let (material, count) = (&bands.materials[material as usize], bands.bands.len());
         let halves = [0, 1].map(|half| {
             let mut leaving = vec![0.0; count];

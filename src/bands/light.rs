@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 
 use super::cie::Observer;
 use super::error::{BandError, relative_noise};
-use super::final_gather::{GatheredVertex, HALVES};
+use super::final_gather::GatheredVertex;
 use super::lookup::{Lookup, add};
 use super::spectra::{Band, Bands};
 use super::surface_vertices::SurfaceVertices;
-use super::vertex_system::{Settled, VertexEquation, VertexSystem};
+use super::vertex_system::{Converged, VertexEquation, VertexSystem};
 use crate::accuracy::hidden;
 use crate::backend::cpu::RayGather;
 use crate::bake::BakeResult;
@@ -19,12 +19,12 @@ use crate::mesh::Mesh;
 use crate::scene::{Rgb, Sky};
 use crate::vertex::VertexMesh;
 
-/// Ratio of the rays of a vertex for the final gather to those for the iteration: noise that
-/// differs from vertex to vertex is averaged over all that a vertex sees.
-const SETTLING_RAY_DIVISOR: u32 = 16;
+/// Ratio of the rays of a vertex for the final gather to those for the iteration, whose noise
+/// differs from vertex to vertex and is averaged over all that a vertex sees. Plain choice.
+const ITERATION_RAY_DIVISOR: u32 = 16;
 
-/// Minimum number of rays of a vertex for the iteration.
-const MIN_SETTLING_RAYS: u32 = 64;
+/// Minimum number of rays of a vertex for the iteration. Plain choice.
+const MIN_ITERATION_RAYS: u32 = 64;
 
 /// Radiosity and irradiance of all bands at the vertices of a surface.
 #[derive(Clone, Debug)]
@@ -70,11 +70,11 @@ impl Bands {
         }
         let rays = baked.settings.gather.as_ref().map_or(model::ELEMENT_RAYS, |g| g.rays);
         let gathered = Gathering::new(self, mesh, &surface, baked).light(rays, &mut progress)?;
-        let Some((settled, reflected, noise)) = gathered else { return Ok(None) };
+        let Some(Gathered { converged, reflected, noise }) = gathered else { return Ok(None) };
         let corners = &surface.vertices.corners;
         let count = self.bands.len();
-        let of_rays = relative_noise(mesh, corners, (&reflected, &noise), count);
-        let parts = of_rays.into_iter().zip(&settled.unsettled);
+        let of_rays = relative_noise(mesh, corners, &reflected, &noise, count);
+        let parts = of_rays.into_iter().zip(&converged.remainder);
         let of_bake = baked.estimate.total;
         let errors = parts.map(|(noise, &left)| BandError::new(noise, left, of_bake)).collect();
         let mut light = BandLight {
@@ -84,7 +84,7 @@ impl Bands {
             irradiance: reflected,
             noise,
             errors,
-            sweeps: settled.sweeps,
+            sweeps: converged.sweeps,
             sky: self.sky.clone(),
         };
         light.reflect(self, mesh, corners);
@@ -105,9 +105,15 @@ struct Gathering<'a> {
     touching: f64,
 }
 
-/// Statistics of the iteration; then the reflected light of vertices, and its standard error, W/m²,
-/// bands side by side.
-type Gathered = (Settled, Vec<f64>, Vec<f64>);
+/// The light that vertices gathered.
+struct Gathered {
+    /// The light that they gathered it from.
+    converged: Converged,
+    /// Reflected radiosity of all vertices, W/m², bands side by side.
+    reflected: Vec<f64>,
+    /// Its standard error, in the same order.
+    noise: Vec<f64>,
+}
 
 impl<'a> Gathering<'a> {
     fn new(
@@ -129,8 +135,8 @@ impl<'a> Gathering<'a> {
         rays: u32,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<Gathered>, Error> {
-        let settling_rays = (rays / SETTLING_RAY_DIVISOR).max(MIN_SETTLING_RAYS).min(rays);
-        let few = RayGather::new(self.mesh, settling_rays)?;
+        let few_rays = (rays / ITERATION_RAY_DIVISOR).max(MIN_ITERATION_RAYS).min(rays);
+        let few = RayGather::new(self.mesh, few_rays)?;
         let many = RayGather::new(self.mesh, rays)?;
         let rows = |maker| VertexRows::new(self.mesh, &self.surface.vertices, self.touching, maker);
         let (few, many) = (rows(&few), rows(&many));
@@ -140,17 +146,18 @@ impl<'a> Gathering<'a> {
         let scattering: Vec<u32> =
             (0..count as u32).filter(|&v| materials[v as usize].is_some()).collect();
         let of = 2 * scattering.len();
-        let Some(settled) = self.settled(&few, &materials, &scattering, |done| progress(done, of))
+        let Some(converged) =
+            self.converge(&few, &materials, &scattering, |done| progress(done, of))
         else {
             return Ok(None);
         };
         let many = many.map(
             &scattering,
-            HALVES,
+            2,
             |v, row| {
                 let material = materials[v as usize].unwrap_or_default();
-                let both = (&self.lookup, self.bands);
-                (GatheredVertex::new(both, material, row, &settled.reflected), row.buried)
+                let reflected = &converged.reflected;
+                (GatheredVertex::new(&self.lookup, material, row, reflected), row.buried)
             },
             |done| progress(scattering.len() + done, of),
         );
@@ -167,7 +174,7 @@ impl<'a> Gathering<'a> {
                 self.set_mean(values, v, &neighbours);
             }
         }
-        Ok(Some((settled, reflected, noise)))
+        Ok(Some(Gathered { converged, reflected, noise }))
     }
 
     /// Whether `material` reflects or transmits diffusely in any band. Rays pass clear panes.
@@ -178,19 +185,19 @@ impl<'a> Gathering<'a> {
     }
 
     /// The light that the iteration converges to with these `rows`.
-    fn settled(
+    fn converge(
         &self,
         rows: &VertexRows,
         materials: &[Option<u32>],
         scattering: &[u32],
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
-    ) -> Option<Settled> {
+    ) -> Option<Converged> {
         let equations = rows.map(
             scattering,
             1,
             |v, row| {
                 let material = materials[v as usize].unwrap_or_default();
-                (VertexEquation::new(&self.lookup, self.bands, material, row), row.buried)
+                (VertexEquation::new(&self.lookup, material, row), row.buried)
             },
             &mut progress,
         )?;
@@ -202,21 +209,21 @@ impl<'a> Gathering<'a> {
             equations[v as usize] = VertexEquation::mean(&others);
         }
         let done = scattering.len();
-        VertexSystem::new(self.bands, materials, equations).solve(|| progress(done))
+        VertexSystem { bands: self.bands, materials, equations }.solve(|| progress(done))
     }
 
-    /// Extends the results `found` of the `scattering` vertices to all, with `dark` for the others;
+    /// Extends the `results` of the `scattering` vertices to all, with `dark` for the others;
     /// also whether each is buried.
     fn all_vertices<T>(
         &self,
         scattering: &[u32],
-        found: Vec<(T, bool)>,
+        results: Vec<(T, bool)>,
         dark: impl Fn() -> T,
     ) -> (Vec<T>, Vec<bool>) {
-        let mut found = scattering.iter().zip(found).peekable();
+        let mut results = scattering.iter().zip(results).peekable();
         let vertices = 0..self.surface.vertices.positions.len() as u32;
-        let of_vertex = |v: u32| match found.next_if(|(w, _)| **w == v) {
-            Some((_, found)) => found,
+        let of_vertex = |v: u32| match results.next_if(|(w, _)| **w == v) {
+            Some((_, result)) => result,
             None => (dark(), false),
         };
         vertices.map(of_vertex).unzip()

@@ -10,27 +10,23 @@ use crate::gather::point_row::PointRow;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
-/// Material index of elements that do not emit in any band.
-const NO_EMISSION: u32 = u32::MAX;
-
 /// The data that rows are looked up in.
 pub(super) struct Lookup<'a> {
-    bands: &'a Bands,
+    pub bands: &'a Bands,
     /// The vertices at the corners of each element.
     corners: &'a [[u32; 3]],
-    /// The material of each element that emits, else [`NO_EMISSION`].
-    emission: Vec<u32>,
+    /// The exitance of each element by band; `None` where it is 0 in all bands.
+    exitance: Vec<Option<&'a [f64]>>,
 }
 
 impl<'a> Lookup<'a> {
     pub fn new(bands: &'a Bands, mesh: &Mesh, corners: &'a [[u32; 3]]) -> Lookup<'a> {
-        let emits: Vec<bool> =
-            bands.materials.iter().map(|m| m.exitance.iter().any(|&e| e > 0.0)).collect();
-        let emission = |e: usize| {
+        let exitance = |e: usize| {
             let material = mesh.scene().triangles()[mesh.triangle(mesh.element(e))].material;
-            if emits[material as usize] { material } else { NO_EMISSION }
+            let exitance = &bands.materials[material as usize].exitance[..];
+            exitance.iter().any(|&e| e > 0.0).then_some(exitance)
         };
-        Lookup { bands, corners, emission: (0..mesh.element_count()).map(emission).collect() }
+        Lookup { bands, corners, exitance: (0..mesh.element_count()).map(exitance).collect() }
     }
 
     /// Adds to `irradiance` (W/m² by band) the light of emitters, luminaires, the sky and the sun
@@ -40,9 +36,7 @@ impl<'a> Lookup<'a> {
             add(irradiance, factor, &self.bands.materials[material as usize].exitance);
         }
         for hit in row.hits.iter().filter(|hit| hit.emits) {
-            let material = self.emission[hit.element as usize];
-            if material != NO_EMISSION {
-                let exitance = &self.bands.materials[material as usize].exitance;
+            if let Some(exitance) = self.exitance[hit.element as usize] {
                 add(irradiance, row.share * mean(hit.passed), exitance);
             }
         }

@@ -1,23 +1,22 @@
 //! The radiosity equation at the vertices, for all bands with the same rows.
 //!
 //! B − E = R, and R = s + (ρ K_front + τ K_behind) R: K are rows over the vertices, from few rays,
-//! and s is the reflected light of emitters, the sky and the sun. Jacobi's iteration adds one
-//! bounce per sweep. Rows sum to at most 1, so that with c = max (ρ + τ) in a band the remainder
-//! after a sweep that changed R by δ is at most δ c / (1 − c), in the maximum norm: a band ends
-//! where that is small.
+//! and s is the reflected light of emitters, the sky and the sun. Jacobi's iteration
+//! adds one bounce per sweep. Rows sum to at most 1, so that with c = max (ρ + τ) in a band the
+//! remainder after a sweep that changed R by δ is at most δ c / (1 − c), in the maximum norm: a
+//! band ends where that is small.
 
 use std::ops::ControlFlow;
-
-use rayon::prelude::*;
 
 use super::lookup::{Lookup, add};
 use super::spectra::Bands;
 use crate::gather::point_row::PointRow;
 use crate::gather::vertex_rows::VertexRow;
+use crate::linear::gauss_seidel::{self, Equations};
 
 /// A band has converged if its remainder is at most this share of the mean reflected light of
-/// vertices.
-const UNSETTLED: f64 = 1e-4;
+/// vertices: far below the noise of any rays, so that results hardly depend on it.
+const MAX_REMAINDER: f64 = 1e-4;
 
 /// Maximum number of sweeps: at a reflectance of 0.98 a band takes some 600. The remainder is
 /// reported.
@@ -33,25 +32,26 @@ pub(super) struct VertexEquation {
 
 /// The equations of all vertices.
 pub(super) struct VertexSystem<'a> {
-    bands: &'a Bands,
+    pub bands: &'a Bands,
     /// Material of each vertex; `None` where nothing reflects.
-    materials: &'a [Option<u32>],
-    equations: Vec<VertexEquation>,
+    pub materials: &'a [Option<u32>],
+    pub equations: Vec<VertexEquation>,
 }
 
 /// Reflected light of vertices, and statistics of the iteration.
-pub(super) struct Settled {
+pub(super) struct Converged {
     /// Reflected radiosity of all vertices, W/m², bands side by side.
     pub reflected: Vec<f64>,
     /// Number of sweeps of each band.
     pub sweeps: Vec<u32>,
     /// Upper bound of the remainder of the reflected radiosity at any vertex, over the mean.
-    pub unsettled: Vec<f64>,
+    pub remainder: Vec<f64>,
 }
 
 impl VertexEquation {
     /// The equation of a vertex of `material` with this row.
-    pub fn new(lookup: &Lookup, bands: &Bands, material: u32, row: &VertexRow) -> VertexEquation {
+    pub fn new(lookup: &Lookup, material: u32, row: &VertexRow) -> VertexEquation {
+        let bands = lookup.bands;
         let material = &bands.materials[material as usize];
         let mut source = vec![0.0; bands.bands.len()];
         let mut emitted = vec![0.0; bands.bands.len()];
@@ -98,84 +98,66 @@ fn merged(lookup: &Lookup, rows: &[PointRow]) -> Vec<(u32, f32)> {
     runs.map(|run| (run[0].0, run.iter().map(|&(_, weight)| weight).sum::<f64>() as f32)).collect()
 }
 
-impl<'a> VertexSystem<'a> {
-    pub fn new(
-        bands: &'a Bands,
-        materials: &'a [Option<u32>],
-        equations: Vec<VertexEquation>,
-    ) -> VertexSystem<'a> {
-        VertexSystem { bands, materials, equations }
-    }
-
-    /// Sweeps until every band has converged; `None` if `progress` breaks, which is called after
-    /// each sweep.
-    pub fn solve(&self, mut progress: impl FnMut() -> ControlFlow<()>) -> Option<Settled> {
+impl VertexSystem<'_> {
+    /// Sweeps until every band has converged, or [`MAX_SWEEPS`] times; `None` if `progress` breaks,
+    /// which is called after each sweep.
+    pub fn solve(&self, mut progress: impl FnMut() -> ControlFlow<()>) -> Option<Converged> {
         let count = self.bands.bands.len();
         let contraction: Vec<f64> = (0..count)
             .map(|b| self.bands.materials.iter().map(|m| m.albedo(b)).fold(0.0, f64::max))
             .collect();
         let mut now: Vec<f64> =
             self.equations.iter().flat_map(|equation| equation.source.iter().copied()).collect();
-        let mut settled = Settled {
+        let mut converged = Converged {
             reflected: now.clone(),
             sweeps: vec![0; count],
-            unsettled: vec![f64::INFINITY; count],
+            remainder: vec![f64::INFINITY; count],
         };
-        let mut next = vec![0.0; now.len()];
-        for sweep in 1..=MAX_SWEEPS {
-            self.sweep(&now, &mut next);
+        let mut sweep = 0;
+        while sweep < MAX_SWEEPS && converged.remainder.iter().any(|&left| left > MAX_REMAINDER) {
+            sweep += 1;
+            let next = gauss_seidel::sweep(self, &now, count, 1);
             let (change, mean) = (largest_change(&now, &next, count), means(&next, count));
-            std::mem::swap(&mut now, &mut next);
+            now = next;
             for b in 0..count {
-                if settled.unsettled[b] <= UNSETTLED {
+                if converged.remainder[b] <= MAX_REMAINDER {
                     continue;
                 }
                 let left = change[b] * contraction[b] / (1.0 - contraction[b]);
-                settled.unsettled[b] = if left > 0.0 { left / mean[b] } else { 0.0 };
-                settled.sweeps[b] = sweep;
+                converged.remainder[b] = if left > 0.0 { left / mean[b] } else { 0.0 };
+                converged.sweeps[b] = sweep;
                 let values = now.iter().skip(b).step_by(count);
-                for (kept, &value) in
-                    settled.reflected.iter_mut().skip(b).step_by(count).zip(values)
-                {
-                    *kept = value;
-                }
+                let stored = converged.reflected.iter_mut().skip(b).step_by(count);
+                stored.zip(values).for_each(|(stored, &value)| *stored = value);
             }
             if progress().is_break() {
                 return None;
             }
-            if settled.unsettled.iter().all(|&left| left <= UNSETTLED) {
-                break;
+        }
+        Some(converged)
+    }
+}
+
+impl Equations for VertexSystem<'_> {
+    fn evaluate<'x>(&self, k: usize, x: impl Fn(usize) -> &'x [f64], value: &mut [f64]) {
+        let equation = &self.equations[k];
+        value.copy_from_slice(&equation.source);
+        let Some(material) = self.materials[k].map(|m| &self.bands.materials[m as usize]) else {
+            return;
+        };
+        let mut irradiance = vec![0.0; value.len()];
+        for (row, albedo) in
+            [(&equation.front, &material.reflectance), (&equation.behind, &material.transmittance)]
+        {
+            irradiance.fill(0.0);
+            for &(v, factor) in row {
+                add(&mut irradiance, f64::from(factor), x(v as usize));
+            }
+            let received = albedo.iter().zip(&irradiance);
+            for (value, (albedo, received)) in value.iter_mut().zip(received) {
+                *value += albedo * received;
             }
         }
-        Some(settled)
-    }
-
-    /// Adds one bounce to the reflected light `now` of vertices.
-    fn sweep(&self, now: &[f64], next: &mut [f64]) {
-        let count = self.bands.bands.len();
-        let vertices = next.par_chunks_mut(count).zip(&self.equations).zip(self.materials);
-        vertices.for_each_init(
-            || vec![0.0; count],
-            |irradiance, ((next, equation), material)| {
-                next.copy_from_slice(&equation.source);
-                let Some(material) = material.map(|m| &self.bands.materials[m as usize]) else {
-                    return;
-                };
-                for (row, albedo) in [
-                    (&equation.front, &material.reflectance),
-                    (&equation.behind, &material.transmittance),
-                ] {
-                    irradiance.fill(0.0);
-                    for &(v, factor) in row {
-                        add(irradiance, f64::from(factor), &now[v as usize * count..][..count]);
-                    }
-                    let received = albedo.iter().zip(&*irradiance);
-                    for (next, (albedo, received)) in next.iter_mut().zip(received) {
-                        *next += albedo * received;
-                    }
-                }
-            },
-        );
     }
 }
 

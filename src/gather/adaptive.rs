@@ -286,7 +286,8 @@ impl<'a> AdaptiveGather<'a> {
         let elements = self.samples.mesh.element_count();
         let found = gathered.further_bounces(
             maker,
-            (self.scale.touching(), self.scale.radiosity_floor),
+            self.scale.touching(),
+            self.scale.radiosity_floor,
             |gathered| progress(&Progress { pass, refinements, elements, gathered, total }),
         );
         let Some(added) = found else { return StopReason::Cancelled };

@@ -1,20 +1,20 @@
-//! What all further bounces add to the light that vertices gathered.
+//! The light of all further bounces, beyond that which vertices gathered.
 //!
-//! With L = E + ρF S gathered from S, the light that settles is L + Σ (ρF)ⁿ (L − S) over n ≥ 1.
-//! Rays are cast once from every vertex; what they find of L − S is the first bounce, and the
-//! vertices [exchange](super::exchange) it until it is used up. The same rays see both lights, so
-//! noise is that of the small difference, and few rays do.
+//! With L = E + ρF S gathered from S, the solution is L + Σ (ρF)ⁿ (L − S) over n ≥ 1. Rays are cast
+//! once from every vertex; what they gather of L − S is the first bounce, and the vertices
+//! [exchange](super::exchange) it until convergence. The same rays gather both lights, so that the
+//! noise is that of the small difference, and few rays suffice.
 
 use std::ops::ControlFlow;
 
 use super::RadiosityField;
-use super::exchange::{Place, SeenPlace, settle};
+use super::exchange::{Equation, Term, converge};
 use super::point_row::{PointRow, PointRows, SurfaceHit, SurfaceRows};
 use super::sampled_mesh::SampledMesh;
 use super::vertex_rows::{VertexRow, VertexRows};
 use crate::scene::Rgb;
 
-/// The light that vertices gathered, and what they gathered it from.
+/// The light that vertices gathered, and its source.
 pub(super) struct GatheredFrom<'a> {
     pub samples: &'a SampledMesh,
     /// The light of `samples`, on its mesh.
@@ -23,14 +23,15 @@ pub(super) struct GatheredFrom<'a> {
 }
 
 impl GatheredFrom<'_> {
-    /// What all further bounces add to the reflected radiosity of each vertex, W/m², by rows of
-    /// `maker`: until all bounces together add less than a thousandth of `floor` (W/m²). Surfaces
-    /// nearer than `touching` (scene unit) touch. None where `progress` broke, which is told how
-    /// many of the vertices have cast their rays.
+    /// The reflected radiosity that all further bounces add at each vertex, W/m², by rows of
+    /// `maker`; converged to a thousandth of it, or of `floor` (W/m²) where it is less. Surfaces
+    /// nearer than `touching` (scene unit) touch. `progress` is called with the number of vertices
+    /// that have cast their rays; `None` if it breaks.
     pub fn further_bounces(
         &self,
         maker: &dyn PointRows,
-        (touching, floor): (f64, f64),
+        touching: f64,
+        floor: f64,
         progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Option<Vec<Rgb>> {
         let SampledMesh { mesh, vertices, .. } = self.samples;
@@ -38,27 +39,27 @@ impl GatheredFrom<'_> {
         let rows = VertexRows::new(mesh, vertices, touching, &maker);
         let all = 0..vertices.positions.len() as u32;
         let gathering: Vec<u32> = all.filter(|&v| rows.albedo(v) != Rgb::ZERO).collect();
-        let place = |v: u32, row: &VertexRow| self.place(&rows, v, row);
-        let found = rows.map(&gathering, 1, place, progress)?;
-        let mut places = vec![Place::default(); vertices.positions.len()];
-        for (v, place) in gathering.into_iter().zip(found) {
-            places[v as usize] = place;
+        let equation = |v: u32, row: &VertexRow| self.equation(&rows, v, row);
+        let of_gathering = rows.map(&gathering, 1, equation, progress)?;
+        let mut equations = vec![Equation::default(); vertices.positions.len()];
+        for (v, equation) in gathering.into_iter().zip(of_gathering) {
+            equations[v as usize] = equation;
         }
-        Some(settle(&places, floor))
+        Some(converge(&equations, floor))
     }
 
-    /// Vertex `v` as a place that exchanges light with others; darkness where it is buried.
-    fn place(
+    /// The equation of vertex `v`; darkness where it is buried.
+    fn equation(
         &self,
         rows: &VertexRows,
         v: u32,
         VertexRow { front, behind, buried }: &VertexRow,
-    ) -> Place {
+    ) -> Equation {
         if *buried {
-            return Place::default();
+            return Equation::default();
         }
         let mut difference = Rgb::ZERO;
-        let mut seen = vec![];
+        let mut shares = vec![];
         let sides: [&[PointRow]; 2] = [front, behind];
         for (share, side) in rows.shares_of_sides(v).into_iter().zip(sides) {
             for row in side {
@@ -67,13 +68,13 @@ impl GatheredFrom<'_> {
                     difference += share * self.difference_at(hit);
                     let e = hit.element as usize;
                     if let Some(corner) = self.nearest_corner(hit) {
-                        seen.push((corner, share * self.samples.mesh.relative_reflectance(e)));
+                        shares.push((corner, share * self.samples.mesh.relative_reflectance(e)));
                     }
                 }
             }
         }
         let albedo = rows.albedo(v);
-        Place { albedo, constant: albedo * difference, seen: SeenPlace::merged(seen) }
+        Equation { albedo, constant: albedo * difference, terms: Term::merged(shares) }
     }
 
     /// Reflected radiosity of the light at `hit` less that of its source, W/m².

@@ -11,9 +11,6 @@ const SECOND_RADIATION: f64 = 14387.76877;
 /// ∫ z³/(e^z − 1) dz from 0 to infinity is π⁴/15.
 const WHOLE: f64 = PI * PI * PI * PI / 15.0;
 
-/// Below this z = c₂/λT the power series of the integral is used, above it that in e^−z.
-const SERIES_BELOW: f64 = 1.5;
-
 /// Share of a black body's emission below `wavelength` (µm) at `temperature` (K), 0 to 1.
 ///
 /// 15/π⁴ Σ e^−nz (z³ + 3z²/n + 6z/n² + 6/n³)/n with z = c₂/λT (S. L. Chang, K. T. Rhee, "Blackbody
@@ -42,11 +39,11 @@ impl Split {
         if product <= 0.0 || z > NO_SHORTER_WAVES {
             return Split { below: 0.0, above: 1.0 };
         }
-        if z < SERIES_BELOW {
+        if z < 1.5 {
             let above = power_series(z) / WHOLE;
             return Split { below: 1.0 - above, above };
         }
-        // Terms fall by e^−z < 0.23: term 30 is 1e-20 of the first.
+        // Terms fall by e^−z ≤ 0.223: term 30 is 1e-19 of the first.
         let term = |n: f64| {
             (-n * z).exp() * (((z + 3.0 / n) * z + 6.0 / (n * n)) * z + 6.0 / (n * n * n)) / n
         };

@@ -11,20 +11,14 @@ use rayon::prelude::*;
 
 use super::balance::{GroupHeat, HeatBalance};
 use super::black_body::{Bands, emission, temperature};
-use super::gmres;
 use super::surface::{Boundary, HeatSettings, Surface, of_group};
 use crate::error::{Error, ErrorKind};
+use crate::linear::gmres;
 use crate::view_factor::{Estimate, ViewFactors};
 
-/// Maximum relative change of converged emissions.
-const SETTLED: f64 = 1e-13;
-
-/// Maximum number of Newton steps; typically a handful suffice.
+/// Maximum number of Newton steps. Plain choice: a handful suffices, since convergence is
+/// quadratic.
 const MAX_STEPS: usize = 100;
-
-/// Ratio of a step to the one before it above which, after convergence to a millionth, the change
-/// is rounding.
-const STALLED: f64 = 0.5;
 
 pub(super) struct Exchange<'a> {
     factors: &'a ViewFactors,
@@ -36,8 +30,8 @@ pub(super) struct Exchange<'a> {
     emission: Vec<f64>,
 }
 
-/// Linearized black body's emission of a group as a function of its irradiance, by band: at + slope
-/// · change, where the change is determined by the net flux.
+/// Linearized black body's emission of a group as a function of its irradiance, by band:
+/// at + slope · change, where the change is determined by the net flux.
 struct Linear {
     at: Vec<f64>,
     slope: Vec<f64>,
@@ -79,7 +73,7 @@ impl<'a> Exchange<'a> {
         let is_linear = bands == 1
             || self.surfaces.iter().all(|s| matches!(s.boundary, Boundary::Temperature(_)));
         let mut radiosity = vec![0.0; groups * bands];
-        let (mut products, mut moved_before) = (0, f64::INFINITY);
+        let (mut products, mut change_before) = (0, f64::INFINITY);
         for _ in 0..MAX_STEPS {
             let linear: Vec<Linear> = (0..groups).map(|i| self.linear(i)).collect();
             let nothing = vec![0.0; groups * bands];
@@ -98,13 +92,15 @@ impl<'a> Exchange<'a> {
                 return Err(Error::new(ErrorKind::Setting, "heat", found, remedy));
             }
             let irradiance = self.irradiance(&radiosity, true);
-            let moved = self.follow(&irradiance);
-            let has_stalled = moved < 1e-6 && moved > STALLED * moved_before;
-            if is_linear || moved <= SETTLED || has_stalled {
+            let change = self.update_emission(&irradiance);
+            // Below a millionth each step squares the change, unless it is rounding; so are changes
+            // below 1e-13.
+            let is_rounding = change < 1e-6 && change > 0.5 * change_before;
+            if is_linear || change <= 1e-13 || is_rounding {
                 let residual = solved.residual;
                 return self.balance(&radiosity, &irradiance, residual, products).map(Some);
             }
-            moved_before = moved;
+            change_before = change;
         }
         Err(Error::new(
             ErrorKind::Setting,
@@ -176,11 +172,11 @@ impl<'a> Exchange<'a> {
 
     /// Sets the emission of groups with given flux from their irradiance, and returns the largest
     /// relative change.
-    fn follow(&mut self, irradiance: &[f64]) -> f64 {
+    fn update_emission(&mut self, irradiance: &[f64]) -> f64 {
         let (bands, surfaces) = (&self.bands, self.surfaces);
         let count = bands.count();
         let groups = self.emission.par_iter_mut().zip(surfaces);
-        let moves: Vec<f64> = groups
+        let changes: Vec<f64> = groups
             .zip(irradiance.par_chunks(count))
             .map(|((emission, surface), irradiance)| {
                 let Boundary::NetFlux(q) = surface.boundary else { return 0.0 };
@@ -191,7 +187,7 @@ impl<'a> Exchange<'a> {
                 (*emission - before).abs() / emission.abs().max(f64::MIN_POSITIVE)
             })
             .collect();
-        moves.into_iter().fold(0.0, f64::max)
+        changes.into_iter().fold(0.0, f64::max)
     }
 
     fn balance(

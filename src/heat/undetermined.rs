@@ -5,9 +5,6 @@ use crate::error::Error;
 use crate::geometry::union_find::UnionFind;
 use crate::view_factor::ViewFactors;
 
-/// Shares below this are rounding.
-const LEAST_SHARE: f64 = 1e-12;
-
 /// Whether each group with given flux exchanges heat, directly or through others, with something
 /// that has a temperature: a group that absorbs, the surroundings, or backs of surfaces, which are
 /// cold.
@@ -33,8 +30,9 @@ pub(super) fn check(
         }
     }
     let mut is_anchored = vec![false; surfaces.len() * bands];
+    // Shares below 1e-12 are rounding.
     let lost_to_backs = (0..surfaces.len())
-        .filter(|&i| factors.back[i].value > 3.0 * factors.back[i].error + LEAST_SHARE);
+        .filter(|&i| factors.back[i].value > 3.0 * factors.back[i].error + 1e-12);
     for i in factors.open_rows().into_iter().chain(lost_to_backs) {
         (0..bands).for_each(|band| is_anchored[sets.find(node(i, band))] = true);
     }

@@ -148,7 +148,7 @@ pub(super) fn gatherer<'a>(
         None => (RAYS, f64::INFINITY),
     };
     let rays = GatherRays { rays, noise, dim, near_field: true };
-    backend.gather_or_cast_rays(&baked.light.mesh, rays, |_| ())
+    backend.gather_with_fallback(&baked.light.mesh, rays, |_| ())
 }
 
 /// Fills empty texels next to charts from their neighbours.

@@ -11,8 +11,8 @@
 //! holds only those rows that cannot be computed again; other cached rows are rebuilt identically
 //! on demand.
 
-use std::fs;
 use std::path::Path;
+use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
@@ -27,9 +27,6 @@ use crate::mesh::Mesh;
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radiosi\x02";
-
-/// Bytes of the checksum at the end of every file.
-const CHECKSUM_BYTES: usize = 8;
 
 /// Data that must be equal for a session to be resumed. Stop rules may differ.
 #[derive(Serialize, Deserialize)]
@@ -55,13 +52,9 @@ impl SolveSession<'_> {
         let path = path.as_ref();
         let mut temporary = path.as_os_str().to_owned();
         temporary.push(".new");
-        fs::write(&temporary, self.to_bytes()).and_then(|()| fs::rename(&temporary, path)).map_err(
-            |e| {
-                let remedy = "choose a folder that can be written to and has room";
-                let place = path.display().to_string();
-                Error::new(ErrorKind::File, place, e.to_string(), remedy).with_source(e)
-            },
-        )
+        let written = fs::write(&temporary, self.to_bytes());
+        let remedy = "choose a folder that can be written to and has room";
+        written.and_then(|()| fs::rename(&temporary, path)).map_err(file_error(path, remedy))
     }
 
     /// The bytes that [`SolveSession::save`] writes.
@@ -75,17 +68,11 @@ impl SolveSession<'_> {
             row_source: self.row_source.clone(),
         };
         let content = (identity, SavedSession::of(self));
-        let bytes =
+        let mut bytes =
             postcard::to_extend(&content, MAGIC.to_vec()).expect("a vector takes all bytes");
-        append_checksum(bytes)
+        bytes.extend(xxh3_64(&bytes).to_le_bytes());
+        bytes
     }
-}
-
-/// `bytes` with their checksum.
-fn append_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
-    let sum = xxh3_64(&bytes);
-    bytes.extend(sum.to_le_bytes());
-    bytes
 }
 
 impl Solver {
@@ -113,11 +100,7 @@ impl Solver {
         form_factors: &dyn FormFactors,
         path: &Path,
     ) -> Result<SolveSession<'m>, Error> {
-        let bytes = fs::read(path).map_err(|e| {
-            let place = path.display().to_string();
-            Error::new(ErrorKind::File, place, e.to_string(), "name a file that can be read")
-                .with_source(e)
-        })?;
+        let bytes = fs::read(path).map_err(file_error(path, "name a file that can be read"))?;
         let session = self.begin_after(mesh, received)?;
         self.restore_bytes(session, form_factors, &bytes).map_err(|e| e.inside(path))
     }
@@ -158,16 +141,24 @@ impl Solver {
     }
 }
 
+/// Errors of the file at `path`.
+fn file_error(path: &Path, remedy: &str) -> impl FnOnce(io::Error) -> Error {
+    move |e| {
+        let place = path.display().to_string();
+        Error::new(ErrorKind::File, place, e.to_string(), remedy).with_source(e)
+    }
+}
+
 /// The bytes between header and checksum, if both are valid.
 fn verified_content(bytes: &[u8]) -> Result<&[u8], Error> {
     let Some(body) = bytes.strip_prefix(MAGIC) else {
         let found = format!("the first bytes are {:x?}", &bytes[..bytes.len().min(MAGIC.len())]);
         return Err(refuse("header", found, "give a state that this version has saved"));
     };
-    let Some((content, sum)) = body.split_last_chunk::<CHECKSUM_BYTES>() else {
+    let Some((content, sum)) = body.split_last_chunk() else {
         return Err(refuse("end of file", "no checksum", DAMAGED));
     };
-    if xxh3_64(&bytes[..bytes.len() - CHECKSUM_BYTES]).to_le_bytes() != *sum {
+    if xxh3_64(&bytes[..bytes.len() - sum.len()]) != u64::from_le_bytes(*sum) {
         return Err(refuse("end of file", "a checksum that is not that of the file", DAMAGED));
     }
     Ok(content)

@@ -148,7 +148,7 @@ impl<'m> SolveSession<'m> {
         irreparable
     }
 
-    /// Patches with stale rows, by the flux that they may have misplaced, most first; ties in mesh
+    /// Patches with stale rows, by descending flux that they may have misplaced; ties in mesh
     /// order.
     fn patches_by_misplaced_flux(&self) -> Vec<NodeId> {
         let stale = self.rows.histories.iter().filter(|(_, history)| history.stale_fraction > 0.0);

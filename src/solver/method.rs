@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::Solver;
 use crate::error::{Error, ErrorKind};
+use crate::linear::gmres;
 
 /// Method of light distribution. All methods solve the same equations to the same unshot share; all
 /// but shooting from patches larger than elements need a row for every element that has light.
@@ -52,7 +53,7 @@ impl Method {
         Method::Shooting { overshoot: true },
         Method::Jacobi,
         Method::GaussSeidel,
-        Method::Gmres { restart: 50 },
+        Method::Gmres { restart: gmres::RESTART },
         Method::Direct,
     ];
 

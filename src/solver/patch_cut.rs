@@ -26,37 +26,22 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::flux_state::Flux;
-use super::patch_error::{InverseDistanceMoments, patch_error};
+use super::patch_error::{InverseDistanceMoments, Surfaces, patch_error};
 use crate::form_factor::Row;
 use crate::geometry::rounding::tie_stable_key;
 use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// Number of emitting elements up to which each shoots separately. Above, the emitters are glowing
-/// rooms rather than lamps. Plain choice; no recorded measurement.
-const MAX_EMITTER_ELEMENTS: usize = 1024;
-
 /// A batch of shots ends where the unshot flux is below this share of that of its brightest patch.
 /// Plain choice; no recorded measurement.
 const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
 
-/// Maximum number of rejected viewpoints per patch. After that the patch is split, or shoots from
-/// the next viewpoint if it is of minimum size.
-const MAX_REJECTED_VIEWPOINTS: u32 = 4;
-
-/// An element is lit if its radiosity is at least this share of the mean of its patch.
-const MIN_LIT_SHARE: f64 = 0.5;
-
 /// The patches that shoot. Together they cover every element once.
 #[derive(Clone)]
 pub(super) struct PatchCut<'m> {
-    mesh: &'m Mesh,
+    surfaces: Surfaces<'m>,
     clusters: &'m Clusters,
-    /// Centroid of each element.
-    centroids: Vec<DVec3>,
-    /// Total surface area, square of the scene's unit.
-    area: f64,
     patches: Vec<ShootingPatch>,
     /// Viewpoints that see mostly back faces.
     occluded_viewpoints: HashSet<NodeId>,
@@ -109,10 +94,8 @@ pub(super) struct Shot {
 impl<'m> PatchCut<'m> {
     fn empty(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
         PatchCut {
-            mesh,
+            surfaces: Surfaces::of(mesh),
             clusters: mesh.clusters(),
-            centroids: centroids(mesh),
-            area: surface_area(mesh),
             patches: vec![],
             occluded_viewpoints: HashSet::new(),
             tolerance,
@@ -125,11 +108,12 @@ impl<'m> PatchCut<'m> {
     pub fn new(mesh: &'m Mesh, tolerance: f64, min_level: u32) -> PatchCut<'m> {
         let mut cut = PatchCut::empty(mesh, tolerance, min_level);
         let triangles = 0..mesh.scene().triangles().len();
-        let distances = InverseDistanceMoments::in_cube_of_area(cut.area);
+        let distances = InverseDistanceMoments::in_cube_of_area(cut.surfaces.area);
         let emits = |t: usize| mesh.scene().material(t).exitance != Rgb::ZERO;
         let emitter_elements: usize =
             triangles.filter(|&t| emits(t)).map(|t| mesh.elements_of(mesh.root(t)).len()).sum();
-        let emitters_are_few = emitter_elements <= MAX_EMITTER_ELEMENTS;
+        // With more, the emitters are glowing rooms rather than lamps. Plain choice.
+        let emitters_are_few = emitter_elements <= 1024;
         for &root in cut.clusters.roots() {
             let triangles = cut.clusters.triangles(root);
             // All triangles of a cluster have one material.
@@ -191,10 +175,8 @@ impl<'m> PatchCut<'m> {
 
     /// Switches to `mesh`, whose elements are the same.
     pub fn set_mesh(&mut self, mesh: &'m Mesh) {
-        self.mesh = mesh;
+        self.surfaces = Surfaces::of(mesh);
         self.clusters = mesh.clusters();
-        self.centroids = centroids(mesh);
-        self.area = surface_area(mesh);
     }
 
     /// Rejects the viewpoint `node`, which now sees mostly back faces, so that its patch shoots
@@ -210,7 +192,7 @@ impl<'m> PatchCut<'m> {
         Some(elements)
     }
 
-    /// The next shots, by unshot flux, most first; emitters before all others. Ends at `max_rows`
+    /// The next shots, by descending unshot flux; emitters before all others. Ends at `max_rows`
     /// patches for which `is_missing` says that the row must be computed, at `max_shots`, or where
     /// the flux falls below [`MIN_BATCH_FLUX_SHARE`] of the first's, so that no dim patch shoots
     /// before a bright one has received its light.
@@ -268,13 +250,15 @@ impl<'m> PatchCut<'m> {
     /// Measures from a new row the distances of the receivers of `shot`. Returns whether the shot
     /// is still to be taken; if not, the patch has been split, or another viewpoint is needed.
     pub fn accept_or_split(&mut self, shot: &Shot, row: &Row, flux: &Flux) -> bool {
-        let eye = self.mesh.centroid(shot.patch);
+        let eye = self.surfaces.mesh.centroid(shot.patch);
         let patch = &mut self.patches[shot.index];
-        patch.distances = InverseDistanceMoments::of_row(row, eye, &self.centroids);
+        patch.distances = InverseDistanceMoments::of_row(row, eye, &self.surfaces.centroids);
         let is_inside = Row::form_factor(row.backface) > buried::VIEWPOINT;
         let is_one_element = indices(&patch.elements).nth(1).is_none();
         if is_inside && !is_one_element {
-            if patch.rejected_viewpoints < MAX_REJECTED_VIEWPOINTS {
+            // After four, the patch is split, or shoots from the next viewpoint if it is of minimum
+            // size. Plain choice.
+            if patch.rejected_viewpoints < 4 {
                 patch.rejected_viewpoints += 1;
                 patch.viewpoint = None;
                 self.occluded_viewpoints.insert(shot.patch);
@@ -334,15 +318,14 @@ impl<'m> PatchCut<'m> {
         }
         let ShootingPatch { elements, distances, .. } = patch;
         let viewpoint = self.viewpoint(patch, flux);
-        let surfaces = (&self.centroids[..], self.area);
-        patch_error(share, self.mesh, surfaces, elements, viewpoint, *distances, flux)
+        patch_error(share, &self.surfaces, elements, viewpoint, *distances, flux)
     }
 
     /// The node whose row `patch` is to shoot along: the patch itself if its middle is lit; else,
     /// and for a cluster, the lit element nearest to the centroid of its light. Unlit elements may
     /// lie inside other geometry, such as the floor under a block.
     fn viewpoint(&self, patch: &ShootingPatch, flux: &Flux) -> NodeId {
-        let mesh = self.mesh;
+        let mesh = self.surfaces.mesh;
         if let Some(viewpoint) = patch.viewpoint {
             return viewpoint;
         }
@@ -351,25 +334,27 @@ impl<'m> PatchCut<'m> {
         let elements = || indices(&patch.elements);
         let total: f64 = elements().map(light).sum();
         let mean = total / elements().map(area).sum::<f64>();
-        let is_lit = |&e: &usize| area(e) > 0.0 && light(e) >= MIN_LIT_SHARE * mean * area(e);
+        // Lit elements have at least half of the mean radiosity of the patch. Plain choice.
+        let is_lit = |&e: &usize| area(e) > 0.0 && light(e) >= 0.5 * mean * area(e);
         if let Source::Node(node) = patch.source
             && !self.occluded_viewpoints.contains(&node)
             && mesh.elements_of(self.middle(node)).all(|e| is_lit(&e))
         {
             return node;
         }
-        let centre = elements().map(|e| light(e) * self.centroids[e]).sum::<DVec3>() / total;
+        let centre =
+            elements().map(|e| light(e) * self.surfaces.centroids[e]).sum::<DVec3>() / total;
         let nearest = elements()
             .filter(is_lit)
             .filter(|&e| !self.occluded_viewpoints.contains(&mesh.element(e)))
-            .min_by_key(|&e| tie_stable_key(self.centroids[e].distance_squared(centre)));
+            .min_by_key(|&e| tie_stable_key(self.surfaces.centroids[e].distance_squared(centre)));
         mesh.element(nearest.unwrap_or(patch.elements[0].start))
     }
 
     /// The deepest node with the centroid of `node`: the middle child, recursively.
     fn middle(&self, node: NodeId) -> NodeId {
         let mut middle = node;
-        while let Some([.., child]) = self.mesh.children(middle) {
+        while let Some([.., child]) = self.surfaces.mesh.children(middle) {
             middle = child;
         }
         middle
@@ -377,7 +362,7 @@ impl<'m> PatchCut<'m> {
 
     /// The patch at `source`, before its first shot; a cluster of one triangle is that triangle.
     fn patch(&self, source: Source, distances: InverseDistanceMoments) -> ShootingPatch {
-        let mesh = self.mesh;
+        let mesh = self.surfaces.mesh;
         let (source, mut elements) = match source {
             Source::Cluster(c) if self.clusters.parts(c).is_some() => {
                 let triangles = self.clusters.triangles(c);
@@ -413,8 +398,8 @@ impl<'m> PatchCut<'m> {
             Source::Cluster(c) => {
                 self.clusters.parts(c).into_iter().flatten().map(Source::Cluster).collect()
             }
-            Source::Node(node) => match self.mesh.children(node) {
-                Some(children) if height(self.mesh, node) > self.min_level => {
+            Source::Node(node) => match self.surfaces.mesh.children(node) {
+                Some(children) if height(self.surfaces.mesh, node) > self.min_level => {
                     children.map(Source::Node).to_vec()
                 }
                 _ => vec![],
@@ -426,14 +411,6 @@ impl<'m> PatchCut<'m> {
 /// The indices in `ranges`.
 fn indices(ranges: &[Range<usize>]) -> impl Iterator<Item = usize> {
     ranges.iter().cloned().flatten()
-}
-
-fn surface_area(mesh: &Mesh) -> f64 {
-    (0..mesh.scene().triangles().len()).map(|t| mesh.scene().solid_area(t)).sum()
-}
-
-fn centroids(mesh: &Mesh) -> Vec<DVec3> {
-    (0..mesh.element_count()).map(|e| mesh.centroid(mesh.element(e))).collect()
 }
 
 /// Maximum number of quadtree levels below `node`.

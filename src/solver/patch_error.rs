@@ -42,8 +42,29 @@ use crate::mesh::{Mesh, NodeId};
 /// Plain choice; no recorded measurement.
 const UNEVENNESS_WEIGHT: f64 = 3.0;
 
-/// Means of 1/r and 1/r² over what a patch sees, r the distance of a receiver's centroid from the
-/// viewpoint.
+/// The surfaces of a mesh.
+#[derive(Clone)]
+pub(super) struct Surfaces<'m> {
+    pub mesh: &'m Mesh,
+    /// Centroid of each element.
+    pub centroids: Vec<DVec3>,
+    /// Total area, square of the scene's unit.
+    pub area: f64,
+}
+
+impl<'m> Surfaces<'m> {
+    pub fn of(mesh: &'m Mesh) -> Surfaces<'m> {
+        let scene = mesh.scene();
+        Surfaces {
+            mesh,
+            centroids: (0..mesh.element_count()).map(|e| mesh.centroid(mesh.element(e))).collect(),
+            area: (0..scene.triangles().len()).map(|t| scene.solid_area(t)).sum(),
+        }
+    }
+}
+
+/// Means of 1/r and 1/r² over all that a patch sees, r the distance of a receiver's centroid from
+/// the viewpoint.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct InverseDistanceMoments {
     /// d₁, 1/length.
@@ -130,25 +151,24 @@ impl SourceMoments {
         let InverseDistanceMoments { first: d1, second: d2 } = distances;
         // The square of the angle subtended by the patch.
         let solid = self.square_offset / self.flux * d2;
-        let by_place =
+        let by_position =
             self.offset.length() / self.flux * d1 + solid + UNEVENNESS_WEIGHT * u * solid.sqrt();
         let by_normal = (self.normal_deviation.length() + self.square_normal_deviation) / self.flux;
-        (by_place + by_normal).min(1.0)
+        (by_position + by_normal).min(1.0)
     }
 }
 
 /// Error of a patch of these `elements`, seen from the centroid of node `viewpoint`; `s` is its
-/// share of the emitted light, and the error is 0 where there is none. `centroids` are those of all
-/// elements of `mesh`, `area` is their total area.
+/// share of the emitted light, and the error is 0 where there is none.
 pub(super) fn patch_error(
     s: f64,
-    mesh: &Mesh,
-    (centroids, area): (&[DVec3], f64),
+    surfaces: &Surfaces,
     elements: &[Range<usize>],
     viewpoint: NodeId,
     distances: InverseDistanceMoments,
     flux: &Flux,
 ) -> f64 {
+    let Surfaces { mesh, centroids, area } = surfaces;
     let light = |e: usize| flux.leaving(e).element_sum();
     let (eye, normal) = (mesh.centroid(viewpoint), mesh.normal(viewpoint));
     let mut moments = SourceMoments::default();
@@ -167,5 +187,5 @@ pub(super) fn patch_error(
         deviation += (light(e) - even).abs();
     }
     let q = moments.misplaced_share(deviation / moments.flux, distances);
-    (s.sqrt() * q).max(moments.spot(s, area, distances))
+    (s.sqrt() * q).max(moments.spot(s, *area, distances))
 }

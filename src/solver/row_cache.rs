@@ -65,21 +65,18 @@ impl RowCache {
         self.free_bytes
     }
 
-    /// Restores saved histories; the rows are missing.
+    /// Restores saved histories and `rows`; all other cached rows are missing.
     pub fn restore(
         &mut self,
-        histories: BTreeMap<NodeId, PatchHistory>,
+        histories: Vec<(NodeId, PatchHistory)>,
+        rows: Vec<(NodeId, Row)>,
         rows_made: u64,
         free_bytes: usize,
     ) {
-        self.histories = histories;
+        self.rows = rows.into_iter().map(|(patch, row)| (patch, Arc::new(row))).collect();
+        self.histories = histories.into_iter().collect();
         self.rows_made = rows_made;
         self.free_bytes = free_bytes.min(self.free_bytes);
-    }
-
-    /// Restores a cached row.
-    pub fn restore_row(&mut self, patch: NodeId, row: Row) {
-        self.rows.insert(patch, Arc::new(row));
     }
 
     /// Whether the row of `patch` is cached, in memory or missing.

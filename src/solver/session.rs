@@ -7,8 +7,9 @@ use std::time::Instant;
 use super::flux_state::{FluxState, ReceivedLight};
 use super::method_state::MethodState;
 use super::row_cache::RowCache;
+use super::shooting::Shooting;
 use super::staleness::tightened_unshot;
-use super::step::{Counters, MIN_UNSHOT_SHARE, StepContext};
+use super::step::{Counters, StepContext};
 use super::{Ledger, Progress, Solution, Solver};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
@@ -47,7 +48,7 @@ pub struct SolveSession<'m> {
     pub(super) solver: Solver,
     pub(super) state: FluxState<'m>,
     pub(super) rows: RowCache,
-    pub(super) method: MethodState<'m>,
+    pub(super) method: MethodState<Shooting<'m>>,
     pub(super) counters: Counters,
     pub(super) stop: Option<StopReason>,
     /// [`FormFactors::fingerprint`] of the source of the last rows.
@@ -129,7 +130,9 @@ impl<'m> SolveSession<'m> {
             counters: &mut self.counters,
             progress,
             start,
-            unshot: unshot.max(MIN_UNSHOT_SHARE),
+            // Even where 0 is requested: less cannot change a radiosity in f64, not even in a room
+            // whose lamps emit 1e-12 of the light of others.
+            unshot: unshot.max(1e-28),
             max_steps: self.solver.max_steps,
         };
         self.stop = self.method.advance(&mut step)?;

@@ -18,10 +18,6 @@ use crate::form_factor::{FormFactors, Row};
 use crate::mesh::NodeId;
 use crate::scene::Rgb;
 
-/// Minimum unshot share solved to, even where 0 is requested. Less cannot change a radiosity in
-/// f64, not even in a room whose lamps emit 1e-12 of the light of others.
-pub(super) const MIN_UNSHOT_SHARE: f64 = 1e-28;
-
 /// Counters of a solve.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Counters {

@@ -27,7 +27,7 @@ fn bits(light: &BandLight, b: usize) -> Vec<u64> {
     let of_vertices = [&light.radiosity, &light.irradiance, &light.noise];
     let values = of_vertices.into_iter().flat_map(|v| v.iter().skip(b).step_by(light.bands.len()));
     let error = light.errors[b];
-    let whole = [error.total, error.noise, error.unsettled, f64::from(light.sweeps[b])];
+    let whole = [error.total, error.noise, error.remainder, f64::from(light.sweeps[b])];
     values.chain(&whole).map(|value| value.to_bits()).collect()
 }
 

@@ -34,7 +34,7 @@ pub fn same_as_on_the_cpu(
     peak: f64,
 ) -> Vec<IrradianceSample> {
     let Rays { count, noise } = rays;
-    let mut device = TracedGather::with_noise(gpu, field.mesh, count, (noise, 0.0)).unwrap();
+    let mut device = TracedGather::with_noise(gpu, field.mesh, count, noise, 0.0).unwrap();
     let mut cpu = RayGather::new(field.mesh, count).unwrap().with_noise(noise, 0.0);
     let found = device.gather(field, points).unwrap();
     assert!(device.gather(field, points).unwrap() == found, "the same bits twice");

@@ -14,28 +14,28 @@ mod direct_light;
 mod doubled;
 mod near_field;
 mod point_rows;
+mod scene_rays;
 mod visible;
 mod wide_light;
 
 use std::f64::consts::PI;
 use std::ops::Range;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::lights::{Lights, NO_LIGHT};
+use crate::gather::lights::NO_LIGHT;
 use crate::gather::luminaire_light::LuminaireLight;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
-use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene};
-use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::visibility::ray_scene::Hit;
 use direct_light::DirectLight;
-use doubled::{Doubled, Found};
+use doubled::{Doubled, RaySums};
 use near_field::{NearField, NearLight, NearRay};
+pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
+use scene_rays::SceneRays;
 use visible::Visible;
 use wide_light::WideLight;
 
@@ -47,10 +47,7 @@ use wide_light::WideLight;
 /// hemisphere where the light fills much of it.
 #[derive(Debug)]
 pub struct RayGather {
-    scene: Arc<RayScene>,
-    panes: Panes,
-    lights: Lights,
-    rotations: CellRotation,
+    scene: SceneRays,
     /// None where interpolated light counts however near it is.
     near_field: Option<NearField>,
     samples: HemisphereSamples,
@@ -63,24 +60,15 @@ pub struct RayGather {
     dim: f64,
 }
 
-/// Maximum number of rays over the minimum. Plain choice; no recorded measurement.
-const MAX_OVERSAMPLING: u32 = 16;
-
-/// Rays over the hemisphere per shadow ray to each light. Plain choice; no recorded measurement.
-pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
-
 impl RayGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayGather, Error> {
-        let min_rays = least_rays(count)?;
+        let min_rays = min_rays(count)?;
         Ok(RayGather {
-            scene: RayScene::of_scene(mesh.scene()),
-            panes: Panes::of_scene(mesh.scene()),
-            lights: Lights::new(mesh.shared_scene()),
-            rotations: CellRotation::new(&mesh.scene().bounds()),
+            scene: SceneRays::new(mesh),
             near_field: None,
             samples: samples(mesh.scene(), min_rays, min_rays),
             min_rays,
@@ -97,8 +85,8 @@ impl RayGather {
     /// whose squares add up; those with the larger are doubled. Few points need more rays, such as
     /// those that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
-        let max_rays = most_rays(self.min_rays, noise);
-        let samples = samples(self.lights.scene(), max_rays, self.min_rays);
+        let max_rays = max_rays(self.min_rays, noise);
+        let samples = samples(self.scene.lights.scene(), max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
@@ -115,11 +103,11 @@ impl RayGather {
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
-        let direct_light = DirectLight::new(self, point);
-        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.found(range));
+        let direct_light = DirectLight::new(&self.scene, self.min_rays, point);
+        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.cast(range));
         let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
-        let of_luminaires = self.luminaires().irradiance(point);
+        let of_luminaires = self.scene.luminaires().irradiance(point);
         loop {
             let all = hemisphere.mean() + direct.mean() + of_luminaires;
             let allowed = self.noise * all.length().max(self.dim);
@@ -135,7 +123,7 @@ impl RayGather {
                 break;
             }
         }
-        let (rays, count) = (hemisphere.found(), hemisphere.count());
+        let (rays, count) = (hemisphere.sums(), hemisphere.count());
         let noise = direct.error().hypot(hemisphere.error());
         rays.samples(count, direct.mean() + of_luminaires, noise)
     }
@@ -147,12 +135,7 @@ impl RayGather {
 
     /// The light of luminaires.
     pub(crate) fn luminaires(&self) -> LuminaireLight<'_> {
-        LuminaireLight {
-            luminaires: self.lights.scene().luminaires(),
-            rays: &self.scene,
-            panes: &self.panes,
-            rotations: &self.rotations,
-        }
+        self.scene.luminaires()
     }
 
     /// Sums over the rays of `range`. They exclude the emission of lights that `direct` sends rays
@@ -164,24 +147,24 @@ impl RayGather {
         direct: &'d DirectLight,
         range: Range<u32>,
     ) -> HemisphereRays<'d, FIELDS> {
-        let rotation = self.rotations.at(point.position, point.near);
-        let mut found = HemisphereRays::none(direct.wide());
-        let sky = self.lights.scene().sky();
-        let out = &mut found.of_all_fields;
-        let of_wide = &mut found.of_wide;
+        let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
+        let rotation = rotations.at(point.position, point.near);
+        let mut sums = HemisphereRays::none(direct.wide());
+        let sky = lights.scene().sky();
+        let out = &mut sums.of_all_fields;
+        let of_wide = &mut sums.of_wide;
         let (mut ray, rays) = (range.start, range.len());
         let mut near = vec![];
         let directions = self.samples.directions_in(range, point.normal, rotation);
-        self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
-            let passed =
-                |end: f64| self.panes.transmittance(point.position, direction, point.near..end);
+        surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+            let passed = |end: f64| panes.transmittance(point.position, direction, point.near..end);
             direct.add_to_wide(of_wide, direction, hit, passed);
             ray += 1;
             let Some(hit) = hit else {
                 out.escaped += 1.0;
                 let radiosity = PI * sky.radiance(direction) * passed(f64::INFINITY);
                 out.irradiance += radiosity;
-                found.largest = found.largest.max(radiosity.length());
+                sums.largest = sums.largest.max(radiosity.length());
                 return;
             };
             out.inverse_distance += 1.0 / hit.distance;
@@ -199,11 +182,11 @@ impl RayGather {
                     0 => first * passed,
                     k => fields[k].reflected_at(hit.triangle, hit.u, hit.v) * passed,
                 };
-                add(&mut found.reflected, &mut found.largest, std::array::from_fn(reflected));
+                add(&mut sums.reflected, &mut sums.largest, std::array::from_fn(reflected));
             }
-            let light = self.lights.of_triangle[hit.triangle];
-            if light != NO_LIGHT && !direct.knows(light) {
-                out.direct += self.lights.lights[light as usize].exitance * passed;
+            let light = lights.of_triangle[hit.triangle];
+            if light != NO_LIGHT && !direct.samples(light) {
+                out.direct += lights.lights[light as usize].exitance * passed;
             }
         });
         let covered = self.near_field.as_ref();
@@ -214,7 +197,7 @@ impl RayGather {
             let reflected = if let Some(near_field) = covered {
                 let by_area = !direct.lights().is_empty();
                 let NearLight { light, end } =
-                    near_field.light(fields[0].mesh, (point, rotation), &ray, by_area);
+                    near_field.light(fields[0].mesh, point, rotation, &ray, by_area);
                 fields.map(|field| match &end {
                     Some((share, end)) => light + *share * reflected_at(field, end),
                     None => light,
@@ -223,9 +206,9 @@ impl RayGather {
                 fields.map(|field| reflected_at(field, &ray.hit))
             };
             let reflected = reflected.map(|radiosity| radiosity * ray.passed);
-            add(&mut found.reflected, &mut found.largest, reflected);
+            add(&mut sums.reflected, &mut sums.largest, reflected);
         }
-        found
+        sums
     }
 }
 
@@ -241,19 +224,20 @@ fn add<const FIELDS: usize>(sums: &mut [Rgb; FIELDS], largest: &mut f64, reflect
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] when `count` is 0 or above 2²⁰.
-pub(crate) fn least_rays(count: u32) -> Result<u32, Error> {
+pub(crate) fn min_rays(count: u32) -> Result<u32, Error> {
     if count == 0 || count > hemisphere::MAX_RAYS {
-        let place = format!("{count} rays a place");
+        let place = format!("{count} rays a point");
         let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
         return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
     }
     Ok(1 << f64::from(count).log2().round().max(1.0) as u32)
 }
 
-/// Maximum number of rays of a point with at least `min_rays`, and more only for a finite `noise`.
-pub(crate) fn most_rays(min_rays: u32, noise: f64) -> u32 {
+/// Maximum number of rays of a point with at least `min_rays`: 16 times as many for a finite
+/// `noise`. Plain choice; no recorded measurement.
+pub(crate) fn max_rays(min_rays: u32, noise: f64) -> u32 {
     match noise.is_finite() {
-        true => (min_rays * MAX_OVERSAMPLING).min(hemisphere::MAX_RAYS),
+        true => (16 * min_rays).min(hemisphere::MAX_RAYS),
         false => min_rays,
     }
 }
@@ -293,7 +277,7 @@ impl<'d, const FIELDS: usize> HemisphereRays<'d, FIELDS> {
     }
 }
 
-impl<const FIELDS: usize> Found for HemisphereRays<'_, FIELDS> {
+impl<const FIELDS: usize> RaySums for HemisphereRays<'_, FIELDS> {
     fn add(&mut self, other: &Self) {
         for (sum, term) in self.of_wide.iter_mut().zip(&other.of_wide) {
             sum.add(term);
@@ -344,18 +328,18 @@ impl<const FIELDS: usize> HemisphereRays<'_, FIELDS> {
 impl Gather for RayGather {
     fn gather(
         &mut self,
-        sources: &RadiosityField,
-        places: &[GatherPoint],
+        field: &RadiosityField,
+        points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
-        Ok(places.par_iter().map(|p| self.irradiance([sources], p)[0]).collect())
+        Ok(points.par_iter().map(|p| self.irradiance([field], p)[0]).collect())
     }
 
     fn gather_both(
         &mut self,
-        sources: [&RadiosityField; 2],
-        places: &[GatherPoint],
+        fields: [&RadiosityField; 2],
+        points: &[GatherPoint],
     ) -> Result<[Vec<IrradianceSample>; 2], Error> {
-        let both = places.par_iter().map(|p| self.irradiance(sources, p).into());
+        let both = points.par_iter().map(|p| self.irradiance(fields, p).into());
         let (first, second) = both.unzip::<IrradianceSample, IrradianceSample, _, _>();
         Ok([first, second])
     }

@@ -5,10 +5,6 @@ use super::limits::GpuLimits;
 use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
 
-const PACKAGES: &str = "install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers libvulkan1; \
-     Fedora: mesa-vulkan-drivers vulkan-loader; software rendering included), \
-     or make rows on the CPU (RayRows; --cpu in the examples)";
-
 /// The adapter whose name contains `name` in any case, or the best: [`crate::Gpu::new`].
 pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
     let from_env = std::env::var("WGPU_ADAPTER_NAME").ok();
@@ -25,7 +21,10 @@ pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
         return Ok(found.swap_remove(index));
     }
     let (found, remedy) = if names.is_empty() {
-        ("no graphics adapter".to_string(), PACKAGES.to_string())
+        let remedy = "install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers libvulkan1; \
+             Fedora: mesa-vulkan-drivers vulkan-loader; software rendering included), \
+             or make rows on the CPU (RayRows; --cpu in the examples)";
+        ("no graphics adapter".to_string(), remedy.to_string())
     } else {
         let found = format!("no adapter with '{wanted}' in its name");
         (found, format!("there are: {}", names.join(", ")))

@@ -39,15 +39,9 @@ pub struct SubmittedRows {
     room: u64,
 }
 
-/// Bytes of entries that a batch has room for, or those of one row where these are more.
-const ENTRY_BYTES: u64 = 32 << 20;
-
-/// Expected number of entries of the first batch: 2 MiB of them.
-const FIRST_ENTRIES: u64 = 65_536;
-
 impl CompactedRows {
-    /// Rows of a batch, at most. A submission and its readback take a millisecond on hardware,
-    /// which so many rows share; and a hemicube takes a layer of a texture, of which every WebGPU
+    /// Maximum number of rows of a batch. They share the millisecond that a submission and its
+    /// readback take on hardware; and a hemicube takes a layer of a texture, of which every WebGPU
     /// device has 256. The size of a batch decides the order of shots.
     pub const MAX_BATCH: u32 = 256;
 
@@ -56,26 +50,29 @@ impl CompactedRows {
     pub fn new(
         memory: &Memory,
         buffer_bytes: u64,
-        (rows, row_entries): (u32, u32),
+        rows: u32,
+        row_entries: u32,
     ) -> Result<CompactedRows, Error> {
         use wgpu::BufferUsages as Usage;
         let (of_row, entry_bytes) = (u64::from(row_entries), size_of::<RowEntry>() as u64);
         let fits = buffer_bytes.saturating_sub(ROW_ENTRIES_HEADER_BYTES) / entry_bytes;
-        let most = (ENTRY_BYTES / entry_bytes).max(of_row).min(fits);
-        let entries = most.min(u64::from(rows) * of_row);
+        // 32 MiB, or one row where that is more. Plain choice.
+        let max = ((32 << 20) / entry_bytes).max(of_row).min(fits);
+        let entries = max.min(u64::from(rows) * of_row);
         let storage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         Ok(CompactedRows {
             settings: memory.uniform("settings", &[0; size_of::<RowSettings>()])?,
             entries: entries as u32,
             found: memory.buffer("entries", bytes(entries), storage)?,
             staging: memory.buffer("staging", bytes(entries), Usage::MAP_READ | Usage::COPY_DST)?,
-            expected: FIRST_ENTRIES,
+            // 2 MiB.
+            expected: 65_536,
         })
     }
 
-    /// All rows of `patches`, in their order, from what `make` gives for `batch_len` patches at
-    /// once, at most: the rows of these, or none where there is no room for their entries. It is
-    /// then asked for the first half of them and for the second.
+    /// All rows of `patches`, in their order. `make` makes those of up to `batch_len` patches at
+    /// once, or returns `None` where there is no room for their entries: then it is called with
+    /// each half of them.
     ///
     /// # Errors
     /// Those of `make`, and [`ErrorKind::Memory`] where there is no room for a single row.
@@ -114,7 +111,7 @@ impl CompactedRows {
         rows: u32,
         through_panes: bool,
     ) {
-        let pipelines = gpu.row_pipelines();
+        let pipelines = gpu.tracing.row_pipelines(&gpu.device);
         let pipeline = match through_panes {
             true => &pipelines.compact_rows_through_panes,
             false => &pipelines.compact_rows,
@@ -134,23 +131,23 @@ impl CompactedRows {
     }
 
     /// Runs what `encoder` recorded, by these `settings`: passes that count, then
-    /// [`CompactedRows::compact`]. All rows together have `most` entries, at most.
+    /// [`CompactedRows::compact`]. All rows together have at most `max_entries` entries.
     pub fn submit(
         &self,
         gpu: &Gpu,
         mut encoder: wgpu::CommandEncoder,
         settings: RowSettings,
-        most: u64,
+        max_entries: u64,
     ) -> SubmittedRows {
         let room = u64::from(settings.entries);
-        let copied = self.expected.min(most).min(room).max(1);
+        let copied = self.expected.min(max_entries).min(room).max(1);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
         encoder.copy_buffer_to_buffer(&self.found, 0, &self.staging, 0, bytes(copied));
         SubmittedRows { submission: gpu.queue.submit([encoder.finish()]), copied, room }
     }
 
-    /// What `read` makes of all entries of the rows, the last that were submitted: row by row in
-    /// any order, slots ascending. None where there is no room for them.
+    /// The result of `read` for all entries of the rows, the last that were submitted: row by row
+    /// in any order, slots ascending. `None` where there is no room for them.
     pub fn read<T>(
         &mut self,
         gpu: &Gpu,
@@ -185,7 +182,7 @@ impl CompactedRows {
     }
 }
 
-/// The entries of each of `rows` rows, by their numbers in the batch; or what is wrong with them.
+/// The entries of each of `rows` rows, by their numbers in the batch; or the first wrong number.
 pub fn by_row(entries: &[RowEntry], rows: usize) -> Result<Vec<&[RowEntry]>, String> {
     let mut of_rows = vec![&entries[..0]; rows];
     for row in entries.chunk_by(|a, b| a.patch_ == b.patch_) {

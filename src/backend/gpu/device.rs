@@ -16,9 +16,12 @@ use super::adapters;
 use super::error::{device_error, invalid_result, message};
 use super::limits::{self, GpuLimits};
 use super::memory::{Memory, MemoryBudget};
+use super::traced_scene::TracedScene;
 use super::tracing::Tracing;
 use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
+use crate::gather::lights::Lights;
+use crate::scene::Scene;
 
 /// An open graphics device. Clones are the same device.
 #[derive(Clone, Debug)]
@@ -49,7 +52,7 @@ impl Gpu {
     /// [`ErrorKind::Device`] when there is no such adapter; the message lists the available ones,
     /// or names the packages that install one.
     pub fn new(name: Option<&str>) -> Result<Gpu, Error> {
-        Gpu::within(name, &GpuLimits::MOST)
+        Gpu::within(name, &GpuLimits::NONE)
     }
 
     /// As [`Gpu::new`], but as if the device had at most `limits`: to leave memory for other
@@ -72,7 +75,12 @@ impl Gpu {
             record(&lost, format!("the device was lost: {why}"));
         });
         if gpu.assumed != AdapterKind::Cpu {
-            gpu.compile_ahead();
+            // All passes of rays are ready when the scene is loaded.
+            let (device, tracing) = (gpu.device.clone(), gpu.tracing.clone());
+            std::thread::spawn(move || {
+                tracing.gather_pipelines(&device);
+                tracing.row_pipelines(&device);
+            });
         }
         Ok(gpu)
     }
@@ -182,15 +190,30 @@ impl Gpu {
             match self.with_error_scopes(|| make(self.memory(), batch)) {
                 Err(e) if e.kind() == ErrorKind::Memory && batch > 1 => {
                     batch /= 2;
-                    // The memory of the failed attempt is freed once writes to it have completed.
-                    self.with_error_scopes(|| {
-                        self.queue.submit([]);
-                        self.wait()
-                    })?;
+                    self.free_unused()?;
                 }
                 made => return made,
             }
         }
+    }
+
+    /// Frees buffers and textures that have been dropped: once writes to them have completed.
+    pub(super) fn free_unused(&self) -> Result<(), Error> {
+        self.with_error_scopes(|| {
+            self.queue.submit([]);
+            self.wait()
+        })
+    }
+
+    /// The scene of `lights`, which is `scene`, on the device: uploaded unless it is the previous
+    /// one.
+    pub(super) fn traced_scene(
+        &self,
+        scene: &Arc<Scene>,
+        lights: &Lights,
+    ) -> Result<Arc<TracedScene>, Error> {
+        let upload = || self.with_error_scopes(|| TracedScene::new(self.memory(), lights));
+        self.tracing.scene(scene, upload)
     }
 
     /// Waits until all submitted work is done.
@@ -377,10 +400,10 @@ mod tests {
         let own = gpu();
         let mesh = scene();
         let (device, queue) = callers_device(wgpu::Limits::default());
-        let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::MOST).unwrap();
+        let gpu = Gpu::from_wgpu(device.clone(), queue, &GpuLimits::NONE).unwrap();
         assert_eq!(gpu.adapter(), own.adapter());
         assert_eq!(rows(&gpu, &mesh).unwrap(), rows(&own, &mesh).unwrap());
-        let limits = GpuLimits { memory: 1000, ..GpuLimits::MOST };
+        let limits = GpuLimits { memory: 1000, ..GpuLimits::NONE };
         let small = Gpu::from_wgpu(device.clone(), gpu.queue.clone(), &limits).unwrap();
         assert_eq!(rows(&small, &mesh).unwrap_err().kind(), ErrorKind::Memory);
         device.destroy();
@@ -391,7 +414,7 @@ mod tests {
     #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
     fn from_wgpu_rejects_low_limits() {
         let (device, queue) = callers_device(wgpu::Limits::downlevel_webgl2_defaults());
-        let e = Gpu::from_wgpu(device, queue, &GpuLimits::MOST).unwrap_err();
+        let e = Gpu::from_wgpu(device, queue, &GpuLimits::NONE).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Setting);
         let text = e.to_string();
         assert!(text.contains("max_storage_buffers_per_shader_stage = 0"), "{text}");

@@ -20,10 +20,6 @@ use crate::scene::Scene;
 /// triangles. Plain choice; no recorded measurement.
 const MAX_TRIANGLES_PER_CHUNK: usize = 16;
 
-/// Number of triangles in a run from which another begins: on software devices the time of a draw
-/// with clipping grows with the square of its size. Plain choice; no recorded measurement.
-const MAX_TRIANGLES_PER_DRAW: usize = 128;
-
 /// A drawing order, and the bounding box of each chunk of it.
 #[derive(Debug)]
 pub struct DrawList {
@@ -79,7 +75,9 @@ impl DrawList {
                 continue;
             }
             match runs.last_mut() {
-                Some(run) if run.end == positions.start && run.len() < MAX_TRIANGLES_PER_DRAW => {
+                // On software devices the time of a draw with clipping grows with the square of
+                // its size. Plain choice; no recorded measurement.
+                Some(run) if run.end == positions.start && run.len() < 128 => {
                     run.end = positions.end;
                 }
                 _ => runs.push(positions.clone()),

@@ -1,4 +1,4 @@
-//! Errors of a graphics device as errors of the crate: place, finding, remedy.
+//! Errors of a graphics device as errors of the crate: where, what is wrong, and the remedy.
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;

@@ -149,9 +149,9 @@ pub fn check(limits: GpuLimits, field: &RadiosityField, triangles: usize) -> Res
     }
     // There are fewer than three nodes per element: less than 4/3 in trees and one in lattices;
     // plus two words per triangle, which has at least one element.
-    let most = u64::from(limits.texture / 3 * ELEMENTS_A_LINE).min(limits.buffer / 20);
-    if elements as u64 > most {
-        return setting(format!("{elements} elements"), format!("this device holds {most}"));
+    let max = u64::from(limits.texture / 3 * ELEMENTS_A_LINE).min(limits.buffer / 20);
+    if elements as u64 > max {
+        return setting(format!("{elements} elements"), format!("this device holds {max}"));
     }
     Ok(())
 }

@@ -1,8 +1,10 @@
 //! Usable limits of a device, and the requirements of the passes.
 
 use super::error::place;
-use super::traced_gather::MAX_POINTS;
 use crate::error::{Error, ErrorKind};
+
+/// Maximum number of points of a batch: an H200 gets no faster beyond that.
+pub const MAX_POINTS: u32 = 32_768;
 
 /// Maximum limits requested of a device, where it has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,23 +23,23 @@ pub struct GpuLimits {
 
 impl GpuLimits {
     /// No limits.
-    pub const MOST: GpuLimits =
+    pub const NONE: GpuLimits =
         GpuLimits { memory: u64::MAX, buffer: u64::MAX, texture: u32::MAX, layers: u32::MAX };
 
     /// The limits to request of an adapter with these `available` ones.
     pub(super) fn requested(&self, available: &wgpu::Limits) -> wgpu::Limits {
         // Those of WebGPU, except for textures, of which adapters without it support less.
-        let least = wgpu::Limits {
+        let min = wgpu::Limits {
             max_storage_buffers_per_shader_stage: 8,
             ..wgpu::Limits::downlevel_defaults()
         };
         let binding = available.max_storage_buffer_binding_size;
         wgpu::Limits {
             max_texture_dimension_2d: available.max_texture_dimension_2d.min(self.texture),
-            max_texture_array_layers: least.max_texture_array_layers.min(self.layers),
+            max_texture_array_layers: min.max_texture_array_layers.min(self.layers),
             max_buffer_size: available.max_buffer_size.min(self.buffer),
             max_storage_buffer_binding_size: binding.min(self.buffer),
-            ..least
+            ..min
         }
     }
 

@@ -6,8 +6,8 @@
 //! rows ◄─ sum checked ◄─ readback of entries ◄─ compact ◄──────────────────────────────┘
 //! ```
 //!
-//! A batch holds as many hemicubes as [`BATCH_BYTES`], [`CompactedRows::MAX_BATCH`] and the limits
-//! of the device allow, and a half or a quarter of them where memory is short.
+//! A batch holds as many hemicubes as 32 MiB of item buffers, [`CompactedRows::MAX_BATCH`] and the
+//! limits of the device allow, and a half or a quarter of them where memory is short.
 
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
@@ -73,14 +73,6 @@ struct Batches {
     _memory: Memory,
 }
 
-/// Maximum size of the item buffers of a batch of more than one, bytes: a software device draws
-/// that in a fraction of a second.
-const BATCH_BYTES: u64 = 32 << 20;
-
-/// Hemicubes of a batch on a software device, at most: it is as fast with so few. Chosen by hand;
-/// no measurement kept.
-const MAX_SOFTWARE_BATCH: u32 = 16;
-
 impl HemicubeRows {
     /// Default share of the emitted flux from which a patch gets the full resolution. With 128
     /// pixels the error of a whole bake increases by 1 %, at most by 3 %, over full resolution for
@@ -102,12 +94,14 @@ impl HemicubeRows {
         check_mesh_fits(limits, mesh)?;
         let slots = slots(mesh);
         let item_bytes = Reduce::items_bytes(resolution);
-        let most = match gpu.assumed_kind() {
-            AdapterKind::Cpu => MAX_SOFTWARE_BATCH,
+        let max_batch = match gpu.assumed_kind() {
+            // More are no faster. Plain choice; no recorded measurement.
+            AdapterKind::Cpu => 16,
             _ => CompactedRows::MAX_BATCH,
         };
-        let preferred_batch = u64::from(most.min(limits.layers))
-            .min((BATCH_BYTES / item_bytes).max(1))
+        // A software device draws 32 MiB of item buffers in a fraction of a second.
+        let preferred_batch = u64::from(max_batch.min(limits.layers))
+            .min(((32 << 20) / item_bytes).max(1))
             .min(limits.buffer / item_bytes)
             .min(limits.buffer / row_bytes(slots)) as u32;
         let coordinates = SplitFloat::new(mesh.scene());
@@ -120,8 +114,8 @@ impl HemicubeRows {
             let size = BatchSize { resolution, slots, hemicubes };
             let reduce = Reduce::new(&memory, &table.slots, size)?;
             let resolutions = Resolution::halved(&memory, &reduce, resolution, hemicubes)?;
-            let batch_size = (hemicubes, row_entries(slots, resolution));
-            let compacted = CompactedRows::new(&memory, limits.buffer, batch_size)?;
+            let row_entries = max_row_entries(slots, resolution);
+            let compacted = CompactedRows::new(&memory, limits.buffer, hemicubes, row_entries)?;
             let clock = Clock::new(&memory)?;
             Ok(Batches {
                 item_buffer,
@@ -193,7 +187,7 @@ impl HemicubeRows {
         })
     }
 
-    /// One hemicube a patch, of resolution number `at`; none where there is no room for their
+    /// One hemicube a patch, of resolution number `at`; `None` where there is no room for their
     /// entries.
     fn draw_batch(
         &mut self,
@@ -208,7 +202,7 @@ impl HemicubeRows {
         let Batches { item_buffer, reduce, resolutions, compacted, clock, .. } = &mut self.batches;
         let Resolution { pixels, targets, bindings, drawn } = &mut resolutions[at];
         let settings = RowSettings { slots, entries: compacted.entries, ..Default::default() };
-        let most = u64::from(row_entries(slots, *pixels)) * u64::from(count);
+        let max_entries = u64::from(max_row_entries(slots, *pixels)) * u64::from(count);
         let rows = gpu.with_error_scopes(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let queries = clock.as_ref().map(|clock| &clock.queries);
@@ -218,7 +212,7 @@ impl HemicubeRows {
             if let Some(clock) = clock {
                 clock.resolve(&mut encoder);
             }
-            let submitted = compacted.submit(gpu, encoder, settings, most);
+            let submitted = compacted.submit(gpu, encoder, settings, max_entries);
             let rows = compacted.read(gpu, &submitted, |entries| rows_of(entries, patches))?;
             let seconds = clock.as_ref().map(|clock| clock.seconds(gpu, submitted.submission));
             let (draw, reduce) = seconds.transpose()?.unwrap_or_default();
@@ -237,14 +231,14 @@ fn slots(mesh: &Mesh) -> u32 {
     mesh.element_count() as u32 + FIRST_ELEMENT
 }
 
-/// Bytes of a dense row of so many words.
+/// Bytes of a dense row of this number of words.
 fn row_bytes(slots: u32) -> u64 {
     u64::from(slots) * 4
 }
 
-/// Entries of a row, at most: as many as the hemicube has pixels, a top face of `resolution`² and
-/// four side faces of half as many.
-fn row_entries(slots: u32, resolution: u32) -> u32 {
+/// Maximum number of entries of a row: that of the hemicube's pixels, a top face of `resolution`²
+/// and four side faces of half as many.
+fn max_row_entries(slots: u32, resolution: u32) -> u32 {
     slots.min(3 * resolution * resolution)
 }
 
@@ -253,10 +247,10 @@ fn check_resolution_fits(limits: GpuLimits, resolution: u32) -> Result<(), Error
     if fits(&resolution) {
         return Ok(());
     }
-    let most = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
+    let max = RESOLUTIONS.rev().find(fits).unwrap_or(0) / 2 * 2;
     let place = format!("hemicube resolution {resolution}");
     let found = format!("an item buffer of {resolution} × {} pixels", 3 * resolution);
-    let remedy = format!("this device allows resolutions up to {most}");
+    let remedy = format!("this device allows resolutions up to {max}");
     Err(Error::new(ErrorKind::Setting, place, found, remedy))
 }
 
@@ -269,8 +263,8 @@ fn check_mesh_fits(limits: GpuLimits, mesh: &Mesh) -> Result<(), Error> {
         return Ok(());
     }
     let found = format!("{items} finest cells of elements in {triangles} triangles");
-    let (cells, most) = (limits.buffer / 4, limits.buffer / triangle_bytes);
-    let remedy = format!("this device holds {cells} and {most}");
+    let (cells, triangles) = (limits.buffer / 4, limits.buffer / triangle_bytes);
+    let remedy = format!("this device holds {cells} and {triangles}");
     Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy))
 }
 
@@ -299,13 +293,13 @@ fn rotation(patch: NodeId) -> f64 {
     unit_interval(split_mix64_nth(patch.0.into())) * FRAC_PI_2
 }
 
-/// The rows of `patches` by the entries of all; or what is wrong with these.
+/// The rows of `patches` by the entries of all; or the first that is wrong.
 fn rows_of(entries: &[RowEntry], patches: &[NodeId]) -> Result<Vec<Row>, String> {
     let rows = by_row(entries, patches.len())?;
     rows.par_iter().zip(patches).map(|(row, &patch)| row_of(row, patch)).collect()
 }
 
-/// The row of `patch` by its entries; or what is wrong with these.
+/// The row of `patch` by its entries, if these sum to 1; else an error message.
 fn row_of(entries: &[RowEntry], patch: NodeId) -> Result<Row, String> {
     let (lost, seen) = entries.split_at(entries.partition_point(|e| e.slot < FIRST_ELEMENT));
     let entry = |e: &RowEntry| Entry { element: e.slot - FIRST_ELEMENT, share: e.count };

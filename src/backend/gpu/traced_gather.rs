@@ -8,8 +8,8 @@
 //!
 //! The sums are those of [`RayGather`], in 32 bits. Lists of the points that need more rays are
 //! made on the device: the host waits for samples only. Rays to luminaires are cast on the CPU, and
-//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device meet
-//! no luminaires.
+//! in scenes with luminaires all rays of points that near surfaces cover: paths on the device do
+//! not sample luminaires.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};
@@ -19,15 +19,15 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::field::{self, FieldBuffers};
-use super::layout::{
-    GatherSettings, POINT_STATE_BYTES, Sample, TEXELS_A_LINE, TracedPoint, WORK_HEADER_BYTES,
-};
+use super::layout::{GatherSettings, Sample, TEXELS_A_LINE, TracedPoint, WORK_HEADER_BYTES};
+use super::limits::MAX_POINTS;
 use super::memory::Memory;
 use super::pipeline::bind_group;
+use super::slots::{IN_FLIGHT, Slot, Slots};
 use super::traced_scene::TracedScene;
 use crate::backend::adapter::AdapterKind;
 use crate::backend::cpu::RayGather;
-use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, least_rays, most_rays, samples};
+use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, max_rays, min_rays, samples};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
@@ -62,43 +62,12 @@ pub struct TracedGather {
     seconds: f64,
 }
 
-/// Buffers of the batches in flight: stored with the device, for all gatherers in turn.
-#[derive(Debug)]
-pub struct Slots {
-    /// Initial contents of the first half of `Work`, with empty lists.
-    no_work: wgpu::Buffer,
-    slots: Vec<Slot>,
-    /// Maximum number of points of a batch.
-    points: u32,
-    /// Maximum number of passes that cast rays of one half, and of those that follow paths.
-    passes: [u32; 2],
-    _memory: Memory,
-}
-
-/// Buffers of a batch, reused once its samples are read.
-#[derive(Debug)]
-struct Slot {
-    points: wgpu::Buffer,
-    states: wgpu::Buffer,
-    samples: wgpu::Buffer,
-    work: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    /// One per preceding pass that cast rays of the same half.
-    settings: Vec<wgpu::Buffer>,
-    /// The same of passes that follow paths.
-    path_settings: Vec<wgpu::Buffer>,
-}
-
 /// A batch in flight.
 struct InFlight {
     slot: usize,
     points: usize,
     submission: wgpu::SubmissionIndex,
 }
-
-/// Number of batches in flight: one is read while one runs and one is ready. With two the device
-/// waits for the host between batches.
-const IN_FLIGHT: usize = 3;
 
 /// Maximum number of rays of a point in one pass, 64 per lane: lavapipe (Mesa 22.3) leaves all
 /// loops of an invocation after 65 535 iterations in total, and a ray takes some hundred.
@@ -115,13 +84,6 @@ fn path_rays(kind: AdapterKind) -> u32 {
     }
 }
 
-/// Maximum number of points of a batch: an H200 gets no faster beyond that.
-pub const MAX_POINTS: u32 = 32_768;
-
-/// Maximum seconds of one dispatch: drivers abort those of seconds, and a desktop freezes
-/// meanwhile.
-const DISPATCH_SECONDS: f64 = 0.02;
-
 impl TracedGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
@@ -130,7 +92,7 @@ impl TracedGather {
     /// device; [`ErrorKind::Memory`] when there is no memory; [`ErrorKind::Device`] when the device
     /// fails.
     pub fn new(gpu: &Gpu, mesh: &Mesh, count: u32) -> Result<TracedGather, Error> {
-        TracedGather::with_noise(gpu, mesh, count, (f64::INFINITY, 0.0))
+        TracedGather::with_noise(gpu, mesh, count, f64::INFINITY, 0.0)
     }
 
     /// Adaptive: doubles the number of rays, up to 16 times, until the error estimate is below
@@ -144,10 +106,11 @@ impl TracedGather {
         gpu: &Gpu,
         mesh: &Mesh,
         count: u32,
-        (noise, dim): (f64, f64),
+        noise: f64,
+        dim: f64,
     ) -> Result<TracedGather, Error> {
-        let min_rays = least_rays(count)?;
-        let max_rays = most_rays(min_rays, noise);
+        let min_rays = min_rays(count)?;
+        let max_rays = max_rays(min_rays, noise);
         check_textures(gpu.limits().texture)?;
         let scene = mesh.scene();
         let lights = Arc::new(Lights::new(mesh.shared_scene()));
@@ -240,28 +203,29 @@ impl TracedGather {
         if is_sound { Ok(sample) } else { Err(format!("{sample:?}")) }
     }
 
-    /// Number of points of one batch: limited by the time of a dispatch, and at most `most`.
-    fn batch_len(&self, most: u32) -> u32 {
+    /// Number of points of one batch: limited by the time of a dispatch, and at most `max`.
+    fn batch_len(&self, max: u32) -> u32 {
         let per_ray = match (self.gpu.adapter().kind, self.rays) {
             (AdapterKind::Cpu, 0) => 1e-6,
             (_, 0) => 2e-8,
             (_, rays) => self.seconds / rays as f64,
         };
         let seconds = per_ray * f64::from(self.min_rays.min(PASS_RAYS));
-        ((DISPATCH_SECONDS / seconds) as u32).max(64).min(most)
+        // A dispatch takes 20 ms: drivers abort those of seconds, and a desktop freezes meanwhile.
+        ((0.02 / seconds) as u32).max(64).min(max)
     }
 
-    /// The samples of `points`, in batches of at most `most`, and whether paths found the light of
-    /// surfaces near them.
+    /// The samples of `points`, in batches of at most `max_len`, and whether paths found the light
+    /// of surfaces near them.
     fn gather_all(
         &mut self,
         field: &FieldBuffers,
         points: &[TracedPoint],
-        most: u32,
+        max_len: u32,
     ) -> Result<Vec<(IrradianceSample, bool)>, Error> {
         let gpu = self.gpu.clone();
         let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let len = (self.batch_len(most) as usize).min(points.len());
+        let len = (self.batch_len(max_len) as usize).min(points.len());
         // For all rays of the first pass, or of the last doubling.
         let rays = self.min_rays.max(self.max_rays / 2);
         let passes = [PASS_RAYS, self.path_rays()].map(|of_pass| rays.div_ceil(of_pass));
@@ -320,7 +284,7 @@ impl TracedGather {
                 gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
             }
         }
-        let pipelines = gpu.gather_pipelines();
+        let pipelines = gpu.tracing.gather_pipelines(&gpu.device);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let has_lights = self.has_lights();
         let passes = |rays: u32| rays.div_ceil(PASS_RAYS) as usize;
@@ -412,7 +376,7 @@ impl TracedGather {
     /// Bind groups of a slot for all passes.
     fn bind(&self, slot: &Slot, field: &FieldBuffers) -> Bound {
         let (device, scene) = (&self.gpu.device, &*self.scene);
-        let pipelines = self.gpu.gather_pipelines();
+        let pipelines = self.gpu.tracing.gather_pipelines(device);
         let Slot { points, states, samples, work, settings, path_settings, .. } = slot;
         let view = wgpu::BindingResource::TextureView;
         let geometry = scene.geometry();
@@ -508,48 +472,6 @@ impl BoundPass {
     }
 }
 
-impl Slots {
-    fn new(memory: Memory, points: u32, passes: [u32; 2]) -> Result<Slots, Error> {
-        use wgpu::BufferUsages as Usage;
-        let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
-        let no_work =
-            memory.buffer("no work", WORK_HEADER_BYTES, Usage::COPY_SRC | Usage::COPY_DST)?;
-        memory.queue.write_buffer(&no_work, 0, bytemuck::cast_slice(&header));
-        let room = u64::from(points);
-        let storage = Usage::STORAGE | Usage::COPY_DST;
-        let sample_bytes = room * size_of::<Sample>() as u64;
-        let settings = |count: u32| {
-            let settings = |_| memory.uniform("settings", &[0; size_of::<GatherSettings>()]);
-            (0..count).map(settings).collect::<Result<_, Error>>()
-        };
-        let slot = |_| {
-            Ok(Slot {
-                points: memory.buffer("points", room * size_of::<TracedPoint>() as u64, storage)?,
-                states: memory.buffer("states", room * POINT_STATE_BYTES, Usage::STORAGE)?,
-                samples: memory.buffer(
-                    "samples",
-                    sample_bytes,
-                    Usage::STORAGE | Usage::COPY_SRC,
-                )?,
-                work: memory.buffer(
-                    "work",
-                    WORK_HEADER_BYTES + 2 * room * 4,
-                    storage | Usage::INDIRECT,
-                )?,
-                staging: memory.buffer(
-                    "staging",
-                    sample_bytes,
-                    Usage::MAP_READ | Usage::COPY_DST,
-                )?,
-                settings: settings(passes[0])?,
-                path_settings: settings(passes[1])?,
-            })
-        };
-        let slots = (0..IN_FLIGHT).map(slot).collect::<Result<_, Error>>()?;
-        Ok(Slots { no_work, slots, points, passes, _memory: memory })
-    }
-}
-
 /// Checks that a device supports the width of textures that are read as arrays.
 pub fn check_textures(texture: u32) -> Result<(), Error> {
     if texture >= TEXELS_A_LINE {
@@ -598,17 +520,18 @@ impl Gather for TracedGather {
         field::check(self.gpu.limits(), field, self.triangles)?;
         let traced: Vec<TracedPoint> = points.par_iter().map(|p| self.traced_point(p)).collect();
         let gpu = self.gpu.clone();
-        let mut most = MAX_POINTS.min((points.len() as u32).next_power_of_two());
+        let mut max_len = MAX_POINTS.min((points.len() as u32).next_power_of_two());
         let samples = loop {
             let samples = gpu.with_error_scopes(|| {
-                let field = gpu.field_buffers(&self.scene, field)?;
-                self.gather_all(&field, &traced, most)
+                let field = gpu.tracing.field(&self.scene, field, || gpu.memory())?;
+                self.gather_all(&field, &traced, max_len)
             });
             match samples {
                 // Smaller batches leave memory for the field.
-                Err(e) if e.kind() == ErrorKind::Memory && most > 1 => {
-                    most /= 2;
-                    gpu.forget_slots()?;
+                Err(e) if e.kind() == ErrorKind::Memory && max_len > 1 => {
+                    max_len /= 2;
+                    *gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner) = None;
+                    gpu.free_unused()?;
                 }
                 samples => break samples,
             }

@@ -52,13 +52,10 @@ struct Buffers {
     patches: wgpu::Buffer,
     counts: wgpu::Buffer,
     compacted: CompactedRows,
-    /// Patches of a batch, at most.
+    /// Maximum number of patches of a batch.
     patches_at_once: u32,
     memory: Memory,
 }
-
-/// Counts of a batch take at most this many bytes: what any WebGPU device binds.
-const COUNT_BYTES: u64 = 128 << 20;
 
 impl TracedRows {
     /// `count` rays per row over the triangles of `mesh`, and fewer for patches that shoot little.
@@ -74,15 +71,16 @@ impl TracedRows {
         let has_panes = mesh.scene().clear_panes().is_some();
         let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
         let row_bytes = u64::from(slots) * if has_panes { 16 } else { 4 };
-        let most = gpu.limits().buffer.min(COUNT_BYTES);
-        if row_bytes > most {
+        // Any WebGPU device binds 128 MiB.
+        let max_bytes = gpu.limits().buffer.min(128 << 20);
+        if row_bytes > max_bytes {
             let found = format!("rows of {row_bytes} bytes");
-            let remedy = format!("this device has room for {most}");
+            let remedy = format!("this device has room for {max_bytes}");
             return Err(Error::new(ErrorKind::Memory, "mesh".to_string(), found, remedy));
         }
-        let patches_at_once = (most / row_bytes).min(CompactedRows::MAX_BATCH.into()) as u32;
+        let patches_at_once = (max_bytes / row_bytes).min(CompactedRows::MAX_BATCH.into()) as u32;
         let buffers = gpu.with_error_scopes(|| {
-            Buffers::new(gpu, mesh, (row_bytes, count.min(slots)), patches_at_once)
+            Buffers::new(gpu, mesh, row_bytes, count.min(slots), patches_at_once)
         })?;
         let mut rows = TracedRows {
             gpu: gpu.clone(),
@@ -126,13 +124,14 @@ impl TracedRows {
         }
     }
 
-    /// The rows of a batch by so many `rays` in the directions of number `at`; none where there is
-    /// no room for their entries.
+    /// The rows of a batch by `rays` rays each in the directions of number `at`; `None` where there
+    /// is no room for their entries.
     fn batch(
         &mut self,
         mesh: &Mesh,
         patches: &[NodeId],
-        (rays, at): (u32, usize),
+        rays: u32,
+        at: usize,
     ) -> Result<Option<Vec<Row>>, Error> {
         let traced: Vec<TracedPatch> =
             patches.par_iter().map(|&p| self.traced_patch(mesh, p)).collect();
@@ -162,7 +161,7 @@ impl TracedRows {
         let Buffers { quadtrees, patches: patch_buffer, counts, compacted, .. } = &mut self.buffers;
         let gpu = &self.gpu;
         gpu.queue.write_buffer(patch_buffer, 0, bytemuck::cast_slice(patches));
-        let pipeline = &gpu.row_pipelines().row_rays;
+        let pipeline = &gpu.tracing.row_pipelines(&gpu.device).row_rays;
         let group = |group: u32, entries: &[(u32, wgpu::BindingResource)]| {
             let layout = pipeline.get_bind_group_layout(group);
             bind_group(&gpu.device, "rows", &layout, entries)
@@ -185,14 +184,13 @@ impl TracedRows {
             pass.dispatch_workgroups(settings.rays.div_ceil(64), patches.len() as u32, 1);
         }
         compacted.compact(gpu, &mut encoder, counts, patches.len() as u32, self.has_panes);
-        let most = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
-        let submitted = compacted.submit(gpu, encoder, settings, most);
+        let max_entries = u64::from(settings.rays.min(settings.slots)) * patches.len() as u64;
+        let submitted = compacted.submit(gpu, encoder, settings, max_entries);
         compacted.read(gpu, &submitted, read)
     }
 }
 
-/// The rows of so many `patches` by the entries of all, of so many `rays` a row; or what is wrong
-/// with these.
+/// The rows of `patches` patches by the entries of all, `rays` rays each; or the first wrong row.
 fn rows_of(
     entries: &[RowEntry],
     patches: usize,
@@ -253,14 +251,14 @@ impl Buffers {
     fn new(
         gpu: &Gpu,
         mesh: &Mesh,
-        (row_bytes, row_entries): (u64, u32),
+        row_bytes: u64,
+        row_entries: u32,
         patches_at_once: u32,
     ) -> Result<Buffers, Error> {
         use wgpu::BufferUsages as Usage;
         let memory = gpu.memory();
         let patches = u64::from(patches_at_once);
         let storage = Usage::STORAGE | Usage::COPY_DST;
-        let batch_size = (patches_at_once, row_entries);
         Ok(Buffers {
             quadtrees: memory.storage("quadtrees", bytemuck::cast_slice(&quadtrees(mesh)))?,
             patches: memory.buffer(
@@ -270,7 +268,12 @@ impl Buffers {
             )?,
             // Zero initially and after each batch.
             counts: memory.buffer("counts", patches * row_bytes, storage)?,
-            compacted: CompactedRows::new(&memory, gpu.limits().buffer, batch_size)?,
+            compacted: CompactedRows::new(
+                &memory,
+                gpu.limits().buffer,
+                patches_at_once,
+                row_entries,
+            )?,
             patches_at_once,
             memory,
         })
@@ -285,7 +288,7 @@ impl FormFactors for TracedRows {
             None => self.add_directions(&HemisphereSamples::new(rays)?, rays)?,
         };
         let (gpu, batch_len) = (self.gpu.clone(), self.buffers.patches_at_once);
-        let make = |batch: &[_]| self.batch(mesh, batch, (rays, at));
+        let make = |batch: &[_]| self.batch(mesh, batch, rays, at);
         CompactedRows::in_batches(&gpu, patches, batch_len, make)
     }
 

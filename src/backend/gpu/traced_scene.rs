@@ -151,18 +151,18 @@ impl TracedArrays {
     fn add_nodes(&mut self, rays: &RayScene, first_triangle: usize) {
         let tree = rays.tree();
         // Only inner nodes are stored: leaves are encoded in their parents.
-        let mut place = vec![u32::MAX; tree.nodes.len()];
+        let mut index = vec![u32::MAX; tree.nodes.len()];
         let mut next = self.nodes.len() as u32;
         for (k, node) in tree.nodes.iter().enumerate() {
             if node.children.is_some() {
-                place[k] = next;
+                index[k] = next;
                 next += 1;
             }
         }
         let child = |k: usize| {
             let node = &tree.nodes[k];
             match node.children {
-                Some(_) => place[k],
+                Some(_) => index[k],
                 None => {
                     let first = (first_triangle + node.items.start) as u32;
                     LEAF | (node.items.len() as u32 - 1) << 29 | first
@@ -177,18 +177,17 @@ impl TracedArrays {
         for node in &tree.nodes {
             if let Some(first) = node.children {
                 nodes.push(pair(
-                    (bounds(first), child(first)),
-                    (bounds(first + 1), child(first + 1)),
+                    [first, first + 1].map(|k| Child { bounds: bounds(k), node: child(k) }),
                 ));
             }
         }
         if nodes.is_empty() {
             // The root is a leaf, or there are no triangles.
             let root = match tree.order.is_empty() {
-                true => (NOWHERE, LEAF),
-                false => (bounds(0), child(0)),
+                true => Child::NONE,
+                false => Child { bounds: bounds(0), node: child(0) },
             };
-            nodes.push(pair(root, (NOWHERE, LEAF)));
+            nodes.push(pair([root, Child::NONE]));
         }
         self.nodes.extend(nodes);
     }
@@ -312,12 +311,29 @@ impl TracedArrays {
     }
 }
 
-/// A box that no ray hits: a point beyond the farthest end.
-const NOWHERE: [[f32; 3]; 2] = [[1e31; 3]; 2];
+/// A child of a node of the hierarchy: its box, low and high corner, and its index or leaf.
+struct Child {
+    bounds: [[f32; 3]; 2],
+    node: u32,
+}
 
-fn pair((a, child_a): ([[f32; 3]; 2], u32), (b, child_b): ([[f32; 3]; 2], u32)) -> TraceNode {
-    let ([low_a, high_a], [low_b, high_b]) = (a, b);
-    TraceNode { low_a, child_a, high_a, child_b, low_b, padding: 0, high_b, padding_2: 0 }
+impl Child {
+    /// An empty leaf in a box that no ray hits: a point beyond the farthest end.
+    const NONE: Child = Child { bounds: [[1e31; 3]; 2], node: LEAF };
+}
+
+fn pair([a, b]: [Child; 2]) -> TraceNode {
+    let ([low_a, high_a], [low_b, high_b]) = (a.bounds, b.bounds);
+    TraceNode {
+        low_a,
+        child_a: a.node,
+        high_a,
+        child_b: b.node,
+        low_b,
+        padding: 0,
+        high_b,
+        padding_2: 0,
+    }
 }
 
 /// A row with a share of light per channel.

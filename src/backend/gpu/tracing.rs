@@ -3,23 +3,18 @@
 use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
-use super::device::Gpu;
 use super::field::{self, FieldBuffers};
+use super::memory::Memory;
 use super::pipeline;
 use super::shaders::{
     COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, NEAR_PATHS_WGSL, RANK_LIGHTS_WGSL,
     ROW_RAYS_WGSL, SETTLE_WGSL,
 };
-use super::traced_gather::Slots;
+use super::slots::Slots;
 use super::traced_scene::TracedScene;
 use crate::error::{Error, ErrorKind};
 use crate::gather::RadiosityField;
-use crate::gather::lights::Lights;
 use crate::scene::Scene;
-
-/// Number of fields stored on a device: the field that vertices gather from, and the gathered one,
-/// which an estimate of the error compares.
-const FIELDS: usize = 2;
 
 /// Stored with a device, for all users that cast rays on it.
 #[derive(Debug, Default)]
@@ -130,73 +125,55 @@ impl RowPipelines {
     }
 }
 
-impl Gpu {
-    /// Frees the memory of batches on the device.
-    pub(super) fn forget_slots(&self) -> Result<(), Error> {
-        *self.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        // It is freed once writes to it have completed.
-        self.with_error_scopes(|| {
-            self.queue.submit([]);
-            self.wait()
-        })
-    }
-
-    /// Starts to compile all passes of rays, so that they are ready when the scene is loaded.
-    pub(super) fn compile_ahead(&self) {
-        let gpu = self.clone();
-        std::thread::spawn(move || {
-            gpu.gather_pipelines();
-            gpu.row_pipelines();
-        });
-    }
-
+impl Tracing {
     /// The passes of rows: compiled at the first call.
-    pub(super) fn row_pipelines(&self) -> &RowPipelines {
-        self.tracing.rows.get_or_init(|| RowPipelines::new(&self.device))
+    pub fn row_pipelines(&self, device: &wgpu::Device) -> &RowPipelines {
+        self.rows.get_or_init(|| RowPipelines::new(device))
     }
 
     /// The passes of a gather: compiled at the first call.
-    pub(super) fn gather_pipelines(&self) -> &GatherPipelines {
-        self.tracing.gather.get_or_init(|| GatherPipelines::new(&self.device))
+    pub fn gather_pipelines(&self, device: &wgpu::Device) -> &GatherPipelines {
+        self.gather.get_or_init(|| GatherPipelines::new(device))
     }
 
-    /// The scene of `lights` on the device: uploaded unless it is the previous one.
-    pub(super) fn traced_scene(
+    /// `scene` on the device: the result of `upload` unless it is the previous one.
+    pub fn scene(
         &self,
         scene: &Arc<Scene>,
-        lights: &Lights,
+        upload: impl FnOnce() -> Result<TracedScene, Error>,
     ) -> Result<Arc<TracedScene>, Error> {
-        let mut kept = self.tracing.scene.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((owner, traced)) = &*kept
             && owner.upgrade().is_some_and(|owner| Arc::ptr_eq(&owner, scene))
         {
             return Ok(traced.clone());
         }
         *kept = None;
-        self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner).clear();
-        let traced = self.with_error_scopes(|| TracedScene::new(self.memory(), lights))?;
-        let traced = Arc::new(traced);
+        self.fields.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        let traced = Arc::new(upload()?);
         *kept = Some((Arc::downgrade(scene), traced.clone()));
         Ok(traced)
     }
 
-    /// `field` on the device: uploaded unless it is stored.
-    pub(super) fn field_buffers(
+    /// `field` on the device: uploaded to the result of `memory` unless it is stored.
+    pub fn field(
         &self,
         scene: &Arc<TracedScene>,
         field: &RadiosityField,
+        memory: impl Fn() -> Memory,
     ) -> Result<Arc<FieldBuffers>, Error> {
         let key = field::key(field);
-        let mut kept = self.tracing.fields.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
         let is_same = |kept: &KeptField| kept.key == key && Arc::ptr_eq(&kept.scene, scene);
-        let found = kept.iter().position(is_same).map(|k| kept.remove(k).buffers);
-        let buffers = match found {
-            Some(buffers) => buffers,
+        let buffers = match kept.iter().position(is_same) {
+            Some(k) => kept.remove(k).buffers,
             None => {
-                if kept.len() >= FIELDS {
+                // Two are stored: the field that vertices gather from, and the gathered one, which
+                // an estimate of the error compares.
+                if kept.len() >= 2 {
                     kept.remove(0);
                 }
-                let new = || FieldBuffers::new(self.memory(), field, scene.radiance_unit);
+                let new = || FieldBuffers::new(memory(), field, scene.radiance_unit);
                 Arc::new(new().or_else(|e| match e.kind() {
                     // The other fields are freed.
                     ErrorKind::Memory if !kept.is_empty() => {

@@ -307,7 +307,7 @@ fn little_memory_draws_same_rows_in_smaller_batches() {
     let one: u64 = 2 * 128 * 384 * 4;
     let mut fits = vec![];
     for memory in (0..10).map(|k| (one / 16) << k) {
-        let gpu = within(GpuLimits { memory, ..GpuLimits::MOST });
+        let gpu = within(GpuLimits { memory, ..GpuLimits::NONE });
         match HemicubeRows::new(&gpu, &mesh, 128) {
             Ok(mut rows) => {
                 assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{memory}");
@@ -351,7 +351,7 @@ fn little_memory_gathers_the_same_in_smaller_batches() {
     let mut fits = vec![];
     // In steps of an eighth: somewhere there is room for all but the light that comes last.
     for memory in (0..24).map(|k| (one as f64 * 1.5f64.powi(k) / 2.0) as u64) {
-        match gather(&within(GpuLimits { memory, ..GpuLimits::MOST })) {
+        match gather(&within(GpuLimits { memory, ..GpuLimits::NONE })) {
             Ok(found) => {
                 assert!(found == all, "{memory}");
                 fits.push(memory);
@@ -366,7 +366,7 @@ fn little_memory_gathers_the_same_in_smaller_batches() {
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn limits_of_small_device_are_reported() {
     let mesh = furnace();
-    let small = within(GpuLimits { texture: 256, ..GpuLimits::MOST });
+    let small = within(GpuLimits { texture: 256, ..GpuLimits::NONE });
     // An item buffer is three times as high as wide: 3 · 84 = 252.
     let e = HemicubeRows::new(&small, &mesh, 128).unwrap_err();
     let text = e.to_string();
@@ -381,7 +381,7 @@ fn limits_of_small_device_are_reported() {
         assert!(e.kind() == ErrorKind::Setting && text.contains("take 2048"), "{text}");
     }
     // Rows of 4 bytes an element in buffers of 64 KiB: some 16 000 elements.
-    let few = within(GpuLimits { buffer: 64 << 10, ..GpuLimits::MOST });
+    let few = within(GpuLimits { buffer: 64 << 10, ..GpuLimits::NONE });
     let large = cornell_box(20.0);
     let e = HemicubeRows::new(&few, &large, 16).unwrap_err();
     assert!(e.kind() == ErrorKind::Memory && e.place() == "mesh", "{e}");
@@ -398,7 +398,7 @@ fn limits_of_small_device_are_reported() {
     // One layer is one hemicube at a time, and the same rows.
     let patches: Vec<NodeId> = (0..20).map(|e| mesh.element(e)).collect();
     let [one, many] = [1, 16].map(|layers| {
-        let gpu = within(GpuLimits { layers, ..GpuLimits::MOST });
+        let gpu = within(GpuLimits { layers, ..GpuLimits::NONE });
         HemicubeRows::new(&gpu, &mesh, 32).unwrap().rows(&mesh, &patches, 1.0).unwrap()
     });
     assert!(one == many);

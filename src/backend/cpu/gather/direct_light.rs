@@ -7,10 +7,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::doubled::Found;
+use super::doubled::RaySums;
+use super::scene_rays::SceneRays;
 use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
-use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::geometry::polygon::clip;
 use crate::sampling::low_discrepancy::sobol_02_point;
@@ -21,7 +21,7 @@ use crate::visibility::ray_scene::Hit;
 
 /// The lights and the sun that rays are sent to from one point.
 pub(super) struct DirectLight<'a> {
-    gather: &'a RayGather,
+    scene: &'a SceneRays,
     point: &'a GatherPoint,
     /// Each with its unoccluded form factor.
     lights: Vec<(u32, f64)>,
@@ -31,12 +31,8 @@ pub(super) struct DirectLight<'a> {
     rotation: f64,
 }
 
-/// Minimum cosine of the angle between the mean direction to a light and any direction to it, for
-/// points on it to sample it well: 60°. Plain choice.
-const MIN_AXIS_COSINE: f64 = 0.5;
-
-/// Whether the part of a light above the horizon of `point` is within a cone around its mean
-/// direction; false if there is none.
+/// Whether the part of a light above the horizon of `point` is within 60° of its mean direction, so
+/// that points on it sample it well (plain choice); false if there is none.
 fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
     let mut directions = vec![];
     for corners in triangles {
@@ -46,8 +42,7 @@ fn is_within_cone(point: &GatherPoint, triangles: impl Iterator<Item = [DVec3; 3
         }
     }
     let axis = directions.iter().map(|d| d.normalize_or_zero()).sum::<DVec3>().try_normalize();
-    let is_within =
-        |axis: DVec3| directions.iter().all(|d| d.dot(axis) > MIN_AXIS_COSINE * d.length());
+    let is_within = |axis: DVec3| directions.iter().all(|d| d.dot(axis) > 0.5 * d.length());
     axis.is_some_and(is_within)
 }
 
@@ -63,25 +58,26 @@ impl<'a> DirectLight<'a> {
     /// A light that subtends a large angle at `point` is sampled better by rays over the hemisphere
     /// than by points spread over its area: those with a closed form are [`WideLight`]s, and the
     /// others are treated like any surface.
-    pub fn new(gather: &'a RayGather, point: &'a GatherPoint) -> DirectLight<'a> {
-        let scene = gather.lights.scene();
-        let mut lights = gather.lights.importance_ranked(point);
+    ///
+    /// `min_rays` is the minimum number of rays over the hemisphere.
+    pub fn new(rays: &'a SceneRays, min_rays: u32, point: &'a GatherPoint) -> DirectLight<'a> {
+        let scene = rays.lights.scene();
+        let mut lights = rays.lights.importance_ranked(point);
         lights.retain(|&(light, _)| {
-            let light = &gather.lights.lights[light as usize];
+            let light = &rays.lights.lights[light as usize];
             let corner = |&t: &u32| scene.corners(t as usize);
             light.convex || is_within_cone(point, light.triangles.iter().map(corner))
         });
-        let all = &gather.lights.lights;
-        let rays = [gather.min_rays, RAYS_PER_SHADOW_RAY];
+        let all = &rays.lights.lights;
         let (wide, lights): (Vec<_>, Vec<_>) = lights.into_iter().partition(|&(light, factor)| {
-            WideLight::is_wide(&all[light as usize], factor, scene, point, rays)
+            WideLight::is_wide(&all[light as usize], factor, scene, point, min_rays)
         });
-        let wide = wide
-            .into_iter()
-            .map(|ranked| WideLight::new(&all[ranked.0 as usize], ranked, scene, point));
+        let wide = wide.into_iter().map(|(light, factor)| {
+            WideLight::new(&all[light as usize], light, factor, scene, point)
+        });
         let wide = wide.collect();
-        let rotation = gather.rotations.at(point.position, point.near);
-        DirectLight { gather, point, lights, wide, sun: scene.sky().sun(), rotation }
+        let rotation = rays.rotations.at(point.position, point.near);
+        DirectLight { scene: rays, point, lights, wide, sun: scene.sky().sun(), rotation }
     }
 
     /// The lights, each with its unoccluded form factor.
@@ -105,18 +101,18 @@ impl<'a> DirectLight<'a> {
     ) {
         let front = hit.filter(|hit| hit.front);
         for (wide, visible) in self.wide.iter().zip(visible) {
-            let is_met = |hit: &Hit| self.gather.lights.of_triangle[hit.triangle] == wide.light;
-            wide.add_ray(direction, front.filter(is_met).map(|hit| passed(hit.distance)), visible);
+            let is_hit = |hit: &Hit| self.scene.lights.of_triangle[hit.triangle] == wide.light;
+            wide.add_ray(direction, front.filter(is_hit).map(|hit| passed(hit.distance)), visible);
         }
     }
 
     /// Whether the direct light of `light` is counted separately from reflected light.
-    pub fn knows(&self, light: u32) -> bool {
+    pub fn samples(&self, light: u32) -> bool {
         self.lights.iter().any(|&(k, _)| k == light) || self.wide.iter().any(|w| w.light == light)
     }
 
-    /// Results of the rays of `range`.
-    pub fn found(&self, range: Range<u32>) -> ShadowRays<'_> {
+    /// Casts the rays of `range`.
+    pub fn cast(&self, range: Range<u32>) -> ShadowRays<'_> {
         let visible = |&(light, _): &(u32, f64)| self.rays_to(light, range.clone());
         let sun = |sun: &Sun| self.rays_to_sun(sun, range.clone());
         ShadowRays {
@@ -129,7 +125,7 @@ impl<'a> DirectLight<'a> {
     /// Sums of cosines at the point, over points of `range` spread over the sun: of the visible
     /// ones, and of all above the horizon.
     pub fn rays_to_sun(&self, sun: &Sun, range: Range<u32>) -> Visible {
-        let (gather, point) = (self.gather, self.point);
+        let (scene, point) = (self.scene, self.point);
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
         let second_rotation = second_rotation(self.rotation);
         for [x, y] in range.map(sobol_02_point) {
@@ -139,8 +135,8 @@ impl<'a> DirectLight<'a> {
             let reach = point.near..f64::INFINITY;
             out.all += cosine;
             let (from, any) = (point.position, |_: &Hit| true);
-            if cosine > 0.0 && !gather.scene.occluded(from, direction, reach.clone(), any) {
-                out.seen += cosine * gather.panes.transmittance(from, direction, reach);
+            if cosine > 0.0 && !scene.surfaces.occluded(from, direction, reach.clone(), any) {
+                out.seen += cosine * scene.panes.transmittance(from, direction, reach);
             }
         }
         out
@@ -149,8 +145,8 @@ impl<'a> DirectLight<'a> {
     /// Form factors from the point to the visible part of a light, and to all of it unoccluded,
     /// both by the same points on it: those of `range`.
     pub fn rays_to(&self, light: u32, range: Range<u32>) -> Visible {
-        let (gather, point) = (self.gather, self.point);
-        let (lights, scene) = (&gather.lights, gather.lights.scene());
+        let (rays, point) = (self.scene, self.point);
+        let (lights, scene) = (&rays.lights, rays.lights.scene());
         let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
         // Both coordinates are rotated: where only a strip of the light is visible, the same points
         // everywhere would cause an error in the same direction everywhere.
@@ -168,15 +164,15 @@ impl<'a> DirectLight<'a> {
             let near = point.near / to.length();
             let other = |h: &Hit| !(lights.of_triangle[h.triangle] == light && h.front);
             let reach = near..1.0 - offset::SEGMENT_END;
-            if !is_hole && !gather.scene.occluded(point.position, to, reach.clone(), other) {
-                out.seen += factor * gather.panes.transmittance(point.position, to, reach);
+            if !is_hole && !rays.surfaces.occluded(point.position, to, reach.clone(), other) {
+                out.seen += factor * rays.panes.transmittance(point.position, to, reach);
             }
         }
         out
     }
 }
 
-impl Found for ShadowRays<'_> {
+impl RaySums for ShadowRays<'_> {
     fn add(&mut self, other: &ShadowRays) {
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
             sum.add(term);
@@ -185,10 +181,10 @@ impl Found for ShadowRays<'_> {
     }
 
     fn mean(&self, _: u32) -> Rgb {
-        let DirectLight { gather, point, lights, sun, .. } = self.light;
+        let DirectLight { scene, point, lights, sun, .. } = self.light;
         let mut irradiance = Rgb::ZERO;
         for (&(light, factor), visible) in lights.iter().zip(&self.lights) {
-            let light = &gather.lights.lights[light as usize];
+            let light = &scene.lights.lights[light as usize];
             let share = visible.share_of(light.convex.then_some(factor));
             irradiance += light.exitance * visible.seen * share;
         }

@@ -12,7 +12,7 @@ use std::ops::Range;
 use crate::scene::Rgb;
 
 /// Sums over some rays.
-pub(super) trait Found {
+pub(super) trait RaySums {
     /// Adds the sums over other rays.
     fn add(&mut self, other: &Self);
 
@@ -24,20 +24,20 @@ pub(super) trait Found {
 }
 
 /// Sums over rays, and the function that casts more.
-pub(super) struct Doubled<F, T> {
-    found: F,
+pub(super) struct Doubled<S, T> {
+    sums: S,
     trace: T,
     count: u32,
     max: u32,
     error: f64,
 }
 
-impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
+impl<S: RaySums, T: Fn(Range<u32>) -> S> Doubled<S, T> {
     /// Starts with the first of `limits`; the second is the maximum. `trace` casts the rays of a
     /// range.
-    pub fn new([min, max]: [u32; 2], trace: T) -> Doubled<F, T> {
-        let found = trace(0..min / 2);
-        let mut doubled = Doubled { found, trace, count: min / 2, max, error: f64::INFINITY };
+    pub fn new([min, max]: [u32; 2], trace: T) -> Doubled<S, T> {
+        let sums = trace(0..min / 2);
+        let mut doubled = Doubled { sums, trace, count: min / 2, max, error: f64::INFINITY };
         doubled.add_half();
         doubled
     }
@@ -54,15 +54,15 @@ impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
     fn add_half(&mut self) {
         let half = self.count;
         let second = (self.trace)(half..2 * half);
-        let difference = self.found.mean(half).distance(second.mean(half));
-        self.found.add(&second);
+        let difference = self.sums.mean(half).distance(second.mean(half));
+        self.sums.add(&second);
         self.count = 2 * half;
-        self.error = difference.max(self.found.largest() / f64::from(self.count)) / 2.0;
+        self.error = difference.max(self.sums.largest() / f64::from(self.count)) / 2.0;
     }
 
     /// The irradiance by all rays.
     pub fn mean(&self) -> Rgb {
-        self.found.mean(self.count)
+        self.sums.mean(self.count)
     }
 
     /// Estimated error of the mean.
@@ -70,8 +70,8 @@ impl<F: Found, T: Fn(Range<u32>) -> F> Doubled<F, T> {
         self.error
     }
 
-    pub fn found(&self) -> &F {
-        &self.found
+    pub fn sums(&self) -> &S {
+        &self.sums
     }
 
     pub fn count(&self) -> u32 {

@@ -1,4 +1,4 @@
-//! Near surfaces, whose elements are too large to know their light there.
+//! Near surfaces, whose elements are too large to resolve their light there.
 //!
 //! ```text
 //!        ▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔   one element, lit at its right end
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! An element that is wider than it is far away covers much of the hemisphere of a point, and its
-//! interpolated light may differ from what the point sees of it: in a gap, light that is
+//! interpolated light may differ from the part that the point sees: in a gap, light that is
 //! interpolated from its mouth would fill all of it, and be reflected between its walls. So where
 //! such surfaces cover much of the hemisphere, the light that they reflect is found by paths, one a
 //! ray, that end at the first surface that is further away than its element is wide (secondary
@@ -24,10 +24,7 @@ use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 
-/// Share of the hemisphere that near surfaces cover above which paths find their light.
-const MIN_COVERED: f64 = 0.5;
-
-/// A ray that meets a near surface.
+/// A ray that hits a near surface.
 pub(super) struct NearRay {
     pub hit: Hit,
     pub direction: DVec3,
@@ -65,9 +62,10 @@ impl NearField {
         NearField::is_near(mesh, mesh.element_at(hit.triangle, hit.u, hit.v).0, hit)
     }
 
-    /// Whether paths find the light of as many `near` rays of all.
+    /// Whether paths find the light of near surfaces: where more than half of `rays` are `near`.
+    /// Plain choice.
     pub fn is_covered(near: usize, rays: usize) -> bool {
-        near as f64 > MIN_COVERED * rays as f64
+        2 * near > rays
     }
 
     /// The light of a near surface at the end of a `ray` from `point`, where light is known on the
@@ -77,7 +75,8 @@ impl NearField {
     pub fn light(
         &self,
         mesh: &Mesh,
-        (point, rotation): (&GatherPoint, f64),
+        point: &GatherPoint,
+        rotation: f64,
         ray: &NearRay,
         by_area: bool,
     ) -> NearLight {

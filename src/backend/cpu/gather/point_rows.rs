@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use super::RayGather;
 use super::direct_light::DirectLight;
 use super::near_field::{NearField, NearLight, NearRay};
+use super::scene_rays::{RAYS_PER_SHADOW_RAY, SceneRays};
 use super::visible::Visible;
-use super::{RAYS_PER_SHADOW_RAY, RayGather};
 use crate::gather::GatherPoint;
 use crate::gather::lights::NO_LIGHT;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
@@ -14,11 +15,11 @@ use crate::scene::Rgb;
 
 impl PointRows for RayGather {
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow> {
-        let light = DirectLight::new(self, point);
+        let light = DirectLight::new(&self.scene, self.min_rays, point);
         let count = (self.min_rays / parts.max(1)).max(1);
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
         // The same for all parts: the light of luminaires has almost no noise.
-        let luminaires = self.luminaires().unscaled(point);
+        let luminaires = self.scene.luminaires().unscaled(point);
         let row = |range| PointRow {
             luminaires: luminaires.clone(),
             ..self.row(mesh, point, &light, range)
@@ -45,7 +46,7 @@ impl RayGather {
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
         for &(light, unoccluded) in direct.lights() {
             let visible = direct.rays_to(light, range.clone());
-            let is_convex = self.lights.lights[light as usize].convex;
+            let is_convex = self.scene.lights.lights[light as usize].convex;
             let factor = mean(visible.seen) * visible.share_of(is_convex.then_some(unoccluded));
             row.emitters.push((self.material_of(light), factor));
         }
@@ -67,7 +68,8 @@ impl RayGather {
         direct: Option<&DirectLight>,
         range: Range<u32>,
     ) -> PointRow {
-        let rotation = self.rotations.at(point.position, point.near);
+        let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
+        let rotation = rotations.at(point.position, point.near);
         let share = 1.0 / f64::from(range.end - range.start);
         let mut row = PointRow { share, ..PointRow::default() };
         row.hits.reserve_exact((range.end - range.start) as usize);
@@ -75,13 +77,13 @@ impl RayGather {
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
         let (mut ray, mut near) = (range.start, vec![]);
         let wide = direct.map_or(&[][..], DirectLight::wide);
-        let has_entry = |light: u32| direct.is_some_and(|direct| direct.knows(light));
+        let has_entry = |light: u32| direct.is_some_and(|direct| direct.samples(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
         let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
-        self.scene.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+        surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {
             let passed = |end: f64| {
                 let reach = point.near..end;
-                mean(self.panes.transmittance(point.position, direction, reach))
+                mean(panes.transmittance(point.position, direction, reach))
             };
             if let Some(direct) = direct {
                 direct.add_to_wide(&mut of_wide, direction, hit, |end| Rgb::splat(passed(end)));
@@ -97,7 +99,7 @@ impl RayGather {
                 return;
             }
             let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
-            let light = self.lights.of_triangle[hit.triangle];
+            let light = lights.of_triangle[hit.triangle];
             let passed = Rgb::splat(passed(hit.distance));
             if near_field.is_some() && NearField::is_near_at(source, &hit) {
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
@@ -113,8 +115,7 @@ impl RayGather {
             && NearField::is_covered(near.len(), range.len())
         {
             for (k, ray) in near {
-                let NearLight { end, .. } =
-                    near_field.light(source, (point, rotation), &ray, false);
+                let NearLight { end, .. } = near_field.light(source, point, rotation, &ray, false);
                 let hit = &mut row.hits[k];
                 hit.passed *= end.map_or(Rgb::ZERO, |(share, _)| share);
                 if let Some((_, end)) = end {
@@ -130,8 +131,9 @@ impl RayGather {
     }
 
     fn material_of(&self, light: u32) -> u32 {
-        let first = self.lights.lights[light as usize].triangles[0];
-        self.lights.scene().triangles()[first as usize].material
+        let lights = &self.scene.lights;
+        let first = lights.lights[light as usize].triangles[0];
+        lights.scene().triangles()[first as usize].material
     }
 }
 

@@ -18,6 +18,7 @@ use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::scene::{Rgb, Scene};
 
+use super::scene_rays::RAYS_PER_SHADOW_RAY;
 use super::visible::{Visible, point_on};
 
 /// A light seen from a point.
@@ -33,14 +34,16 @@ pub(super) struct WideLight {
 /// Number of points by which their weights are compared. Plain choice.
 const POINTS: u32 = 32;
 
-/// Minimum expected number of rays towards a light: with fewer there may be none.
-const LEAST_RAYS: f64 = 8.0;
+/// Minimum expected number of rays towards a light: of fewer there may be none (with a probability
+/// of e⁻⁸ for independent rays).
+const MIN_RAYS: f64 = 8.0;
 
 impl WideLight {
     /// The light `light` with this number and unoccluded form factor, seen from `point`.
     pub fn new(
         light: &Light,
-        (number, unoccluded): (u32, f64),
+        number: u32,
+        unoccluded: f64,
         scene: &Scene,
         point: &GatherPoint,
     ) -> WideLight {
@@ -55,24 +58,24 @@ impl WideLight {
     }
 
     /// Whether rays over the hemisphere estimate the visible share of `light` from `point` better
-    /// than points on it, one for each `rays_a_point` of these rays: whether the number of `rays`
-    /// towards it exceeds the effective number of such points. n points of weights w have the
-    /// effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
+    /// than points on it, one per [`RAYS_PER_SHADOW_RAY`] of at least `min_rays` rays: whether more
+    /// of them go towards it than the effective number of such points. n points of weights w have
+    /// the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     pub fn is_wide(
         light: &Light,
         unoccluded: f64,
         scene: &Scene,
         point: &GatherPoint,
-        [rays, rays_a_point]: [u32; 2],
+        min_rays: u32,
     ) -> bool {
-        if !light.convex || f64::from(rays) * unoccluded < LEAST_RAYS {
+        if !light.convex || f64::from(min_rays) * unoccluded < MIN_RAYS {
             return false;
         }
         let weights = (0..POINTS).map(|i| point_on(light, scene, point, sobol_02_point(i)).factor);
         let (sum, squares) =
             weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
         let worth = sum * sum / (squares * f64::from(POINTS)).max(f64::MIN_POSITIVE);
-        unoccluded * f64::from(rays_a_point) > worth
+        unoccluded * f64::from(RAYS_PER_SHADOW_RAY) > worth
     }
 
     /// Whether the light, occluded or not, lies in a `direction` above the horizon.

@@ -14,8 +14,6 @@ pub const SOURCES: usize = MAX_EXPLICIT_LIGHTS + 1;
 /// Index of the sun in `visible`.
 pub const SUN: usize = MAX_EXPLICIT_LIGHTS;
 
-pub const RAYS_PER_SHADOW_RAY: u32 = 4;
-
 /// Sums over rays.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -16,7 +16,7 @@ pub fn is_near(scene: &TracedArrays, hit: &Hit, side: u32) -> bool {
     hit.distance * hit.distance < square
 }
 
-/// Whether paths find the light of as many `near` rays of all.
+/// Whether paths find the light of near surfaces: `near` of all `rays` hit some.
 pub fn is_covered(near: f32, rays: f32) -> bool {
     near > MIN_COVERED * rays
 }

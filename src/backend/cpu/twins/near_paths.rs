@@ -46,8 +46,8 @@ impl Random {
     }
 }
 
-/// Deviations that rounding may cause: of directions, of places on lights, and of origins. Of the
-/// twin itself none.
+/// Deviations that rounding may cause: of directions, of points on lights, and of origins. The twin
+/// itself has none.
 #[derive(Clone, Copy)]
 pub struct Shift<'a> {
     pub across: Vec2,
@@ -105,7 +105,7 @@ pub fn covered_halves(state: &PointState) -> [bool; 2] {
     state.rays.map(|sums| is_covered(sums.near, half as f32))
 }
 
-/// What ray `k` meets of the light that near surfaces reflect, by one path.
+/// Light that near surfaces reflect along ray `k`, by one path.
 pub fn near_light(
     rays: &HemisphereRays,
     point: &TracedPoint,

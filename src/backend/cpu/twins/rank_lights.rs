@@ -4,8 +4,9 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::gather_state::{LANES, PointState, RAYS_PER_SHADOW_RAY, RankedLight, added_up};
+use super::gather_state::{LANES, PointState, RankedLight, added_up};
 use super::lights::{from_point, sobol, to_light};
+use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
 use crate::backend::gpu::layout::{GatherSettings, TracedLight, TracedPoint, TracedTriangle};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;

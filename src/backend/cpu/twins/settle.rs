@@ -2,12 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
-use super::gather_state::{PointState, RAYS_PER_SHADOW_RAY, RaySums, SOURCES, SUN, Visible};
+use super::gather_state::{PointState, RaySums, SOURCES, SUN, Visible};
 use super::near_field::is_covered;
+use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
 use crate::backend::gpu::layout::{GatherSettings, Sample, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
-
-pub const SINE_OF_SUN: f32 = 0.004_652_4;
+use crate::scene::Sun;
 
 /// Visibilities by light and sun.
 type Visibilities = [Visible; SOURCES];
@@ -61,7 +61,7 @@ fn of_sun(scene: &TracedArrays, normal: Vec3, sun: &Visible, points: f32) -> Vec
     }
     let (irradiance, seen) = (Vec3::from(info.sun), Vec3::from(sun.seen));
     let cosine = normal.dot(info.sun_middle.into());
-    match cosine >= SINE_OF_SUN {
+    match cosine >= Sun::SINE as f32 {
         true => irradiance * cosine * seen / sun.all.max(1e-37),
         false => irradiance * seen / points.max(1.0),
     }

@@ -21,7 +21,7 @@ use crate::backend::cpu::twins::settle::{Settled, settle};
 use crate::backend::cpu::twins::sky::towards_sun;
 use crate::backend::cpu::twins::trace::nearest;
 use crate::backend::gpu::field::{element_texels, quadtrees};
-use crate::backend::gpu::layout::{NOTHING, TracedLight};
+use crate::backend::gpu::layout::{NOTHING, POINT_STATE_BYTES, TracedLight};
 use crate::backend::gpu::test_support::{
     gpu, lamp_within_ceiling, narrow_gap, on_sides, places, random_radiosity, read_buffer, shifts,
     traced_scenes, turned_by, under_sky_and_sun,
@@ -68,7 +68,7 @@ impl Passes {
     fn new(mesh: &Mesh, count: usize, rays: u32) -> Passes {
         let gpu = gpu();
         let gather =
-            TracedGather::with_noise(&gpu, mesh, rays, (1e-6, 0.0)).unwrap().with_near_field();
+            TracedGather::with_noise(&gpu, mesh, rays, 1e-6, 0.0).unwrap().with_near_field();
         let mut slots = Slots::new(gpu.memory(), count as u32, [1; 2]).unwrap();
         let mut slot = slots.slots.remove(0);
         // Buffers that the tests read and write.
@@ -153,7 +153,7 @@ impl Passes {
         let slot = &self.slot;
         let header = [0u32, 1, 1, 0, 1, 1, 0, 0];
         self.gpu.queue.write_buffer(&slot.work, 0, bytemuck::cast_slice(&header));
-        let pipelines = self.gpu.gather_pipelines();
+        let pipelines = self.gpu.tracing.gather_pipelines(&self.gpu.device);
         let count = self.points.len();
         let groups = Groups::Count(count.div_ceil(64) as u32);
         self.run((&self.bound.settle, &pipelines.settle), settings, groups);
@@ -331,7 +331,7 @@ struct Met {
 }
 
 fn compare(name: &str, passes: &Passes, met: &mut Met) {
-    let pipelines = passes.gpu.gather_pipelines();
+    let pipelines = passes.gpu.tracing.gather_pipelines(&passes.gpu.device);
     let bound = &passes.bound;
     let all = Groups::Count(passes.points.len() as u32);
     passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
@@ -748,7 +748,8 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
         };
         let points: Vec<GatherPoint> = (0..POINTS).map(near_by).collect();
         let traced: Vec<TracedPoint> = points.iter().map(|p| device.traced_point(p)).collect();
-        let buffers = device.gpu.field_buffers(&device.scene, &field).unwrap();
+        let buffers =
+            device.gpu.tracing.field(&device.scene, &field, || device.gpu.memory()).unwrap();
         let found = device.gather_all(&buffers, &traced, MAX_POINTS).unwrap();
         assert!(found.iter().all(|(_, is_covered)| *is_covered), "{place:?} is covered");
         let found: Vec<IrradianceSample> = found.into_iter().map(|(sample, _)| sample).collect();
@@ -793,7 +794,7 @@ fn covered_points_under_luminaires_are_gathered_on_the_cpu() {
         near: 2.5e-5,
     });
     for noise in [f64::INFINITY, 0.05] {
-        let device = TracedGather::with_noise(&gpu, &mesh, 256, (noise, 0.1)).unwrap();
+        let device = TracedGather::with_noise(&gpu, &mesh, 256, noise, 0.1).unwrap();
         let mut device = device.with_near_field();
         let mut cpu = RayGather::new(&mesh, 256).unwrap().with_noise(noise, 0.1).with_near_field();
         let found = device.gather(&field, &points).unwrap();
@@ -889,7 +890,8 @@ fn compare_shadow_rays(
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn rays_to_lights_end_at_their_plane() {
     let passes = Passes::new(&lamp_within_ceiling(), 40, 1024);
-    let (pipelines, bound) = (passes.gpu.gather_pipelines(), &passes.bound);
+    let (pipelines, bound) =
+        (passes.gpu.tracing.gather_pipelines(&passes.gpu.device), &passes.bound);
     let all = Groups::Count(40);
     passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
     passes.run((&bound.light_rays, &pipelines.light_rays), &passes.whole(), all);
@@ -1058,7 +1060,7 @@ fn gathered(
     most: u32,
 ) -> Vec<IrradianceSample> {
     let traced: Vec<TracedPoint> = points.iter().map(|p| gather.traced_point(p)).collect();
-    let buffers = gather.gpu.field_buffers(&gather.scene, field).unwrap();
+    let buffers = gather.gpu.tracing.field(&gather.scene, field, || gather.gpu.memory()).unwrap();
     let samples = gather.gather_all(&buffers, &traced, most).unwrap();
     samples.into_iter().map(|(sample, _)| sample).collect()
 }
@@ -1071,7 +1073,7 @@ fn gathers_have_the_same_bits_in_any_batches() {
         let (corners, reflected) = random_radiosity(&mesh);
         let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
         let new =
-            || TracedGather::with_noise(&gpu, &mesh, 64, (0.05, 0.1)).unwrap().with_near_field();
+            || TracedGather::with_noise(&gpu, &mesh, 64, 0.05, 0.1).unwrap().with_near_field();
         // More batches of 64 than are in flight at once.
         let points = places(&mesh, 200);
         let mut gather = new();

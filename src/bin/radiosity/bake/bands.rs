@@ -239,10 +239,10 @@ pub fn write_table(path: &Path, light: &BandLight) -> Result<(), Error> {
 pub fn report(light: &BandLight) -> Value {
     let bands = light.bands.iter().zip(&light.errors).zip(&light.sweeps);
     let entry = |((band, error), sweeps): ((&Band, &BandError), &u32)| {
-        let BandError { total, noise, unsettled, of_bake, .. } = *error;
+        let BandError { total, noise, remainder, of_bake, .. } = *error;
         json!({
             "band": band.name, "wavelength": band.wavelength, "error": total, "noise": noise,
-            "unsettled": unsettled, "of_bake": of_bake, "sweeps": sweeps,
+            "remainder": remainder, "of_bake": of_bake, "sweeps": sweeps,
         })
     };
     bands.map(entry).collect()
