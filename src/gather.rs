@@ -69,6 +69,9 @@ pub struct IrradianceSample {
     /// The part of `irradiance` that lights, luminaires and the sun send straight to the point, per
     /// channel, W/m².
     pub direct: Rgb,
+    /// The part of `direct` that the sun and luminaires send, per channel, W/m²; none where the
+    /// gather does not keep it apart.
+    pub directional: Option<Rgb>,
     /// Standard error of `irradiance` as far as its rays tell, W/m²: a length over the channels;
     /// where they see two fields, that of the first.
     pub noise: f64,

@@ -26,7 +26,7 @@ use super::directional_light::DirectionalLight;
 use super::further_bounces::GatheredFrom;
 use super::gather_points::VertexGatherPoints;
 use super::gathered_mesh::GatheredMesh;
-use super::interpolated_refinement::{InterpolatedRefinement, interpolated_refinement};
+use super::interpolated_refinement::interpolated_refinement;
 use super::point_row::PointRows;
 use super::progress::Progress;
 use super::refinement_indicator::{ErrorScale, counted_area, has_buried_node, squared_error};
@@ -179,15 +179,14 @@ impl<'a> AdaptiveGather<'a> {
         settings: &RefinementSettings,
     ) -> Result<(GatheredMesh, Vec<f64>), Error> {
         let source = self.source.field();
-        let refined = interpolated_refinement(&self.samples, &source, &self.scale, settings)?;
-        let InterpolatedRefinement { samples, residual_error } = refined;
-        let (samples, residual_error) = match &self.directional_light {
+        let samples = match &self.directional_light {
             Some(light) => {
-                resolve_shadow_edges(samples, residual_error, light, &self.scale, settings)?
+                Cow::Owned(resolve_shadow_edges(&self.samples, light, &self.scale, settings)?)
             }
-            None => (samples, residual_error),
+            None => Cow::Borrowed(&self.samples),
         };
-        Ok((self.gathered_mesh_of(Cow::Owned(samples)), residual_error))
+        let refined = interpolated_refinement(&samples, &source, &self.scale, settings)?;
+        Ok((self.gathered_mesh_of(Cow::Owned(refined.samples)), refined.residual_error))
     }
 
     fn gathered_mesh_of(&self, samples: Cow<SampledMesh>) -> GatheredMesh {

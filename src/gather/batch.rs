@@ -67,7 +67,15 @@ impl Batch<'_> {
             let noise = reflected_noise(albedo, sample);
             let is_hidden = outlook([sample; 2]).is_hidden(diagonal);
             let direct = match light {
-                Some(light) if !is_buried => light.reflected(albedo, &points.point(v, attempt)),
+                Some(light) if !is_buried => {
+                    let point = points.point(v, attempt);
+                    let kept_apart = sample.directional;
+                    let arriving = kept_apart.unwrap_or_else(|| light.irradiance(&point));
+                    Direct {
+                        unoccluded: albedo * light.unoccluded(&point),
+                        arriving: albedo * arriving,
+                    }
+                }
                 _ => Direct::default(),
             };
             Some((v, albedo * sample.irradiance, noise, [is_buried, is_hidden], direct))

@@ -12,8 +12,8 @@ use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
 /// Rays to the disc of the sun: at first, and where some are free and some are not. A penumbra then
-/// has 16 steps, each less than what an element at its edge may be off by.
-const RAYS_TO_SUN: [u32; 2] = [4, 16];
+/// has 64 steps, of 1.6 % of the light.
+const RAYS_TO_SUN: [u32; 2] = [8, 64];
 
 /// The sun and the luminaires of a scene, and what rays to them meet.
 #[derive(Debug)]
@@ -51,49 +51,49 @@ impl DirectionalLight {
         })
     }
 
-    /// What it adds to the reflected radiosity of a surface of this `albedo` at `point`.
-    pub fn reflected(&self, albedo: Rgb, point: &TwoSidedPoint) -> Direct {
-        let Direct { unoccluded, arriving } = self.irradiance(point);
-        Direct { unoccluded: albedo * unoccluded, arriving: albedo * arriving }
+    /// Irradiance that it would cause at `point` if nothing were in its way, W/m² per channel.
+    pub fn unoccluded(&self, point: &TwoSidedPoint) -> Rgb {
+        let of_sun = |point: &GatherPoint| match self.scene.sky().sun() {
+            Some(sun) => {
+                let cosine = point.normal.dot(sun.direction);
+                sun.unoccluded(cosine).unwrap_or(sun.irradiance * cosine.max(0.0))
+            }
+            None => Rgb::ZERO,
+        };
+        on_both_sides(point, |point| of_sun(point) + self.luminaires().unoccluded(point))
     }
 
-    /// Irradiance on both sides of `point`, by their shares, W/m² per channel.
-    fn irradiance(&self, point: &TwoSidedPoint) -> Direct {
-        let mut sum = Direct::default();
-        for (share, point) in point.shares().into_iter().zip([point.point, point.other_side()]) {
-            if share == Rgb::ZERO {
-                continue;
-            }
-            if let Some(sun) = self.scene.sky().sun() {
-                let Direct { unoccluded, arriving } = self.of_sun(sun, &point);
-                sum.unoccluded += share * unoccluded;
-                sum.arriving += share * arriving;
-            }
-            let luminaires = LuminaireLight {
-                luminaires: self.scene.luminaires(),
-                rays: &self.rays,
-                panes: &self.panes,
-                rotations: &self.rotations,
-            };
-            sum.unoccluded += share * luminaires.unoccluded(&point);
-            sum.arriving += share * luminaires.irradiance(&point);
+    /// Irradiance that it causes at `point`, W/m² per channel.
+    pub fn irradiance(&self, point: &TwoSidedPoint) -> Rgb {
+        let sun = self.scene.sky().sun();
+        on_both_sides(point, |point| {
+            let of_sun = sun.map_or(Rgb::ZERO, |sun| self.of_sun(sun, point));
+            of_sun + self.luminaires().irradiance(point)
+        })
+    }
+
+    fn luminaires(&self) -> LuminaireLight<'_> {
+        LuminaireLight {
+            luminaires: self.scene.luminaires(),
+            rays: &self.rays,
+            panes: &self.panes,
+            rotations: &self.rotations,
         }
-        sum
     }
 
-    fn of_sun(&self, sun: &Sun, point: &GatherPoint) -> Direct {
+    fn of_sun(&self, sun: &Sun, point: &GatherPoint) -> Rgb {
         let rotation = self.rotations.at(point.position, point.near);
         let second_rotation = second_rotation(rotation);
-        let (mut seen, mut all, mut rays) = (Rgb::ZERO, 0.0, 0.0);
+        let (mut seen, mut all) = (Rgb::ZERO, 0.0);
         for (start, end) in [(0, RAYS_TO_SUN[0]), (RAYS_TO_SUN[0], RAYS_TO_SUN[1])] {
             for [x, y] in (start..end).map(sobol_02_point) {
                 let towards = sun.towards([(x + second_rotation).fract(), (y + rotation).fract()]);
                 let cosine = point.normal.dot(towards).max(0.0);
                 let reach = point.near..f64::INFINITY;
-                let is_free =
-                    || !self.rays.occluded(point.position, towards, reach.clone(), |_| true);
-                (all, rays) = (all + cosine, rays + 1.0);
-                if cosine > 0.0 && is_free() {
+                all += cosine;
+                if cosine > 0.0
+                    && !self.rays.occluded(point.position, towards, reach.clone(), |_| true)
+                {
                     seen += cosine * self.panes.transmittance(point.position, towards, reach);
                 }
             }
@@ -101,8 +101,15 @@ impl DirectionalLight {
                 break;
             }
         }
-        let cosine = point.normal.dot(sun.direction);
-        let unoccluded = sun.unoccluded(cosine).unwrap_or(sun.irradiance * (all / rays));
-        Direct { unoccluded, arriving: unoccluded * seen / f64::max(all, f64::MIN_POSITIVE) }
+        let unoccluded = sun.unoccluded(point.normal.dot(sun.direction));
+        let share = seen / f64::max(all, f64::MIN_POSITIVE);
+        unoccluded.unwrap_or(sun.irradiance * (all / f64::from(RAYS_TO_SUN[1]))) * share
     }
+}
+
+/// `irradiance` on the sides of `point`, by their shares.
+fn on_both_sides(point: &TwoSidedPoint, irradiance: impl Fn(&GatherPoint) -> Rgb) -> Rgb {
+    let [front, behind] = point.shares();
+    let of_front = front * irradiance(&point.point);
+    if behind == Rgb::ZERO { of_front } else { of_front + behind * irradiance(&point.other_side()) }
 }

@@ -22,15 +22,19 @@ use super::sampled_mesh::{SampledMesh, new_vertices};
 use crate::error::Error;
 use crate::scene::Rgb;
 
-/// Splits the elements of `samples` that an edge of a shadow of `light` crosses, down to the
-/// shortest edge of `settings`; with `residual_error` of each element (W/m²), which its parts keep.
+/// Squared error that elements at edges may have together without being split, over what the mesh
+/// may have: those are slivers, as the shortest edge bounds all others.
+const NEGLIGIBLE_SHARE: f64 = 0.01;
+
+/// `samples` with the elements split that an edge of a shadow of `light` crosses, down to the
+/// shortest edge of `settings`.
 pub(super) fn resolve_shadow_edges(
-    mut samples: SampledMesh,
-    mut residual_error: Vec<f64>,
+    samples: &SampledMesh,
     light: &DirectionalLight,
     scale: &ErrorScale,
     settings: &RefinementSettings,
-) -> Result<(SampledMesh, Vec<f64>), Error> {
+) -> Result<SampledMesh, Error> {
+    let mut samples = samples.clone();
     for (reflected, direct) in samples.reflected.iter_mut().zip(&samples.direct) {
         *reflected -= direct.arriving;
     }
@@ -45,20 +49,23 @@ pub(super) fn resolve_shadow_edges(
         let (mut finer, old_numbers) = samples.with_split(&crossed)?;
         let points = VertexGatherPoints::new(&finer.mesh, &finer.vertices, scale.touching());
         let new = new_vertices(&old_numbers);
-        let direct: Vec<Direct> = new
-            .par_iter()
-            .map(|&v| light.reflected(points.albedo(v), &points.point(v, 0)))
-            .collect();
+        let at = |&v: &u32| {
+            let (albedo, point) = (points.albedo(v), points.point(v, 0));
+            Direct {
+                unoccluded: albedo * light.unoccluded(&point),
+                arriving: albedo * light.irradiance(&point),
+            }
+        };
+        let direct: Vec<Direct> = new.par_iter().map(at).collect();
         for (v, direct) in new.into_iter().zip(direct) {
             finer.direct[v as usize] = direct;
         }
-        residual_error = inherited(&residual_error, &crossed);
         samples = finer;
     }
     for (reflected, direct) in samples.reflected.iter_mut().zip(&samples.direct) {
         *reflected = (*reflected + direct.arriving).max(Rgb::ZERO);
     }
-    Ok((samples, residual_error))
+    Ok(samples)
 }
 
 /// The elements that an edge crosses and that may be off by more than `settings` allow, those with
@@ -90,22 +97,21 @@ fn crossed_elements(
         let allowed = settings.mesh_error * settings.group_factor(group(samples, e));
         (error > allowed).then(|| (error * error * counted_area(samples, scale, settings, e), e))
     };
-    let outlines: Vec<(usize, &[u32])> = samples.vertices.outlines.iter().collect();
-    let mut crossed: Vec<(f64, usize)> = outlines.into_par_iter().filter_map(error).collect();
+    let all: Vec<(usize, &[u32])> = samples.vertices.outlines.iter().collect();
+    let mut crossed: Vec<(f64, usize)> = all.par_iter().copied().filter_map(error).collect();
     crossed.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    // The smallest, as many as are negligible together.
+    let area: f64 = all.iter().map(|&(e, _)| counted_area(samples, scale, settings, e)).sum();
+    let mut negligible = NEGLIGIBLE_SHARE * settings.mesh_error.powi(2) * area;
+    while let Some(&(square, _)) = crossed.last()
+        && square <= negligible
+    {
+        negligible -= square;
+        crossed.pop();
+    }
     crossed.into_iter().map(|(_, e)| e).collect()
 }
 
 fn group(samples: &SampledMesh, e: usize) -> u32 {
     samples.mesh.group(samples.mesh.element(e))
-}
-
-/// `values` of elements where each of `split` (ascending) has become four with the same value.
-fn inherited(values: &[f64], split: &[usize]) -> Vec<f64> {
-    let mut split = split.iter().peekable();
-    let parts = |(e, &value): (usize, &f64)| {
-        let count = if split.next_if_eq(&&e).is_some() { 4 } else { 1 };
-        std::iter::repeat_n(value, count)
-    };
-    values.iter().enumerate().flat_map(parts).collect()
 }

@@ -124,6 +124,10 @@ fn mixed(front: IrradianceSample, back: IrradianceSample, share: Rgb) -> Irradia
     IrradianceSample {
         irradiance: front.irradiance + share * (back.irradiance - front.irradiance),
         direct: front.direct + share * (back.direct - front.direct),
+        directional: match (front.directional, back.directional) {
+            (Some(front), Some(back)) => Some(front + share * (back - front)),
+            _ => None,
+        },
         noise: ((1.0 - mean) * front.noise).hypot(mean * back.noise),
         ..front
     }

@@ -125,7 +125,8 @@ impl RayGather {
         }
         let (rays, count) = (hemisphere.sums(), hemisphere.count());
         let noise = direct.error().hypot(hemisphere.error());
-        rays.samples(count, direct.mean() + of_luminaires, noise)
+        let directional = direct.sums().of_sun() + of_luminaires;
+        rays.samples(count, [direct.mean() + of_luminaires, directional], noise)
     }
 
     /// Minimum and maximum number of shadow rays to each light.
@@ -311,13 +312,20 @@ impl<const FIELDS: usize> HemisphereRays<'_, FIELDS> {
         self.wide.iter().zip(&self.of_wide).map(|(wide, seen)| wide.irradiance(seen)).sum()
     }
 
-    /// The irradiance from each field by `count` rays, plus that of lights by other rays.
-    fn samples(&self, count: u32, of_lights: Rgb, noise: f64) -> [IrradianceSample; FIELDS] {
+    /// The irradiance from each field by `count` rays, plus that of lights by other rays, with
+    /// the part of the sun and luminaires.
+    fn samples(
+        &self,
+        count: u32,
+        [of_lights, directional]: [Rgb; 2],
+        noise: f64,
+    ) -> [IrradianceSample; FIELDS] {
         let (share, mut out) = (1.0 / f64::from(count), self.of_all_fields);
         out.escaped *= share;
         out.backface *= share;
         out.inverse_distance *= share;
         out.direct = out.direct * share + self.of_wide_lights() + of_lights;
+        out.directional = Some(directional);
         self.reflected.map(|reflected| {
             let irradiance = (out.irradiance + reflected) * share + out.direct;
             IrradianceSample { irradiance, noise, ..out }

@@ -186,6 +186,7 @@ impl TracedGather {
         let sample = IrradianceSample {
             irradiance: light(sample.irradiance),
             direct: light(sample.direct),
+            directional: None,
             noise: f64::from(sample.noise) * unit,
             escaped: sample.escaped.into(),
             backface: sample.back.into(),

@@ -172,6 +172,19 @@ impl<'a> DirectLight<'a> {
     }
 }
 
+impl ShadowRays<'_> {
+    /// The irradiance of the sun, W/m² per channel.
+    pub fn of_sun(&self) -> Rgb {
+        let DirectLight { point, sun, .. } = self.light;
+        let Some(sun) = sun else { return Rgb::ZERO };
+        let Visible { points, seen, all } = self.sun;
+        match sun.unoccluded(point.normal.dot(sun.direction)) {
+            Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
+            None => sun.irradiance * (seen / points.max(1.0)),
+        }
+    }
+}
+
 impl RaySums for ShadowRays<'_> {
     fn add(&mut self, other: &ShadowRays) {
         for (sum, term) in self.lights.iter_mut().zip(&other.lights) {
@@ -181,21 +194,14 @@ impl RaySums for ShadowRays<'_> {
     }
 
     fn mean(&self, _: u32) -> Rgb {
-        let DirectLight { scene, point, lights, sun, .. } = self.light;
+        let DirectLight { scene, lights, .. } = self.light;
         let mut irradiance = Rgb::ZERO;
         for (&(light, factor), visible) in lights.iter().zip(&self.lights) {
             let light = &scene.lights.lights[light as usize];
             let share = visible.share_of(light.convex.then_some(factor));
             irradiance += light.exitance * visible.seen * share;
         }
-        if let Some(sun) = sun {
-            let Visible { points, seen, all } = self.sun;
-            irradiance += match sun.unoccluded(point.normal.dot(sun.direction)) {
-                Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
-                None => sun.irradiance * (seen / points.max(1.0)),
-            };
-        }
-        irradiance
+        irradiance + self.of_sun()
     }
 
     /// 0: all rays to a light contribute to its occlusion.
