@@ -129,11 +129,11 @@ pub fn end() -> Result<(), Stop> {
 
 /// `r,g,b`, or one number for all three.
 pub fn rgb(text: &str) -> Parsed<Rgb> {
-    const EXPECTED: &str = "r,g,b, or one number for all three";
-    match list(EXPECTED)(text)?[..] {
+    let expected = "r,g,b, or one number for all three";
+    match list(expected)(text)?[..] {
         [grey] => Ok(Rgb::splat(grey)),
         [r, g, b] => Ok(Rgb::new(r, g, b)),
-        _ => Err(give(EXPECTED)),
+        _ => Err(give(expected)),
     }
 }
 

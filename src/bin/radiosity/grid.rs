@@ -18,9 +18,6 @@ use crate::args::{self, Parsed, Stop, numbers, value};
 use crate::light::{Light, LightOptions};
 use crate::{interrupt, progress};
 
-/// Height above floors, m: that of desks.
-const DESK_HEIGHT: f64 = 0.8;
-
 /// A length for people.
 const METRES: &str = "a length in metres";
 
@@ -117,7 +114,8 @@ impl Options {
         let up = self.light.reading.sky.up().unwrap_or_else(|| up_axis(scene));
         let (task, floor) = (self.settings(0.0), self.settings(GridSettings::default().strip));
         if self.groups.is_empty() && self.planes.is_empty() {
-            let height = self.height.unwrap_or(DESK_HEIGHT);
+            // That of desks, m.
+            let height = self.height.unwrap_or(0.8);
             let grids = MeasuringGrid::above_floors(scene, up, height, &floor)?;
             if grids.is_empty() {
                 let found = format!("nothing is large enough where {up} is up");

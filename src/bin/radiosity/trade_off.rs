@@ -85,15 +85,8 @@ struct Results {
     adapter: String,
 }
 
-/// Runs shorter than this many seconds are timed [`ROUNDS`] times, and the least time counts: other
-/// programs may use the machine too. Chosen by hand; no measurement kept.
-const SHORT_RUN: f64 = 4.0;
-
-/// How often short runs are timed.
+/// Number of times that runs of less than 4 s are timed.
 const ROUNDS: u32 = 3;
-
-/// The error of the run before all others, which compiles shaders and is not timed.
-const WARM_UP_ERROR: f64 = 0.3;
 
 /// What bakes are made of and with.
 struct Bench {
@@ -101,9 +94,6 @@ struct Bench {
     device: Backend,
     measure: Measure,
 }
-
-/// Errors below this are all alike: 0.0001 %.
-const LEAST_ERROR: f64 = 1e-6;
 
 impl Options {
     /// Runs the command.
@@ -141,7 +131,8 @@ impl Options {
         let runs = runs::runs(&scene, self.quick);
         let bench = Bench { scene: scene.clone(), device: self.device.open()?, measure };
         interrupt::catch();
-        bench.bake("warming up", &Target::Error(WARM_UP_ERROR))?;
+        // Compiles shaders, and is not timed.
+        bench.bake("warming up", &Target::Error(0.3))?;
         let runs = bench.measure_all(runs, &mut verifier)?;
         Ok(Results {
             front: front(&runs),
@@ -190,7 +181,8 @@ impl Bench {
         for round in 1..ROUNDS {
             let name = format!("short runs again, {} of {ROUNDS} times", round + 1);
             eprintln!("{name}");
-            for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < SHORT_RUN) {
+            // Other programs may use the machine too: the least time of a short run counts.
+            for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < 4.0) {
                 let seconds = self.bake(&name, &run.target)?.timings.total();
                 if interrupt::stopped() {
                     return Ok(all);
@@ -232,7 +224,7 @@ impl Measured {
 
     /// The error, or its standard error where that is larger: a smaller error is not told from it.
     fn known_error(&self) -> f64 {
-        self.error.value.max(self.error.standard_error).max(LEAST_ERROR)
+        self.error.value.max(self.error.standard_error).max(1e-6)
     }
 }
 

@@ -21,14 +21,6 @@ use crate::{interrupt, progress};
 use points::Points;
 use verdict::verdict;
 
-/// Maximum number of groups that are named as those of the tail, and least share of its squared
-/// error that each has.
-const TAIL_GROUPS: usize = 3;
-const MIN_TAIL_SHARE: f64 = 0.05;
-
-/// Groups in the printed table at most.
-const MAX_PRINTED: usize = 20;
-
 /// Measures the error of a solution of a scene, by path tracing
 #[derive(Args)]
 #[command(after_help = "\
@@ -210,7 +202,7 @@ fn tail_groups(scene: &Scene, found: &Verification) -> String {
         let share = 100.0 * group.tail_share;
         format!("{share:.0} % of it on {}", scene.groups()[group.group])
     };
-    let most = groups.iter().take(TAIL_GROUPS).filter(|g| g.tail_share >= MIN_TAIL_SHARE);
+    let most = groups.iter().take(3).filter(|g| g.tail_share >= 0.05);
     let names: Vec<String> = most.map(|group| name(group)).collect();
     if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) }
 }
@@ -222,9 +214,6 @@ fn time(text: &str) -> Parsed<Limit> {
     };
     text.parse().ok().and_then(limit).ok_or_else(|| give("seconds, such as 10, or inf"))
 }
-
-/// Twice what an error is rounded by in the comment of a PLY file.
-const COMMENT_ROUNDING: f64 = 1e-5;
 
 /// What the report of a bake says of its error.
 #[derive(Default)]
@@ -242,7 +231,8 @@ impl Told {
             return report;
         };
         match report.total() {
-            Some(total) if (total - own).abs() <= COMMENT_ROUNDING => return report,
+            // Twice the rounding of the comment.
+            Some(total) if (total - own).abs() <= 1e-5 => return report,
             Some(total) => eprintln!(
                 "warning: {} is of another bake, with an error of {:.2} %, for {:.2} % here: left \
                  aside",
@@ -344,10 +334,10 @@ fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
     lines
 }
 
-/// The table as text, cut after [`MAX_PRINTED`] groups.
+/// The table as text, cut after 20 groups.
 fn table(lines: &[Line]) -> String {
     let Some((all, groups)) = lines.split_last() else { return String::new() };
-    let (shown, rest) = groups.split_at(groups.len().min(MAX_PRINTED));
+    let (shown, rest) = groups.split_at(groups.len().min(20));
     let lengths = shown.iter().map(|line| line.name.chars().count());
     let width = lengths.max().unwrap_or(0).clamp(5, 40);
     let percent = |share: Option<f64>| share.map_or("–".into(), |x| format!("{:.2}", 100.0 * x));

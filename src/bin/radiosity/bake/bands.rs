@@ -11,9 +11,6 @@ use serde_json::{Value, json};
 
 use crate::{interrupt, progress};
 
-/// The name that stands for all materials that the file does not name.
-const ALL_OTHERS: &str = "*";
-
 /// A file of bands.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -140,14 +137,14 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         spectrum.values(&bands).map_err(|(found, remedy)| wrong(place(), found, remedy))
     };
     let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
-    if let Some(name) = materials.keys().find(|name| *name != ALL_OTHERS && !known(name)) {
+    if let Some(name) = materials.keys().find(|name| *name != "*" && !known(name)) {
         let found = format!("material '{name}', which is not there");
         return Err(wrong(file, found, "name materials as the scene does"));
     }
     let mut of_bands = vec![];
     for material in scene.materials() {
         let name = &material.name;
-        let entry = materials.get(name).or_else(|| materials.get(ALL_OTHERS)).ok_or_else(|| {
+        let entry = materials.get(name).or_else(|| materials.get("*")).ok_or_else(|| {
             let remedy = "give it an entry, or one for all others, *";
             wrong(file.clone(), format!("nothing of material '{name}'"), remedy)
         })?;
