@@ -28,6 +28,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::GatheredMesh;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 use crate::vertex::{FacePlace, VertexMesh};
@@ -63,16 +64,9 @@ pub struct RadianceImage {
 /// Largest image side, pixels. Plain choice: memory for the pixels is 24 GiB there.
 const MAX_SIDE: u32 = 1 << 15;
 
-/// Maximum number of primary rays along a pixel's side. Plain choice.
-const MAX_SAMPLES: u32 = 256;
-
 /// Cosine of the angle between the view direction and the camera's up above which another up
 /// direction is used. Plain choice.
 const VERTICAL_VIEW: f64 = 0.9999;
-
-/// Largest relative difference of the distances of two surfaces that count as coincident. Rounding
-/// is far below it except for grazing rays.
-const SAME_PLACE: f64 = 1e-9;
 
 impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
@@ -124,7 +118,7 @@ impl Camera {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return bad(format!("an image of {width} × {height}"), "use 1 to 32768 pixels a side");
         }
-        if !(1..=MAX_SAMPLES).contains(&samples) {
+        if !(1..=256).contains(&samples) {
             return bad(format!("{samples} samples"), "use 1 to 256 along a pixel's side");
         }
         if !(self.vertical_fov > 0.0 && self.vertical_fov < 180.0) {
@@ -281,7 +275,8 @@ impl PrimaryRays<'_> {
         }
         let is_front = |hit: &Hit| hit.front;
         let front = self.met.closest_hit_of(self.eye, direction, 0.0, None, is_front)?;
-        (front.distance <= first.distance * (1.0 + SAME_PLACE)).then_some(Seen::Front(front))
+        (front.distance <= first.distance * (1.0 + COINCIDENCE_TOLERANCE))
+            .then_some(Seen::Front(front))
     }
 
     /// Values at the surface's vertices, interpolated linearly to a hit.

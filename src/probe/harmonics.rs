@@ -19,13 +19,6 @@ use crate::scene::Rgb;
 /// Number of coefficients per channel.
 pub const COUNT: usize = 9;
 
-/// Factor from radiance to irradiance of order l: Â_l = π, 2π/3, π/4 (Ramamoorthi and Hanrahan
-/// 2001, equation 8).
-const COSINE_LOBE: [f64; 3] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
-
-/// Order l of each coefficient.
-const ORDER: [usize; COUNT] = [0, 1, 1, 1, 2, 2, 2, 2, 2];
-
 /// A function of direction by its harmonics to order 2, three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Harmonics {
@@ -43,8 +36,11 @@ impl Harmonics {
     /// The radiance, W/(m² sr), whose irradiance this is: L_lm = E_lm / Â_l.
     pub fn radiance_of_irradiance(&self) -> Harmonics {
         let mut coefficients = self.coefficients;
-        for (c, order) in coefficients.iter_mut().zip(ORDER) {
-            *c /= COSINE_LOBE[order];
+        let [zero, one, two] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
+        // Â_l = π, 2π/3, π/4 of order l (Ramamoorthi and Hanrahan 2001, equation 8).
+        let lobe = [zero, one, one, one, two, two, two, two, two];
+        for (c, factor) in coefficients.iter_mut().zip(lobe) {
+            *c /= factor;
         }
         Harmonics { coefficients }
     }

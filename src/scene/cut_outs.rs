@@ -10,6 +10,8 @@
 //! used for light is this fraction of the geometric one. Triangles that lack texture coordinates at
 //! a corner are solid.
 
+use crate::geometry::COINCIDENCE_TOLERANCE;
+use crate::geometry::FILE_TOLERANCE;
 use glam::DVec2;
 
 use super::Scene;
@@ -17,13 +19,6 @@ use super::rgb::Rgb;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
 use super::textured::Piece;
-
-/// Distance of a piece's solid fraction from 0 or 1 below which it is rounded to it.
-const ROUNDING: f64 = 1e-9;
-
-/// Distance of texture coordinates, relative to one plus their length, below which they are equal:
-/// the rounding of a file's six digits.
-const SAME_PLACE: f64 = 1e-4;
 
 /// Number of points along each side of a piece whose mean has no closed form.
 const MAX_POINTS: f64 = 48.0;
@@ -101,7 +96,8 @@ impl Scene {
         let Some(mask) = other.mask(s) else { return true };
         let of_t = corners.map(|corner| self.texture_place(t, corner));
         let of_s = Scene::WHOLE.map(|corner| other.texture_place(s, corner));
-        let near = |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, SAME_PLACE * (1.0 + b.length()));
+        let near =
+            |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, FILE_TOLERANCE * (1.0 + b.length()));
         self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
     }
 }
@@ -145,8 +141,8 @@ impl TextureMap {
             solid / all
         };
         match share {
-            share if share < ROUNDING => 0.0,
-            share if share > 1.0 - ROUNDING => 1.0,
+            share if share < COINCIDENCE_TOLERANCE => 0.0,
+            share if share > 1.0 - COINCIDENCE_TOLERANCE => 1.0,
             share => share,
         }
     }

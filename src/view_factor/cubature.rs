@@ -30,6 +30,7 @@ use super::point_visibility::{PointFactors, PointVisibility};
 use super::shaft::{Blocker, Shaft, fully_occludes};
 use super::unoccluded::unoccluded_exchange;
 use super::visual_events::{most_balanced_split, split_triangle};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::plane::Plane;
 use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
@@ -52,9 +53,6 @@ const RIM_AREA_SHARE: f64 = 0.1;
 /// Corners are sampled inside the cell, by this share of the way to its centroid, since blockers
 /// may touch the boundary. Plain choice.
 const CORNER_INSET: f64 = 1e-3;
-
-/// Visible or hidden flux below this share of the unoccluded flux counts as zero: above rounding.
-const NOTHING_SHARE: f64 = 1e-9;
 
 /// Minimum error estimate of a cell, as a share of its bound: a single cut without change proves
 /// little. Plain choice; no recorded measurement.
@@ -200,7 +198,7 @@ impl Cell {
         flux: CellFlux,
         visibility: &mut PointVisibility,
     ) -> f64 {
-        let nothing = NOTHING_SHARE * flux.unoccluded;
+        let nothing = COINCIDENCE_TOLERANCE * flux.unoccluded;
         if flux.visible > nothing && flux.unoccluded - flux.visible > nothing {
             return 0.0;
         }

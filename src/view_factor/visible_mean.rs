@@ -21,6 +21,7 @@ use super::pair_visibility::FacingPair;
 use super::point_visibility::{PointFactors, PointVisibility};
 use super::polygon_points::{PolygonPoints, scrambled_point};
 use super::shaft::Blocker;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::polygon_area;
 
 /// Parts of the point set: each is evenly distributed for its number of points.
@@ -34,10 +35,6 @@ const STUDENT_FACTOR: f64 = 2.365 / 2.0;
 /// reported. Plain choice.
 const FIRST_POINTS: u32 = 2;
 const MAX_POINTS: u32 = 512;
-
-/// Visible shares that differ by less than this from each other, from 0 or from 1 count as equal:
-/// above rounding.
-const NOTHING_SHARE: f64 = 1e-9;
 
 /// Minimum number of points of a pair.
 pub(super) const MIN_POINTS: u32 = PARTS as u32 * FIRST_POINTS;
@@ -124,7 +121,9 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
     // of the others; or the opposite value, where all see all or nothing.
     let points = f64::from(count) * PARTS as f64;
     let range = high - low;
-    let unmet = match range < NOTHING_SHARE && (low < NOTHING_SHARE || high > 1.0 - NOTHING_SHARE) {
+    let unmet = match range < COINCIDENCE_TOLERANCE
+        && (low < COINCIDENCE_TOLERANCE || high > 1.0 - COINCIDENCE_TOLERANCE)
+    {
         true => 2.0 / points,
         false => 0.5 * range / points,
     };

@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::cut_outs::CutOuts;
 use super::offset;
 use super::ray_scene::RayScene;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::scene::{Rgb, Scene};
 
 /// The panes of a scene, for rays.
@@ -25,10 +26,6 @@ pub(crate) struct Panes {
 /// A hit with a barycentric weight below this is on the edge between two triangles, which both
 /// report it: above the tolerance of the hits, [`super::triangle_plane::BARYCENTRIC_TOLERANCE`].
 const SEAM: f64 = 1e-11;
-
-/// Hits on such edges whose distances differ by at most this share are the same: rounding of the
-/// distances is some 1e-15.
-const SAME_PLACE: f64 = 1e-9;
 
 impl Panes {
     /// The panes of `scene`.
@@ -81,7 +78,8 @@ impl Panes {
         let (mut passed, seams) = (passed.get(), seams.into_inner());
         for (k, &(distance, share)) in seams.iter().enumerate() {
             let same = |other: &(f64, Rgb)| {
-                other.1 == share && (other.0 - distance).abs() <= SAME_PLACE * distance.abs()
+                other.1 == share
+                    && (other.0 - distance).abs() <= COINCIDENCE_TOLERANCE * distance.abs()
             };
             if !seams[..k].iter().any(same) {
                 passed *= share;

@@ -88,7 +88,7 @@ fn object_fills_the_picture() {
         let reaches = [reach(0, 1.0), reach(0, -1.0), reach(1, 1.0), reach(1, -1.0)];
         // The camera is rounded to 1e-4 of the scene.
         let most = reaches.into_iter().fold(0.0, f64::max);
-        assert!((most - (1.0 - 2.0 * MARGIN)).abs() < 1e-3, "{aspect}: {reaches:?}");
+        assert!((most - (1.0 - 2.0 * 0.04)).abs() < 1e-3, "{aspect}: {reaches:?}");
     }
 }
 

@@ -11,6 +11,7 @@ use rustc_hash::FxHashMap;
 
 use super::repeated::lamps_of_other_sides;
 use super::sheets::{Sheets, SideIndex};
+use crate::geometry::FILE_TOLERANCE;
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene, Sides};
@@ -33,7 +34,6 @@ const GRAZES: f64 = 1e-10;
 
 /// Maximum distance of coinciding surfaces, as a share of the square root of a triangle's area, as
 /// for covered backs; minimum cosine between their normals.
-const SAME_PLACE: f64 = 1e-4;
 const ALIKE: f64 = 0.999;
 
 /// Maximum number of points of a triangle tried to find one outside of holes. Plain choice.
@@ -188,7 +188,7 @@ impl<'a> Walks<'a> {
     /// that one.
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
-        let reach = (SAME_PLACE * self.scene.area(t).sqrt()).max(self.contact);
+        let reach = (FILE_TOLERANCE * self.scene.area(t).sqrt()).max(self.contact);
         let found = Cell::new(None);
         self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
             let alike = self.normals[hit.triangle].dot(normal) > ALIKE;
