@@ -63,10 +63,6 @@ pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, MatrixSize, Missing, ViewFactors};
 pub use self::partial_matrix::PartialMatrix;
 
-/// Maximum memory per factor of an exact matrix, bytes. Measured: 28 to 34 for cubes with a box
-/// inside.
-const BYTES_OF_EXACT_FACTOR: usize = 35;
-
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
     /// or far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
@@ -108,7 +104,8 @@ impl ViewFactors {
             return Ok(sparse::predicted_size(scene, polygons, error));
         }
         let factors = scene.groups().len().pow(2);
-        Ok(MatrixSize { factors, bytes: BYTES_OF_EXACT_FACTOR * factors })
+        // Measured: 28 to 34 bytes for cubes with a box inside.
+        Ok(MatrixSize { factors, bytes: 35 * factors })
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.

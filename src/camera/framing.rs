@@ -131,7 +131,8 @@ impl Framing<'_> {
 }
 
 /// The box around the reflected light but for 5 % at either end of each axis, each triangle weighed
-/// by its mean, or around all that reflects unless it is much smaller; and the sum of flux times normal.
+/// by its mean, or around all that reflects unless it is much smaller; and the sum of flux times
+/// normal.
 fn lit_box(light: &GatheredMesh) -> (Aabb, DVec3) {
     let (surface, scene) = (&light.surface, light.mesh.scene());
     let (mut weights, mut flux) = (vec![0.0; surface.positions.len()], DVec3::ZERO);

@@ -88,8 +88,7 @@ impl SecondPass {
             return None;
         }
         let glass = GlassBodies::new(scene);
-        let contact = (offset::PATH_CONTACT * scene.bounds().diagonal())
-            .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp());
+        let contact = offset::path_contact(scene);
         Some(SecondPass {
             media: glass.around(scene, lit.rays.eye),
             glass,

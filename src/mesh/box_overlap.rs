@@ -22,9 +22,6 @@ use crate::geometry::bvh::Bvh;
 /// choice, well above the number at a point of an ordinary mesh; no measurement was kept.
 const MAX_OVERLAPS: usize = 256;
 
-/// Maximum number of boxes in a leaf of the tree. Plain choice; no measurement was kept.
-const LEAF_SIZE: usize = 4;
-
 /// For each box, the others that it overlaps, in no particular order. Pairs are complete unless
 /// both boxes have more than [`MAX_OVERLAPS`] partners; of those, only pairs are given in which one
 /// is among the [`MAX_OVERLAPS`] of highest `rank`. Time and memory are O(n · [`MAX_OVERLAPS`]),
@@ -58,7 +55,7 @@ pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> 
 /// Boxes halved along the axis of the largest extent of their centres.
 fn tree(boxes: &[Aabb]) -> Bvh {
     let centre = |&k: &u32| boxes[k as usize].centre();
-    Bvh::new(boxes, LEAF_SIZE, |part, _| {
+    Bvh::new(boxes, 4, |part, _| {
         let axis = Aabb::from_points(part.iter().map(centre)).longest_axis();
         let half = part.len() / 2;
         part.select_nth_unstable_by(half, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));

@@ -12,19 +12,8 @@
 use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
+use crate::geometry::barycentric::WHOLE;
 use crate::geometry::polygon::longest_edge;
-
-/// Fraction of the triangles that may lie outside the dense region, at either end of each axis.
-const TRIMMED_SHARE: f64 = 0.1;
-
-/// Least ratio of the diagonals of the scene and of the dense region for a split into octaves.
-const MIN_CONCENTRATION: f64 = 4.0;
-
-/// Largest such ratio: smaller parts are lost in the rounding of coordinates.
-const MAX_CONCENTRATION: f64 = 1e9;
-
-/// The whole triangle, by weights of its second and third corner.
-const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
 /// The dense region from which distances are measured.
 #[derive(Clone, Copy, Debug)]
@@ -51,9 +40,11 @@ impl Octaves {
     pub fn new(middles: impl IntoIterator<Item = DVec3>, diagonal: f64) -> Octaves {
         let middles: Vec<(DVec3, f64)> = middles.into_iter().map(|middle| (middle, 1.0)).collect();
         let is_concentrated = |centre: &Aabb| {
-            (MIN_CONCENTRATION..MAX_CONCENTRATION).contains(&(diagonal / centre.diagonal()))
+            // Smaller parts are lost in the rounding of coordinates.
+            (4.0..1e9).contains(&(diagonal / centre.diagonal()))
         };
-        Octaves { centre: Aabb::around_most(&middles, TRIMMED_SHARE).filter(is_concentrated) }
+        // A tenth of the triangles may lie outside, at either end of each axis.
+        Octaves { centre: Aabb::around_most(&middles, 0.1).filter(is_concentrated) }
     }
 
     /// Calls `take` with the parts of a triangle with this `area`: none is longer than its

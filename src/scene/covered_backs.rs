@@ -20,10 +20,6 @@ use crate::geometry::FILE_TOLERANCE;
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 
-/// Fraction of a triangle's area that may stay open if it counts as covered: slivers between
-/// outlines due to rounding.
-const OPEN_SHARE: f64 = 1e-6;
-
 /// Number of triangles at a corner above which the corner is skipped, and maximum number of
 /// candidates for one triangle: otherwise thousands that meet in a point would each test all of
 /// them. Plain choice.
@@ -64,7 +60,8 @@ impl Surfaces<'_> {
             return None;
         }
         let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
-        let still_open = OPEN_SHARE * self.scene.area(t);
+        // Slivers between outlines stay open by rounding.
+        let still_open = 1e-6 * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
         let mut known: FxHashSet<u32> = FxHashSet::default();
         let mut covers = vec![];

@@ -12,6 +12,7 @@
 
 use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::FILE_TOLERANCE;
+use crate::geometry::barycentric::WHOLE;
 use glam::DVec2;
 
 use super::Scene;
@@ -19,10 +20,6 @@ use super::rgb::Rgb;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
 use super::textured::Piece;
-
-/// Number of points along each side of a piece whose mean has no closed form.
-const MAX_POINTS: f64 = 48.0;
-const MIN_POINTS: f64 = 8.0;
 
 impl Scene {
     /// Area of triangle `t` without its holes, length unit squared: the area used for light.
@@ -80,7 +77,7 @@ impl Scene {
 
     /// Computes the solid fractions of all triangles from their textures.
     pub(super) fn find_solid_shares(&mut self) {
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
         let solid_shares = self.solid_shares(&pieces);
         self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
     }
@@ -95,7 +92,7 @@ impl Scene {
     ) -> bool {
         let Some(mask) = other.mask(s) else { return true };
         let of_t = corners.map(|corner| self.texture_place(t, corner));
-        let of_s = Scene::WHOLE.map(|corner| other.texture_place(s, corner));
+        let of_s = WHOLE.map(|corner| other.texture_place(s, corner));
         let near =
             |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, FILE_TOLERANCE * (1.0 + b.length()));
         self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
@@ -177,7 +174,7 @@ impl TextureMap {
 /// Points spread evenly over a triangle with a limit of `cells` along its outline: a square of them
 /// folded onto it.
 fn spread_over([a, b, c]: [DVec2; 3], cells: f64) -> impl Iterator<Item = DVec2> {
-    let n = (MAX_POINTS * cells / MAX_OUTLINE_CELLS).clamp(MIN_POINTS, MAX_POINTS) as u32;
+    let n = (48.0 * cells / MAX_OUTLINE_CELLS).clamp(8.0, 48.0) as u32;
     (0..n).flat_map(move |i| (0..n).map(move |j| [i, j])).map(move |ij| {
         let [mut s, mut t] = ij.map(|k| (f64::from(k) + 0.5) / f64::from(n));
         if s + t > 1.0 {

@@ -39,13 +39,6 @@ struct Level {
 /// by 1e-4 if cells differ.
 pub(super) const MAX_OUTLINE_CELLS: f64 = 1500.0;
 
-/// Number of repetitions of a texture across a triangle above which the mean of the whole texture
-/// is used. Plain choice.
-const MAX_TILES: f64 = 4096.0;
-
-/// Points along each side at which a clamped texture is sampled beyond its border.
-const CLAMPED_POINTS: u32 = 48;
-
 impl Texture {
     /// An image of `width` × `height` texels, at least one, rows from the top: sRGB, 8 bits per
     /// channel (IEC 61966-2-1). `None` when the number of texels differs.
@@ -149,7 +142,8 @@ impl Texture {
         // Relative to the tile of the lowest corner, so that no digits are lost far out.
         let origin = low.floor();
         let tiles = (high - origin).ceil().max(DVec2::ONE);
-        if tiles.x * tiles.y > MAX_TILES.min(cells) {
+        // Plain choice.
+        if tiles.x * tiles.y > cells.min(4096.0) {
             return self.whole_mean();
         }
         let outline = [a - b, b - c, c - a].map(|edge| (edge * size).length()).iter().sum::<f64>();
@@ -199,7 +193,7 @@ impl Texture {
 
     /// The mean of points spread evenly over a triangle.
     fn sampled_mean(&self, [a, b, c]: [DVec2; 3]) -> Rgb {
-        let n = CLAMPED_POINTS;
+        let n = 48;
         let mut sum = Rgb::ZERO;
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             // The square of points folded onto the triangle.

@@ -18,24 +18,14 @@ use rustc_hash::FxHashMap;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
+use crate::geometry::barycentric::WHOLE;
 use crate::geometry::barycentric::barycentric;
 
 /// A piece of a triangle: its index, and the weights of the second and third corner of the triangle
 /// at the three corners of the piece.
 pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
-/// Maximum number of cells of images along the outlines of all pieces computed together: some 10 s
-/// on two cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`],
-/// so that the time is bounded for any number that each show all of a large image.
-const SCENE_OUTLINE_CELLS: f64 = 2e7;
-
-/// Minimum number of cells of a piece: its mean is off by some 1e-2 of the contrast within.
-const MIN_OUTLINE_CELLS: f64 = 64.0;
-
 impl Scene {
-    /// The whole triangle, as in a [`Piece`].
-    pub(crate) const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-
     /// Texture coordinates (u, v) of the corners of triangle `t`, as in the file; `None` if the
     /// scene has no textures, unless they were [kept](crate::ObjSettings::texture_coordinates). Not
     /// finite for a corner without them.
@@ -95,7 +85,7 @@ impl Scene {
         (barycentric, share): ([f64; 2], f64),
     ) -> Rgb {
         let Some(map) = map else { return mean };
-        let [a, b, c] = Scene::WHOLE.map(|corner| self.texture_place(t, corner));
+        let [a, b, c] = WHOLE.map(|corner| self.texture_place(t, corner));
         let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
         map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
     }
@@ -132,7 +122,7 @@ impl Scene {
     pub(super) fn lay_textures(&mut self, of_materials: BTreeMap<u32, MaterialTextures>) {
         let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
         self.textures = SceneTextures { of_materials, ..(*self.textures).clone() }.into();
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
         if has_masks {
             self.find_solid_shares();
         }
@@ -220,8 +210,10 @@ impl Scene {
             }))
         };
         let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
-        let cells = SCENE_OUTLINE_CELLS / different.len().max(1) as f64;
-        let cells = cells.clamp(MIN_OUTLINE_CELLS, MAX_OUTLINE_CELLS);
+        // For all pieces together some 10 s on two cores; with 64 cells a mean is off by some 1e-2
+        // of the contrast.
+        let cells = 2e7 / different.len().max(1) as f64;
+        let cells = cells.clamp(64.0, MAX_OUTLINE_CELLS);
         let found = different.par_iter().map(|&(map, mask, place)| find(map, mask, place, cells));
         let found: Vec<T> = found.collect();
         numbers.into_iter().map(|number| Some(found[number? as usize])).collect()

@@ -30,16 +30,6 @@ use crate::sampling::hash::split_mix64;
 /// error.
 const BOUND_SHARE: f64 = 0.1;
 
-/// Number of progress calls for a large scene. Plain choice.
-const PROGRESS_CALLS: usize = 100;
-
-/// Minimum number of polygons between two progress calls, so that all cores have work. Plain
-/// choice.
-const MIN_BATCH: usize = 4;
-
-/// Maximum number of polygons between two progress calls, for a timely cancellation. Plain choice.
-const MAX_BATCH: usize = 64;
-
 /// Computes the rows of the polygons `wanted`; `None` if stopped.
 pub(super) fn make(
     polygons: ScenePolygons,
@@ -49,7 +39,8 @@ pub(super) fn make(
 ) -> Option<()> {
     let assembler = Assembler::new(polygons, error);
     let (count, mut done) = (wanted.len(), 0);
-    let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH) * making.ranks.size();
+    // Progress some 100 times, with work for all cores and timely cancellation.
+    let batch = (count / 100).clamp(4, 64) * making.ranks.size();
     for batch in wanted.chunks(batch) {
         let of_polygon = |&s: &u32| assembler.row(s as usize);
         let rows = share_out(batch, making.ranks, of_polygon);

@@ -13,7 +13,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
-use super::tolerances::{COPLANARITY, STRAIGHT_SINE};
+use super::tolerances::COPLANARITY;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::area_vector;
 use crate::geometry::weld::Weld;
@@ -232,7 +233,7 @@ impl Outlines {
         let mut around = 0.0;
         for k in 0..outline.len() {
             let (sine, cosine) = self.turn(outline, k, normal);
-            if sine < -STRAIGHT_SINE || (cosine < 0.0 && sine <= STRAIGHT_SINE) {
+            if sine < -COINCIDENCE_TOLERANCE || (cosine < 0.0 && sine <= COINCIDENCE_TOLERANCE) {
                 return false;
             }
             around += sine.atan2(cosine);
@@ -254,7 +255,8 @@ impl Outlines {
         // Indices of polygons, by representative triangle.
         let mut numbers = vec![None; self.loops.len()];
         for (t, outline) in self.loops.iter().enumerate() {
-            let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT_SINE;
+            let bend =
+                |&k: &usize| self.turn(outline, k, self.normals[t]).0 > COINCIDENCE_TOLERANCE;
             let kept = (0..outline.len()).filter(bend);
             let corners = kept.map(|k| self.corners[outline[k] as usize]).collect();
             if let Some(polygon) = ConvexPolygon::new(corners, scene.triangles()[t].group) {

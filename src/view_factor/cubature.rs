@@ -50,22 +50,6 @@ const COARSE_CELL_BOUND: f64 = 0.25;
 /// of the area.
 const RIM_AREA_SHARE: f64 = 0.1;
 
-/// Corners are sampled inside the cell, by this share of the way to its centroid, since blockers
-/// may touch the boundary. Plain choice.
-const CORNER_INSET: f64 = 1e-3;
-
-/// Minimum error estimate of a cell, as a share of its bound: a single cut without change proves
-/// little. Plain choice; no recorded measurement.
-const MIN_ESTIMATE_SHARE: f64 = 0.03;
-
-/// Error estimate requested of a sum, as a share of its tolerance, which applies to the bound: rows
-/// of thousands of factors then close to a tenth of the requested error.
-const ESTIMATE_SHARE: f64 = 0.1;
-
-/// Maximum offset of cuts in two from the middle, as a share of the side, so that errors along a
-/// line of cells are independent. Plain choice.
-const CUT_JITTER: f64 = 0.1;
-
 /// An occluded pair of polygons: one of the two, the domain, in cells.
 pub(super) struct OccludedPair {
     /// Area of the domain.
@@ -205,7 +189,8 @@ impl Cell {
         let centroid = self.corners.iter().sum::<DVec3>() / 3.0;
         let mut largest = 0.0_f64;
         for corner in &self.corners {
-            let point = corner.lerp(centroid, CORNER_INSET);
+            // Blockers may touch the boundary.
+            let point = corner.lerp(centroid, 1e-3);
             let factors = self.factors_from(point, pair, visibility);
             let deviation = if flux.visible > nothing {
                 factors.unoccluded - factors.visible
@@ -235,7 +220,8 @@ impl Cell {
         let change = parts.iter().map(|part| part.flux).sum::<f64>() - self.flux;
         let share = change.abs() / (parts.len() as f64).sqrt();
         for part in &mut parts {
-            let least = MIN_ESTIMATE_SHARE * part.error_bound;
+            // A single cut without change proves little. Plain choice.
+            let least = 0.03 * part.error_bound;
             part.error_estimate = share.max(least).min(part.error_bound);
         }
         parts
@@ -248,7 +234,7 @@ impl Cell {
         let square = |side: &(DVec3, DVec3, DVec3)| side.0.distance_squared(side.1);
         let longest = sides.iter().max_by(|x, y| square(x).total_cmp(&square(y)));
         let &(p, q, opposite) = longest.unwrap_or(&sides[0]);
-        let share = (0.5 - CUT_JITTER) + 2.0 * CUT_JITTER * unit_interval(self.seed);
+        let share = 0.4 + 0.2 * unit_interval(self.seed);
         let middle = p.lerp(q, share);
         [[p, middle, opposite], [middle, q, opposite]]
     }
@@ -302,7 +288,8 @@ impl SquaredErrors {
     }
 
     fn are_within(&self, tolerance: f64) -> bool {
-        self.bound <= tolerance.powi(2) && self.estimate <= (ESTIMATE_SHARE * tolerance).powi(2)
+        // Rows of thousands of factors then close to a tenth of the requested error.
+        self.bound <= tolerance.powi(2) && self.estimate <= (0.1 * tolerance).powi(2)
     }
 }
 

@@ -17,16 +17,12 @@ use super::cubature::{Cell, OccludedPair};
 use super::matrix::Estimate;
 use super::point_visibility::PointVisibility;
 use super::shaft::{Blocker, Shaft, fully_occludes};
-use super::tolerances::{CONTACT_HEIGHT, SAME_POSITION};
+use super::tolerances::CONTACT_HEIGHT;
 use super::unoccluded::unoccluded_exchange;
 use super::visual_events::{event_planes, parts_between_planes, standing_on};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::{clip, fan, max_distance, merge_close_corners, polygon_area};
 use crate::sampling::hash::split_mix64;
-
-/// Ratio of the extents of two polygons below which the shorter one is the domain: all that it
-/// receives may come from a spot of the longer that no cell of that one samples. Plain choice; no
-/// recorded measurement.
-const MIN_EXTENT_RATIO: f64 = 0.25;
 
 /// The exchange between two polygons before any refinement.
 pub(super) enum PairVisibility {
@@ -66,8 +62,8 @@ impl FacingPair {
         }
         let mut a = clip(&s.corners, at_t, t.normal);
         let mut b = clip(&t.corners, at_s, s.normal);
-        merge_close_corners(&mut a, SAME_POSITION);
-        merge_close_corners(&mut b, SAME_POSITION);
+        merge_close_corners(&mut a, COINCIDENCE_TOLERANCE);
+        merge_close_corners(&mut b, COINCIDENCE_TOLERANCE);
         let both = a.len() > 2 && b.len() > 2;
         both.then_some(FacingPair { a, a_normal: s.normal, b, b_normal: t.normal })
     }
@@ -149,7 +145,9 @@ fn reaches_before(polygon: &ConvexPolygon, other: &ConvexPolygon, origin: DVec3)
 fn is_better_domain(a: &End, b: &End) -> bool {
     let extent_a = max_distance(&a.corners, a.corners[0]);
     let extent_b = max_distance(&b.corners, b.corners[0]);
-    if extent_a.min(extent_b) < MIN_EXTENT_RATIO * extent_a.max(extent_b) {
+    // All that the shorter one receives may come from a spot of the longer that no cell of that one
+    // samples. Plain choice.
+    if extent_a.min(extent_b) < 0.25 * extent_a.max(extent_b) {
         extent_a <= extent_b
     } else {
         let rank_a = (a.standing.len(), polygon_area(&a.corners));

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use crate::geometry::barycentric::WHOLE;
 use crate::scene::Scene;
 use crate::scene::texture::TextureMap;
 
@@ -27,7 +28,7 @@ impl CutOuts {
             if mask.is_none() {
                 *mask = scene.mask(t).cloned();
             }
-            (material, Scene::WHOLE.map(|corner| scene.texture_place(t, corner)))
+            (material, WHOLE.map(|corner| scene.texture_place(t, corner)))
         };
         let places = triangles.map(place).collect();
         Some(CutOuts { masks, places })

@@ -23,13 +23,6 @@ const OPENNESS_RAYS: u32 = 128;
 /// Rays per batch, a divisor of [`OPENNESS_RAYS`].
 const RAYS_AT_ONCE: u32 = 4;
 
-/// Fractions of a segment's length at which both its sides are tested.
-const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
-
-/// Distance from a side, as a fraction of the triangle's height over it, that counts as 0: about
-/// the rounding of coordinates in single precision.
-const ON_SIDE: f64 = 1e-7;
-
 /// Tests on which sides of a contact segment light may fall.
 pub(super) struct Openness {
     rays: Arc<RayScene>,
@@ -62,7 +55,7 @@ impl Openness {
             self.beside.iter().filter(|&&beside| line[0].distance(line[1]) >= beside);
         long_enough.any(|&beside| {
             let [from, to] = part_of_length(beside, ends.map(on_plane), line);
-            OPENNESS_PLACES.into_iter().any(|share| {
+            [0.2, 0.5, 0.8].into_iter().any(|share| {
                 let place = from.lerp(to, share) + self.above * beside * normal;
                 let sides = [across, -across].map(|away| (place + beside * away, away));
                 match sides.map(|(beside, _)| self.is_open(beside, normal)) {
@@ -100,7 +93,8 @@ impl Openness {
 /// Whether a part of a triangle, by its ends in barycentric coordinates, is one of its sides: there
 /// is no cut where a neighbour begins.
 fn is_on_side(ends: &[DVec2; 2]) -> bool {
-    let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < ON_SIDE);
+    // About the rounding of coordinates in single precision.
+    let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < 1e-7);
     from_side(|p| p.x) || from_side(|p| p.y) || from_side(|p| 1.0 - p.x - p.y)
 }
 
