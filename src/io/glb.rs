@@ -76,14 +76,11 @@ const PLACE_BYTES: u64 = 8;
 /// Bytes of an index.
 const INDEX_BYTES: u64 = 4;
 
-/// Distance of a scene from the origin, in units of its size, above which it is moved: see
-/// [`write_glb`].
-const FAR_AWAY: f64 = 16.0;
-
 /// Origin of the positions written for a scene with these `bounds`, scene unit.
 fn origin(bounds: Aabb) -> Vec3 {
     let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
-    let far = reach > FAR_AWAY * bounds.longest_side();
+    // See `write_glb`.
+    let far = reach > 16.0 * bounds.longest_side();
     if far { bounds.centre().as_vec3() } else { Vec3::ZERO }
 }
 
@@ -109,15 +106,6 @@ enum Attribute {
     TextureCoordinates,
 }
 
-const ATTRIBUTES: [Attribute; 6] = [
-    Attribute::Position,
-    Attribute::Normal,
-    Attribute::Colour,
-    Attribute::Radiosity,
-    Attribute::Irradiance,
-    Attribute::TextureCoordinates,
-];
-
 impl Attribute {
     /// Bytes of one value.
     fn size(self) -> u64 {
@@ -141,7 +129,16 @@ impl Model<'_> {
 
     /// The attributes that any primitive has.
     fn attributes(&self) -> impl Iterator<Item = Attribute> {
-        ATTRIBUTES.into_iter().filter(|a| self.primitives.iter().any(|p| a.is_of(p)))
+        [
+            Attribute::Position,
+            Attribute::Normal,
+            Attribute::Colour,
+            Attribute::Radiosity,
+            Attribute::Irradiance,
+            Attribute::TextureCoordinates,
+        ]
+        .into_iter()
+        .filter(|a| self.primitives.iter().any(|p| a.is_of(p)))
     }
 
     /// Number of vertices of all primitives with an attribute.

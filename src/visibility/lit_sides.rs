@@ -162,8 +162,8 @@ impl<'a> LitSides<'a> {
         let mut is_lit = vec![false; 2 * scene.triangles().len()];
         let (mut flux, mut lit_area) = (0.0, 0.0);
         for sides in sampled.chunks_exact(2) {
-            // Whether no walk from the side itself reaches light, where the share of its sheet gives
-            // that a probability below 5 %.
+            // Whether no walk from the side itself reaches light, and that has a probability below
+            // 5 % given the share of its sheet.
             let is_darker = |&side: &SideIndex| {
                 let (own, share) = (light.of(side), light.of_sheet(side).share());
                 own.hits == 0.0 && (1.0 - share).powf(own.places) < 0.05

@@ -9,12 +9,6 @@ use gltf_json::Root;
 use crate::error::Error;
 use crate::io::{cannot_write, write_file};
 
-/// "glTF", the version of the container, and the kinds of its chunks, "JSON" and "BIN".
-const MAGIC: u32 = 0x4654_6C67;
-const VERSION: u32 = 2;
-const JSON_CHUNK: u32 = 0x4E4F_534A;
-const BINARY_CHUNK: u32 = 0x004E_4942;
-
 /// Writes `document` and then `binary` bytes of numbers, a multiple of four, by `write_binary`.
 ///
 /// # Errors
@@ -33,11 +27,12 @@ pub(super) fn write(
         return Err(cannot_write(path, io::Error::new(io::ErrorKind::FileTooLarge, found)));
     };
     write_file(path, |out| {
-        for word in [MAGIC, VERSION, total, json.len() as u32, JSON_CHUNK] {
+        let kind = u32::from_le_bytes;
+        for word in [kind(*b"glTF"), 2, total, json.len() as u32, kind(*b"JSON")] {
             out.write_all(&word.to_le_bytes())?;
         }
         out.write_all(&json)?;
-        for word in [binary as u32, BINARY_CHUNK] {
+        for word in [binary as u32, kind(*b"BIN\0")] {
             out.write_all(&word.to_le_bytes())?;
         }
         write_binary(out)

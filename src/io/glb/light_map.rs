@@ -98,11 +98,6 @@ struct Vertex {
 /// Bytes of a vertex.
 const VERTEX_BYTES: u64 = 2 * VECTOR_BYTES + 2 * PLACE_BYTES;
 
-/// Views of the binary chunk: vertices, indices, image.
-const VERTICES: usize = 0;
-const INDICES: usize = 1;
-const IMAGE: u32 = 2;
-
 impl Model<'_> {
     fn new(map: &LightMap, png: Vec<u8>) -> Model<'_> {
         let scene = map.atlas.scene();
@@ -208,7 +203,7 @@ impl Model<'_> {
                     root.push(material)
                 });
                 let attributes = primitive.attributes(root, vertices * VERTEX_BYTES);
-                let indices = (INDICES, faces, primitive.faces.len());
+                let indices = (1, faces, primitive.faces.len());
                 primitives.push(parts::triangles(root, attributes, indices, material));
                 vertices += primitive.vertices.len() as u64;
                 faces += primitive.faces.len() as u64;
@@ -230,7 +225,7 @@ impl Model<'_> {
 
 /// Adds the map as a texture, smoothly filtered and not repeated.
 fn add_texture(root: &mut Root) -> Index<Texture> {
-    let source = parts::add_image(root, IMAGE, Some("light map"));
+    let source = parts::add_image(root, 2, Some("light map"));
     let sampler = Sampler {
         mag_filter: Some(Valid(MagFilter::Linear)),
         // Without mipmaps, in which charts would run together.
@@ -253,8 +248,9 @@ impl Primitive {
         let positions = self.vertices.iter().map(|vertex| vertex.position);
         let count = self.vertices.len();
         let at = |bytes: u64, type_: Type| Accessor {
+            // Views of the binary chunk: 0 vertices, 1 indices, 2 image.
             type_: Valid(type_),
-            ..accessor(VERTICES, offset + bytes, count)
+            ..accessor(0, offset + bytes, count)
         };
         let position = parts::with_bounds(at(0, Type::Vec3), positions);
         let mut attributes = vec![

@@ -17,9 +17,6 @@ use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Sce
 use super::INDEX_BYTES;
 use crate::scene::{self, Rgb};
 
-/// The extension for colours without lighting.
-const UNLIT: &str = "KHR_materials_unlit";
-
 /// Accessors of the attributes of a primitive.
 pub(super) type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
 
@@ -31,7 +28,7 @@ pub(super) fn document(binary_length: u64, notes: &BTreeMap<&str, Value>) -> Roo
         ..Default::default()
     };
     let mut root = Root { asset, ..Default::default() };
-    root.extensions_used.push(UNLIT.into());
+    root.extensions_used.push("KHR_materials_unlit".into());
     root.push(Buffer {
         byte_length: binary_length.into(),
         name: None,

@@ -52,11 +52,6 @@ impl<'a> Shown<'a> {
 /// A face of the surface, and its triangle of the scene.
 type Face = ([u32; 3], usize);
 
-/// Distance of texture coordinates below which they belong to one vertex: a hundredth of a texel of
-/// a large image, and far more than the rounding difference of two triangles' coordinates along
-/// their common side.
-const SEAM: f64 = 1.0 / (1 << 20) as f64;
-
 /// The faces of `light` by group, then material, in the order of the scene's.
 pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     let (surface, mesh) = (&light.surface, &light.mesh);
@@ -123,7 +118,9 @@ fn textured<'a>(
         let frame = shown.and_then(|shown| shown.frame());
         let place = frame.map_or(place, |map| place * map.scale + map.offset);
         let place = DVec2::new(place.x, 1.0 - place.y);
-        let cell = (place / SEAM).round().to_array().map(|x| x as i64);
+        // Nearer coordinates are one vertex: a hundredth of a texel of a large image, far more than
+        // the rounding difference of two triangles along their common side.
+        let cell = (place / 2f64.powi(-20)).round().to_array().map(|x| x as i64);
         *numbers.entry((v, cell)).or_insert_with(|| {
             vertices.push(v);
             places.push(place.as_vec2());

@@ -14,10 +14,6 @@ use crate::error::{Error, ErrorKind, nearest, quoted};
 use crate::scene::texture::{MaterialTextures, TextureMap};
 use crate::scene::{Material, Rgb, Specular, Triangle, WarningKind};
 
-/// Maximum transmittance of a textured material, as a fraction of the texture's reflectance plus
-/// transmittance: the remaining reflectance gives the distribution over the texture.
-const MAX_TRANSMITTED: f64 = 0.99;
-
 impl ObjFile<'_> {
     /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
     /// if no used material has a readable texture.
@@ -70,7 +66,8 @@ impl ObjFile<'_> {
                     // The transmittance is a fraction of the texture's total.
                     let all = factor * texture.whole_mean();
                     let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
-                    let share = share.min(Rgb::splat(MAX_TRANSMITTED));
+                    // The remaining reflectance gives the distribution over the texture.
+                    let share = share.min(Rgb::splat(0.99));
                     material.transmittance = share * all;
                     factor *= Rgb::ONE - share;
                 }

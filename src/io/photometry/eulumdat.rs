@@ -27,15 +27,6 @@ use crate::scene::{Opening, Pole};
 /// Lines before those of the sets of lamps.
 const HEADER: usize = 26;
 
-/// Lines of a set of lamps.
-const LAMP_LINES: usize = 6;
-
-/// Maximum number of sets of lamps: the format's own limit.
-const MAX_SETS: f64 = 20.0;
-
-/// Ratios before the angles.
-const DIRECT_RATIOS: usize = 10;
-
 pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     let mut warnings = vec![];
     let mut rest = physical_lines(file, text);
@@ -58,11 +49,11 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         factor = 1.0;
     }
     let sets = field(26).number("the number of sets of lamps")?;
-    if !(0.0..=MAX_SETS).contains(&sets) || sets.fract() != 0.0 {
+    if !(0.0..=20.0).contains(&sets) || sets.fract() != 0.0 {
         let found = format!("{sets} sets of lamps");
         return Err(field(26).error(found, "give a whole number from 0 to 20"));
     }
-    let lamps: Vec<Line> = rest.by_ref().take(LAMP_LINES * sets as usize).collect();
+    let lamps: Vec<Line> = rest.by_ref().take(6 * sets as usize).collect();
     let lamp = |k: usize| Field { file, number: HEADER + k, line: lamps.get(k - 1) };
     let is_absolute = lamp(1).number_or_zero() < 0.0;
     let flux = lamp(3).number_or_zero().abs();
@@ -72,7 +63,7 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         warnings.push("lamps without flux: intensities are taken for candela".into());
     }
     let mut numbers = Numbers::new(file, rest, Comma::IsDecimal);
-    numbers.list(DIRECT_RATIOS, "a direct ratio")?;
+    numbers.list(10, "a direct ratio")?;
     let azimuths = numbers.list(plane_count, "a C-angle")?;
     let angles = numbers.list(polar_count, "an angle γ")?;
     let values = numbers.rest();

@@ -22,9 +22,6 @@ use super::{Photometry, name_of};
 use crate::error::{Error, ErrorKind};
 use crate::scene::{IntensityDistribution, Opening, Pole};
 
-/// Metres of a foot.
-const FOOT: f64 = 0.3048;
-
 /// Whether `text` is an LM-63 file: by its first line, or by a line for the tilt.
 pub fn is_lm_63(text: &str) -> bool {
     let start = text.trim_start_matches('\u{feff}').trim_start();
@@ -173,7 +170,7 @@ impl Header {
             }
         };
         let metres = match numbers.next("the type of units")? {
-            1.0 => FOOT,
+            1.0 => 0.3048,
             2.0 => 1.0,
             other => {
                 warnings.push(format!("units of type {other} are taken for metres"));
