@@ -103,9 +103,6 @@ impl Direction {
 /// to order 2, root mean square over the sphere.
 pub(super) const DIRECTIONS: [Direction; 26] = directions();
 
-/// Weights of the middles of sides, edges and corners.
-const WEIGHTS: [f64; 3] = [1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0];
-
 const fn directions() -> [Direction; 26] {
     let mut all = [Direction { towards: [0.0; 3], weight: 0.0 }; 26];
     let (mut cell, mut next) = (0, 0);
@@ -114,7 +111,11 @@ const fn directions() -> [Direction; 26] {
         let nonzero = towards[0] * towards[0] + towards[1] * towards[1] + towards[2] * towards[2];
         if nonzero > 0 {
             let towards = [towards[0] as f64, towards[1] as f64, towards[2] as f64];
-            all[next] = Direction { towards, weight: WEIGHTS[nonzero as usize - 1] };
+            // Of the middles of sides, edges and corners.
+            all[next] = Direction {
+                towards,
+                weight: [1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0][nonzero as usize - 1],
+            };
             next += 1;
         }
         cell += 1;

@@ -241,6 +241,15 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     })
 }
 
+/// A CSV file of rows of one length, the first of them the names of the columns.
+pub fn csv(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
+    let mut table = csv::Writer::from_writer(vec![]);
+    for row in rows {
+        table.write_record(row).expect("rows of one length");
+    }
+    table.into_inner().expect("a vector takes all bytes")
+}
+
 /// Writes a file; errors name it.
 ///
 /// # Errors

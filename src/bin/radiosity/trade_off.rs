@@ -107,7 +107,7 @@ impl Options {
         let results = self.results(Arc::new(scene))?;
         if !results.runs.is_empty() {
             say!("{}", results.text());
-            self.write("csv", results.csv().as_bytes())?;
+            self.write("csv", &results.csv())?;
         }
         if interrupt::stopped() {
             eprintln!("stopped: the table has the runs that were finished; there is no chart");
