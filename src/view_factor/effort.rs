@@ -1,12 +1,13 @@
 //! Predicts the time for an exact matrix from the blockers between random pairs.
 
 use super::pair_visibility::FacingPair;
+use super::partial_matrix::Method;
 use super::scene_polygons::ScenePolygons;
 use super::shaft::fully_occludes;
 use crate::sampling::hash::split_mix64_nth;
 
-/// Whether the exact matrix of `polygons` would take minutes or more.
-pub(super) fn is_exact_too_long(polygons: &ScenePolygons) -> bool {
+/// The method for the matrix of `polygons`: exact unless that would take minutes or more.
+pub(super) fn method(polygons: &ScenePolygons) -> Method {
     let ScenePolygons { fronts, blockers, .. } = polygons;
     let fronts = &fronts.polygons;
     // A property of one pair in a hundred is sampled 41 times, with a standard deviation of a
@@ -17,7 +18,7 @@ pub(super) fn is_exact_too_long(polygons: &ScenePolygons) -> bool {
     let all_pairs = 0.5 * count * (count - 1.0);
     // Known before any pair is sampled.
     if all_pairs * max_blockers as f64 <= max_work {
-        return false;
+        return Method::Exact;
     }
     let end = |bits: u64| &fronts[(bits % fronts.len() as u64) as usize];
     let work = |k: u64| {
@@ -33,5 +34,6 @@ pub(super) fn is_exact_too_long(polygons: &ScenePolygons) -> bool {
         }
         pair_cost + between.len() as f64
     };
-    (0..pairs).map(work).sum::<f64>() / pairs as f64 * all_pairs > max_work
+    let work = (0..pairs).map(work).sum::<f64>() / pairs as f64 * all_pairs;
+    if work > max_work { Method::Sparse } else { Method::Exact }
 }

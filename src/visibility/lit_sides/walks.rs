@@ -1,7 +1,7 @@
 //! Random walks from sides of triangles to the light.
 
 use std::cell::Cell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::iter::{once, repeat_with};
 use std::sync::Arc;
 
@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 use super::repeated::lamps_of_other_sides;
 use super::sheets::{Sheets, SideIndex};
 use crate::geometry::FILE_TOLERANCE;
+use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene, Sides};
@@ -193,11 +194,8 @@ impl<'a> Walks<'a> {
 
     /// A cosine-distributed direction from a side.
     fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
-        let (normal, turn) = (self.normal(side), TAU * rng.f64());
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let square = rng.f64();
-        let across = turn.cos() * tangent + turn.sin() * bitangent;
-        square.sqrt() * across + (1.0 - square).sqrt() * normal
+        let turn = rng.f64();
+        cosine_direction(self.normal(side), [rng.f64(), turn])
     }
 
     /// The hit of a ray from a point on a side, and the side that it hits.
