@@ -25,9 +25,9 @@ impl<'a> TexelPoints<'a> {
     /// centre, moved slightly inside.
     pub fn point(&self, texel: u32, t: usize) -> TwoSidedPoint {
         let (scene, width) = (self.atlas.scene(), self.atlas.width());
-        let places = self.atlas.corners(t);
+        let positions = self.atlas.corners(t);
         let centre = DVec2::new((texel % width).into(), (texel / width).into());
-        let ([u, v], _) = nearest_point(places, centre);
+        let ([u, v], _) = nearest_point(positions, centre);
         let corners = scene.corners(t);
         let at = |u: f64, v: f64| corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
         let size = self.texel_size(t);

@@ -260,7 +260,7 @@ mod tests {
         at: impl Fn(f64, f64) -> DVec3,
         kind: impl Fn(u32) -> [u32; 2],
     ) -> Scene {
-        let place = |k: u32| {
+        let point = |k: u32| {
             at(f64::from(k % (n + 1)) / f64::from(n), f64::from(k / (n + 1)) / f64::from(m))
         };
         let mut triangles = vec![];
@@ -275,7 +275,7 @@ mod tests {
         }
         let names = ["g", "h"].map(String::from).to_vec();
         let materials = ["m", "n"].map(|name| Material::grey(name, 0.5)).to_vec();
-        Scene::new((0..(n + 1) * (m + 1)).map(place).collect(), triangles, names, materials)
+        Scene::new((0..(n + 1) * (m + 1)).map(point).collect(), triangles, names, materials)
             .unwrap()
     }
 

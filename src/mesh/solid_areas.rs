@@ -48,11 +48,11 @@ impl Mesh {
             return centroid;
         }
         let [a, b, c] = self.corners(node);
-        let place = |k: usize| {
+        let point = |k: usize| {
             let [u, v] = fold_to_triangle(r2_point(k, 0.5));
             a + u * (b - a) + v * (c - a)
         };
-        let solid = (0..64).map(place).filter(|&p| self.is_solid(node, p));
+        let solid = (0..64).map(point).filter(|&p| self.is_solid(node, p));
         let distance = |p: &DVec3| p.distance_squared(centroid);
         solid.min_by(|p, q| distance(p).total_cmp(&distance(q))).unwrap_or(centroid)
     }

@@ -31,7 +31,7 @@ impl Scene {
     /// Whether triangle `t` is solid at the point with these weights of its second and third
     /// corner.
     pub fn is_solid(&self, t: usize, barycentric: [f64; 2]) -> bool {
-        self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_place(t, barycentric)))
+        self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_point(t, barycentric)))
     }
 
     /// Whether any material has a mask.
@@ -71,7 +71,7 @@ impl Scene {
 
     /// The same for one piece.
     pub(crate) fn solid_share(&self, (t, corners): Piece) -> f64 {
-        let place = || corners.map(|corner| self.texture_place(t, corner));
+        let place = || corners.map(|corner| self.texture_point(t, corner));
         self.mask(t).map_or(1.0, |mask| mask.solid_share(place(), MAX_OUTLINE_CELLS))
     }
 
@@ -91,8 +91,8 @@ impl Scene {
         corners: [[f64; 2]; 3],
     ) -> bool {
         let Some(mask) = other.mask(s) else { return true };
-        let of_t = corners.map(|corner| self.texture_place(t, corner));
-        let of_s = WHOLE.map(|corner| other.texture_place(s, corner));
+        let of_t = corners.map(|corner| self.texture_point(t, corner));
+        let of_s = WHOLE.map(|corner| other.texture_point(s, corner));
         let near =
             |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, FILE_TOLERANCE * (1.0 + b.length()));
         self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)

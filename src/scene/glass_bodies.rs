@@ -163,13 +163,13 @@ impl GlassBodies {
     /// Determines the cavities, and numbers bodies by the shells around them.
     fn nest(&mut self) {
         let shells = &self.shells;
-        let place = |s: &Shell| s.triangles[0][0];
+        let position = |s: &Shell| s.triangles[0][0];
         let around = |k: usize| -> Vec<usize> {
             let encloses = |&j: &usize| {
                 j != k
                     && shells[j].material == shells[k].material
                     && shells[j].volume > shells[k].volume
-                    && shells[j].encloses(place(&shells[k]))
+                    && shells[j].encloses(position(&shells[k]))
             };
             (0..shells.len()).filter(encloses).collect()
         };

@@ -74,7 +74,7 @@ impl Texture {
     pub(super) fn texel_at(&self, uv: DVec2, clamped: bool) -> Rgb {
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
         let [x, y] = [(uv.x, self.width), (1.0 - uv.y, self.height)]
-            .map(|(place, count)| ((place * f64::from(count)) as u32).min(count - 1));
+            .map(|(position, count)| ((position * f64::from(count)) as u32).min(count - 1));
         self.cell(0, x, y)
     }
 
@@ -104,8 +104,8 @@ impl Texture {
         let [columns, rows] = self.level_size(level);
         let size = DVec2::new(self.width.into(), self.height.into()) * 0.5f64.powi(level as i32);
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
-        let place = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
-        let (first, part) = (place.floor(), place - place.floor());
+        let position = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
+        let (first, part) = (position.floor(), position - position.floor());
         let wrapped = |k: f64, count: u32| -> u32 {
             let count = i64::from(count);
             let k = k as i64;
@@ -441,11 +441,11 @@ mod tests {
                 sum += texture.cell(0, x, y);
             }
             let mean = sum / f64::from(across * down);
-            let place = |x: u32, y: u32| {
+            let position = |x: u32, y: u32| {
                 let p = DVec2::new(x.into(), y.into()) / size;
                 DVec2::new(p.x, 1.0 - p.y)
             };
-            let (low, high) = (place(0, down), place(across, 0));
+            let (low, high) = (position(0, down), position(across, 0));
             for shift in [DVec2::ZERO, DVec2::new(3.0, -2.0)] {
                 let found = rectangle(&texture, low + shift, high + shift);
                 assert!(found.abs_diff_eq(mean, 1e-6), "{width} × {height}: {found} {mean}");

@@ -85,9 +85,9 @@ impl Scene {
         (barycentric, share): ([f64; 2], f64),
     ) -> Rgb {
         let Some(map) = map else { return mean };
-        let [a, b, c] = WHOLE.map(|corner| self.texture_place(t, corner));
+        let [a, b, c] = WHOLE.map(|corner| self.texture_point(t, corner));
         let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
-        map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
+        map.scaled(map.filtered(self.texture_point(t, barycentric), area), mean)
     }
 
     /// Exitance per channel, W/m², with which triangle `t` lights others: that of its material, or
@@ -134,12 +134,12 @@ impl Scene {
         for (&m, maps) in &mut textures.of_materials {
             let material = &mut self.materials[m as usize];
             if let Some(map) = &mut maps.reflectance {
-                let told = map.mean;
+                let given = map.mean;
                 map.mean = reflectances.get(&m).copied().unwrap_or(map.whole_mean());
                 material.reflectance = map.mean;
                 if material.is_translucent() {
-                    let has_mean = told.cmpgt(Rgb::ZERO);
-                    material.transmittance *= Rgb::select(has_mean, map.mean / told, Rgb::ZERO);
+                    let has_mean = given.cmpgt(Rgb::ZERO);
+                    material.transmittance *= Rgb::select(has_mean, map.mean / given, Rgb::ZERO);
                 }
             }
             if let Some(map) = &mut maps.exitance {
@@ -201,7 +201,7 @@ impl Scene {
         let number_of = |&(t, corners): &Piece| {
             let textures = self.textures(t)?;
             let (map, mask) = (map_of(textures)?, textures.mask.as_ref());
-            let [a, b, c] = corners.map(|corner| self.texture_place(t, corner));
+            let [a, b, c] = corners.map(|corner| self.texture_point(t, corner));
             let bits = [a.x, a.y, b.x, b.y, c.x, c.y].map(f64::to_bits);
             let key = (self.triangles[t].material, bits);
             Some(*numbers.entry(key).or_insert_with(|| {
@@ -225,7 +225,7 @@ impl Scene {
     }
 
     /// Texture coordinates of a point of triangle `t`; not finite if it has none.
-    pub(crate) fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+    pub(crate) fn texture_point(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let place = |[a, b, c]: [DVec2; 3]| a * (1.0 - u - v) + b * u + c * v;
         self.texture_coordinates(t).map_or(DVec2::NAN, place)
     }

@@ -75,8 +75,8 @@ impl<'a> RayCaster<'a> {
         fronts: &'a Fronts,
         blockers: Vec<Option<u32>>,
     ) -> RayCaster<'a> {
-        let place = in_units(scene, unit);
-        let corners = (0..scene.triangles().len()).map(|t| scene.corners(t).map(&place));
+        let position = in_units(scene, unit);
+        let corners = (0..scene.triangles().len()).map(|t| scene.corners(t).map(&position));
         let rays = RayScene::new(corners).with_covered_backs(|t| scene.is_back_covered(t));
         RayCaster { fronts, rays, blockers }
     }

@@ -292,7 +292,7 @@ impl TracedArrays {
         let mut has_holes = vec![false; count];
         for t in 0..count {
             let Some(mask) = scene.mask(t) else { continue };
-            let corners = WHOLE.map(|c| mask.in_texels(scene.texture_place(t, c)));
+            let corners = WHOLE.map(|c| mask.in_texels(scene.texture_point(t, c)));
             if !corners.iter().all(|place| place.is_finite()) {
                 continue;
             }

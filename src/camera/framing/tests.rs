@@ -76,12 +76,12 @@ fn object_fills_the_picture() {
         let camera = Camera::framing(&light, aspect);
         let [right, up, forward] = camera.frame();
         let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
-        let place = |p: DVec3| {
+        let point = |p: DVec3| {
             let to = p - camera.eye;
             let scale = to.dot(forward) * tangent;
             [to.dot(right) / scale / aspect, to.dot(up) / scale]
         };
-        let corners = bounds(&light).corners().map(place);
+        let corners = bounds(&light).corners().map(point);
         let reach = |k: usize, sign: f64| {
             corners.iter().map(|c| sign * c[k]).fold(f64::NEG_INFINITY, f64::max)
         };

@@ -114,7 +114,7 @@ fn textured<'a>(
     let (mut vertices, mut places) = (vec![], vec![]);
     let mut number = |v: u32, t: usize| {
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
-        let place = scene.texture_place(t, barycentric);
+        let place = scene.texture_point(t, barycentric);
         let frame = shown.and_then(|shown| shown.frame());
         let place = frame.map_or(place, |map| place * map.scale + map.offset);
         let place = DVec2::new(place.x, 1.0 - place.y);

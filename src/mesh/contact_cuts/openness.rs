@@ -56,8 +56,8 @@ impl Openness {
         long_enough.any(|&beside| {
             let [from, to] = part_of_length(beside, ends.map(on_plane), line);
             [0.2, 0.5, 0.8].into_iter().any(|share| {
-                let place = from.lerp(to, share) + self.above * beside * normal;
-                let sides = [across, -across].map(|away| (place + beside * away, away));
+                let point = from.lerp(to, share) + self.above * beside * normal;
+                let sides = [across, -across].map(|away| (point + beside * away, away));
                 match sides.map(|(beside, _)| self.is_open(beside, normal)) {
                     [true, true] => true,
                     [true, false] => self.is_slit(sides[0]),
@@ -70,18 +70,18 @@ impl Openness {
 
     /// Whether another wall is nearer than the finest element edge, seen `away` from the wall
     /// beside.
-    fn is_slit(&self, (place, away): (DVec3, DVec3)) -> bool {
+    fn is_slit(&self, (point, away): (DVec3, DVec3)) -> bool {
         let [_, finest] = self.beside;
-        self.rays.occluded(place, away, 0.0..finest, |_| true)
+        self.rays.occluded(point, away, 0.0..finest, |_| true)
     }
 
-    fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
+    fn is_open(&self, point: DVec3, normal: DVec3) -> bool {
         // Most points are in the open, which the first few rays show.
         let most = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);
         while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
             let directions = self.directions.directions_in(cast..cast + RAYS_AT_ONCE, normal, 0.5);
-            self.rays.closest_hits(place, directions, 0.0, None, |_, hit| {
+            self.rays.closest_hits(point, directions, 0.0, None, |_, hit| {
                 backs += u32::from(hit.is_some_and(|hit| !hit.front));
             });
             cast += RAYS_AT_ONCE;

@@ -15,7 +15,7 @@ pub struct Sheets {
     /// Per side, the first side of its sheet.
     first: Vec<SideIndex>,
     /// Per side, the number of sample points on it.
-    places: Vec<usize>,
+    points: Vec<usize>,
 }
 
 impl Sheets {
@@ -26,7 +26,7 @@ impl Sheets {
         let count = sizes.iter().filter(|&&size| size > 0).count();
         let of_sheet = (16384.0 / count as f64).min(128.0);
         let total_area: f64 = (0..scene.triangles().len()).map(|t| scene.area(t)).sum();
-        let places = |(side, &first): (SideIndex, &SideIndex)| {
+        let points = |(side, &first): (SideIndex, &SideIndex)| {
             let of_area = 2048.0 * scene.area(side / 2) / total_area;
             let of_sheet = of_sheet / f64::from(sizes[first]);
             // Enough on each side to overrule the result of its sheet if most of them agree, more
@@ -34,8 +34,8 @@ impl Sheets {
             // at most. Plain choice.
             of_area.max(4.0).max(of_sheet).ceil() as usize
         };
-        let places = first.iter().enumerate().map(places).collect();
-        Sheets { first, places }
+        let points = first.iter().enumerate().map(points).collect();
+        Sheets { first, points }
     }
 
     /// Calls `find` for the sample points on each of `sides`, with a random sequence of its own per
@@ -47,22 +47,22 @@ impl Sheets {
     ) -> SideStatistics<'_> {
         let from_side = |&side: &SideIndex| {
             let mut rng = Rng::with_seed(split_mix64(side as u64));
-            let mut found = Samples { places: self.places[side] as f64, ..Samples::default() };
-            for value in (0..self.places[side]).filter_map(|_| find(side, &mut rng)) {
-                found.hits += 1.0;
-                found.sum += value;
+            let mut samples = Samples { points: self.points[side] as f64, ..Samples::default() };
+            for value in (0..self.points[side]).filter_map(|_| find(side, &mut rng)) {
+                samples.hits += 1.0;
+                samples.sum += value;
             }
-            (side, found)
+            (side, samples)
         };
-        let found: Vec<(SideIndex, Samples)> = sides.par_iter().map(from_side).collect();
+        let samples: Vec<(SideIndex, Samples)> = sides.par_iter().map(from_side).collect();
         let mut of_sides = vec![Samples::default(); self.first.len()];
         let mut of_sheets = of_sides.clone();
-        for (side, found) in found {
+        for (side, samples) in samples {
             let sheet = &mut of_sheets[self.first[side]];
-            sheet.places += found.places;
-            sheet.hits += found.hits;
-            sheet.sum += found.sum;
-            of_sides[side] = found;
+            sheet.points += samples.points;
+            sheet.hits += samples.hits;
+            sheet.sum += samples.sum;
+            of_sides[side] = samples;
         }
         SideStatistics { sheets: self, of_sides, of_sheets }
     }
@@ -93,7 +93,7 @@ impl SideStatistics<'_> {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Samples {
     /// Number of points.
-    pub places: f64,
+    pub points: f64,
     /// Number of points with a value.
     pub hits: f64,
     /// Sum of the values.
@@ -103,12 +103,12 @@ pub struct Samples {
 impl Samples {
     /// Share of the points with a value.
     pub fn share(self) -> f64 {
-        self.hits / self.places
+        self.hits / self.points
     }
 
     /// Mean value; points without one count as 0.
     pub fn mean(self) -> f64 {
-        self.sum / self.places
+        self.sum / self.points
     }
 }
 

@@ -274,9 +274,9 @@ impl<'a> Walks<'a> {
     /// nothing is solid.
     pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
         let [a, b, c] = self.scene.corners(t);
-        let place = fold_to_triangle([rng.f64(), rng.f64()]);
+        let position = fold_to_triangle([rng.f64(), rng.f64()]);
         let others = repeat_with(|| fold_to_triangle([rng.f64(), rng.f64()])).take(1000);
-        let [u, v] = self.scene.first_solid(t, once(place).chain(others)).unwrap_or(place);
+        let [u, v] = self.scene.first_solid(t, once(position).chain(others)).unwrap_or(position);
         a + u * (b - a) + v * (c - a)
     }
 }
