@@ -52,11 +52,12 @@ impl Octaves {
     pub fn for_each_part(
         &self,
         triangle: [DVec3; 3],
-        (area, has_holes): (f64, bool),
+        area: f64,
+        has_holes: bool,
         take: &mut dyn FnMut(Part),
     ) {
         let is_split = self.centre.is_some() && !has_holes;
-        self.split(&triangle, WHOLE, (area, is_split), take);
+        self.split(&triangle, WHOLE, area, is_split, take);
     }
 
     /// Distance of the part plus the diagonal of the dense region; 1 if all is one octave.
@@ -71,7 +72,8 @@ impl Octaves {
         &self,
         triangle: &[DVec3; 3],
         corners: [[f64; 2]; 3],
-        (area, is_split): (f64, bool),
+        area: f64,
+        is_split: bool,
         take: &mut dyn FnMut(Part),
     ) {
         let [a, b, c] = triangle;
@@ -86,7 +88,7 @@ impl Octaves {
         let (p, q, r) = (middle(0, 1), middle(1, 2), middle(2, 0));
         let [a, b, c] = corners;
         for part in [[a, p, r], [p, b, q], [r, q, c], [p, q, r]] {
-            self.split(triangle, part, (area / 4.0, is_split), take);
+            self.split(triangle, part, area / 4.0, is_split, take);
         }
     }
 }
@@ -119,7 +121,7 @@ mod tests {
 
     fn parts_of(octaves: &Octaves, has_holes: bool) -> Vec<Part> {
         let mut parts = vec![];
-        octaves.for_each_part(GROUND, (2e6, has_holes), &mut |part| parts.push(part));
+        octaves.for_each_part(GROUND, 2e6, has_holes, &mut |part| parts.push(part));
         parts
     }
 

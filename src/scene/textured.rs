@@ -47,7 +47,7 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn reflectance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
-        self.filtered(t, map, self.material(t).reflectance, (barycentric, share))
+        self.filtered(t, map, self.material(t).reflectance, barycentric, share)
     }
 
     /// The fraction of the light arriving around a point that is scattered diffusely, on either
@@ -72,7 +72,7 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn exitance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
-        self.filtered(t, map, self.material(t).exitance, (barycentric, share))
+        self.filtered(t, map, self.material(t).exitance, barycentric, share)
     }
 
     /// The value of `map` at a point of triangle `t`, filtered over a fraction of its area, for
@@ -82,7 +82,8 @@ impl Scene {
         t: usize,
         map: Option<&TextureMap>,
         mean: Rgb,
-        (barycentric, share): ([f64; 2], f64),
+        barycentric: [f64; 2],
+        share: f64,
     ) -> Rgb {
         let Some(map) = map else { return mean };
         let [a, b, c] = WHOLE.map(|corner| self.texture_point(t, corner));

@@ -57,11 +57,11 @@ impl Openness {
             let [from, to] = part_of_length(beside, ends.map(on_plane), line);
             [0.2, 0.5, 0.8].into_iter().any(|share| {
                 let point = from.lerp(to, share) + self.above * beside * normal;
-                let sides = [across, -across].map(|away| (point + beside * away, away));
-                match sides.map(|(beside, _)| self.is_open(beside, normal)) {
+                let at = |away: DVec3| point + beside * away;
+                match [across, -across].map(|away| self.is_open(at(away), normal)) {
                     [true, true] => true,
-                    [true, false] => self.is_slit(sides[0]),
-                    [false, true] => self.is_slit(sides[1]),
+                    [true, false] => self.is_slit(at(across), across),
+                    [false, true] => self.is_slit(at(-across), -across),
                     [false, false] => false,
                 }
             })
@@ -70,7 +70,7 @@ impl Openness {
 
     /// Whether another wall is nearer than the finest element edge, seen `away` from the wall
     /// beside.
-    fn is_slit(&self, (point, away): (DVec3, DVec3)) -> bool {
+    fn is_slit(&self, point: DVec3, away: DVec3) -> bool {
         let [_, finest] = self.beside;
         self.rays.occluded(point, away, 0.0..finest, |_| true)
     }
