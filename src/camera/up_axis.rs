@@ -15,12 +15,6 @@ use glam::DVec3;
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Sine of the angle up to which a surface counts as level or upright: 5 degrees. Plain choice.
-const LEVEL_SINE: f64 = 0.087;
-
-/// Height of the lowest and of the highest slice, as a fraction of the scene's. Plain choice.
-const SLICE: f64 = 0.03;
-
 /// The axis, +y or +z, that most likely points up in `scene`: by level and upright area, by objects
 /// that are wider below than above, and by which way ground, roofs and lamps face. +y without clear
 /// evidence.
@@ -32,6 +26,8 @@ pub fn up_axis(scene: &Scene) -> DVec3 {
 fn evidence(scene: &Scene, axis: DVec3) -> f64 {
     let (mut area, mut aligned, mut upward) = (0.0, 0.0, 0.0);
     let (mut emitted, mut downward) = (0.0, 0.0);
+    // Level and upright within 5 degrees. Plain choice.
+    let sine = 0.087;
     for t in 0..scene.triangles().len() {
         let (size, cosine) = (scene.area(t), scene.normal(t).dot(axis));
         let exitance = scene.material(t).exitance.element_sum();
@@ -41,8 +37,8 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
             continue;
         }
         area += size;
-        let level = cosine.abs() > 1.0 - LEVEL_SINE * LEVEL_SINE / 2.0;
-        if level || cosine.abs() < LEVEL_SINE {
+        let level = cosine.abs() > 1.0 - sine * sine / 2.0;
+        if level || cosine.abs() < sine {
             aligned += size;
         }
         if level {
@@ -64,14 +60,16 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
 fn footing(scene: &Scene, axis: DVec3) -> f64 {
     let bounds = scene.reflecting_bounds();
     let (low, height) = (bounds.low.dot(axis), bounds.size().dot(axis));
+    // As a fraction of the height. Plain choice.
+    let slice = 0.03;
     let (mut lowest, mut highest) = (Aabb::EMPTY, Aabb::EMPTY);
     let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters());
     for corner in reflecting.flat_map(|t| scene.corners(t)) {
         let level = corner.dot(axis) - low;
-        if level <= SLICE * height {
+        if level <= slice * height {
             lowest.include(corner);
         }
-        if level >= (1.0 - SLICE) * height {
+        if level >= (1.0 - slice) * height {
             highest.include(corner);
         }
     }

@@ -113,7 +113,9 @@ mod tests {
     use super::*;
     use crate::sampling::hash::{split_mix64_nth, unit_interval};
 
-    const UNIT: Aabb = Aabb { low: DVec3::ZERO, high: DVec3::ONE };
+    fn unit() -> Aabb {
+        Aabb { low: DVec3::ZERO, high: DVec3::ONE }
+    }
 
     /// Cubes in a unit cube, at random.
     fn cubes(count: u32, size: f64) -> Vec<Aabb> {
@@ -149,7 +151,7 @@ mod tests {
     fn crowded_boxes_find_all_others() {
         // Some floors, each below all the cubes, are in crowds; the cubes are not.
         let mut boxes = cubes(3000, 0.02);
-        boxes.extend([UNIT; 3]);
+        boxes.extend([unit(); 3]);
         let all = sorted(&boxes);
         assert!(all == brute_force(&boxes));
         assert!(all[3000].len() > 10 * MAX_OVERLAPS);
@@ -157,10 +159,10 @@ mod tests {
 
     #[test]
     fn is_linear_in_crowds() {
-        const N: usize = 20_000;
-        let all = sorted(&[UNIT; N]);
+        let n = 20_000;
+        let all = sorted(&vec![unit(); n]);
         // Each is paired with the 256 of highest rank, and these with all.
-        let expected = |k: usize| if k < MAX_OVERLAPS { N - 1 } else { MAX_OVERLAPS };
-        assert!((0..N).all(|k| all[k].len() == expected(k)));
+        let expected = |k: usize| if k < MAX_OVERLAPS { n - 1 } else { MAX_OVERLAPS };
+        assert!((0..n).all(|k| all[k].len() == expected(k)));
     }
 }

@@ -35,10 +35,6 @@ use crate::geometry::plane::Plane;
 use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
 
-/// Maximum number of cells of a sum; the remaining error is reported. Limits time and memory; plain
-/// choice.
-const MAX_CELLS: usize = 40_000;
-
 /// An occluded pair of polygons: one of the two, the domain, in cells.
 pub(super) struct OccludedPair {
     /// Area of the domain.
@@ -286,7 +282,7 @@ impl SquaredErrors {
 }
 
 /// The sum of A₁F₁₂ over all `pairs`: cells are cut until the error bound of the sum is at most
-/// `tolerance` and its estimate a tenth of that, or [`MAX_CELLS`] are reached.
+/// `tolerance` and its estimate a tenth of that, or 40 000 cells are reached.
 pub(super) fn integrate_adaptively(
     pairs: &mut [OccludedPair],
     tolerance: f64,
@@ -300,7 +296,8 @@ pub(super) fn integrate_adaptively(
             heap.push(HeapEntry { error_bound: cell.error_bound, pair, cell: index });
         }
     }
-    while !squared_errors.are_within(tolerance) && heap.len() < MAX_CELLS {
+    // Limits time and memory; the remaining error is reported.
+    while !squared_errors.are_within(tolerance) && heap.len() < 40_000 {
         let Some(HeapEntry { error_bound, pair, cell }) = heap.pop() else { break };
         if error_bound == 0.0 {
             break;

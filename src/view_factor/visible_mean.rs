@@ -27,15 +27,11 @@ use crate::geometry::polygon::polygon_area;
 /// Parts of the point set: each is evenly distributed for its number of points.
 const PARTS: usize = 8;
 
-/// Maximum number of points of a part: limits time, and the remaining error is reported. Plain
-/// choice.
-const MAX_POINTS: u32 = 512;
-
 /// Minimum number of points of a pair.
 pub(super) const MIN_POINTS: u32 = 2 * PARTS as u32;
 
 /// A₁F₁₂ of `pair` past all blockers `between`, from points of its first polygon, with a standard
-/// error of `tolerance` if eight times [`MAX_POINTS`] suffice; `unoccluded` is the value without
+/// error of `tolerance` if 4096 points suffice; `unoccluded` is the value without
 /// blockers.
 pub(super) fn visible_mean(
     pair: &FacingPair,
@@ -64,7 +60,8 @@ pub(super) fn visible_mean(
         let spacing = (area / f64::from(PARTS as u32 * count)).sqrt();
         let share = visible_share(&parts, count, (spacing / penumbra).min(1.0));
         let mean = Estimate { value: unoccluded * share.value, error: unoccluded * share.error };
-        if mean.error <= tolerance || count >= MAX_POINTS {
+        // Limits time; the remaining error is reported.
+        if mean.error <= tolerance || count >= 512 {
             return mean;
         }
         // All of them are the first half of twice the number.

@@ -85,9 +85,6 @@ struct Results {
     adapter: String,
 }
 
-/// Number of times that runs of less than 4 s are timed.
-const ROUNDS: u32 = 3;
-
 /// What bakes are made of and with.
 struct Bench {
     scene: Arc<Scene>,
@@ -178,8 +175,9 @@ impl Bench {
             eprintln!("{name}: {:.2} s, error {:.2} %", one.seconds, 100.0 * one.error.value);
             all.push((run, one));
         }
-        for round in 1..ROUNDS {
-            let name = format!("short runs again, {} of {ROUNDS} times", round + 1);
+        let rounds = 3;
+        for round in 1..rounds {
+            let name = format!("short runs again, {} of {rounds} times", round + 1);
             eprintln!("{name}");
             // Other programs may use the machine too: the least time of a short run counts.
             for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < 4.0) {

@@ -65,7 +65,7 @@ pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     let mut primitives = vec![];
     for (k, ((group, material), faces)) in faces.into_iter().enumerate() {
         primitives.push(if faces.iter().all(|&(_, t)| has_texture_coordinates(light, t)) {
-            textured(light, (group, material), &faces)
+            textured(light, group, material, &faces)
         } else {
             let mut vertices = vec![];
             let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
@@ -105,7 +105,8 @@ fn has_texture_coordinates(light: &GatheredMesh, t: usize) -> bool {
 /// The primitive of `faces`, each with its triangle of the scene.
 fn textured<'a>(
     light: &'a GatheredMesh,
-    (group, material): (u32, u32),
+    group: u32,
+    material: u32,
     faces: &[Face],
 ) -> Primitive<'a> {
     let (surface, scene) = (&light.surface, light.mesh.scene());

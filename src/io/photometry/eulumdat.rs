@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use super::super::text::{Line, finite, physical_lines, place};
 use super::numbers::{Comma, Numbers};
-use super::planes::{Planes, SAME};
+use super::planes::{ANGLE_TOLERANCE, Planes};
 use super::{Photometry, name_of};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Opening, Pole};
@@ -101,12 +101,14 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
 
 /// The C-angles, out of `azimuths`, of the planes that a file of this `symmetry` stores, in order.
 fn measured(symmetry: u8, azimuths: &[f64]) -> Vec<f64> {
-    let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + SAME);
+    let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + ANGLE_TOLERANCE);
     match symmetry {
         1 => azimuths.iter().copied().take(1).collect(),
         2 => up_to(180.0).collect(),
         3 => {
-            let from_270 = azimuths.iter().filter(|a| (270.0 - SAME..360.0 - SAME).contains(*a));
+            let from_270 = azimuths
+                .iter()
+                .filter(|a| (270.0 - ANGLE_TOLERANCE..360.0 - ANGLE_TOLERANCE).contains(*a));
             from_270.map(|a| a - 360.0).chain(up_to(90.0)).collect()
         }
         4 => up_to(90.0).collect(),
@@ -119,7 +121,9 @@ fn unfold(symmetry: u8, planes: &mut Planes) -> Result<(), String> {
     let Some([first, last]) = planes.span().filter(|_| planes.planes.len() > 1) else {
         return Ok(());
     };
-    let is = |from: f64, to: f64| (first - from).abs() < SAME && (last - to).abs() < SAME;
+    let is = |from: f64, to: f64| {
+        (first - from).abs() < ANGLE_TOLERANCE && (last - to).abs() < ANGLE_TOLERANCE
+    };
     match symmetry {
         1 => {}
         2 if is(0.0, 180.0) => planes.mirror_at_last(),
