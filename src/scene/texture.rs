@@ -15,6 +15,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use arrayvec::ArrayVec;
 use glam::DVec2;
 
 use super::rgb::Rgb;
@@ -152,7 +153,7 @@ impl Texture {
         for (i, j) in (0..tiles.y as u32).flat_map(|j| (0..tiles.x as u32).map(move |i| (i, j))) {
             let tile = origin + DVec2::new(i.into(), j.into());
             let inside = |p: DVec2| (DVec2::new(p.x - tile.x, 1.0 - (p.y - tile.y))) * size;
-            let polygon = Polygon::new(&corners.map(inside));
+            let polygon = Polygon(corners.map(inside).into_iter().collect());
             self.add(self.levels.len(), [0, 0], &polygon, smallest, &mut (&mut sum, &mut covered));
         }
         if covered > 0.0 { sum / covered } else { self.at((a + b + c) / 3.0, clamped) }
@@ -347,48 +348,32 @@ pub struct MaterialTextures {
 }
 
 /// A triangle cut by a rectangle has seven corners at most.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec2; 8],
-    count: usize,
-}
+#[derive(Clone)]
+struct Polygon(ArrayVec<DVec2, 8>);
 
 impl Polygon {
-    fn new(corners: &[DVec2]) -> Polygon {
-        let mut polygon = Polygon { corners: [DVec2::ZERO; 8], count: 0 };
-        corners.iter().for_each(|&p| polygon.push(p));
-        polygon
-    }
-
-    fn push(&mut self, corner: DVec2) {
-        if self.count < self.corners.len() {
-            self.corners[self.count] = corner;
-            self.count += 1;
-        }
-    }
-
     /// The part between `low` and `high` (I. Sutherland, G. Hodgman, 1974).
     fn cut(&self, low: DVec2, high: DVec2) -> Polygon {
         let inside = |p: &DVec2| p.cmpge(low).all() && p.cmple(high).all();
-        if self.corners[..self.count].iter().all(inside) {
-            return *self;
+        let mut cut = self.clone();
+        if self.0.iter().all(inside) {
+            return cut;
         }
-        let mut cut = *self;
         for (axis, bound, sign) in
             [(0, low.x, 1.0), (0, high.x, -1.0), (1, low.y, 1.0), (1, high.y, -1.0)]
         {
-            let before = cut;
-            cut.count = 0;
-            for k in 0..before.count {
-                let (p, q) = (before.corners[k], before.corners[(k + 1) % before.count]);
+            let before = std::mem::take(&mut cut.0);
+            for (k, &p) in before.iter().enumerate() {
+                let q = before[(k + 1) % before.len()];
                 let [from, to] = [p, q].map(|p| sign * (p[axis] - bound));
+                // Rounding may give one more corner, of no area.
                 if from >= 0.0 {
-                    cut.push(p);
+                    _ = cut.0.try_push(p);
                 }
                 if (from < 0.0) != (to < 0.0) {
                     let mut crossing = p.lerp(q, from / (from - to));
                     crossing[axis] = bound;
-                    cut.push(crossing);
+                    _ = cut.0.try_push(crossing);
                 }
             }
         }
@@ -396,8 +381,7 @@ impl Polygon {
     }
 
     fn area(&self) -> f64 {
-        let corners = &self.corners[..self.count];
-        let [first, rest @ ..] = corners else { return 0.0 };
+        let [first, rest @ ..] = &self.0[..] else { return 0.0 };
         let fan = rest.windows(2).map(|e| (e[0] - *first).perp_dot(e[1] - *first));
         0.5 * fan.sum::<f64>().abs()
     }
