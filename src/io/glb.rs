@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
 use gltf_json::mesh::Semantic;
 use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
@@ -157,7 +157,7 @@ impl Model<'_> {
         ]);
         if !primitive.places.is_empty() {
             let irradiance = file.add_vectors("_IRRADIANCE", &of_all(&|v| light(irradiance(v))));
-            let places: Vec<[f32; 2]> = primitive.places.iter().map(|uv| uv.to_array()).collect();
+            let places: Vec<[f32; 2]> = primitive.places.iter().map(Vec2::to_array).collect();
             let places = file.add_vectors("TEXCOORD_0", &places);
             all.insert(Valid(Semantic::Extras("IRRADIANCE".into())), irradiance);
             all.insert(Valid(Semantic::TexCoords(0)), places);
