@@ -368,12 +368,13 @@ fn table(lines: &[Line]) -> String {
 
 /// The table as CSV, errors as shares.
 fn csv(lines: &[Line]) -> Vec<u8> {
-    let head = "group,area_share,points,told,measured,standard_error,told/measured";
+    let head = "group,area_share,hidden_share,points,told,measured,standard_error,told/measured";
     let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
     let rows = lines.iter().map(|line| {
         vec![
             line.name.clone(),
             line.area_share.to_string(),
+            line.hidden_share.to_string(),
             line.points.to_string(),
             number(line.claimed),
             number(line.error.map(|error| error.value)),
