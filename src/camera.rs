@@ -28,6 +28,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::GatheredMesh;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 use crate::vertex::{FacePlace, VertexMesh};
@@ -63,17 +64,6 @@ pub struct RadianceImage {
 /// Largest image side, pixels. Plain choice: memory for the pixels is 24 GiB there.
 const MAX_SIDE: u32 = 1 << 15;
 
-/// Maximum number of primary rays along a pixel's side. Plain choice.
-const MAX_SAMPLES: u32 = 256;
-
-/// Cosine of the angle between the view direction and the camera's up above which another up
-/// direction is used. Plain choice.
-const VERTICAL_VIEW: f64 = 0.9999;
-
-/// Largest relative difference of the distances of two surfaces that count as coincident. Rounding
-/// is far below it except for grazing rays.
-const SAME_PLACE: f64 = 1e-9;
-
 impl Camera {
     /// Draws `surface` with `width` × `height` pixels, each the mean (box filter) of `samples` ×
     /// `samples` primary rays on an n-rooks grid: no two in one row or column.
@@ -91,7 +81,7 @@ impl Camera {
         height: u32,
         samples: u32,
     ) -> Result<RadianceImage, Error> {
-        let rays = PrimaryRays::new(self, (surface, None), width, height, samples)?;
+        let rays = PrimaryRays::new(self, surface, None, width, height, samples)?;
         let radiosity = |hit: &Hit| rays.interpolate(hit, &surface.radiosity);
         let (pixels, sky) = rays.pixels(0..width * height, &radiosity).unzip();
         Ok(RadianceImage { width, height, pixels, sky })
@@ -101,9 +91,11 @@ impl Camera {
     fn frame(&self) -> [DVec3; 3] {
         let forward = (self.target - self.eye).normalize();
         let up = self.up.normalize();
-        let vertical = if forward.dot(up).abs() <= VERTICAL_VIEW {
+        // Another direction than up where the view is along it. Plain choice.
+        let is_along = |cosine: f64| cosine.abs() > 0.9999;
+        let vertical = if !is_along(forward.dot(up)) {
             up
-        } else if up.y.abs() > VERTICAL_VIEW {
+        } else if is_along(up.y) {
             DVec3::NEG_Z
         } else {
             DVec3::Y
@@ -124,7 +116,7 @@ impl Camera {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return bad(format!("an image of {width} × {height}"), "use 1 to 32768 pixels a side");
         }
-        if !(1..=MAX_SAMPLES).contains(&samples) {
+        if !(1..=256).contains(&samples) {
             return bad(format!("{samples} samples"), "use 1 to 256 along a pixel's side");
         }
         if !(self.vertical_fov > 0.0 && self.vertical_fov < 180.0) {
@@ -176,7 +168,8 @@ struct PrimaryRays<'a> {
 impl PrimaryRays<'_> {
     fn new<'a>(
         camera: &Camera,
-        (surface, mesh): (&'a VertexMesh, Option<&'a Mesh>),
+        surface: &'a VertexMesh,
+        mesh: Option<&'a Mesh>,
         width: u32,
         height: u32,
         samples: u32,
@@ -218,7 +211,7 @@ impl PrimaryRays<'_> {
         samples: u32,
     ) -> Result<PrimaryRays<'a>, Error> {
         let GatheredMesh { mesh, surface, .. } = light;
-        PrimaryRays::new(camera, (surface, Some(mesh)), width, height, samples)
+        PrimaryRays::new(camera, surface, Some(mesh), width, height, samples)
     }
 
     /// Ranges of the first `pixels` pixels, in order, with about `rays` primary rays each.
@@ -281,7 +274,8 @@ impl PrimaryRays<'_> {
         }
         let is_front = |hit: &Hit| hit.front;
         let front = self.met.closest_hit_of(self.eye, direction, 0.0, None, is_front)?;
-        (front.distance <= first.distance * (1.0 + SAME_PLACE)).then_some(Seen::Front(front))
+        (front.distance <= first.distance * (1.0 + COINCIDENCE_TOLERANCE))
+            .then_some(Seen::Front(front))
     }
 
     /// Values at the surface's vertices, interpolated linearly to a hit.

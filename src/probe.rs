@@ -29,10 +29,6 @@ use harmonics::DIRECTIONS;
 pub use harmonics::Harmonics;
 pub use probe_grid::ProbeGrid;
 
-/// Probes in the first batch; later batches follow the clock. Plain choice: results do not depend
-/// on it.
-const FIRST_BATCH: usize = 16;
-
 /// Irradiance at a point from all sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
@@ -105,7 +101,7 @@ pub fn probes_at(
     let near = near * offset::NEAR_OF_LIFT;
     let mut probes = Vec::with_capacity(positions.len());
     let mut remaining = positions;
-    let mut batches = BatchSizer::new(FIRST_BATCH);
+    let mut batches = BatchSizer::new(16);
     while !remaining.is_empty() {
         let found = batches.next(&mut remaining, |batch| {
             let around = |&position: &DVec3| {

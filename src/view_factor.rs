@@ -63,10 +63,6 @@ pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, MatrixSize, Missing, ViewFactors};
 pub use self::partial_matrix::PartialMatrix;
 
-/// Maximum memory per factor of an exact matrix, bytes. Measured: 28 to 34 for cubes with a box
-/// inside.
-const BYTES_OF_EXACT_FACTOR: usize = 35;
-
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
     /// or far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
@@ -82,13 +78,7 @@ impl ViewFactors {
         two_sided: &[usize],
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
-        check_settings(scene, error, two_sided)?;
-        let polygons = ScenePolygons::new(scene, two_sided);
-        let method = match effort::is_exact_too_long(&polygons) {
-            true => Method::Sparse,
-            false => Method::Exact,
-        };
-        Ok(whole(scene, polygons, error, method, progress))
+        whole(scene, error, two_sided, None, progress)
     }
 
     /// Approximate size of the matrix that [`ViewFactors::new`] makes: estimated from the rays of
@@ -104,11 +94,12 @@ impl ViewFactors {
     ) -> Result<MatrixSize, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        if effort::is_exact_too_long(&polygons) {
+        if effort::method(&polygons) == Method::Sparse {
             return Ok(sparse::predicted_size(scene, polygons, error));
         }
         let factors = scene.groups().len().pow(2);
-        Ok(MatrixSize { factors, bytes: BYTES_OF_EXACT_FACTOR * factors })
+        // Measured: 28 to 34 bytes for cubes with a box inside.
+        Ok(MatrixSize { factors, bytes: 35 * factors })
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
@@ -137,9 +128,7 @@ impl ViewFactors {
         two_sided: &[usize],
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
-        check_settings(scene, error, two_sided)?;
-        let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(whole(scene, polygons, error, Method::Exact, progress))
+        whole(scene, error, two_sided, Some(Method::Exact), progress)
     }
 
     /// The matrix of many polygons that each see few others: with two absolute standard errors of
@@ -163,9 +152,7 @@ impl ViewFactors {
         two_sided: &[usize],
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<ViewFactors>, Error> {
-        check_settings(scene, error, two_sided)?;
-        let polygons = ScenePolygons::new(scene, two_sided);
-        Ok(whole(scene, polygons, error, Method::Sparse, progress))
+        whole(scene, error, two_sided, Some(Method::Sparse), progress)
     }
 
     /// Rows of the exact matrix for the groups `from`: a reference for another matrix.
@@ -258,10 +245,7 @@ impl PartialMatrix {
         }
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        let method = match effort::is_exact_too_long(&polygons) {
-            true => Method::Sparse,
-            false => Method::Exact,
-        };
+        let method = effort::method(&polygons);
         let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
         if let Some(done) = done {
             part.check_fits(&done, "rows that are done")?;
@@ -271,20 +255,23 @@ impl PartialMatrix {
     }
 }
 
-/// The whole matrix by `method`, or `None` if `progress` stops it.
+/// The whole matrix by `method`, or by the one that is faster, or `None` if `progress` stops it.
 fn whole(
     scene: &Scene,
-    polygons: ScenePolygons,
     error: f64,
-    method: Method,
+    two_sided: &[usize],
+    method: Option<Method>,
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-) -> Option<ViewFactors> {
+) -> Result<Option<ViewFactors>, Error> {
+    check_settings(scene, error, two_sided)?;
+    let polygons = ScenePolygons::new(scene, two_sided);
+    let method = method.unwrap_or_else(|| effort::method(&polygons));
     let part = PartialMatrix::none(scene, error, &[], method, &polygons);
     let groups = 0..scene.groups().len();
     let mut told = |_: &PartialMatrix, done, of| progress(done, of);
     let alone = &mut Alone;
     let (part, is_done) = with_rows(part, scene, polygons, error, groups, alone, &mut told);
-    if is_done { part.into_matrix().ok() } else { None }
+    Ok(if is_done { part.into_matrix().ok() } else { None })
 }
 
 /// `part` with rows of `groups` added, and whether the work was completed.

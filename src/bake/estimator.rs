@@ -354,8 +354,8 @@ impl ErrorEstimator<'_> {
                 let (face, group) = (face as u32, mesh.group(node));
                 parts.push(SampledPart { face, group, part, error, flux });
             };
-            let area = (solid * area(vertices), solid < 1.0);
-            self.octaves.for_each_part(corners(vertices), area, &mut take);
+            let area = solid * area(vertices);
+            self.octaves.for_each_part(corners(vertices), area, solid < 1.0, &mut take);
             parts
         };
         let faces = (0..surface.faces.len()).into_par_iter();

@@ -5,6 +5,8 @@
 //!                      └─► inside:  where its middle sees fronts all around; from outside too
 //!                                   where a wall is missing
 //! ```
+//!
+//! All numbers here are plain choices: nothing but the picture depends on them.
 
 use std::f64::consts::TAU;
 
@@ -16,38 +18,6 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::sampling::low_discrepancy::{r2_point, radical_inverse};
 use crate::visibility::ray_scene::{Hit, RayScene};
-
-/// Vertical field of view from outside and from inside, degrees. Plain choice: rooms need a wide
-/// one.
-const OUTSIDE_FOV: f64 = 40.0;
-const INSIDE_FOV: f64 = 70.0;
-
-/// Elevation above the horizon in degrees and azimuth in turns of an oblique view; elevation of a
-/// view from inside. Plain choice.
-const OBLIQUE: [f64; 2] = [25.0, 1.0 / 12.0];
-const INSIDE_ELEVATION: f64 = 10.0;
-
-/// Margin around a box seen from outside, as a fraction of the picture. Plain choice.
-const MARGIN: f64 = 0.04;
-
-/// Number of azimuths from inside; fraction of the free distance behind the middle by which the eye
-/// is moved back. Plain choice: nearly at the wall.
-const AZIMUTHS: u32 = 16;
-const STEP_BACK: f64 = 0.85;
-
-/// Number of directions from the middle, and fractions of them with fronts in a room, and with
-/// nothing in one that lacks a wall. Plain choice: a wall is 1/6 of all directions.
-const DIRECTIONS: usize = 64;
-const ENCLOSURE: f64 = 0.75;
-const OPENING: f64 = 0.1;
-
-/// Points that are tried in turn for a middle that is not within a solid. Plain choice.
-const POINTS: usize = 16;
-
-/// Fraction of the weight that may lie outside the lit box at either end of an axis; its largest
-/// diagonal as a fraction of the scene's: otherwise all is framed. Plain choice.
-const OUTLYING_SHARE: f64 = 0.05;
-const LIT_SIZE: f64 = 0.6;
 
 impl Camera {
     /// Chooses a view of what is lit in `light`, for a picture of this width over height: from
@@ -65,8 +35,8 @@ impl Camera {
         };
         let level = from(0.0, 0.0);
         let camera = match framing.middle_of_room() {
-            None => framing.fitted(from(OBLIQUE[0], OBLIQUE[1]), aspect),
-            Some((middle, open)) if open > OPENING && framing.hit(middle, -level).is_none() => {
+            None => framing.fitted(from(25.0, 1.0 / 12.0), aspect),
+            Some((middle, open)) if open > 0.1 && framing.hit(middle, -level).is_none() => {
                 framing.fitted(level, aspect)
             }
             Some((middle, _)) => framing.inside(middle),
@@ -98,10 +68,10 @@ impl Framing<'_> {
 
     /// The view along unit `forward` from the least distance at which the box is in the picture.
     fn fitted(&self, forward: DVec3, aspect: f64) -> Camera {
-        let (target, up) = (self.bounds.centre(), self.up);
-        let camera = Camera { eye: -forward, target: DVec3::ZERO, up, vertical_fov: OUTSIDE_FOV };
+        let (target, up, vertical_fov) = (self.bounds.centre(), self.up, 40.0_f64);
+        let camera = Camera { eye: -forward, target: DVec3::ZERO, up, vertical_fov };
         let [right, up, _] = camera.frame();
-        let half = (OUTSIDE_FOV.to_radians() / 2.0).tan() * (1.0 - 2.0 * MARGIN);
+        let half = (vertical_fov.to_radians() / 2.0).tan() * (1.0 - 2.0 * 0.04);
         let back = self.bounds.corners().map(|corner| {
             let [x, y, z] = [right, up, forward].map(|axis| (corner - target).dot(axis));
             (x / aspect).abs().max(y.abs()) / half - z
@@ -119,32 +89,32 @@ impl Framing<'_> {
         };
         // Fractions of directions with fronts and with backs.
         let seen = |point: DVec3| {
-            let [mut fronts, mut backs] = [0.0; 2];
-            for [x, y] in (0..DIRECTIONS).map(|k| r2_point(k, 0.5)) {
+            let (count, mut fronts, mut backs) = (64, 0.0, 0.0);
+            for [x, y] in (0..count).map(|k| r2_point(k, 0.5)) {
                 let direction = self.forward((2.0 * x - 1.0).asin().to_degrees(), y);
                 if let Some(hit) = self.hit(point, direction) {
-                    *(if hit.front { &mut fronts } else { &mut backs }) += 1.0 / DIRECTIONS as f64;
+                    *(if hit.front { &mut fronts } else { &mut backs }) += 1.0 / count as f64;
                 }
             }
             [fronts, backs]
         };
-        let mut points = (0..POINTS).map(|k| (point(k), seen(point(k))));
+        let mut points = (0..16).map(|k| (point(k), seen(point(k))));
         let (middle, [fronts, backs]) = points.find(|(_, [_, backs])| *backs < 0.5)?;
-        (fronts >= ENCLOSURE).then_some((middle, 1.0 - fronts - backs))
+        (fronts >= 0.75).then_some((middle, 1.0 - fronts - backs))
     }
 
     /// The view of the middle of the box from the farthest point behind `middle`.
     fn inside(&self, middle: DVec3) -> Camera {
         let eye = |k: u32| {
-            let forward = self.forward(INSIDE_ELEVATION, f64::from(k) / f64::from(AZIMUTHS));
+            let forward = self.forward(10.0, f64::from(k) / 16.0);
             // Not far out of a window.
             let [open, most] = [0.1, 0.5].map(|share| share * self.bounds.diagonal());
             let free = self.hit(middle, -forward).map_or(open, |hit| hit.distance.min(most));
-            middle - forward * (STEP_BACK * free)
+            middle - forward * (0.85 * free)
         };
         let farther = |a: &DVec3, b: &DVec3| a.distance(middle).total_cmp(&b.distance(middle));
-        let eye = (0..AZIMUTHS).map(eye).max_by(farther).expect("some azimuths");
-        Camera { eye, target: self.bounds.centre(), up: self.up, vertical_fov: INSIDE_FOV }
+        let eye = (0..16).map(eye).max_by(farther).expect("some azimuths");
+        Camera { eye, target: self.bounds.centre(), up: self.up, vertical_fov: 70.0 }
     }
 
     /// The same view with rounded coordinates: steps below 1e-4 of the size of the box.
@@ -160,8 +130,9 @@ impl Framing<'_> {
     }
 }
 
-/// The box around nearly all of the reflected light, each triangle weighed by its mean, or around
-/// all that reflects unless it is much smaller; and the sum of flux times normal.
+/// The box around the reflected light but for 5 % at either end of each axis, each triangle weighed
+/// by its mean, or around all that reflects unless it is much smaller; and the sum of flux times
+/// normal.
 fn lit_box(light: &GatheredMesh) -> (Aabb, DVec3) {
     let (surface, scene) = (&light.surface, light.mesh.scene());
     let (mut weights, mut flux) = (vec![0.0; surface.positions.len()], DVec3::ZERO);
@@ -178,8 +149,8 @@ fn lit_box(light: &GatheredMesh) -> (Aabb, DVec3) {
     }
     let places: Vec<(DVec3, f64)> = surface.positions.iter().copied().zip(weights).collect();
     let whole = scene.reflecting_bounds();
-    let lit = Aabb::around_most(&places, OUTLYING_SHARE);
-    let lit = lit.filter(|lit| lit.diagonal() < LIT_SIZE * whole.diagonal());
+    let lit = Aabb::around_most(&places, 0.05);
+    let lit = lit.filter(|lit| lit.diagonal() < 0.6 * whole.diagonal());
     (lit.unwrap_or(whole), flux)
 }
 

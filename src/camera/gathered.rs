@@ -29,17 +29,6 @@ use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 
-/// Primary rays cast at once: bounds the memory for their hits, some 10 MiB. Plain choice.
-const RAYS_PER_BAND: u32 = 1 << 16;
-
-/// Gather points in the first batch; later batches follow the clock. Plain choice: results do not
-/// depend on it.
-const FIRST_BATCH: usize = 64;
-
-/// Relative spread of the interpolated radiosity among rays above which they do not share a gather:
-/// an edge of a shadow lies between them. Plain choice; no measurement kept.
-const EDGE_CONTRAST: f64 = 0.1;
-
 impl Camera {
     /// Draws `light` with the primary rays of [`Camera::image`], but with irradiance gathered at
     /// their hits: the radiance of a point is (E + ρ × irradiance) / π, W/(m² sr).
@@ -63,13 +52,14 @@ impl Camera {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
-        let bands = rays.bands(width * height, RAYS_PER_BAND);
+        // Bounds the memory for hits, some 10 MiB.
+        let bands = rays.bands(width * height, 1 << 16);
         let view = GatheredView::new(LitSurface { rays, light });
         let field = light.radiosity_field();
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let mut sky = vec![false; pixels.len()];
         let total = pixels.len();
-        let mut batch_sizer = BatchSizer::new(FIRST_BATCH);
+        let mut batch_sizer = BatchSizer::new(64);
         for band in bands {
             let end = band.end;
             let (gathering, others): (Vec<PixelPart>, Vec<PixelPart>) =
@@ -228,7 +218,9 @@ impl GatheredView<'_> {
         let sum: Rgb = radiosity().sum();
         let low = radiosity().fold(Rgb::INFINITY, Rgb::min);
         let spread = (radiosity().fold(Rgb::ZERO, Rgb::max) - low) * hits.len() as f64;
-        if hits.len() > 1 && spread.length() > EDGE_CONTRAST * sum.length() {
+        // Rays among which radiosity differs by more than a tenth do not share a gather: an edge of
+        // a shadow lies between them. Plain choice.
+        if hits.len() > 1 && spread.length() > 0.1 * sum.length() {
             // Hits are in order of sub-pixel rows: the upper and the lower half.
             let (upper, lower) = hits.split_at(hits.len() / 2);
             self.add_parts(pixel, history, upper, parts);

@@ -12,9 +12,6 @@ use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
 
-/// Primary rays between two reports of progress: a tenth of a second on two cores.
-const RAYS_PER_BAND: u32 = 1 << 18;
-
 impl Camera {
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
     /// hits a textured material, the irradiance between the vertices is reflected by the texture at
@@ -37,7 +34,8 @@ impl Camera {
     ) -> Result<Option<RadianceImage>, Error> {
         let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
         let count = width * height;
-        let bands = rays.bands(count, RAYS_PER_BAND);
+        // A tenth of a second on two cores.
+        let bands = rays.bands(count, 1 << 18);
         let lit = LitSurface { rays, light };
         let second_pass = SecondPass::new(&lit);
         let (mut pixels, mut sky) = (Vec::with_capacity(count as usize), vec![]);

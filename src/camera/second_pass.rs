@@ -34,10 +34,6 @@ use crate::visibility::ray_scene::Hit;
 /// dropped. Plain choice: below one step of 8 bits at white.
 const LEFT_OUT: f64 = 1.0 / 1024.0;
 
-/// Maximum number of boundaries that a ray and its branches hit. Plain choice: between two mirrors
-/// of reflectance 0.98 a ray is down to [`LEFT_OUT`] after 343.
-const MAX_BOUNDARIES: usize = 512;
-
 /// A surface or sky seen along a camera ray or a branch of it.
 pub(super) struct Sighting {
     pub seen: Seen,
@@ -92,8 +88,7 @@ impl SecondPass {
             return None;
         }
         let glass = GlassBodies::new(scene);
-        let contact = (offset::PATH_CONTACT * scene.bounds().diagonal())
-            .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp());
+        let contact = offset::path_contact(scene);
         Some(SecondPass {
             media: glass.around(scene, lit.rays.eye),
             glass,
@@ -133,7 +128,9 @@ impl SecondPass {
         }];
         let (mut all, mut seen_weight) = (vec![], Rgb::ZERO);
         let heaviness = |branch: &Branch| branch.weight.max_element();
-        for _ in 0..=MAX_BOUNDARIES {
+        // Plain choice: between two mirrors of reflectance 0.98 a ray is down to a weight of
+        // `LEFT_OUT` after 343.
+        for _ in 0..=512 {
             if pending.iter().map(heaviness).sum::<f64>() <= LEFT_OUT {
                 break;
             }

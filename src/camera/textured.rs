@@ -39,8 +39,8 @@ impl LitSurface<'_> {
             return [material.albedo(), material.exitance];
         }
         let position = self.rays.interpolate(hit, &self.light.surface.positions);
-        let (place, share) = (scene.barycentric(t, position), self.share(t, position, sight));
-        [scene.albedo_around(t, place, share), scene.exitance_around(t, place, share)]
+        let (point, share) = (scene.barycentric(t, position), self.share(t, position, sight));
+        [scene.albedo_around(t, point, share), scene.exitance_around(t, point, share)]
     }
 
     /// Radiosity at a hit, W/m²: by the light at the vertices and the texture at the hit.

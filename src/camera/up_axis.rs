@@ -15,34 +15,19 @@ use glam::DVec3;
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Sine of the angle up to which a surface counts as level or upright: 5 degrees. Plain choice.
-const LEVEL_SINE: f64 = 0.087;
-
-/// Weights of the other evidence; that of the fraction of level and upright area is 1. Chosen on
-/// scenes of both kinds: the footing distinguishes a house from one on its gable, where 0.3 of the
-/// area, its roof, is out of line; a room that lacks a wall, 0.2 of its area, keeps its axis; a
-/// lamp decides otherwise equal cases.
-const FOOTING_WEIGHT: f64 = 0.5;
-const UPWARD_WEIGHT: f64 = 0.3;
-const LAMP_WEIGHT: f64 = 0.08;
-
-/// Height of the lowest and of the highest slice, as a fraction of the scene's. Plain choice.
-const SLICE: f64 = 0.03;
-
-/// Least excess of the evidence for +z over that for +y. Plain choice.
-const MARGIN: f64 = 0.05;
-
 /// The axis, +y or +z, that most likely points up in `scene`: by level and upright area, by objects
 /// that are wider below than above, and by which way ground, roofs and lamps face. +y without clear
 /// evidence.
 pub fn up_axis(scene: &Scene) -> DVec3 {
-    if evidence(scene, DVec3::Z) > evidence(scene, DVec3::Y) + MARGIN { DVec3::Z } else { DVec3::Y }
+    if evidence(scene, DVec3::Z) > evidence(scene, DVec3::Y) + 0.05 { DVec3::Z } else { DVec3::Y }
 }
 
 /// Evidence for `axis`: about 1 for a room, more for objects on a ground.
 fn evidence(scene: &Scene, axis: DVec3) -> f64 {
     let (mut area, mut aligned, mut upward) = (0.0, 0.0, 0.0);
     let (mut emitted, mut downward) = (0.0, 0.0);
+    // Level and upright within 5 degrees. Plain choice.
+    let sine = 0.087;
     for t in 0..scene.triangles().len() {
         let (size, cosine) = (scene.area(t), scene.normal(t).dot(axis));
         let exitance = scene.material(t).exitance.element_sum();
@@ -52,8 +37,8 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
             continue;
         }
         area += size;
-        let level = cosine.abs() > 1.0 - LEVEL_SINE * LEVEL_SINE / 2.0;
-        if level || cosine.abs() < LEVEL_SINE {
+        let level = cosine.abs() > 1.0 - sine * sine / 2.0;
+        if level || cosine.abs() < sine {
             aligned += size;
         }
         if level {
@@ -61,10 +46,13 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
         }
     }
     let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).max(0.0) } else { 0.0 };
+    // Weights chosen on scenes of both kinds. The footing distinguishes a house from one on its
+    // gable, where 0.3 of the area, its roof, is out of line; a room that lacks a wall, 0.2 of its
+    // area, keeps its axis; a lamp decides otherwise equal cases.
     share(aligned, area)
-        + FOOTING_WEIGHT * footing(scene, axis)
-        + UPWARD_WEIGHT * share(upward, area)
-        + LAMP_WEIGHT * share(downward, emitted)
+        + 0.5 * footing(scene, axis)
+        + 0.3 * share(upward, area)
+        + 0.08 * share(downward, emitted)
 }
 
 /// Size of the lowest slice less that of the highest one, as a fraction of the whole: size across
@@ -72,14 +60,16 @@ fn evidence(scene: &Scene, axis: DVec3) -> f64 {
 fn footing(scene: &Scene, axis: DVec3) -> f64 {
     let bounds = scene.reflecting_bounds();
     let (low, height) = (bounds.low.dot(axis), bounds.size().dot(axis));
+    // As a fraction of the height. Plain choice.
+    let slice = 0.03;
     let (mut lowest, mut highest) = (Aabb::EMPTY, Aabb::EMPTY);
     let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters());
     for corner in reflecting.flat_map(|t| scene.corners(t)) {
         let level = corner.dot(axis) - low;
-        if level <= SLICE * height {
+        if level <= slice * height {
             lowest.include(corner);
         }
-        if level >= (1.0 - SLICE) * height {
+        if level >= (1.0 - slice) * height {
             highest.include(corner);
         }
     }

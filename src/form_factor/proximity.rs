@@ -28,10 +28,6 @@ use crate::mesh::{Mesh, NodeId};
 /// reach, or just twice as large: rounding must not decide which of them are corrected.
 const REACH_TOLERANCE: f64 = 1.0 + 1e-6;
 
-/// Receivers more than this number of times as large as the patch keep their entries: their own
-/// centroid represents them worse than the patch's represents the patch.
-const MAX_RECEIVER_SIZE: f64 = 2.0;
-
 /// Rows of another source, with the entries of near receivers corrected by closed forms.
 ///
 /// The correction is for the proximity assumption of Baum, Rushmeier and Winget (1989): that all
@@ -125,7 +121,9 @@ impl NearField {
         for (k, entry) in row.entries.iter().enumerate() {
             let sphere = self.spheres[entry.element as usize];
             let is_far = sphere.gap(&around) > self.reach * 2.0 * around.radius * REACH_TOLERANCE;
-            if is_far || sphere.radius > MAX_RECEIVER_SIZE * around.radius * REACH_TOLERANCE {
+            // The centroid of a larger receiver represents it worse than the patch's represents the
+            // patch.
+            if is_far || sphere.radius > 2.0 * around.radius * REACH_TOLERANCE {
                 continue;
             }
             let element = mesh.element(entry.element as usize);

@@ -14,11 +14,11 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::GatherPoint;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::quadrature::{GAUSS_LEGENDRE_3, Node};
 use crate::sampling::low_discrepancy::{r2_point, sobol_02_point};
 use crate::sampling::rotation::{CellRotation, second_rotation};
 use crate::scene::{Luminaire, Rgb};
-use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
@@ -107,7 +107,7 @@ impl LuminaireLight<'_> {
     /// The share per channel of light that arrives at `point` from `target`.
     fn passed(&self, point: &GatherPoint, target: DVec3) -> Rgb {
         let to = target - point.position;
-        let reach = point.near / to.length()..1.0 - offset::SEGMENT_END;
+        let reach = point.near / to.length()..1.0 - COINCIDENCE_TOLERANCE;
         if self.rays.occluded(point.position, to, reach.clone(), |_| true) {
             return Rgb::ZERO;
         }

@@ -9,10 +9,8 @@
 //! low  0────────1       └── x      box has low = ∞ and high = −∞.
 //! ```
 
+use super::COINCIDENCE_TOLERANCE;
 use glam::{BVec3, DVec3};
-
-/// Largest relative difference of sides that count as equal: coordinates are rounded.
-const EQUAL: f64 = 1e-9;
 
 /// An axis-aligned box from its lowest to its highest coordinates, both within it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,7 +108,7 @@ impl Aabb {
     /// The axis (0 to 2) of the longest side; the last of those that are equal but for rounding.
     pub fn longest_axis(&self) -> usize {
         let size = self.size();
-        let long = (1.0 - EQUAL) * size.max_element();
+        let long = (1.0 - COINCIDENCE_TOLERANCE) * size.max_element();
         (0..3).rfind(|&axis| size[axis] >= long).unwrap_or(2)
     }
 

@@ -119,17 +119,6 @@ pub(crate) fn collapsed_point([a, b, c]: [DVec3; 3], u: f64, v: f64) -> DVec3 {
     a + u * ((b - a) + v * (c - b))
 }
 
-/// Levels of the tanh–sinh rule: the finest step is 2⁻⁷.
-const TANH_SINH_LEVELS: u32 = 7;
-
-/// Nodes of the tanh–sinh rule with weights below this change no sum of terms near 1.
-const TANH_SINH_MIN_WEIGHT: f64 = 1e-18;
-
-/// Largest difference of two levels of the tanh–sinh rule at convergence, in units of the
-/// integrand, which callers keep near 1. The error about squares with each level, so that only
-/// rounding is left.
-const TANH_SINH_TOLERANCE: f64 = 1e-13;
-
 /// Nodes of the tanh–sinh rule in the nearer half of [0, 1]: `x` is the distance from either end.
 /// Level k has the nodes that step 2^−(k+1) adds to those of twice that step.
 static TANH_SINH: LazyLock<Vec<Vec<Node>>> = LazyLock::new(|| {
@@ -141,9 +130,11 @@ static TANH_SINH: LazyLock<Vec<Vec<Node>>> = LazyLock::new(|| {
         let step = 0.5_f64.powi(k as i32 + 1);
         let stride = if k == 0 { 1 } else { 2 };
         let nodes = (1..).step_by(stride).map(move |i: u32| node_at(f64::from(i) * step));
-        nodes.take_while(|node| node.weight > TANH_SINH_MIN_WEIGHT).collect()
+        // Less changes no sum of terms near 1.
+        nodes.take_while(|node| node.weight > 1e-18).collect()
     };
-    (0..TANH_SINH_LEVELS).map(level).collect()
+    // The finest step is 2⁻⁷.
+    (0..7).map(level).collect()
 });
 
 /// ∫ f over [from, to], f analytic inside but perhaps singular at the ends: the tanh–sinh rule
@@ -159,7 +150,9 @@ pub(crate) fn tanh_sinh(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
         sum += level.iter().map(|node| node.weight * both_ends(node.x)).sum::<f64>();
         step *= 0.5;
         let coarser = std::mem::replace(&mut value, step * sum);
-        if (value - coarser).abs() <= TANH_SINH_TOLERANCE {
+        // In units of the integrand, which callers keep near 1. The error about squares with each
+        // level, so that only rounding is left.
+        if (value - coarser).abs() <= 1e-13 {
             break;
         }
     }
@@ -177,29 +170,23 @@ pub(crate) struct TriangleNode {
     pub degree_2: f64,
 }
 
-/// Weights of the centroid in Radon's rule (9/40) and in the rule of degree two within it.
-///
-/// The weights of the rule of degree two have seven digits only, so that it errs by 3e-8 for
-/// polynomials of degree two: accurate enough for the difference that estimates an error.
-const RADON_CENTROID: (f64, f64) = (0.225, 0.484_123_183_164);
-
-/// Orbits of three points of Radon's rule: barycentric coordinate of two of the corners,
-/// (6 ∓ √15)/21, weight, (155 ∓ √15)/1200, and weight in the rule of degree two within it.
-const RADON_ORBITS: [(f64, f64, f64); 2] = [
-    (0.101_286_507_323_456_34, 0.125_939_180_544_827_15, 0.171_958_938_945),
-    (0.470_142_064_105_115_1, 0.132_394_152_788_506_2, 0.0),
-];
-
 /// The seven points over a triangle of Radon's rule, exact to degree five (J. Radon, 1948;
 /// A. H. Stroud, Approximate Calculation of Multiple Integrals, 1971, T2:5-1).
 ///
 /// Four of the points with other weights are exact to degree two: the difference of the two sums
 /// estimates the smoothness of the integrand.
 pub(crate) fn radon_nodes([a, b, c]: [DVec3; 3]) -> [TriangleNode; 7] {
-    let (degree_5, degree_2) = RADON_CENTROID;
+    // The weights of the rule of degree two have seven digits only, so that it errs by 3e-8 for
+    // polynomials of degree two: accurate enough for the difference that estimates an error.
+    let (degree_5, degree_2) = (0.225, 0.484_123_183_164);
+    // (6 ∓ √15)/21 and (155 ∓ √15)/1200.
+    let orbits = [
+        (0.101_286_507_323_456_34, 0.125_939_180_544_827_15, 0.171_958_938_945),
+        (0.470_142_064_105_115_1, 0.132_394_152_788_506_2, 0.0),
+    ];
     let mut nodes = [TriangleNode { point: (a + b + c) / 3.0, degree_5, degree_2 }; 7];
     let mut at = 1;
-    for (share, degree_5, degree_2) in RADON_ORBITS {
+    for (share, degree_5, degree_2) in orbits {
         for (p, q, r) in [(a, b, c), (b, c, a), (c, a, b)] {
             let point = share * (p + q) + (1.0 - 2.0 * share) * r;
             nodes[at] = TriangleNode { point, degree_5, degree_2 };

@@ -11,10 +11,6 @@
 use earcut::{Earcut, utils3d::project3d_to_2d};
 use glam::DVec3;
 
-/// Maximum number of corners of a polygon that no fan covers: ear clipping takes time quadratic in
-/// them at worst. Plain choice.
-pub(crate) const MAX_EAR_CLIPPING_CORNERS: usize = 10_000;
-
 /// Height of a triangle up to which it is flat but for the rounding of its corners: a few
 /// operations on coordinates. In units of the polygon's extent or of its largest coordinate,
 /// whichever is larger.
@@ -109,7 +105,8 @@ fn turns([a, b, c]: [DVec3; 3], up: DVec3, flat_height: f64) -> bool {
 
 /// Ear clipping in the plane across `up`: triangles, and twice the area that they cover there.
 fn ear_clip(points: &[DVec3], up: DVec3, flat_height: f64) -> Option<(Vec<[usize; 3]>, f64)> {
-    if points.len() > MAX_EAR_CLIPPING_CORNERS {
+    // The time is quadratic in the number of corners at worst.
+    if points.len() > 10_000 {
         return None;
     }
     let points: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();

@@ -14,15 +14,6 @@ pub struct GridSettings {
     pub spacing: Option<f64>,
 }
 
-/// The longest cell of EN 12464-1, m.
-const LONGEST_CELL: f64 = 10.0;
-
-/// Ratio of its sides from which a plane's cells follow the shorter side (EN 12464-1:2011, 4.4).
-const LONG_PLANE: f64 = 2.0;
-
-/// Maximum number of points of a grid. Plain choice.
-const MAX_POINTS: f64 = 1e6;
-
 impl Default for GridSettings {
     /// Metres, the standard's spacing, and its strip along walls.
     fn default() -> GridSettings {
@@ -47,13 +38,14 @@ impl GridSettings {
         let [a, b] = edges.map(|edge| edge / self.metre);
         self.checked()?;
         let (long, short) = (a.max(b), a.min(b));
-        let d = if long >= LONG_PLANE * short { short } else { long };
-        let by_norm = (0.2 * 5f64.powf(d.log10())).min(LONGEST_CELL);
+        // EN 12464-1:2011, 4.4.
+        let d = if long >= 2.0 * short { short } else { long };
+        let by_norm = (0.2 * 5f64.powf(d.log10())).min(10.0);
         let p = self.spacing.unwrap_or(by_norm);
         // The next odd number; 1e-9 keeps rounding of a whole number of cells from adding one.
         let counts = [a, b].map(|edge| (edge / p * (1.0 - 1e-9) / 2.0 - 0.5).ceil() * 2.0 + 1.0);
         let counts = counts.map(|n| n.max(1.0));
-        if counts[0] * counts[1] <= MAX_POINTS {
+        if counts[0] * counts[1] <= 1e6 {
             return Ok(counts.map(|n| n as usize));
         }
         let found = format!("a plane of {a} m by {b} m with {p} m between its points");

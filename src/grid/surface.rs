@@ -16,15 +16,6 @@ use crate::visibility::ray_scene::RayScene;
 /// Cosine of the angle up to which a surface counts as level: 5 degrees. Plain choice.
 const LEVEL_COSINE: f64 = 0.996;
 
-/// Least area of a floor, m²: more than that of tables. Plain choice.
-const MIN_FLOOR_AREA: f64 = 4.0;
-
-/// Depth below its highest corner that still belongs to a group's highest side, m. Plain choice.
-const SAME_LEVEL: f64 = 0.01;
-
-/// Number of directions in which a surface is tested to go on, from each point.
-const AROUND: usize = 8;
-
 /// Triangles with similar normals, in about one plane.
 pub(super) struct LevelSurface {
     name: String,
@@ -65,7 +56,8 @@ impl LevelSurface {
             parts[joined.find(k)].push(t);
         }
         let is_large = |part: &Vec<usize>| {
-            part.iter().map(|&t| scene.area(t)).sum::<f64>() >= MIN_FLOOR_AREA * metre * metre
+            // 4 m²: more than tables have.
+            part.iter().map(|&t| scene.area(t)).sum::<f64>() >= 4.0 * metre * metre
         };
         let large = parts.into_iter().filter(is_large);
         let mut floors: Vec<LevelSurface> =
@@ -110,7 +102,8 @@ impl LevelSurface {
             return wrong("no flat side".into(), "name one that is flat, or give a plane");
         }
         let top = LevelSurface::new(scene, side, normal);
-        let is_top = |&t: &usize| level(scene, t, normal) > top.level - SAME_LEVEL * metre;
+        // 1 cm.
+        let is_top = |&t: &usize| level(scene, t, normal) > top.level - 0.01 * metre;
         let triangles = top.triangles.into_iter().filter(is_top).collect();
         Ok(LevelSurface { triangles, name: group.into(), ..top })
     }
@@ -135,10 +128,10 @@ impl LevelSurface {
         };
         let axes = self.axes(&inner);
         let around = |k: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / 8.0).sin_cos();
             strip * (cos * axes[0] + sin * axes[1])
         };
-        let inside = |p: DVec3| is_over(p) && (0..AROUND).all(|k| is_over(p + around(k)));
+        let inside = |p: DVec3| is_over(p) && (0..8).all(|k| is_over(p + around(k)));
         let grid = MeasuringGrid::filling(self.name.clone(), inner, settings, inside)?;
         Ok(grid.points.iter().any(Option::is_some).then_some(grid))
     }

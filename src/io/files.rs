@@ -18,16 +18,6 @@ use crate::error::quoted;
 /// least two, so that 32 bits number the sides of all triangles.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 
-/// Maximum number of names searched in a scene's folder; more count as missing, so that a file with
-/// a million names does not keep the disk busy. Plain choice: a search takes some 10 µs.
-const MAX_LOOKUPS: usize = 10_000;
-
-/// Maximum number of bytes of a name that is searched: that of a path on Linux.
-const MAX_NAME: usize = 4096;
-
-/// Maximum number of folders of a name, from its end, that are searched below the scene's folder.
-const MAX_FOLDERS: usize = 8;
-
 /// The files that an OBJ file and its libraries can name.
 pub(super) struct FileSource<'a> {
     place: Place<'a>,
@@ -68,13 +58,15 @@ impl<'a> FileSource<'a> {
 
     /// The file of this `name`, as a path from the scene's folder.
     pub fn find(&self, name: &str) -> Option<String> {
-        if name.len() > MAX_NAME || name.contains('\0') {
+        // The length of a path on Linux.
+        if name.len() > 4096 || name.contains('\0') {
             return None;
         }
         if let Some(found) = self.found.borrow().get(name) {
             return found.clone();
         }
-        if self.lookups.replace(self.lookups.get() + 1) >= MAX_LOOKUPS {
+        // A search takes some 10 µs: a file with a million names does not keep the disk busy.
+        if self.lookups.replace(self.lookups.get() + 1) >= 10_000 {
             return None;
         }
         let found = self.look_for(name);
@@ -90,7 +82,7 @@ impl<'a> FileSource<'a> {
         let parts: Vec<&str> = slashes.split('/').filter(|p| !["", "."].contains(p)).collect();
         // The part up to the last `..` lies outside the folder.
         let inside = parts.iter().rposition(|&p| p == "..").map_or(0, |k| k + 1);
-        let first = inside.max(parts.len().saturating_sub(MAX_FOLDERS));
+        let first = inside.max(parts.len().saturating_sub(8));
         (first..parts.len()).find_map(|k| self.spelled(&parts[k..]))
     }
 

@@ -7,21 +7,24 @@
 //!          │     material, by its name       │ (of each primitive, one after the other)
 //! ```
 //!
-//! The numbers are written as they are computed; the JSON, which comes first, needs only counts and
-//! the box of each primitive. (Khronos, "glTF 2.0 Specification", 2021.)
+//! (Khronos, "glTF 2.0 Specification", 2021.)
 
-mod container;
-mod document;
+mod file;
 mod images;
 #[cfg(feature = "light-map")]
 mod light_map;
-mod parts;
 mod primitives;
 
-use std::io::{self, Write};
+use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
+use gltf_json::mesh::Semantic;
+use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf_json::validation::Checked::Valid;
+use gltf_json::{Index, Material, Value};
 
 use super::cannot_write;
 use crate::error::Error;
@@ -29,6 +32,7 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
+use file::{Attributes, GlbFile, unlit};
 use images::{Images, irradiance, mean_radiosity};
 #[cfg(feature = "light-map")]
 pub use light_map::write_light_map_glb;
@@ -63,27 +67,36 @@ pub fn write_glb(
     tone: &ToneCurve,
 ) -> Result<(), Error> {
     let path = path.as_ref();
-    let model = Model::new(light, tone).map_err(|e| cannot_write(path, io::Error::other(e)))?;
-    container::write(path, &model.document(), model.binary_length(), |out| model.write_binary(out))
+    let origin = origin(Aabb::from_points(light.surface.positions.iter().copied()));
+    let primitives = primitives(light);
+    let images = Images::new(light, tone, &primitives);
+    let images = images.map_err(|e| cannot_write(path, io::Error::other(e)))?;
+    let model = Model { light, tone, images, origin };
+    let mut file = GlbFile::new(&model.notes());
+    let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
+    for of_group in primitives.chunk_by(|a, b| a.group == b.group) {
+        let mut parts = vec![];
+        for primitive in of_group {
+            let key = (primitive.material, primitive.shown.is_some());
+            let material = || model.add_material(&mut file, primitive);
+            let material = *materials.entry(key).or_insert_with(material);
+            let attributes = model.add_attributes(&mut file, primitive);
+            parts.push(file.triangles(attributes, &primitive.faces, material));
+        }
+        let name = &light.mesh.scene().groups()[of_group[0].group as usize];
+        groups.push(file.add_group(name, parts));
+    }
+    for png in model.images.into_files() {
+        file.add_image(png, None);
+    }
+    file.write(path, groups, origin)
 }
-
-/// Bytes of three floats.
-const VECTOR_BYTES: u64 = 12;
-
-/// Bytes of two floats.
-const PLACE_BYTES: u64 = 8;
-
-/// Bytes of an index.
-const INDEX_BYTES: u64 = 4;
-
-/// Distance of a scene from the origin, in units of its size, above which it is moved: see
-/// [`write_glb`].
-const FAR_AWAY: f64 = 16.0;
 
 /// Origin of the positions written for a scene with these `bounds`, scene unit.
 fn origin(bounds: Aabb) -> Vec3 {
     let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
-    let far = reach > FAR_AWAY * bounds.longest_side();
+    // See `write_glb`.
+    let far = reach > 16.0 * bounds.longest_side();
     if far { bounds.centre().as_vec3() } else { Vec3::ZERO }
 }
 
@@ -91,123 +104,104 @@ fn origin(bounds: Aabb) -> Vec3 {
 struct Model<'a> {
     light: &'a GatheredMesh,
     tone: &'a ToneCurve,
-    primitives: Vec<Primitive<'a>>,
     images: Images,
     /// The point that positions are relative to, scene unit.
     origin: Vec3,
 }
 
-/// Attributes of a vertex, in the order of the file: three floats each, except two for texture
-/// coordinates. The last two are for vertices that have texture coordinates.
-#[derive(Clone, Copy, PartialEq)]
-enum Attribute {
-    Position,
-    Normal,
-    Colour,
-    Radiosity,
-    Irradiance,
-    TextureCoordinates,
-}
-
-const ATTRIBUTES: [Attribute; 6] = [
-    Attribute::Position,
-    Attribute::Normal,
-    Attribute::Colour,
-    Attribute::Radiosity,
-    Attribute::Irradiance,
-    Attribute::TextureCoordinates,
-];
-
-impl Attribute {
-    /// Bytes of one value.
-    fn size(self) -> u64 {
-        if self == Attribute::TextureCoordinates { PLACE_BYTES } else { VECTOR_BYTES }
-    }
-
-    /// Whether vertices of `primitive` have it.
-    fn is_of(self, primitive: &Primitive<'_>) -> bool {
-        let of_textures = matches!(self, Attribute::Irradiance | Attribute::TextureCoordinates);
-        !of_textures || !primitive.places.is_empty()
-    }
-}
-
 impl Model<'_> {
-    fn new<'a>(light: &'a GatheredMesh, tone: &'a ToneCurve) -> image::ImageResult<Model<'a>> {
-        let origin = origin(Aabb::from_points(light.surface.positions.iter().copied()));
-        let primitives = primitives(light);
-        let images = Images::new(light, tone, &primitives)?;
-        Ok(Model { light, tone, primitives, images, origin })
+    fn notes(&self) -> BTreeMap<&'static str, Value> {
+        let images = "textures in the median light of a material; COLOR_0 is relative to that";
+        BTreeMap::from([
+            ("axes", Value::from("those of the scene's file")),
+            ("unit", Value::from("that of the scene's file")),
+            ("_RADIOSITY", Value::from("W/m2 per channel, linear BT.709")),
+            ("COLOR_0", Value::from("_RADIOSITY times exposure, highlights rolled off")),
+            ("images", Value::from(images)),
+            ("exposure", Value::from(self.tone.exposure())),
+        ])
     }
 
-    /// The attributes that any primitive has.
-    fn attributes(&self) -> impl Iterator<Item = Attribute> {
-        ATTRIBUTES.into_iter().filter(|a| self.primitives.iter().any(|p| a.is_of(p)))
-    }
-
-    /// Number of vertices of all primitives with an attribute.
-    fn vertex_count(&self, attribute: Attribute) -> u64 {
-        let having = self.primitives.iter().filter(|primitive| attribute.is_of(primitive));
-        having.map(|primitive| primitive.vertices.len() as u64).sum()
-    }
-
-    /// Number of faces of all primitives.
-    fn face_count(&self) -> u64 {
-        self.primitives.iter().map(|primitive| primitive.faces.len() as u64).sum()
-    }
-
-    /// Bytes of the binary chunk, a multiple of four.
-    fn binary_length(&self) -> u64 {
-        (self.geometry_length() + self.images.length()).next_multiple_of(4)
-    }
-
-    /// Bytes of attributes and indices.
-    fn geometry_length(&self) -> u64 {
-        let bytes = |a: Attribute| self.vertex_count(a) * a.size();
-        self.attributes().map(bytes).sum::<u64>() + 3 * self.face_count() * INDEX_BYTES
-    }
-
-    fn write_binary(&self, out: &mut impl Write) -> io::Result<()> {
-        for attribute in self.attributes() {
-            for primitive in self.primitives.iter().filter(|p| attribute.is_of(p)) {
-                for k in 0..primitive.vertices.len() {
-                    let numbers = self.value(attribute, primitive, k).to_array();
-                    for x in &numbers[..attribute.size() as usize / size_of::<f32>()] {
-                        out.write_all(&x.to_le_bytes())?;
-                    }
-                }
-            }
-        }
-        for &v in self.primitives.iter().flat_map(|primitive| primitive.faces.as_flattened()) {
-            out.write_all(&v.to_le_bytes())?;
-        }
-        for image in self.images.iter() {
-            out.write_all(&image.png)?;
-        }
-        let padding = self.binary_length() - self.geometry_length() - self.images.length();
-        out.write_all(&[0; 4][..padding as usize])
-    }
-
-    /// The value of an attribute of vertex `k` of `primitive`, as written.
-    fn value(&self, attribute: Attribute, primitive: &Primitive<'_>, k: usize) -> Vec3 {
-        let (surface, v) = (&self.light.surface, primitive.vertices[k] as usize);
-        let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3();
-        let irradiance = || irradiance(self.light, primitive.vertices[k]);
-        match attribute {
-            Attribute::Position => (surface.positions[v] - self.origin.as_dvec3()).as_vec3(),
-            // glTF allows only length 1.
-            Attribute::Normal => surface.normals[v].normalize_or(DVec3::Y).as_vec3(),
-            Attribute::Colour => {
-                let image = primitive.shown.and_then(|_| self.images.get(primitive.material));
-                let Some(image) = image else {
-                    return self.tone.linear(surface.radiosity[v]).as_vec3();
-                };
-                let material = &self.light.mesh.scene().materials()[primitive.material as usize];
-                let colour = self.tone.linear(mean_radiosity(material, irradiance()));
+    /// Adds the attributes of the vertices of a primitive, those of textures if they have texture
+    /// coordinates.
+    fn add_attributes(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Attributes {
+        let (surface, vertices) = (&self.light.surface, &primitive.vertices);
+        let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3().to_array();
+        let irradiance = |v: u32| irradiance(self.light, v);
+        let image = primitive.shown.and_then(|_| self.images.get(primitive.material));
+        let material = &self.light.mesh.scene().materials()[primitive.material as usize];
+        let position = |v: u32| (surface.positions[v as usize] - self.origin.as_dvec3()).as_vec3();
+        // glTF allows only length 1.
+        let normal = |v: u32| surface.normals[v as usize].normalize_or(DVec3::Y).as_vec3();
+        let colour = |v: u32| match image {
+            None => self.tone.linear(surface.radiosity[v as usize]).as_vec3(),
+            Some(image) => {
+                let colour = self.tone.linear(mean_radiosity(material, irradiance(v)));
                 image.vertex_colour(colour).as_vec3()
             }
-            Attribute::Radiosity => light(surface.radiosity[v]),
-            Attribute::Irradiance => light(irradiance()),
-            Attribute::TextureCoordinates => primitive.places[k].extend(0.0),
+        };
+        let of_all = |value: &dyn Fn(u32) -> [f32; 3]| -> Vec<[f32; 3]> {
+            vertices.iter().map(|&v| value(v)).collect()
+        };
+        let positions = file.add_positions(&of_all(&|v| position(v).to_array()));
+        let normals = file.add_vectors("NORMAL", &of_all(&|v| normal(v).to_array()));
+        let colours = file.add_vectors("COLOR_0", &of_all(&|v| colour(v).to_array()));
+        let radiosity = of_all(&|v| light(surface.radiosity[v as usize]));
+        let radiosity = file.add_vectors("_RADIOSITY", &radiosity);
+        // Custom names are written with a leading underscore, which glTF requires.
+        let mut all = Attributes::from([
+            (Valid(Semantic::Positions), positions),
+            (Valid(Semantic::Normals), normals),
+            (Valid(Semantic::Colors(0)), colours),
+            (Valid(Semantic::Extras("RADIOSITY".into())), radiosity),
+        ]);
+        if !primitive.places.is_empty() {
+            let irradiance = file.add_vectors("_IRRADIANCE", &of_all(&|v| light(irradiance(v))));
+            let places: Vec<[f32; 2]> = primitive.places.iter().map(Vec2::to_array).collect();
+            let places = file.add_vectors("TEXCOORD_0", &places);
+            all.insert(Valid(Semantic::Extras("IRRADIANCE".into())), irradiance);
+            all.insert(Valid(Semantic::TexCoords(0)), places);
         }
+        all
+    }
+
+    /// Adds an unlit material: the colour is in the vertices, and in the image if there is one.
+    fn add_material(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Index<Material> {
+        let material = &self.light.mesh.scene().materials()[primitive.material as usize];
+        // Clear panes are transparent in viewers.
+        let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
+        let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
+        let alpha_mode = match (passed, has_mask) {
+            (Some(_), _) => AlphaMode::Blend,
+            (None, true) => AlphaMode::Mask,
+            (None, false) => AlphaMode::Opaque,
+        };
+        let alpha = 1.0 - passed.unwrap_or(0.0) as f32;
+        let colour = PbrMetallicRoughness {
+            base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
+            base_color_texture: self.add_texture(file, primitive),
+            ..Default::default()
+        };
+        file.add_material(Material {
+            alpha_mode: Valid(alpha_mode),
+            alpha_cutoff: (alpha_mode == AlphaMode::Mask).then_some(AlphaCutoff(0.5)),
+            ..unlit(material, colour)
+        })
+    }
+
+    /// Adds the image of a primitive, repeated or not, smoothly filtered; none without a texture.
+    fn add_texture(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Option<Info> {
+        let clamped = primitive.shown?.frame()?.clamped;
+        let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
+        let sampler = Sampler {
+            mag_filter: Some(Valid(MagFilter::Linear)),
+            min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
+            wrap_s: wrap,
+            wrap_t: wrap,
+            ..Default::default()
+        };
+        let source = Index::new(self.images.number(primitive.material)? as u32);
+        let index = file.add_texture(source, sampler);
+        Some(Info { index, tex_coord: 0, extensions: None, extras: None })
     }
 }

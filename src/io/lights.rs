@@ -47,9 +47,6 @@ const LIGHT_NAMES: [&str; 36] = [
     "arealight",
 ];
 
-/// Suffixes of German compounds for lamps, such as `Deckenleuchte`.
-const LIGHT_ENDS: [&str; 2] = ["leuchte", "lampe"];
-
 /// Names of materials that suggest lamps.
 fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let is_light = |name: &&str| words(name).iter().any(|word| says_light(word));
@@ -59,7 +56,8 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// Whether a word in lower case means a lamp, or lamps.
 fn says_light(word: &str) -> bool {
     let word = word.strip_suffix('s').filter(|one| !one.is_empty()).unwrap_or(word);
-    LIGHT_NAMES.contains(&word) || LIGHT_ENDS.iter().any(|end| word.ends_with(end))
+    // Or a German compound, such as `Deckenleuchte`.
+    LIGHT_NAMES.contains(&word) || ["leuchte", "lampe"].iter().any(|end| word.ends_with(end))
 }
 
 /// The words of a name, in lower case: split at characters other than letters, and before capitals,
@@ -80,9 +78,6 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// Default radiance of the sky over a scene in which nothing emits, W/(m² sr).
-const DEFAULT_SKY: Rgb = Rgb::ONE;
-
 /// The sky over a scene of `used` materials, `wanted` if given; and the warning that none of them
 /// emits, if none does and no sky was given.
 pub(super) fn sky_and_warning<'a>(
@@ -92,7 +87,7 @@ pub(super) fn sky_and_warning<'a>(
 ) -> (Sky, Option<Warning>) {
     let is_dark = !used.clone().any(|m| m.exitance.max_element() > 0.0);
     let warns = is_dark && wanted.is_none_or(Sky::is_black);
-    let default = Sky::uniform(if is_dark { DEFAULT_SKY } else { Rgb::ZERO });
+    let default = Sky::uniform(if is_dark { Rgb::ONE } else { Rgb::ZERO });
     let sky = wanted.cloned().unwrap_or(default);
     let warning = warns.then(|| match emit {
         [] => no_light(used, sky.is_black()),

@@ -9,10 +9,6 @@ use std::sync::Arc;
 use super::textures::{ReadMask, Textures, Unread};
 use crate::scene::texture::Texture;
 
-/// Least value, of 255, that is solid.
-#[cfg(feature = "textures")]
-const HALF: u8 = 128;
-
 impl Textures<'_> {
     /// The mask in the image `name`, white where it is solid and black elsewhere, if it can be
     /// read; none without a hole. `colours` is the image of the material's colours.
@@ -35,9 +31,10 @@ impl Textures<'_> {
         let texels = image.into_raw().as_chunks().0.to_vec();
         let has_alpha = texels.iter().any(|[_, alpha]| *alpha != texels[0][1]);
         let is_solid = |&[luminance, alpha]: &[u8; 2]| match (has_alpha, of_colours) {
-            (true, _) => alpha >= HALF,
+            // Solid from a half on.
+            (true, _) => alpha >= 128,
             (false, true) => true,
-            (false, false) => luminance >= HALF,
+            (false, false) => luminance >= 128,
         };
         if texels.iter().all(is_solid) {
             return Ok(None);

@@ -26,13 +26,6 @@ use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted_few, shortened};
 use crate::scene::{Rgb, Specular, Warning, WarningKind};
 
-/// Maximum number of words of a `mtllib` line that are tried as one name with spaces. Plain choice.
-const MAX_WORDS: usize = 8;
-
-/// Maximum number of libraries, and of materials of each, in a message. Plain choice.
-const LIBRARIES: usize = 2;
-const CONTENTS: usize = 4;
-
 /// The materials of all libraries loaded so far.
 #[derive(Default)]
 pub(super) struct Library {
@@ -85,11 +78,11 @@ impl Library {
             let names: Vec<&str> = names.map(|m| m.name.as_str()).collect();
             let names = match names.len() {
                 0 => "no material".into(),
-                _ => quoted_few(&names, CONTENTS),
+                _ => quoted_few(&names, 4),
             };
             format!("; {} has {names}", shortened(name).escape_debug())
         };
-        self.files.iter().enumerate().take(LIBRARIES).map(of_file).collect()
+        self.files.iter().enumerate().take(2).map(of_file).collect()
     }
 
     /// Where `material` is defined.
@@ -98,15 +91,14 @@ impl Library {
     }
 
     /// Loads the files named by a `mtllib` line: one name or several, each of which may contain
-    /// spaces, with or without backslashes before them. Returns the materials by name, for tobj.
+    /// spaces, with or without backslashes before them.
     pub fn load(
         &mut self,
         line: &Line,
         names: &str,
         files: &FileSource,
         repairs: &mut Repairs,
-    ) -> Result<tobj::MTLLoadResult, Error> {
-        let first = self.materials.len();
+    ) -> Result<(), Error> {
         let whole = names.trim_matches('"');
         if files.find(whole).is_some() {
             self.load_file(line, whole, files, repairs)?;
@@ -114,7 +106,7 @@ impl Library {
             let words = escaped_words(names);
             let mut at = 0;
             while at < words.len() {
-                let most = MAX_WORDS.min(words.len() - at);
+                let most = 8.min(words.len() - at);
                 let name = |count: &usize| words[at..at + count].join(" ");
                 let known = (1..=most).rev().find(|count| files.find(&name(count)).is_some());
                 // A missing name ends at a word with a library's extension.
@@ -128,8 +120,7 @@ impl Library {
                 note_missing(line, "", files, repairs)?;
             }
         }
-        let new = self.materials.iter().enumerate().skip(first);
-        Ok(Ok((vec![], new.map(|(k, m)| (m.name.clone(), k)).collect())))
+        Ok(())
     }
 
     /// Loads the library `name`, if it exists and was not loaded before.

@@ -20,12 +20,6 @@ use super::write_file;
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, Factor, Missing, ViewFactors};
 
-/// Maximum number of bytes of the header of an array; that of a plain one has 128.
-const MAX_HEADER: usize = 512;
-
-/// Maximum number of digits of a number in the header of an array.
-const MAX_DIGITS: usize = 12;
-
 /// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and
 /// additional arrays, which it ignores: `standard_error` of each; of each group `area`, `open` and
 /// `back` with their errors; `names`, separated by line feeds; `absent`.
@@ -250,7 +244,8 @@ impl<R: Read + Seek> Arrays<'_, R> {
         file.read_exact(&mut start).map_err(broken)?;
         let length = usize::from(u16::from_le_bytes([start[8], start[9]]));
         // Version 1 has two bytes for the length; later versions are for long headers.
-        if !start.starts_with(b"\x93NUMPY\x01") || length > MAX_HEADER {
+        // A plain array has 128 bytes.
+        if !start.starts_with(b"\x93NUMPY\x01") || length > 512 {
             return Err(wrong(name, "no plain array", "NumPy's format, version 1.0"));
         }
         let mut header = start.to_vec();
@@ -283,5 +278,5 @@ impl<R: Read + Seek> Arrays<'_, R> {
 fn is_plain(header: &[u8]) -> bool {
     let nested = header.iter().filter(|byte| b"([{".contains(byte)).count();
     let mut runs = header.split(|byte| !byte.is_ascii_digit());
-    nested <= 2 && runs.all(|digits| digits.len() <= MAX_DIGITS)
+    nested <= 2 && runs.all(|digits| digits.len() <= 12)
 }

@@ -1,10 +1,9 @@
 //! Scenes from Wavefront OBJ files and their MTL libraries.
 //!
-//! The `tobj` crate reads geometry, groups and materials. A pass before it ([`statements`]) numbers
-//! the lines, keeps the data that tobj does not return (smoothing groups, which faces are
-//! repaired), and passes on only lines that tobj accepts. Then faces are cut into triangles,
-//! materials are completed and repaired, and the scene is built, with a warning for each kind of
-//! defect.
+//! The `tobj` crate reads geometry and materials. A pass before it ([`statements`]) checks and
+//! repairs the lines, keeps groups, smoothing groups and the use of materials, and passes on the
+//! geometry. Then faces are cut into triangles, materials are completed and repaired, and the scene
+//! is built, with a warning for each kind of defect.
 
 mod faces;
 mod materials;
@@ -12,7 +11,6 @@ pub(super) mod repairs;
 mod settings;
 mod statements;
 
-use std::cell::RefCell;
 use std::collections::HashSet;
 use std::io;
 use std::path::Path;
@@ -115,17 +113,6 @@ struct ObjFile<'a> {
     repairs: Repairs,
 }
 
-/// State shared by the pass before tobj and the loader of libraries.
-struct Reading<'a> {
-    /// The line that tobj reads.
-    line: Line<'a>,
-    statements: Statements,
-    library: Library,
-    repairs: Repairs,
-    /// Why reading ended early.
-    failure: Option<Error>,
-}
-
 impl<'a> ObjFile<'a> {
     fn read(
         path: &'a Path,
@@ -133,39 +120,43 @@ impl<'a> ObjFile<'a> {
         files: &'a FileSource,
         repairs: Repairs,
     ) -> Result<ObjFile<'a>, Error> {
-        let reading = RefCell::new(Reading {
-            line: Line { file: path, number: 0, text: "".into() },
-            statements: Statements::default(),
-            library: Library::default(),
-            repairs,
-            failure: None,
-        });
+        let (statements, library) = (Statements::default(), Library::default());
+        let mut file = ObjFile { path, files, models: vec![], statements, library, repairs };
+        let (mut number, mut failure) = (0, None);
         let mut lines = text::lines(path, &text);
-        let mut feed = LineFeed::new(|out: &mut Vec<u8>| {
-            let reading = &mut *reading.borrow_mut();
-            while out.is_empty() && reading.failure.is_none() {
-                let Some(line) = lines.next() else { break };
-                reading.line = line;
-                let result = reading.statements.line(&reading.line, &mut reading.repairs, out);
-                reading.failure = result.err();
+        let feed = LineFeed::new(|out: &mut Vec<u8>| {
+            while out.is_empty()
+                && let Some(line) = lines.next()
+            {
+                number = line.number;
+                if let Err(e) = file.line(&line, out) {
+                    failure = Some(e);
+                    return Err(io::ErrorKind::InvalidData.into());
+                }
             }
-            if reading.failure.is_none() { Ok(()) } else { Err(io::ErrorKind::InvalidData.into()) }
+            Ok(())
         });
-        let read = tobj::load_obj_buf(&mut feed, &tobj::LoadOptions::default(), |names| {
-            let Reading { line, library, repairs, failure, .. } = &mut *reading.borrow_mut();
-            let loaded = library.load(line, &names.to_string_lossy(), files, repairs);
-            loaded.unwrap_or_else(|e| {
-                *failure = Some(e);
-                Err(tobj::LoadError::GenericFailure)
-            })
-        });
-        let Reading { line, statements, library, repairs, failure } = reading.into_inner();
+        // No line names a library: those are read by `ObjFile::line`.
+        let no_library = |_: &Path| Err(tobj::LoadError::GenericFailure);
+        let options = tobj::LoadOptions::default();
+        let read = tobj::load_obj_buf(&mut io::BufReader::new(feed), &options, no_library);
         if let Some(failure) = failure {
             return Err(failure);
         }
-        let (models, _) = read
-            .map_err(|e| line.parse_error(e, "write it as the OBJ format has it").with_source(e))?;
-        Ok(ObjFile { path, files, models, statements, library, repairs })
+        let (models, _) = read.map_err(|e| {
+            let remedy = "write it as the OBJ format has it";
+            let place = text::place(path, number);
+            Error::new(ErrorKind::Scene, place, e.to_string(), remedy).with_source(e)
+        })?;
+        Ok(ObjFile { models, ..file })
+    }
+
+    /// Processes `line`, and appends what tobj reads of it to `out`.
+    fn line(&mut self, line: &Line, out: &mut Vec<u8>) -> Result<(), Error> {
+        match line.keyword() {
+            ("mtllib", names) => self.library.load(line, names, self.files, &mut self.repairs),
+            _ => self.statements.line(line, &self.library, &mut self.repairs, out),
+        }
     }
 
     fn into_scene(mut self, settings: &ObjSettings) -> Result<Scene, Error> {

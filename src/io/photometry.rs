@@ -22,9 +22,6 @@ use super::files;
 use crate::error::{Error, ErrorKind};
 use crate::scene::{IntensityDistribution, Luminaire, Opening};
 
-/// Maximum number of bytes of a file: five times those of one with 361 × 181 values.
-const MAX_BYTES: u64 = 1 << 22;
-
 /// The luminaire of a photometric file.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -64,7 +61,8 @@ impl Photometry {
 /// with its line if it is of neither format, ends early, or has invalid numbers.
 pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
     let path = path.as_ref();
-    let bytes = files::read_bytes(path, MAX_BYTES).map_err(|e| {
+    // Five times the bytes of a file with 361 × 181 values.
+    let bytes = files::read_bytes(path, 1 << 22).map_err(|e| {
         let remedy = "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file";
         let found = format!("cannot be read: {e}");
         Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
@@ -85,10 +83,7 @@ pub fn photometry_from_bytes(name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<P
     }
 }
 
-/// Maximum number of characters of a name that are kept.
-const MAX_NAME: usize = 100;
-
 /// `text` as a name.
 fn name_of(text: &str) -> String {
-    text.trim().chars().filter(|c| !c.is_control()).take(MAX_NAME).collect()
+    text.trim().chars().filter(|c| !c.is_control()).take(100).collect()
 }

@@ -13,9 +13,6 @@ use crate::error::{Error, ErrorKind, quoted, shortened};
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 
-/// Maximum number of bytes of a PLY file.
-const MAX_BYTES: u64 = 1 << 32;
-
 /// Properties of a vertex, the required ones first.
 const NAMES: [&str; 13] = [
     "x",
@@ -33,9 +30,6 @@ const NAMES: [&str; 13] = [
     "error",
 ];
 
-/// Number of required properties.
-const NEEDED: usize = 6;
-
 /// Reads a mesh as [`write_ply`](super::write_ply) writes it, in ASCII or binary of either order.
 ///
 /// Vertices have `x y z radiosity_r radiosity_g radiosity_b`, and may have `nx ny nz`,
@@ -50,7 +44,7 @@ const NEEDED: usize = 6;
 ///   a face has fewer than three vertices or one that does not exist.
 pub fn read_ply(path: impl AsRef<Path>) -> Result<VertexMesh, Error> {
     let path = path.as_ref();
-    let bytes = files::read_bytes(path, MAX_BYTES).map_err(|e| {
+    let bytes = files::read_bytes(path, 1 << 32).map_err(|e| {
         let remedy = "give a PLY file that can be read";
         Error::new(ErrorKind::File, path.display().to_string(), e.to_string(), remedy)
             .with_source(e)
@@ -120,7 +114,7 @@ fn add_vertices(
     vertices: &[Vertex],
 ) -> Result<(), Error> {
     let has = |name: &&str| element.properties.contains_key(*name);
-    if let Some(missing) = NAMES[..NEEDED].iter().find(|name| !has(name)) {
+    if let Some(missing) = NAMES[..6].iter().find(|name| !has(name)) {
         let names: Vec<&String> = element.properties.keys().collect();
         let found = format!("no property '{missing}' among {}", quoted(&names));
         let remedy = "give radiosity_r, radiosity_g and radiosity_b in W/m², as `bake` writes them";

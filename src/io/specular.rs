@@ -75,9 +75,6 @@ pub(super) struct SpecularStatements {
     pub transparency: Option<f64>,
 }
 
-/// Refractive index of window glass.
-const WINDOW_GLASS: f64 = 1.5;
-
 impl SpecularStatements {
     /// The mirror or glass of these statements.
     pub fn surface(&self) -> Option<Specular> {
@@ -103,7 +100,8 @@ impl SpecularStatements {
         };
         let known = |&n: &f64| n > 1.0 && n <= Specular::MAX_REFRACTIVE_INDEX;
         let index = self.refractive_index.filter(known);
-        let refractive_index = index.unwrap_or(WINDOW_GLASS);
+        // That of window glass.
+        let refractive_index = index.unwrap_or(1.5);
         (transmittance != Rgb::ZERO).then_some(Specular::Glass { refractive_index, transmittance })
     }
 

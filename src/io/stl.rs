@@ -27,9 +27,6 @@ const HEADER: usize = 84;
 /// Bytes of a triangle: normal and corners, 12 floats, and two undefined bytes.
 const TRIANGLE: usize = 50;
 
-/// Number of bytes used for detecting the format.
-const FIRST_BYTES: usize = 1024;
-
 /// Whether `path` has the extension of STL files.
 pub(super) fn is_stl(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl"))
@@ -51,7 +48,7 @@ pub(super) fn to_obj(
         return Ok((of_ascii(path, &text, repairs)?, encoding));
     }
     let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
-    if bytes.len() < HEADER || !is_as_long && bytes.iter().take(FIRST_BYTES).all(is_text) {
+    if bytes.len() < HEADER || !is_as_long && bytes.iter().take(1024).all(is_text) {
         let found = format!("{} bytes with neither a facet nor a binary header", bytes.len());
         let remedy = "give an ASCII or binary STL file";
         return Err(Error::new(ErrorKind::Scene, path.display().to_string(), found, remedy));
@@ -61,7 +58,7 @@ pub(super) fn to_obj(
 
 /// Whether this is text that begins with a solid or has facets.
 fn is_ascii(bytes: &[u8]) -> bool {
-    let first = &bytes[..bytes.len().min(FIRST_BYTES)];
+    let first = &bytes[..bytes.len().min(1024)];
     let first = files::decode(first.to_vec()).0.to_ascii_lowercase();
     let begins = first.trim_start_matches('\u{feff}').trim_start().starts_with("solid");
     !first.contains('\0') && (begins || first.contains("facet"))

@@ -22,29 +22,9 @@ use crate::scene::texture::Texture;
 #[cfg(feature = "textures")]
 const MAX_TEXELS: u64 = 1 << 27;
 
-/// Maximum number of bytes of an image file. Plain choice.
-#[cfg(feature = "textures")]
-const MAX_IMAGE_BYTES: u64 = 1 << 28;
-
 /// Maximum number of texels along a side of an image. Plain choice.
 #[cfg(feature = "textures")]
 const MAX_SIDE: u32 = 1 << 15;
-
-/// Maximum number of texels per byte of a PNG file: deflate expands a byte to at most 1032 (258
-/// from two bits: RFC 1951, 3.2.5), of eight texels each.
-#[cfg(feature = "textures")]
-const PNG_TEXELS: u64 = 8 * 1032;
-
-/// The same for the others: JPEG has at least a bit for each 8 × 8 texels (ITU-T T.81, F and G),
-/// BMP and TGA have two bytes for each run of up to 255 and 128. So a file of a hundred bytes
-/// cannot pass as a truncated one of 10 000 × 10 000 texels.
-#[cfg(feature = "textures")]
-const OTHER_TEXELS: u64 = 512;
-
-/// Maximum total number of bytes of unpacked colour profiles and texts of a PNG, which are read
-/// before its size is known. Plain choice: profiles have some kilobytes.
-#[cfg(feature = "textures")]
-const MAX_ANCILLARY_BYTES: u64 = 1 << 24;
 
 /// `map_Kd`, `map_Ke` or `map_d`.
 #[derive(Debug, PartialEq)]
@@ -161,7 +141,7 @@ impl<'a> Textures<'a> {
     /// The image at this path, if within the limits.
     #[cfg(feature = "textures")]
     pub(super) fn decode(&mut self, found: &str) -> Result<image::DynamicImage, Unread> {
-        let bytes = self.files.read(found, MAX_IMAGE_BYTES).map_err(|e| match e.kind() {
+        let bytes = self.files.read(found, 1 << 28).map_err(|e| match e.kind() {
             io::ErrorKind::FileTooLarge => Unread::large(e),
             _ => Unread::unreadable(e),
         })?;
@@ -174,11 +154,17 @@ impl<'a> Textures<'a> {
         let mut reader = reader.with_guessed_format().map_err(Unread::unreadable)?;
         let is_png = reader.format() == Some(image::ImageFormat::Png);
         let mut limits = image::Limits::default();
-        limits.max_alloc = Some(MAX_ANCILLARY_BYTES);
+        // Unpacked colour profiles and texts, which are read before the size is known.
+        limits.max_alloc = Some(1 << 24);
         reader.limits(limits);
         let decoder = reader.into_decoder().map_err(Unread::undecoded)?;
         let (width, height) = image::ImageDecoder::dimensions(&decoder);
-        self.check(width, height, length * if is_png { PNG_TEXELS } else { OTHER_TEXELS })?;
+        // Maximum number of texels per byte. Deflate expands a byte to at most 1032 (258 from two
+        // bits: RFC 1951, 3.2.5), of eight texels each. JPEG has at least a bit for each 8 × 8
+        // texels (ITU-T T.81, F and G), BMP and TGA have two bytes for each run of up to 255 and
+        // 128. So a file of a hundred bytes cannot pass as a truncated one of 10 000 × 10 000
+        // texels.
+        self.check(width, height, length * if is_png { 8 * 1032 } else { 512 })?;
         let image = image::DynamicImage::from_decoder(decoder).map_err(Unread::undecoded)?;
         self.texels_left -= u64::from(width) * u64::from(height);
         Ok(image)

@@ -119,8 +119,7 @@ impl<'a> PathTracer<'a> {
             panes: Panes::of_scene(&scene),
             normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
             emitters: Emitters::new(&scene),
-            contact: (offset::PATH_CONTACT * diagonal)
-                .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
+            contact: offset::path_contact(&scene),
             diagonal,
             scene,
         }

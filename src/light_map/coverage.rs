@@ -131,13 +131,13 @@ mod tests {
     /// Whether a triangle has a point less than `reach` from `centre` along both axes, by testing
     /// many points.
     fn reaches([a, b, c]: [DVec2; 3], centre: DVec2, reach: f64) -> bool {
-        const STEPS: u32 = 400;
+        let steps = 400;
         let at = |i: u32, j: u32| {
-            let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(STEPS));
+            let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(steps));
             a * (1.0 - u - v) + b * u + c * v
         };
-        (0..=STEPS)
-            .any(|i| (0..=STEPS - i).any(|j| (at(i, j) - centre).abs().max_element() < reach))
+        (0..=steps)
+            .any(|i| (0..=steps - i).any(|j| (at(i, j) - centre).abs().max_element() < reach))
     }
 
     #[test]

@@ -33,16 +33,6 @@ pub struct LightMap {
     pub(super) triangles: Vec<u32>,
 }
 
-/// Rings of empty texels around charts that get values, for the filters of renderers.
-const DILATION: usize = 2;
-
-/// Texels in the first batch; later batches follow the clock. Plain choice: results do not depend
-/// on it.
-const FIRST_BATCH: usize = 256;
-
-/// Rays of a texel if the vertices of a bake did not gather: for an error of about 2 %.
-const RAYS: u32 = 1024;
-
 impl LightMap {
     /// The light of a bake, gathered at the texels of `atlas`: with the final number of rays of its
     /// vertices, so that a texel has the requested accuracy. If the device fails, rays on the CPU
@@ -85,7 +75,7 @@ impl LightMap {
         let mut gathered = vec![false; triangles.len()];
         let mut buried = vec![];
         let (field, points) = (light.radiosity_field(), TexelPoints::new(&atlas));
-        let (mut remaining, mut batches) = (&covered[..], BatchSizer::new(FIRST_BATCH));
+        let (mut remaining, mut batches) = (&covered[..], BatchSizer::new(256));
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
                 let triangle = |texel: u32| triangles[texel as usize] as usize;
@@ -145,7 +135,8 @@ pub(super) fn gatherer<'a>(
     let dim = baked.light.radiosity_field().radiosity_floor(baked.settings.measure.floor);
     let (rays, noise) = match &baked.settings.gather {
         Some(settings) => (settings.rays, settings.noise_tolerance),
-        None => (RAYS, f64::INFINITY),
+        // For an error of about 2 %.
+        None => (1024, f64::INFINITY),
     };
     let rays = GatherRays { rays, noise, dim, near_field: true };
     backend.gather_with_fallback(&baked.light.mesh, rays, |_| ())
@@ -155,7 +146,8 @@ pub(super) fn gatherer<'a>(
 fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
     let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
     let empty = (0..known.len() as u32).filter(|&k| !known[k as usize]).collect();
-    fill_from_neighbours(values, &mut known, size, empty, DILATION);
+    // Filters of renderers reach over two texels.
+    fill_from_neighbours(values, &mut known, size, empty, 2);
 }
 
 /// Checks that `light` is that of the scene of `atlas`, whose triangles a bake may have cut.

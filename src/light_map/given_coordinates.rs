@@ -23,13 +23,6 @@ pub enum Unusable {
     Overlapping([usize; 2]),
 }
 
-/// Depth inside two triangles of the centre of a texel, in texels, from which they overlap: files
-/// have few digits, whose rounding makes neighbours overlap.
-const OVERLAP: f64 = 0.25;
-
-/// Largest distance of texture coordinates outside [0, 1]: the precision of 32-bit numbers.
-const OUTSIDE: f64 = 1e-6;
-
 /// Layout of the triangles of `scene` by the coordinates of its file, unless these are unusable.
 ///
 /// # Errors
@@ -72,7 +65,8 @@ pub(super) fn layout(
 }
 
 fn is_inside(p: &DVec2) -> bool {
-    p.cmpge(DVec2::splat(-OUTSIDE)).all() && p.cmple(DVec2::splat(1.0 + OUTSIDE)).all()
+    // The precision of 32-bit numbers.
+    p.cmpge(DVec2::splat(-1e-6)).all() && p.cmple(DVec2::splat(1.0 + 1e-6)).all()
 }
 
 fn area([a, b, c]: &[DVec2; 3]) -> f64 {
@@ -87,7 +81,8 @@ fn overlapping(coordinates: &[[DVec2; 3]], size: [u32; 2]) -> Option<[usize; 2]>
     for (t, &corners) in coordinates.iter().enumerate() {
         let corners = in_texels(corners, size);
         for_each_texel_around(corners, 0.0, size, |texel, centre| {
-            if depth_inside(corners, centre) > OVERLAP {
+            // Files have few digits, whose rounding makes neighbours overlap by less than that.
+            if depth_inside(corners, centre) > 0.25 {
                 let owner = std::mem::replace(&mut owners[texel], t as u32);
                 if owner != NO_TRIANGLE {
                     found = Some([owner as usize, t]);

@@ -12,7 +12,7 @@
 //! gathered light itself are taken from the bake's estimate: bounces left out, unshot light, and
 //! light that only paths measured.
 
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::ControlFlow;
 
 use glam::{DVec2, DVec3};
 
@@ -33,14 +33,6 @@ use crate::sampling::low_discrepancy::{golden_ratio_order, r2_point};
 use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::Rgb;
-
-/// Number of texels per point; minimum and maximum number of points. Plain choice: with two gathers
-/// per point, a sixteenth of the work of the texels.
-const TEXELS_PER_POINT: usize = 32;
-const POINTS: RangeInclusive<usize> = 2048..=16384;
-
-/// Points in the first batch; later batches follow the clock.
-const FIRST_BATCH: usize = 64;
 
 /// A point, and the map's value there.
 struct ShownPoint {
@@ -75,7 +67,7 @@ impl LightMap {
         let diagonal = baked.settings.solve.light_diagonal(self.atlas.scene());
         let mut found = vec![];
         let order = golden_ratio_order(points.len());
-        let (mut remaining, mut batches) = (&order[..], BatchSizer::new(FIRST_BATCH));
+        let (mut remaining, mut batches) = (&order[..], BatchSizer::new(64));
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
                 let mut gather = |which: usize| {
@@ -115,7 +107,8 @@ impl LightMap {
         let contrasts = self.contrasts();
         let cells = AreaSampler::new(contrasts.iter().copied());
         let gathered = self.gathered.iter().filter(|&&gathered| gathered).count();
-        let count = (gathered / TEXELS_PER_POINT).clamp(*POINTS.start(), *POINTS.end()) / 2;
+        // With two gathers per point, a sixteenth of the work of the texels.
+        let count = (gathered / 32).clamp(2048, 16384) / 2;
         let texels = TexelPoints::new(&self.atlas);
         let (offset, rotations) = (SurfaceOffset::new(scene), CellRotation::new(&scene.bounds()));
         let point = |(t, barycentric): (usize, [f64; 2])| {

@@ -27,13 +27,6 @@ use crate::scene::Rgb;
 /// choice.
 const WEIGHT: f64 = 10.0;
 
-/// Maximum number of steps. The condition number is about w; a step removes about 1/√w of the
-/// error.
-const MAX_STEPS: usize = 100;
-
-/// Ratio of the final to the initial residual.
-const TOLERANCE: f64 = 1e-6;
-
 /// A point on a cut, in the two charts.
 type SeamPoint = [Footprint; 2];
 
@@ -104,8 +97,9 @@ fn changes(points: &[SeamPoint], values: &[Rgb]) -> Vec<Rgb> {
     let mut residual: Vec<Rgb> = pull(values).into_iter().map(|x| -x).collect();
     let mut direction = residual.clone();
     let mut square = dot(&residual, &residual);
-    let enough = TOLERANCE * TOLERANCE * square;
-    for _ in 0..MAX_STEPS {
+    let enough = 1e-12 * square;
+    // The condition number is about w; a step removes about 1/√w of the error.
+    for _ in 0..100 {
         if square.cmple(enough).all() {
             break;
         }

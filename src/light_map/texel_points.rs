@@ -15,10 +15,6 @@ pub(super) struct TexelPoints<'a> {
     offset: SurfaceOffset,
 }
 
-/// Distance of gather points from the sides of triangles, in texels: on the sides themselves
-/// visibility is undefined, as for vertices. Plain choice.
-const SIDE_INSET: f64 = 0.02;
-
 impl<'a> TexelPoints<'a> {
     pub fn new(atlas: &'a Atlas) -> TexelPoints<'a> {
         let offset = SurfaceOffset::new(atlas.scene());
@@ -29,16 +25,17 @@ impl<'a> TexelPoints<'a> {
     /// centre, moved slightly inside.
     pub fn point(&self, texel: u32, t: usize) -> TwoSidedPoint {
         let (scene, width) = (self.atlas.scene(), self.atlas.width());
-        let places = self.atlas.corners(t);
+        let positions = self.atlas.corners(t);
         let centre = DVec2::new((texel % width).into(), (texel / width).into());
-        let ([u, v], _) = nearest_point(places, centre);
+        let ([u, v], _) = nearest_point(positions, centre);
         let corners = scene.corners(t);
         let at = |u: f64, v: f64| corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
         let size = self.texel_size(t);
         // Moved towards the centroid, by the fraction of the way that keeps the weights of all
         // corners above a third of it.
         let to_centroid = (corners.iter().sum::<DVec3>() / 3.0).distance(at(u, v));
-        let share = (SIDE_INSET * size / to_centroid).clamp(0.0, 1.0);
+        // On the sides themselves visibility is undefined, as for vertices. Plain choice.
+        let share = (0.02 * size / to_centroid).clamp(0.0, 1.0);
         let is_near = 3.0 * u.min(v).min(1.0 - u - v) < share;
         let share = if is_near { share } else { 0.0 };
         let [u, v] = [u, v].map(|weight| weight + (1.0 / 3.0 - weight) * share);

@@ -14,13 +14,6 @@ use crate::error::Error;
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
 
-/// Empty texels around a chart: one that points on its outline use, and two of dilation.
-const PADDING: u32 = 3;
-
-/// Maximum number of smooth surfaces for packing charts by their shapes, which leaves less empty
-/// space, and takes seconds for a few thousand. Plain choice.
-const MAX_BY_SHAPE: usize = 1000;
-
 /// A smooth surface as input of the unwrapper: 32-bit numbers.
 #[derive(Default)]
 struct Surface {
@@ -49,8 +42,10 @@ pub(super) fn layout(scene: &Scene, resolution: Resolution) -> Result<Layout, Er
         }
     };
     let surfaces = surfaces(scene);
-    let packing = if surfaces.len() > MAX_BY_SHAPE { Packing::Fast } else { Packing::Shape };
-    let options = Options { density, packing, padding: PADDING, ..Options::default() };
+    // Packing by shapes leaves less empty space, and takes seconds for a few thousand surfaces.
+    let packing = if surfaces.len() > 1000 { Packing::Fast } else { Packing::Shape };
+    // One texel that points on the outline use, and two of dilation.
+    let options = Options { density, packing, padding: 3, ..Options::default() };
     let inputs: Vec<MeshInput<'_>> =
         surfaces.iter().map(|s| MeshInput::new(&s.positions, &s.indices)).collect();
     let atlas = uvunwrap::generate(&inputs, &options)

@@ -22,9 +22,6 @@ use crate::geometry::bvh::Bvh;
 /// choice, well above the number at a point of an ordinary mesh; no measurement was kept.
 const MAX_OVERLAPS: usize = 256;
 
-/// Maximum number of boxes in a leaf of the tree. Plain choice; no measurement was kept.
-const LEAF_SIZE: usize = 4;
-
 /// For each box, the others that it overlaps, in no particular order. Pairs are complete unless
 /// both boxes have more than [`MAX_OVERLAPS`] partners; of those, only pairs are given in which one
 /// is among the [`MAX_OVERLAPS`] of highest `rank`. Time and memory are O(n · [`MAX_OVERLAPS`]),
@@ -58,7 +55,7 @@ pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> 
 /// Boxes halved along the axis of the largest extent of their centres.
 fn tree(boxes: &[Aabb]) -> Bvh {
     let centre = |&k: &u32| boxes[k as usize].centre();
-    Bvh::new(boxes, LEAF_SIZE, |part, _| {
+    Bvh::new(boxes, 4, |part, _| {
         let axis = Aabb::from_points(part.iter().map(centre)).longest_axis();
         let half = part.len() / 2;
         part.select_nth_unstable_by(half, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
@@ -116,7 +113,9 @@ mod tests {
     use super::*;
     use crate::sampling::hash::{split_mix64_nth, unit_interval};
 
-    const UNIT: Aabb = Aabb { low: DVec3::ZERO, high: DVec3::ONE };
+    fn unit() -> Aabb {
+        Aabb { low: DVec3::ZERO, high: DVec3::ONE }
+    }
 
     /// Cubes in a unit cube, at random.
     fn cubes(count: u32, size: f64) -> Vec<Aabb> {
@@ -152,7 +151,7 @@ mod tests {
     fn crowded_boxes_find_all_others() {
         // Some floors, each below all the cubes, are in crowds; the cubes are not.
         let mut boxes = cubes(3000, 0.02);
-        boxes.extend([UNIT; 3]);
+        boxes.extend([unit(); 3]);
         let all = sorted(&boxes);
         assert!(all == brute_force(&boxes));
         assert!(all[3000].len() > 10 * MAX_OVERLAPS);
@@ -160,10 +159,10 @@ mod tests {
 
     #[test]
     fn is_linear_in_crowds() {
-        const N: usize = 20_000;
-        let all = sorted(&[UNIT; N]);
+        let n = 20_000;
+        let all = sorted(&vec![unit(); n]);
         // Each is paired with the 256 of highest rank, and these with all.
-        let expected = |k: usize| if k < MAX_OVERLAPS { N - 1 } else { MAX_OVERLAPS };
-        assert!((0..N).all(|k| all[k].len() == expected(k)));
+        let expected = |k: usize| if k < MAX_OVERLAPS { n - 1 } else { MAX_OVERLAPS };
+        assert!((0..n).all(|k| all[k].len() == expected(k)));
     }
 }

@@ -18,10 +18,8 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
-use std::iter::Peekable;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::SurfaceTopology;
 use crate::geometry::rounding::tie_stable_key;
@@ -59,32 +57,39 @@ struct Cluster {
 
 impl Clusters {
     /// The clusters of `scene`, in time that is linear in its triangles but for the sorting.
-    ///
-    /// Mergeable triangles belong to one smooth surface. So each surface is merged by itself, many
-    /// in parallel, and then the cheapest of the next merges of all gets the next number, as in one
-    /// sequence.
     pub fn new(scene: &Scene) -> Clusters {
         let count = scene.triangles().len();
-        let topology = SurfaceTopology::ignoring_smoothing_groups(scene);
-        let (beside, surface_of) = (neighbours(&topology), topology.surfaces());
+        let mut beside = neighbours(&SurfaceTopology::ignoring_smoothing_groups(scene));
         let mut clusters: Vec<Cluster> = (0..count).map(|t| Cluster::of(scene, t)).collect();
-        let mut order: Vec<u32> = (0..count as u32).collect();
-        order.sort_by_key(|&t| surface_of[t as usize]);
-        let on_one = |&a: &u32, &b: &u32| surface_of[a as usize] == surface_of[b as usize];
-        let merged = |triangles: &[u32]| MergedSurface::new(&clusters, triangles, &beside);
-        let mut surfaces: Vec<MergedSurface> = order.par_chunk_by(on_one).map(merged).collect();
-        let mut parts: Vec<[u32; 2]> = vec![];
-        let mut is_root = vec![true; count];
-        let mut queue: BinaryHeap<_> =
-            (0..).zip(&mut surfaces).filter_map(|(k, surface)| surface.next(k)).collect();
-        while let Some(Reverse((_, pair, k))) = queue.pop() {
-            let surface: &mut MergedSurface = &mut surfaces[k];
-            surface.numbers.push(clusters.len() as u32);
-            clusters.extend(surface.merges.next().map(|merge| merge.cluster));
-            queue.extend(surface.next(k));
-            pair.iter().for_each(|&part| is_root[part as usize] = false);
+        let (mut parts, mut is_root) = (vec![], vec![true; count]);
+        let mut queue = BinaryHeap::new();
+        for (a, others) in (0u32..).zip(&beside) {
+            for &b in others.range(a + 1..) {
+                queue.extend(candidate(&clusters, a, b));
+            }
+        }
+        while let Some(Reverse((_, a, b))) = queue.pop() {
+            if !(is_root[a as usize] && is_root[b as usize]) {
+                continue;
+            }
+            let merged = clusters.len() as u32;
+            clusters.push(clusters[a as usize].merged(&clusters[b as usize]));
+            parts.push([a, b]);
             is_root.push(true);
-            parts.push(pair);
+            let mut others = BTreeSet::new();
+            for part in [a, b] {
+                is_root[part as usize] = false;
+                others.append(&mut beside[part as usize]);
+            }
+            others.retain(|&o| o != a && o != b);
+            for &o in &others {
+                let neighbours = &mut beside[o as usize];
+                neighbours.remove(&a);
+                neighbours.remove(&b);
+                neighbours.insert(merged);
+                queue.extend(candidate(&clusters, o, merged));
+            }
+            beside.push(others);
         }
         let roots = (0..clusters.len() as u32).filter(|&c| is_root[c as usize]).collect();
         Clusters { clusters, parts, roots }
@@ -122,73 +127,6 @@ impl Clusters {
         }
         triangles.sort_unstable();
         triangles
-    }
-}
-
-/// Two clusters become one.
-struct Merge {
-    /// Cost, see [`candidate`].
-    key: u64,
-    /// Both parts, in the surface's numbering: its triangles first, then merged clusters.
-    parts: [u32; 2],
-    cluster: Cluster,
-}
-
-/// A smooth surface with all of its merges.
-struct MergedSurface {
-    /// Numbers in the scene of its clusters so far.
-    numbers: Vec<u32>,
-    /// The remaining merges.
-    merges: Peekable<std::vec::IntoIter<Merge>>,
-}
-
-impl MergedSurface {
-    /// For these `triangles`, ascending, with all `clusters` and the neighbours `beside` each.
-    fn new(clusters: &[Cluster], triangles: &[u32], beside: &[BTreeSet<u32>]) -> MergedSurface {
-        let local = |t: &u32| triangles.partition_point(|other| other < t) as u32;
-        let mut clusters: Vec<Cluster> = triangles.iter().map(|&t| clusters[t as usize]).collect();
-        let mut beside: Vec<BTreeSet<u32>> =
-            triangles.iter().map(|&t| beside[t as usize].iter().map(local).collect()).collect();
-        let mut merges = vec![];
-        // Clusters without a parent so far.
-        let mut active = vec![true; triangles.len()];
-        let mut queue = BinaryHeap::new();
-        for (a, others) in (0u32..).zip(&beside) {
-            for &b in others.range(a + 1..) {
-                queue.extend(candidate(&clusters, a, b));
-            }
-        }
-        while let Some(Reverse((key, a, b))) = queue.pop() {
-            if !(active[a as usize] && active[b as usize]) {
-                continue;
-            }
-            let merged = clusters.len() as u32;
-            let cluster = clusters[a as usize].merged(&clusters[b as usize]);
-            merges.push(Merge { key, parts: [a, b], cluster });
-            clusters.push(cluster);
-            active.push(true);
-            let mut others = BTreeSet::new();
-            for part in [a, b] {
-                active[part as usize] = false;
-                others.append(&mut beside[part as usize]);
-            }
-            others.retain(|&o| o != a && o != b);
-            for &o in &others {
-                let neighbours = &mut beside[o as usize];
-                neighbours.remove(&a);
-                neighbours.remove(&b);
-                neighbours.insert(merged);
-                queue.extend(candidate(&clusters, o, merged));
-            }
-            beside.push(others);
-        }
-        MergedSurface { numbers: triangles.to_vec(), merges: merges.into_iter().peekable() }
-    }
-
-    /// The next merge on this surface, the `k`th: its cost, and the numbers of its parts.
-    fn next(&mut self, k: usize) -> Option<Reverse<(u64, [u32; 2], usize)>> {
-        let Merge { key, parts, .. } = self.merges.peek()?;
-        Some(Reverse((*key, parts.map(|part| self.numbers[part as usize]), k)))
     }
 }
 
@@ -260,7 +198,7 @@ mod tests {
         at: impl Fn(f64, f64) -> DVec3,
         kind: impl Fn(u32) -> [u32; 2],
     ) -> Scene {
-        let place = |k: u32| {
+        let point = |k: u32| {
             at(f64::from(k % (n + 1)) / f64::from(n), f64::from(k / (n + 1)) / f64::from(m))
         };
         let mut triangles = vec![];
@@ -275,7 +213,7 @@ mod tests {
         }
         let names = ["g", "h"].map(String::from).to_vec();
         let materials = ["m", "n"].map(|name| Material::grey(name, 0.5)).to_vec();
-        Scene::new((0..(n + 1) * (m + 1)).map(place).collect(), triangles, names, materials)
+        Scene::new((0..(n + 1) * (m + 1)).map(point).collect(), triangles, names, materials)
             .unwrap()
     }
 

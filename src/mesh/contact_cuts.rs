@@ -47,17 +47,14 @@ const CONTACT_DISTANCE: f64 = 0.05;
 /// thinner. Plain choice.
 const SNAP_DISTANCE: f64 = 0.02;
 
-/// Maximum number of contact segments over all triangles: a scene with more is not cut at all,
-/// since each makes some pieces, and a mesh that fine resolves few of them.
-const MAX_SEGMENTS: usize = 1 << 17;
-
 /// `scene` with its reflecting triangles cut where others touch them, for elements with edges down
 /// to `finest` (scene unit); unchanged if none are touched.
 pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
     let topology = SurfaceTopology::of_scene(scene);
     let mut cuts = find_cuts(scene, &topology, finest);
     let segments: usize = cuts.iter().map(|cuts| cuts.segments.len()).sum();
-    if segments == 0 || segments > MAX_SEGMENTS {
+    // Each makes some pieces, and a mesh that fine resolves few of them.
+    if segments == 0 || segments > 1 << 17 {
         return scene.clone();
     }
     share_side_points(&topology, &mut cuts);

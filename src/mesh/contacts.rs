@@ -23,17 +23,9 @@ use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Distance from a cell's plane below which another triangle touches the cell, in units of the
-/// cell's size (the square root of its area). Plain choice; no measurement was kept.
-const CONTACT_DISTANCE: f64 = 0.15;
-
 /// Least depth of a segment in an element for separating it, as a barycentric weight: a segment
 /// along the element's edge does not. Plain choice; no measurement was kept.
 const MIN_PENETRATION: f64 = 0.02;
-
-/// Least depth in a cell of a segment that separates some element in it, as a barycentric weight,
-/// since elements are at most [`Mesh::MAX_DEPTH`] levels smaller.
-const MIN_CELL_PENETRATION: f64 = MIN_PENETRATION / (1u32 << Mesh::MAX_DEPTH) as f64;
 
 /// Cosine of the angle between the normals above which triangles are coplanar: 1e-5 radians.
 const COPLANAR_COSINE: f64 = 1.0 - 5e-11;
@@ -96,9 +88,12 @@ impl Mesh {
         levels: u32,
         separated: &mut Vec<(usize, Cell)>,
     ) {
+        // Elements are at most `MAX_DEPTH` levels smaller.
         let segments: Vec<ContactSegment> = segments
             .iter()
-            .filter(|segment| segment.separates(cell, MIN_CELL_PENETRATION))
+            .filter(|segment| {
+                segment.separates(cell, MIN_PENETRATION / (1u32 << Mesh::MAX_DEPTH) as f64)
+            })
             .copied()
             .collect();
         if segments.is_empty() {
@@ -124,7 +119,8 @@ impl Mesh {
     /// Distance from its plane below which something touches a cell of `level` in triangle `t`,
     /// scene unit.
     fn contact_distance(&self, t: usize, level: u32) -> f64 {
-        CONTACT_DISTANCE * (self.scene.area(t) / f64::from(1u32 << (2 * level))).sqrt()
+        // Plain choice.
+        0.15 * (self.scene.area(t) / f64::from(1u32 << (2 * level))).sqrt()
     }
 
     /// Level of this mesh's element at the centroid of `cell` of triangle `t`.

@@ -27,19 +27,13 @@ use super::sizing::size_growth;
 use crate::geometry::aabb::Aabb;
 use crate::scene::{Piece, Scene, longest_edge};
 
-/// Maximum number of pieces; a scene with more is left unchanged, and so are its elements.
-const MAX_PIECES: usize = 1 << 18;
-
-/// Largest ratio of the sizes of the scene and of a piece: smaller ones are lost in the rounding of
-/// coordinates.
-const MAX_CONCENTRATION: f64 = 1e9;
-
 /// `scene` with its reflecting triangles cut until none has a longer edge than the diagonal of
 /// `region`, which has the light, times the growth with the distance from it; unchanged if none is
 /// so large. Below a piece there are [`super::Mesh::MAX_DEPTH`] levels of elements, down to 1/4096
 /// of the region.
 pub(crate) fn cut_large_triangles(scene: &Arc<Scene>, region: &Aabb) -> Arc<Scene> {
-    let least = region.diagonal().max(scene.reflecting_bounds().diagonal() / MAX_CONCENTRATION);
+    // Smaller pieces are lost in the rounding of coordinates.
+    let least = region.diagonal().max(scene.reflecting_bounds().diagonal() / 1e9);
     let is_large = |t: usize, corners: &[DVec3; 3]| {
         let material = scene.material(t);
         // Glass cut only partly would enclose no body.
@@ -140,7 +134,7 @@ impl Bisection {
     /// conforming result; returns the pieces of each triangle, unless there are too many.
     fn run(mut self, is_large: impl Fn(usize, &[DVec3; 3]) -> bool) -> Option<Vec<Vec<Piece>>> {
         let triangles = self.parts.len();
-        let most = MAX_PIECES.max(2 * triangles);
+        let most = (2 * triangles).max(1 << 18);
         let mut pending: Vec<usize> = (0..triangles).collect();
         while let Some(p) = pending.pop() {
             let Part { triangle, corners, .. } = self.parts[p];

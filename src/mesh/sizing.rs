@@ -46,9 +46,6 @@ impl ElementSizing {
     }
 }
 
-/// Growth factor of elements per step until there are few enough: it halves their number.
-const COARSENING: f64 = std::f64::consts::SQRT_2;
-
 impl ElementSizing {
     /// The same sizing scaled up until `scene` has at most `most` elements at up to `max_depth`
     /// levels; its triangles are not merged.
@@ -58,7 +55,8 @@ impl ElementSizing {
         let bound = most.max(triangles);
         let longest = (0..triangles).map(|t| longest_edge(scene.corners(t))).fold(0.0, f64::max);
         while sizing.size < longest && sizing.count(scene, max_depth, bound) > bound {
-            sizing.size *= COARSENING;
+            // Half as many elements.
+            sizing.size *= std::f64::consts::SQRT_2;
         }
         sizing
     }

@@ -8,13 +8,6 @@ use glam::DVec3;
 use super::{Mesh, NodeId};
 use crate::sampling::low_discrepancy::{fold_to_triangle, r2_point};
 
-/// Weight of a hole, as a fraction of its area, in means over elements around a vertex: gives
-/// normals to vertices in holes, and does not affect others.
-const HOLE_WEIGHT: f64 = 1e-12;
-
-/// Number of points on a patch that are tested for one outside of holes. Plain choice.
-const PLACES: usize = 64;
-
 impl Mesh {
     /// Area of `node` without its holes, length unit squared: the area used for light.
     pub fn solid_area(&self, node: NodeId) -> f64 {
@@ -37,7 +30,8 @@ impl Mesh {
     /// Weight of `node` in means over elements around a vertex: its solid area, and nearly 0 for a
     /// hole.
     pub(crate) fn weight(&self, node: NodeId) -> f64 {
-        self.solid_area(node).max(HOLE_WEIGHT * self.area(node))
+        // Gives normals to vertices in holes, and does not affect others.
+        self.solid_area(node).max(1e-12 * self.area(node))
     }
 
     /// Whether `position` on `node` is in no hole.
@@ -54,11 +48,11 @@ impl Mesh {
             return centroid;
         }
         let [a, b, c] = self.corners(node);
-        let place = |k: usize| {
+        let point = |k: usize| {
             let [u, v] = fold_to_triangle(r2_point(k, 0.5));
             a + u * (b - a) + v * (c - a)
         };
-        let solid = (0..PLACES).map(place).filter(|&p| self.is_solid(node, p));
+        let solid = (0..64).map(point).filter(|&p| self.is_solid(node, p));
         let distance = |p: &DVec3| p.distance_squared(centroid);
         solid.min_by(|p, q| distance(p).total_cmp(&distance(q))).unwrap_or(centroid)
     }

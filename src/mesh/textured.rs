@@ -3,11 +3,6 @@
 use super::Mesh;
 use crate::scene::Rgb;
 
-/// Least reflectance of an element as a fraction of its material's, if its piece of the texture is
-/// black: negligible, and irradiance can still be computed from the reflected radiosity, since 1e9
-/// is far below the 2⁵³ of rounding.
-const MIN_REFLECTANCE_SHARE: f64 = 1e-9;
-
 impl Mesh {
     /// Reflectance of element `e` per channel: that of its material or, of a textured one, the mean
     /// of the texture over the element, at least 1e-9 of the material's.
@@ -57,9 +52,10 @@ impl Mesh {
             let piece = |&node: &_| (self.triangle(node), self.cell(node).corners());
             let pieces: Vec<_> = nodes.iter().map(piece).collect();
             let mut reflectances = self.scene().mean_reflectances(&pieces);
+            // Negligible, and irradiance can still be computed from the reflected radiosity: 1e9 is
+            // far below the 2⁵³ of rounding.
             for (reflectance, &node) in reflectances.iter_mut().zip(&nodes) {
-                *reflectance =
-                    reflectance.max(MIN_REFLECTANCE_SHARE * self.material(node).reflectance);
+                *reflectance = reflectance.max(1e-9 * self.material(node).reflectance);
             }
             reflectances
         })

@@ -33,6 +33,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::geometry::FILE_TOLERANCE;
 use crate::geometry::union_find::UnionFind;
 use crate::mesh::Mesh;
 use crate::scene::{Scene, Triangle};
@@ -58,10 +59,6 @@ pub(crate) struct Side {
     /// Whether this triangle runs along it from the higher to the lower of the welded positions.
     pub reversed: bool,
 }
-
-/// Largest angle between triangles at one side that coincide, radians: the precision of six digits
-/// of their corners, as for covered backs.
-const SAME_ANGLE: f64 = 1e-4;
 
 /// A triangle, and the number of one of its sides.
 type TriangleSide = (usize, usize);
@@ -186,7 +183,7 @@ fn facing_pairs(
     // Of coincident ones, those that face smaller angles come before those that face larger ones.
     let mut start = 0;
     for end in 1..=around.len() {
-        if end == around.len() || around[end].0 - around[end - 1].0 > SAME_ANGLE {
+        if end == around.len() || around[end].0 - around[end - 1].0 > FILE_TOLERANCE {
             around[start..end].sort_by_key(|&(_, side)| (!looks_back(side), side));
             start = end;
         }
@@ -218,7 +215,7 @@ fn by_angle(
         let (_, out) = across(side);
         // Triangles that coincide with the first have about its angle, on both sides of 0.
         let angle = out.dot(quarter).atan2(out.dot(zero));
-        if angle < -SAME_ANGLE { angle + TAU } else { angle }
+        if angle < -FILE_TOLERANCE { angle + TAU } else { angle }
     };
     let mut around: Vec<_> = sharing.iter().map(|&side| (angle(side), side)).collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -13,12 +13,9 @@
 use glam::DVec3;
 
 use super::{Mesh, NodeId};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::{clip, polygon_area};
 use crate::scene::{Material, Rgb};
-
-/// Shared area, as a fraction of the smaller element's, below which elements are only neighbours:
-/// rounding where they meet.
-const SLIVER: f64 = 1e-9;
 
 /// Light passed on between elements and those behind them; empty if nothing is translucent.
 #[derive(Clone, Debug, Default)]
@@ -100,7 +97,7 @@ impl Transmission {
 fn overlaps(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<(usize, f64)> {
     let (mut open, mut found) = (vec![other], vec![]);
     while let Some(other) = open.pop() {
-        let least = SLIVER * mesh.area(node).min(mesh.area(other));
+        let least = COINCIDENCE_TOLERANCE * mesh.area(node).min(mesh.area(other));
         let shared = shared_polygon(mesh, node, other);
         let area = polygon_area(&shared);
         if area <= least {

@@ -19,13 +19,6 @@ use crate::scene::Rgb;
 /// Number of coefficients per channel.
 pub const COUNT: usize = 9;
 
-/// Factor from radiance to irradiance of order l: Â_l = π, 2π/3, π/4 (Ramamoorthi and Hanrahan
-/// 2001, equation 8).
-const COSINE_LOBE: [f64; 3] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
-
-/// Order l of each coefficient.
-const ORDER: [usize; COUNT] = [0, 1, 1, 1, 2, 2, 2, 2, 2];
-
 /// A function of direction by its harmonics to order 2, three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Harmonics {
@@ -43,8 +36,11 @@ impl Harmonics {
     /// The radiance, W/(m² sr), whose irradiance this is: L_lm = E_lm / Â_l.
     pub fn radiance_of_irradiance(&self) -> Harmonics {
         let mut coefficients = self.coefficients;
-        for (c, order) in coefficients.iter_mut().zip(ORDER) {
-            *c /= COSINE_LOBE[order];
+        let [zero, one, two] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
+        // Â_l = π, 2π/3, π/4 of order l (Ramamoorthi and Hanrahan 2001, equation 8).
+        let lobe = [zero, one, one, one, two, two, two, two, two];
+        for (c, factor) in coefficients.iter_mut().zip(lobe) {
+            *c /= factor;
         }
         Harmonics { coefficients }
     }
@@ -107,9 +103,6 @@ impl Direction {
 /// to order 2, root mean square over the sphere.
 pub(super) const DIRECTIONS: [Direction; 26] = directions();
 
-/// Weights of the middles of sides, edges and corners.
-const WEIGHTS: [f64; 3] = [1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0];
-
 const fn directions() -> [Direction; 26] {
     let mut all = [Direction { towards: [0.0; 3], weight: 0.0 }; 26];
     let (mut cell, mut next) = (0, 0);
@@ -118,7 +111,11 @@ const fn directions() -> [Direction; 26] {
         let nonzero = towards[0] * towards[0] + towards[1] * towards[1] + towards[2] * towards[2];
         if nonzero > 0 {
             let towards = [towards[0] as f64, towards[1] as f64, towards[2] as f64];
-            all[next] = Direction { towards, weight: WEIGHTS[nonzero as usize - 1] };
+            // Of the middles of sides, edges and corners.
+            all[next] = Direction {
+                towards,
+                weight: [1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0][nonzero as usize - 1],
+            };
             next += 1;
         }
         cell += 1;

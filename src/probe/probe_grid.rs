@@ -16,9 +16,6 @@ pub struct ProbeGrid {
     pub counts: [usize; 3],
 }
 
-/// Maximum number of probes of a grid. Plain choice: 1 GiB of them.
-const MAX_PROBES: f64 = 4e6;
-
 impl ProbeGrid {
     /// A grid with `counts` cells along x, y and z of `bounds`.
     ///
@@ -37,7 +34,8 @@ impl ProbeGrid {
                 "give a finite one",
             );
         }
-        if !(1.0..=MAX_PROBES).contains(&product) {
+        // 1 GiB of probes.
+        if !(1.0..=4e6).contains(&product) {
             return wrong(format!("{a} by {b} by {c} probes"), "give one to four million");
         }
         let spacing = size / DVec3::from_array(counts.map(|n| n as f64));

@@ -26,6 +26,14 @@ pub(crate) struct HemisphereSamples {
     directions: Vec<[f64; 3]>,
 }
 
+/// The direction of a hemisphere about unit `normal` for a point of the unit square, in proportion
+/// to the cosine.
+pub(crate) fn cosine_direction(normal: DVec3, [radius2, turn]: [f64; 2]) -> DVec3 {
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    let (sin, cos) = (TAU * turn).sin_cos();
+    radius2.sqrt() * (tangent * cos + bitangent * sin) + normal * (1.0 - radius2).sqrt()
+}
+
 /// Maximum number of rays of a set: some 24 MiB of directions.
 pub(crate) const MAX_RAYS: u32 = 1 << 20;
 

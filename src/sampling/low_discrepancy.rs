@@ -12,9 +12,6 @@
 /// unreasonable effectiveness of quasirandom sequences": R₂).
 const PLASTIC: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053_2];
 
-/// Fractional part of the golden ratio, (√5 − 1)/2.
-const GOLDEN_SECTION: f64 = 0.618_033_988_749_895;
-
 /// The van der Corput sequence in base 2: the bits of `k` mirrored at the binary point, in [0, 1).
 pub(crate) fn radical_inverse(k: u32) -> f64 {
     f64::from(k.reverse_bits()) / 2f64.powi(32)
@@ -52,7 +49,7 @@ pub(crate) fn fold_to_triangle([u, v]: [f64; 2]) -> [f64; 2] {
 /// multiples, modulo `count`, of the next number after `count` × golden section that has no
 /// divisor in common with it (D. E. Knuth 1973, The Art of Computer Programming 3, section 6.4).
 pub(crate) fn golden_ratio_order(count: usize) -> Vec<usize> {
-    let mut step = (count as f64 * GOLDEN_SECTION) as usize;
+    let mut step = (count as f64 * 0.618_033_988_749_895) as usize;
     while step < count && greatest_common_divisor(step, count) != 1 {
         step += 1;
     }
@@ -103,19 +100,18 @@ mod tests {
 
     #[test]
     fn golden_ratio_order_is_a_spread_permutation() {
-        const FIRST: usize = 16;
         for count in [0, 1, 2, 3, 10, 192, 1000, 1024] {
             let order = golden_ratio_order(count);
             let mut sorted = order.clone();
             sorted.sort_unstable();
             assert_eq!(sorted, (0..count).collect::<Vec<_>>());
-            let mut first: Vec<usize> = order.into_iter().take(FIRST).collect();
+            let mut first: Vec<usize> = order.into_iter().take(16).collect();
             first.push(count);
             first.sort_unstable();
             // By the three-gap theorem no gap is larger than the sum of the two others, which at
             // the golden section is below 2.7 times the mean; steps are rounded.
             let gap = first.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0);
-            assert!(gap as f64 <= 3.0 * count as f64 / FIRST as f64 + 1.0, "{count}: {gap}");
+            assert!(gap as f64 <= 3.0 * count as f64 / 16.0 + 1.0, "{count}: {gap}");
         }
     }
 }

@@ -12,19 +12,8 @@
 use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
+use crate::geometry::barycentric::WHOLE;
 use crate::geometry::polygon::longest_edge;
-
-/// Fraction of the triangles that may lie outside the dense region, at either end of each axis.
-const TRIMMED_SHARE: f64 = 0.1;
-
-/// Least ratio of the diagonals of the scene and of the dense region for a split into octaves.
-const MIN_CONCENTRATION: f64 = 4.0;
-
-/// Largest such ratio: smaller parts are lost in the rounding of coordinates.
-const MAX_CONCENTRATION: f64 = 1e9;
-
-/// The whole triangle, by weights of its second and third corner.
-const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
 /// The dense region from which distances are measured.
 #[derive(Clone, Copy, Debug)]
@@ -51,9 +40,11 @@ impl Octaves {
     pub fn new(middles: impl IntoIterator<Item = DVec3>, diagonal: f64) -> Octaves {
         let middles: Vec<(DVec3, f64)> = middles.into_iter().map(|middle| (middle, 1.0)).collect();
         let is_concentrated = |centre: &Aabb| {
-            (MIN_CONCENTRATION..MAX_CONCENTRATION).contains(&(diagonal / centre.diagonal()))
+            // Smaller parts are lost in the rounding of coordinates.
+            (4.0..1e9).contains(&(diagonal / centre.diagonal()))
         };
-        Octaves { centre: Aabb::around_most(&middles, TRIMMED_SHARE).filter(is_concentrated) }
+        // A tenth of the triangles may lie outside, at either end of each axis.
+        Octaves { centre: Aabb::around_most(&middles, 0.1).filter(is_concentrated) }
     }
 
     /// Calls `take` with the parts of a triangle with this `area`: none is longer than its
@@ -61,11 +52,12 @@ impl Octaves {
     pub fn for_each_part(
         &self,
         triangle: [DVec3; 3],
-        (area, has_holes): (f64, bool),
+        area: f64,
+        has_holes: bool,
         take: &mut dyn FnMut(Part),
     ) {
         let is_split = self.centre.is_some() && !has_holes;
-        self.split(&triangle, WHOLE, (area, is_split), take);
+        self.split(&triangle, WHOLE, area, is_split, take);
     }
 
     /// Distance of the part plus the diagonal of the dense region; 1 if all is one octave.
@@ -80,7 +72,8 @@ impl Octaves {
         &self,
         triangle: &[DVec3; 3],
         corners: [[f64; 2]; 3],
-        (area, is_split): (f64, bool),
+        area: f64,
+        is_split: bool,
         take: &mut dyn FnMut(Part),
     ) {
         let [a, b, c] = triangle;
@@ -95,7 +88,7 @@ impl Octaves {
         let (p, q, r) = (middle(0, 1), middle(1, 2), middle(2, 0));
         let [a, b, c] = corners;
         for part in [[a, p, r], [p, b, q], [r, q, c], [p, q, r]] {
-            self.split(triangle, part, (area / 4.0, is_split), take);
+            self.split(triangle, part, area / 4.0, is_split, take);
         }
     }
 }
@@ -128,7 +121,7 @@ mod tests {
 
     fn parts_of(octaves: &Octaves, has_holes: bool) -> Vec<Part> {
         let mut parts = vec![];
-        octaves.for_each_part(GROUND, (2e6, has_holes), &mut |part| parts.push(part));
+        octaves.for_each_part(GROUND, 2e6, has_holes, &mut |part| parts.push(part));
         parts
     }
 

@@ -31,10 +31,6 @@ pub(crate) struct CellRotation {
 /// change at near distances that are round fractions of the scene's size.
 const DOUBLING_PHASE: f64 = 0.377;
 
-/// Smallest cell, as a power of two of the scene's size: keeps cell numbers below 2⁴⁰, which 64-bit
-/// floats represent exactly.
-const SMALLEST_CELL_LOG2: f64 = -40.0;
-
 impl CellRotation {
     /// Largest edge of a cell, in units of a point's near distance: 2^(3 + [`DOUBLING_PHASE`]).
     pub const LARGEST_CELL: f64 = 10.39;
@@ -53,8 +49,8 @@ impl CellRotation {
     /// hundred thousand to another cell.
     pub fn at(&self, position: DVec3, near: f64) -> f64 {
         let size_log2 = (near / self.size).log2() + DOUBLING_PHASE;
-        let cells_per_unit =
-            (-(size_log2.floor() + 3.0).max(SMALLEST_CELL_LOG2)).exp2() / self.size;
+        // Cell numbers below 2⁴⁰ are exact.
+        let cells_per_unit = (-(size_log2.floor() + 3.0).max(-40.0)).exp2() / self.size;
         let cell = ((position - self.low) * cells_per_unit).round().as_i64vec3();
         let mix = |hash: u64, x: i64| split_mix64(hash ^ x as u64);
         unit_interval(cell.to_array().into_iter().fold(0, mix))

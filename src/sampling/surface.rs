@@ -11,9 +11,6 @@
 
 use crate::sampling::low_discrepancy::{fold_to_triangle, r2_point};
 
-/// Number of shifted points that are tried instead of one. Plain choice.
-const MAX_SHIFTS: usize = 64;
-
 /// Chooses triangles in proportion to their areas.
 #[derive(Clone, Debug)]
 pub(crate) struct AreaSampler {
@@ -75,7 +72,7 @@ pub(crate) fn shifted([u, v]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let [x, y] = r2_point(k, 0.0);
         fold_to_triangle([(u + x).fract(), (v + y).fract()])
     };
-    std::iter::once([u, v]).chain((1..MAX_SHIFTS).map(shift))
+    std::iter::once([u, v]).chain((1..64).map(shift))
 }
 
 #[cfg(test)]

@@ -16,16 +16,9 @@ use rustc_hash::FxHashSet;
 
 use super::covers::Covers;
 use super::{Scene, longest_edge};
+use crate::geometry::FILE_TOLERANCE;
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
-
-/// Largest distance of fronts that coincide with a triangle, in units of the longer of their
-/// longest edges: well above the rounding of a flat polygon in a file of six digits.
-const SAME_PLACE: f64 = 1e-4;
-
-/// Fraction of a triangle's area that may stay open if it counts as covered: slivers between
-/// outlines due to rounding.
-const OPEN_SHARE: f64 = 1e-6;
 
 /// Number of triangles at a corner above which the corner is skipped, and maximum number of
 /// candidates for one triangle: otherwise thousands that meet in a point would each test all of
@@ -67,7 +60,8 @@ impl Surfaces<'_> {
             return None;
         }
         let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
-        let still_open = OPEN_SHARE * self.scene.area(t);
+        // Slivers between outlines stay open by rounding.
+        let still_open = 1e-6 * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
         let mut known: FxHashSet<u32> = FxHashSet::default();
         let mut covers = vec![];
@@ -108,7 +102,7 @@ impl Surfaces<'_> {
         }
         let of_s = self.scene.corners(s);
         let height = |p: DVec3| normal.dot(p - corners[0]);
-        let reach = SAME_PLACE * longest_edge(corners).max(longest_edge(of_s));
+        let reach = FILE_TOLERANCE * longest_edge(corners).max(longest_edge(of_s));
         let in_plane = of_s.iter().all(|&p| height(p).abs() <= reach);
         let weights = || of_s.map(|p| self.scene.barycentric(t, p));
         let covers = in_plane

@@ -41,8 +41,8 @@ impl Scene {
                 scene.triangles.push(Triangle { corners, ..self.triangles[t] });
                 scene.cut_sides.push(piece.cut);
                 if let Some([a, b, c]) = self.texture_coordinates(t) {
-                    let place = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
-                    textures.coordinates.push(piece.weights.map(place));
+                    let point = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
+                    textures.coordinates.push(piece.weights.map(point));
                 }
                 textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
             }

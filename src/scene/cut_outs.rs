@@ -10,6 +10,9 @@
 //! used for light is this fraction of the geometric one. Triangles that lack texture coordinates at
 //! a corner are solid.
 
+use crate::geometry::COINCIDENCE_TOLERANCE;
+use crate::geometry::FILE_TOLERANCE;
+use crate::geometry::barycentric::WHOLE;
 use glam::DVec2;
 
 use super::Scene;
@@ -17,17 +20,6 @@ use super::rgb::Rgb;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
 use super::textured::Piece;
-
-/// Distance of a piece's solid fraction from 0 or 1 below which it is rounded to it.
-const ROUNDING: f64 = 1e-9;
-
-/// Distance of texture coordinates, relative to one plus their length, below which they are equal:
-/// the rounding of a file's six digits.
-const SAME_PLACE: f64 = 1e-4;
-
-/// Number of points along each side of a piece whose mean has no closed form.
-const MAX_POINTS: f64 = 48.0;
-const MIN_POINTS: f64 = 8.0;
 
 impl Scene {
     /// Area of triangle `t` without its holes, length unit squared: the area used for light.
@@ -39,7 +31,7 @@ impl Scene {
     /// Whether triangle `t` is solid at the point with these weights of its second and third
     /// corner.
     pub fn is_solid(&self, t: usize, barycentric: [f64; 2]) -> bool {
-        self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_place(t, barycentric)))
+        self.mask(t).is_none_or(|mask| mask.is_solid(self.texture_point(t, barycentric)))
     }
 
     /// Whether any material has a mask.
@@ -79,13 +71,13 @@ impl Scene {
 
     /// The same for one piece.
     pub(crate) fn solid_share(&self, (t, corners): Piece) -> f64 {
-        let place = || corners.map(|corner| self.texture_place(t, corner));
+        let place = || corners.map(|corner| self.texture_point(t, corner));
         self.mask(t).map_or(1.0, |mask| mask.solid_share(place(), MAX_OUTLINE_CELLS))
     }
 
     /// Computes the solid fractions of all triangles from their textures.
     pub(super) fn find_solid_shares(&mut self) {
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
         let solid_shares = self.solid_shares(&pieces);
         self.textures = SceneTextures { solid_shares, ..(*self.textures).clone() }.into();
     }
@@ -99,9 +91,10 @@ impl Scene {
         corners: [[f64; 2]; 3],
     ) -> bool {
         let Some(mask) = other.mask(s) else { return true };
-        let of_t = corners.map(|corner| self.texture_place(t, corner));
-        let of_s = Scene::WHOLE.map(|corner| other.texture_place(s, corner));
-        let near = |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, SAME_PLACE * (1.0 + b.length()));
+        let of_t = corners.map(|corner| self.texture_point(t, corner));
+        let of_s = WHOLE.map(|corner| other.texture_point(s, corner));
+        let near =
+            |(a, b): (&DVec2, &DVec2)| a.abs_diff_eq(*b, FILE_TOLERANCE * (1.0 + b.length()));
         self.mask(t).is_some_and(|of_t| of_t.has_holes_of(mask)) && of_t.iter().zip(&of_s).all(near)
     }
 }
@@ -145,8 +138,8 @@ impl TextureMap {
             solid / all
         };
         match share {
-            share if share < ROUNDING => 0.0,
-            share if share > 1.0 - ROUNDING => 1.0,
+            share if share < COINCIDENCE_TOLERANCE => 0.0,
+            share if share > 1.0 - COINCIDENCE_TOLERANCE => 1.0,
             share => share,
         }
     }
@@ -181,7 +174,7 @@ impl TextureMap {
 /// Points spread evenly over a triangle with a limit of `cells` along its outline: a square of them
 /// folded onto it.
 fn spread_over([a, b, c]: [DVec2; 3], cells: f64) -> impl Iterator<Item = DVec2> {
-    let n = (MAX_POINTS * cells / MAX_OUTLINE_CELLS).clamp(MIN_POINTS, MAX_POINTS) as u32;
+    let n = (48.0 * cells / MAX_OUTLINE_CELLS).clamp(8.0, 48.0) as u32;
     (0..n).flat_map(move |i| (0..n).map(move |j| [i, j])).map(move |ij| {
         let [mut s, mut t] = ij.map(|k| (f64::from(k) + 0.5) / f64::from(n));
         if s + t > 1.0 {

@@ -23,10 +23,6 @@ use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
 
-/// Ratio of the volume to the area to the power of 3/2 below which a shell is flat: a duplicated
-/// sheet. A ball has 0.094, a plate with a thickness of 10⁻⁶ of its width some 10⁻⁷.
-const FLAT: f64 = 1e-9;
-
 /// Role of a triangle of glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GlassFace {
@@ -167,13 +163,13 @@ impl GlassBodies {
     /// Determines the cavities, and numbers bodies by the shells around them.
     fn nest(&mut self) {
         let shells = &self.shells;
-        let place = |s: &Shell| s.triangles[0][0];
+        let position = |s: &Shell| s.triangles[0][0];
         let around = |k: usize| -> Vec<usize> {
             let encloses = |&j: &usize| {
                 j != k
                     && shells[j].material == shells[k].material
                     && shells[j].volume > shells[k].volume
-                    && shells[j].encloses(place(&shells[k]))
+                    && shells[j].encloses(position(&shells[k]))
             };
             (0..shells.len()).filter(encloses).collect()
         };
@@ -215,7 +211,9 @@ impl Shell {
         let volume: f64 = triangles.iter().map(cone).sum();
         let areas = || members.iter().map(|&k| scene.area(faces[k].triangle));
         let area: f64 = areas().sum();
-        if volume.is_nan() || volume.abs() <= FLAT * area.powf(1.5) {
+        // A duplicated sheet; a ball has 0.094, a plate with a thickness of 10⁻⁶ of its width some
+        // 10⁻⁷.
+        if volume.is_nan() || volume.abs() <= 1e-9 * area.powf(1.5) {
             return None;
         }
         let flipped = volume < 0.0;

@@ -195,9 +195,9 @@ fn bend(h: f64) -> f64 {
 /// The step of ascending `angles` that contains `angle`, and its fraction of the step, in [0, 1];
 /// none outside of them. An angle outside by the rounding of a turn counts as inside.
 fn cell(angles: &[f64], angle: f64) -> Option<(usize, f64)> {
-    const ROUNDING: f64 = TAU * f64::EPSILON;
+    let rounding = TAU * f64::EPSILON;
     let (first, last) = (angles[0], angles[angles.len() - 1]);
-    if angle < first - ROUNDING || angle > last + ROUNDING {
+    if angle < first - rounding || angle > last + rounding {
         return None;
     }
     let k = angles.partition_point(|&a| a <= angle).clamp(1, angles.len() - 1) - 1;

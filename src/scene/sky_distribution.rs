@@ -39,9 +39,6 @@ const STANDARD: [[f64; 5]; 15] = [
     [-1.0, -0.15, 24.0, -2.8, 0.15],
 ];
 
-/// Clearness values at which the next row of [`PEREZ`] begins (Perez et al. 1990, table 1).
-const CLEARNESS: [f64; 7] = [1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2];
-
 /// Four coefficients each of a, b, c, d and e (Perez, Seals and Michalsky 1993, table 1, with the
 /// erratum).
 const PEREZ: [[[f64; 4]; 5]; 8] = [
@@ -103,9 +100,6 @@ const PEREZ: [[[f64; 4]; 5]; 8] = [
     ],
 ];
 
-/// Least cosine of the zenith angle in the gradation, which diverges at the horizon for b above 0.
-const MIN_COSINE: f64 = 0.01;
-
 impl SkyDistribution {
     /// The overcast sky, 1 + 2 sin of the elevation (Moon and Spencer 1942): a third of the zenith
     /// at the horizon. The irradiance of open ground is 7π/9 times the zenith's radiance.
@@ -129,7 +123,9 @@ impl SkyDistribution {
         if !all.iter().all(|x| x.is_finite() && *x >= 0.0) {
             return None;
         }
-        let line = CLEARNESS.partition_point(|&least| least <= clearness);
+        // Perez et al. 1990, table 1.
+        let line =
+            [1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2].partition_point(|&least| least <= clearness);
         // The range of the model's fit.
         let brightness = if line > 0 && line < 5 { brightness.max(0.2) } else { brightness };
         let linear =
@@ -152,7 +148,8 @@ impl SkyDistribution {
         let absolute = move |up: f64, from_sun: f64| match self.0 {
             Kind::Traditional => 1.0 + 2.0 * up,
             Kind::Graded([a, b, c, d, e]) => {
-                let gradation = 1.0 + a * (b / up.max(MIN_COSINE)).exp();
+                // It diverges at the horizon for b above 0.
+                let gradation = 1.0 + a * (b / up.max(0.01)).exp();
                 let angle = from_sun.clamp(-1.0, 1.0).acos();
                 let scattered = c * ((d * angle).exp() - (d * FRAC_PI_2).exp());
                 gradation * (1.0 + scattered + e * from_sun * from_sun)

@@ -30,10 +30,6 @@ pub(crate) struct SkyMap {
 /// a function smooth over 20° varies by about 1e-4 within a piece of at most 0.3°.
 const SIDE: usize = 512;
 
-/// Maximum number of pieces along the edge of a square for a picture: about 0.1° each, 24 MB in
-/// all.
-const MAX_SIDE: usize = 1024;
-
 impl SkyMap {
     /// Of `radiance` by directions (unit length, in the scene's axes) above the horizon; black
     /// below. `turn` is the rotation from the scene's axes to the map's.
@@ -51,7 +47,8 @@ impl SkyMap {
     pub fn of_picture(turn: DQuat, width: usize, pixels: &[Rgb]) -> SkyMap {
         use std::f64::consts::{PI, TAU};
         let height = pixels.len() / width;
-        let side = (width / 4).max(height / 2).next_power_of_two().clamp(64, MAX_SIDE);
+        // 1024 pieces of about 0.1° at most: 24 MB.
+        let side = (width / 4).max(height / 2).next_power_of_two().clamp(64, 1024);
         let (mut sums, mut weights) =
             (vec![Rgb::ZERO; 2 * side * side], vec![0.0; 2 * side * side]);
         // Parts of a pixel, enough for each piece to contain one: a piece is no narrower than

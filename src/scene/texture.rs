@@ -15,6 +15,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use arrayvec::ArrayVec;
 use glam::DVec2;
 
 use super::rgb::Rgb;
@@ -38,13 +39,6 @@ struct Level {
 /// too, the mean of a triangle about as wide as high is off by at most 5e-3 of their contrast, and
 /// by 1e-4 if cells differ.
 pub(super) const MAX_OUTLINE_CELLS: f64 = 1500.0;
-
-/// Number of repetitions of a texture across a triangle above which the mean of the whole texture
-/// is used. Plain choice.
-const MAX_TILES: f64 = 4096.0;
-
-/// Points along each side at which a clamped texture is sampled beyond its border.
-const CLAMPED_POINTS: u32 = 48;
 
 impl Texture {
     /// An image of `width` × `height` texels, at least one, rows from the top: sRGB, 8 bits per
@@ -81,7 +75,7 @@ impl Texture {
     pub(super) fn texel_at(&self, uv: DVec2, clamped: bool) -> Rgb {
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
         let [x, y] = [(uv.x, self.width), (1.0 - uv.y, self.height)]
-            .map(|(place, count)| ((place * f64::from(count)) as u32).min(count - 1));
+            .map(|(position, count)| ((position * f64::from(count)) as u32).min(count - 1));
         self.cell(0, x, y)
     }
 
@@ -111,8 +105,8 @@ impl Texture {
         let [columns, rows] = self.level_size(level);
         let size = DVec2::new(self.width.into(), self.height.into()) * 0.5f64.powi(level as i32);
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
-        let place = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
-        let (first, part) = (place.floor(), place - place.floor());
+        let position = DVec2::new(uv.x, 1.0 - uv.y) * size - 0.5;
+        let (first, part) = (position.floor(), position - position.floor());
         let wrapped = |k: f64, count: u32| -> u32 {
             let count = i64::from(count);
             let k = k as i64;
@@ -149,7 +143,8 @@ impl Texture {
         // Relative to the tile of the lowest corner, so that no digits are lost far out.
         let origin = low.floor();
         let tiles = (high - origin).ceil().max(DVec2::ONE);
-        if tiles.x * tiles.y > MAX_TILES.min(cells) {
+        // Plain choice.
+        if tiles.x * tiles.y > cells.min(4096.0) {
             return self.whole_mean();
         }
         let outline = [a - b, b - c, c - a].map(|edge| (edge * size).length()).iter().sum::<f64>();
@@ -158,7 +153,7 @@ impl Texture {
         for (i, j) in (0..tiles.y as u32).flat_map(|j| (0..tiles.x as u32).map(move |i| (i, j))) {
             let tile = origin + DVec2::new(i.into(), j.into());
             let inside = |p: DVec2| (DVec2::new(p.x - tile.x, 1.0 - (p.y - tile.y))) * size;
-            let polygon = Polygon::new(&corners.map(inside));
+            let polygon = Polygon(corners.map(inside).into_iter().collect());
             self.add(self.levels.len(), [0, 0], &polygon, smallest, &mut (&mut sum, &mut covered));
         }
         if covered > 0.0 { sum / covered } else { self.at((a + b + c) / 3.0, clamped) }
@@ -199,7 +194,7 @@ impl Texture {
 
     /// The mean of points spread evenly over a triangle.
     fn sampled_mean(&self, [a, b, c]: [DVec2; 3]) -> Rgb {
-        let n = CLAMPED_POINTS;
+        let n = 48;
         let mut sum = Rgb::ZERO;
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             // The square of points folded onto the triangle.
@@ -353,48 +348,32 @@ pub struct MaterialTextures {
 }
 
 /// A triangle cut by a rectangle has seven corners at most.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec2; 8],
-    count: usize,
-}
+#[derive(Clone)]
+struct Polygon(ArrayVec<DVec2, 8>);
 
 impl Polygon {
-    fn new(corners: &[DVec2]) -> Polygon {
-        let mut polygon = Polygon { corners: [DVec2::ZERO; 8], count: 0 };
-        corners.iter().for_each(|&p| polygon.push(p));
-        polygon
-    }
-
-    fn push(&mut self, corner: DVec2) {
-        if self.count < self.corners.len() {
-            self.corners[self.count] = corner;
-            self.count += 1;
-        }
-    }
-
     /// The part between `low` and `high` (I. Sutherland, G. Hodgman, 1974).
     fn cut(&self, low: DVec2, high: DVec2) -> Polygon {
         let inside = |p: &DVec2| p.cmpge(low).all() && p.cmple(high).all();
-        if self.corners[..self.count].iter().all(inside) {
-            return *self;
+        let mut cut = self.clone();
+        if self.0.iter().all(inside) {
+            return cut;
         }
-        let mut cut = *self;
         for (axis, bound, sign) in
             [(0, low.x, 1.0), (0, high.x, -1.0), (1, low.y, 1.0), (1, high.y, -1.0)]
         {
-            let before = cut;
-            cut.count = 0;
-            for k in 0..before.count {
-                let (p, q) = (before.corners[k], before.corners[(k + 1) % before.count]);
+            let before = std::mem::take(&mut cut.0);
+            for (k, &p) in before.iter().enumerate() {
+                let q = before[(k + 1) % before.len()];
                 let [from, to] = [p, q].map(|p| sign * (p[axis] - bound));
+                // Rounding may give one more corner, of no area.
                 if from >= 0.0 {
-                    cut.push(p);
+                    _ = cut.0.try_push(p);
                 }
                 if (from < 0.0) != (to < 0.0) {
                     let mut crossing = p.lerp(q, from / (from - to));
                     crossing[axis] = bound;
-                    cut.push(crossing);
+                    _ = cut.0.try_push(crossing);
                 }
             }
         }
@@ -402,8 +381,7 @@ impl Polygon {
     }
 
     fn area(&self) -> f64 {
-        let corners = &self.corners[..self.count];
-        let [first, rest @ ..] = corners else { return 0.0 };
+        let [first, rest @ ..] = &self.0[..] else { return 0.0 };
         let fan = rest.windows(2).map(|e| (e[0] - *first).perp_dot(e[1] - *first));
         0.5 * fan.sum::<f64>().abs()
     }
@@ -447,11 +425,11 @@ mod tests {
                 sum += texture.cell(0, x, y);
             }
             let mean = sum / f64::from(across * down);
-            let place = |x: u32, y: u32| {
+            let position = |x: u32, y: u32| {
                 let p = DVec2::new(x.into(), y.into()) / size;
                 DVec2::new(p.x, 1.0 - p.y)
             };
-            let (low, high) = (place(0, down), place(across, 0));
+            let (low, high) = (position(0, down), position(across, 0));
             for shift in [DVec2::ZERO, DVec2::new(3.0, -2.0)] {
                 let found = rectangle(&texture, low + shift, high + shift);
                 assert!(found.abs_diff_eq(mean, 1e-6), "{width} × {height}: {found} {mean}");

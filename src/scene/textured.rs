@@ -18,24 +18,14 @@ use rustc_hash::FxHashMap;
 use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
+use crate::geometry::barycentric::WHOLE;
 use crate::geometry::barycentric::barycentric;
 
 /// A piece of a triangle: its index, and the weights of the second and third corner of the triangle
 /// at the three corners of the piece.
 pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
-/// Maximum number of cells of images along the outlines of all pieces computed together: some 10 s
-/// on two cores. More than ten thousand different pieces get fewer each than [`MAX_OUTLINE_CELLS`],
-/// so that the time is bounded for any number that each show all of a large image.
-const SCENE_OUTLINE_CELLS: f64 = 2e7;
-
-/// Minimum number of cells of a piece: its mean is off by some 1e-2 of the contrast within.
-const MIN_OUTLINE_CELLS: f64 = 64.0;
-
 impl Scene {
-    /// The whole triangle, as in a [`Piece`].
-    pub(crate) const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-
     /// Texture coordinates (u, v) of the corners of triangle `t`, as in the file; `None` if the
     /// scene has no textures, unless they were [kept](crate::ObjSettings::texture_coordinates). Not
     /// finite for a corner without them.
@@ -57,7 +47,7 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn reflectance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
-        self.filtered(t, map, self.material(t).reflectance, (barycentric, share))
+        self.filtered(t, map, self.material(t).reflectance, barycentric, share)
     }
 
     /// The fraction of the light arriving around a point that is scattered diffusely, on either
@@ -82,7 +72,7 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn exitance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
-        self.filtered(t, map, self.material(t).exitance, (barycentric, share))
+        self.filtered(t, map, self.material(t).exitance, barycentric, share)
     }
 
     /// The value of `map` at a point of triangle `t`, filtered over a fraction of its area, for
@@ -92,12 +82,13 @@ impl Scene {
         t: usize,
         map: Option<&TextureMap>,
         mean: Rgb,
-        (barycentric, share): ([f64; 2], f64),
+        barycentric: [f64; 2],
+        share: f64,
     ) -> Rgb {
         let Some(map) = map else { return mean };
-        let [a, b, c] = Scene::WHOLE.map(|corner| self.texture_place(t, corner));
+        let [a, b, c] = WHOLE.map(|corner| self.texture_point(t, corner));
         let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
-        map.scaled(map.filtered(self.texture_place(t, barycentric), area), mean)
+        map.scaled(map.filtered(self.texture_point(t, barycentric), area), mean)
     }
 
     /// Exitance per channel, W/m², with which triangle `t` lights others: that of its material, or
@@ -132,7 +123,7 @@ impl Scene {
     pub(super) fn lay_textures(&mut self, of_materials: BTreeMap<u32, MaterialTextures>) {
         let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
         self.textures = SceneTextures { of_materials, ..(*self.textures).clone() }.into();
-        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, Scene::WHOLE)).collect();
+        let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
         if has_masks {
             self.find_solid_shares();
         }
@@ -144,12 +135,12 @@ impl Scene {
         for (&m, maps) in &mut textures.of_materials {
             let material = &mut self.materials[m as usize];
             if let Some(map) = &mut maps.reflectance {
-                let told = map.mean;
+                let given = map.mean;
                 map.mean = reflectances.get(&m).copied().unwrap_or(map.whole_mean());
                 material.reflectance = map.mean;
                 if material.is_translucent() {
-                    let has_mean = told.cmpgt(Rgb::ZERO);
-                    material.transmittance *= Rgb::select(has_mean, map.mean / told, Rgb::ZERO);
+                    let has_mean = given.cmpgt(Rgb::ZERO);
+                    material.transmittance *= Rgb::select(has_mean, map.mean / given, Rgb::ZERO);
                 }
             }
             if let Some(map) = &mut maps.exitance {
@@ -211,7 +202,7 @@ impl Scene {
         let number_of = |&(t, corners): &Piece| {
             let textures = self.textures(t)?;
             let (map, mask) = (map_of(textures)?, textures.mask.as_ref());
-            let [a, b, c] = corners.map(|corner| self.texture_place(t, corner));
+            let [a, b, c] = corners.map(|corner| self.texture_point(t, corner));
             let bits = [a.x, a.y, b.x, b.y, c.x, c.y].map(f64::to_bits);
             let key = (self.triangles[t].material, bits);
             Some(*numbers.entry(key).or_insert_with(|| {
@@ -220,8 +211,10 @@ impl Scene {
             }))
         };
         let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
-        let cells = SCENE_OUTLINE_CELLS / different.len().max(1) as f64;
-        let cells = cells.clamp(MIN_OUTLINE_CELLS, MAX_OUTLINE_CELLS);
+        // For all pieces together some 10 s on two cores; with 64 cells a mean is off by some 1e-2
+        // of the contrast.
+        let cells = 2e7 / different.len().max(1) as f64;
+        let cells = cells.clamp(64.0, MAX_OUTLINE_CELLS);
         let found = different.par_iter().map(|&(map, mask, place)| find(map, mask, place, cells));
         let found: Vec<T> = found.collect();
         numbers.into_iter().map(|number| Some(found[number? as usize])).collect()
@@ -233,7 +226,7 @@ impl Scene {
     }
 
     /// Texture coordinates of a point of triangle `t`; not finite if it has none.
-    pub(crate) fn texture_place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+    pub(crate) fn texture_point(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let place = |[a, b, c]: [DVec2; 3]| a * (1.0 - u - v) + b * u + c * v;
         self.texture_coordinates(t).map_or(DVec2::NAN, place)
     }

@@ -16,6 +16,7 @@ use crate::error::{Error, ErrorKind};
 use crate::form_factor::Row;
 use crate::form_factor::closed_form::point_to_polygon;
 use crate::geometry::aabb::Aabb;
+use crate::geometry::barycentric::WHOLE;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Rgb, Scene};
 use crate::visibility::offset;
@@ -56,8 +57,8 @@ impl GeometryDelta {
             .map(|t| {
                 before.corners(t) != after.corners(t)
                     || share_passing(before, t) != share_passing(after, t)
-                    || !before.has_no_other_holes(t, (after, t), Scene::WHOLE)
-                    || !after.has_no_other_holes(t, (before, t), Scene::WHOLE)
+                    || !before.has_no_other_holes(t, (after, t), WHOLE)
+                    || !after.has_no_other_holes(t, (before, t), WHOLE)
             })
             .collect();
         let is_pane = |t: usize| before.is_clear(t) || after.is_clear(t);
@@ -118,9 +119,8 @@ impl GeometryDelta {
         let corners = bounds.corners().map(|corner| middle + (corner - middle) / 2.0);
         let targets = || corners.iter().chain([&middle]);
         let blocks = |hit: &Hit| !self.has_moved[hit.triangle];
-        let is_open = |target: &&DVec3| {
-            !rays.occluded(eye, **target - eye, offset::SEGMENT_START..1.0, blocks)
-        };
+        let is_open =
+            |target: &&DVec3| !rays.occluded(eye, **target - eye, offset::RAY_START..1.0, blocks);
         (targets().filter(is_open).count() + 1) as f64 / (targets().count() + 1) as f64
     }
 }

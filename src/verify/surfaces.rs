@@ -83,7 +83,7 @@ fn cells(scene: &Scene, triangles: &[usize], octaves: &Octaves) -> Vec<Cell> {
     for &t in triangles {
         let (area, solid) = (scene.area(t), scene.solid_area(t));
         let mut take = |part| parts.push((t, part));
-        octaves.for_each_part(scene.corners(t), (solid, solid != area), &mut take);
+        octaves.for_each_part(scene.corners(t), solid, solid != area, &mut take);
     }
     let area: f64 = parts.iter().map(|(_, part)| part.area).sum();
     let angular: f64 = parts.iter().map(|(_, part)| part.angular).sum();

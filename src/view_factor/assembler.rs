@@ -25,21 +25,6 @@ use super::scene_polygons::ScenePolygons;
 use super::shared_work::share_out;
 use crate::sampling::hash::split_mix64;
 
-/// Share of the requested error to which the error bound of every sum is reduced. Its estimate is
-/// reduced to a tenth of that: rows of thousands of factors then close to a tenth of the requested
-/// error.
-const BOUND_SHARE: f64 = 0.1;
-
-/// Number of progress calls for a large scene. Plain choice.
-const PROGRESS_CALLS: usize = 100;
-
-/// Minimum number of polygons between two progress calls, so that all cores have work. Plain
-/// choice.
-const MIN_BATCH: usize = 4;
-
-/// Maximum number of polygons between two progress calls, for a timely cancellation. Plain choice.
-const MAX_BATCH: usize = 64;
-
 /// Computes the rows of the polygons `wanted`; `None` if stopped.
 pub(super) fn make(
     polygons: ScenePolygons,
@@ -49,7 +34,8 @@ pub(super) fn make(
 ) -> Option<()> {
     let assembler = Assembler::new(polygons, error);
     let (count, mut done) = (wanted.len(), 0);
-    let batch = (count / PROGRESS_CALLS).clamp(MIN_BATCH, MAX_BATCH) * making.ranks.size();
+    // Progress some 100 times, with work for all cores and timely cancellation.
+    let batch = (count / 100).clamp(4, 64) * making.ranks.size();
     for batch in wanted.chunks(batch) {
         let of_polygon = |&s: &u32| assembler.row(s as usize);
         let rows = share_out(batch, making.ranks, of_polygon);
@@ -88,7 +74,7 @@ impl Assembler {
         let mut fronts: Vec<Exchange> = Vec::new();
         let group_area = self.areas[from.group as usize];
         // Errors of the polygons of a group are independent: squares add up.
-        let share = BOUND_SHARE * self.error * (from.area / group_area).sqrt();
+        let share = self.bound_share(from.area, from.group as usize);
         let mut t = s + 1;
         for group in self.fronts[s + 1..].chunk_by(|a, b| a.group == b.group) {
             let to = group[0].group;
@@ -105,6 +91,13 @@ impl Assembler {
         PolygonRow { fronts, back: Exchange::new(0, back) }
     }
 
+    /// The error bound of a sum from a polygon of this `area` in `group`, as a share of the area of
+    /// the smaller group: a tenth of the requested error. Its estimate is reduced to a tenth of
+    /// that: rows of thousands of factors then close to a tenth of the requested error.
+    fn bound_share(&self, area: f64, group: usize) -> f64 {
+        0.1 * self.error * (area / self.areas[group]).sqrt()
+    }
+
     /// The factors of `group` to all groups, by ascending index, no zeros.
     pub fn whole_row(&self, group: usize) -> Vec<Factor> {
         let polygons = |group| {
@@ -117,7 +110,7 @@ impl Assembler {
             let mut visibility = PointVisibility::default();
             for s in polygons(group) {
                 let from = &self.fronts[s];
-                let share = BOUND_SHARE * self.error * (from.area / self.areas[group]).sqrt();
+                let share = self.bound_share(from.area, group);
                 let tolerance = share * self.areas[group].min(self.areas[to]);
                 let receivers = polygons(to).filter(|t| *t != s);
                 let receivers = receivers.map(|t| (&self.fronts[t], t));

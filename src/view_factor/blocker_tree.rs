@@ -9,13 +9,10 @@ use glam::DVec3;
 
 use super::convex_polygons::ConvexPolygon;
 use super::shaft::{Blocker, Shaft};
-use super::tolerances::SAME_POSITION;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::polygon::{max_distance, polygon_difference};
-
-/// Maximum number of polygons in a leaf. Plain choice; no recorded measurement.
-const LEAF_SIZE: usize = 4;
 
 /// Convex polygons in a tree of boxes.
 pub(super) struct BlockerTree {
@@ -27,7 +24,7 @@ impl BlockerTree {
     /// The tree of `polygons`.
     pub fn new(polygons: Vec<ConvexPolygon>) -> BlockerTree {
         let boxes: Vec<Aabb> = polygons.iter().map(ConvexPolygon::bounds).collect();
-        let bvh = Bvh::new(&boxes, LEAF_SIZE, |part, bounds| {
+        let bvh = Bvh::new(&boxes, 4, |part, bounds| {
             let axis = bounds.longest_axis();
             let twice_centre = |&k: &u32| (boxes[k as usize].low + boxes[k as usize].high)[axis];
             part.sort_by(|a, b| twice_centre(a).total_cmp(&twice_centre(b)));
@@ -112,7 +109,7 @@ impl BlockerTree {
 /// Whether two polygons face the same way in the same plane.
 fn lies_on(polygon: &ConvexPolygon, other: &ConvexPolygon) -> bool {
     let Some(&origin) = other.corners.first() else { return false };
-    let tolerance = SAME_POSITION * max_distance(&polygon.corners, origin);
+    let tolerance = COINCIDENCE_TOLERANCE * max_distance(&polygon.corners, origin);
     let mut heights = polygon.corners.iter().map(|p| other.normal.dot(*p - origin));
     polygon.normal.dot(other.normal) > 0.0 && heights.all(|height| height.abs() <= tolerance)
 }

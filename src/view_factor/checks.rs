@@ -11,6 +11,7 @@
 //! gap; if below minus its error, surfaces coincide.
 
 use super::matrix::ViewFactors;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 
 /// Deviations of a matrix from the laws. A correct row sum does not prove correct entries: that of
 /// a hemicube is exact while its entries have errors. Dimensionless, as form factors are.
@@ -40,12 +41,6 @@ pub struct ErrorStats {
     /// Row and column of the largest; for a whole row, twice the row.
     pub at: (usize, usize),
 }
-
-/// An open share is not zero if it is more than this number of standard errors away.
-const OPEN_SIGMAS: f64 = 3.0;
-
-/// Rounding of the open share of a row of thousands of factors, beside its standard error.
-const OPEN_ROUNDING: f64 = 1e-9;
 
 impl ErrorStats {
     fn of(errors: impl Iterator<Item = ((usize, usize), f64)>) -> ErrorStats {
@@ -114,7 +109,8 @@ fn bound_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> 
 
 /// Maximum deviation of an open share from zero that still counts as closed.
 fn open_tolerance(m: &ViewFactors, i: usize) -> f64 {
-    OPEN_SIGMAS * m.open[i].error + OPEN_ROUNDING
+    // Three standard errors, and the rounding of a row of thousands of factors.
+    3.0 * m.open[i].error + COINCIDENCE_TOLERANCE
 }
 
 /// Whether the open share of group `i` is zero within its error, or below.

@@ -13,9 +13,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
-use super::tolerances::{COPLANARITY, STRAIGHT_SINE};
+use super::tolerances::COPLANARITY;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::area_vector;
+use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::Weld;
 use crate::scene::Scene;
 
@@ -85,8 +87,8 @@ struct Outlines {
     corners: Vec<DVec3>,
     /// Per triangle, the loop of its polygon if it is the representative, else empty.
     loops: Vec<Vec<u32>>,
-    /// Per triangle, its parent in the union-find forest of polygons.
-    parent: Vec<usize>,
+    /// The triangles of each polygon, represented by the first.
+    joined: UnionFind,
     normals: Vec<DVec3>,
     /// Pairs of triangles that may merge, and the squared length of their common side.
     neighbours: Vec<(f64, usize, usize)>,
@@ -121,14 +123,7 @@ impl Outlines {
             }
         }
         neighbours.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        Outlines { corners, loops, parent: (0..count).collect(), normals, neighbours }
-    }
-
-    fn find(&self, mut t: usize) -> usize {
-        while self.parent[t] != t {
-            t = self.parent[t];
-        }
-        t
+        Outlines { corners, loops, joined: UnionFind::new(count), normals, neighbours }
     }
 
     /// Joins those regions of triangles coplanar with the region's first that are convex as a
@@ -160,7 +155,7 @@ impl Outlines {
                 && let Some(outline) = self.union(&members, self.normals[seed])
             {
                 for &t in &members {
-                    self.parent[t] = seed;
+                    self.joined.join(seed, t);
                     self.loops[t].clear();
                 }
                 self.loops[seed] = outline;
@@ -171,13 +166,13 @@ impl Outlines {
     fn join_neighbours(&mut self) {
         for k in 0..self.neighbours.len() {
             let (_, a, b) = self.neighbours[k];
-            let (a, b) = (self.find(a), self.find(b));
+            let (a, b) = (self.joined.find(a), self.joined.find(b));
             let (first, second) = (a.min(b), a.max(b));
             if first == second || !self.coplanar(first, &self.loops[second]) {
                 continue;
             }
             if let Some(outline) = self.union(&[first, second], self.normals[first]) {
-                self.parent[second] = first;
+                self.joined.join(first, second);
                 self.loops[second].clear();
                 self.loops[first] = outline;
             }
@@ -232,7 +227,7 @@ impl Outlines {
         let mut around = 0.0;
         for k in 0..outline.len() {
             let (sine, cosine) = self.turn(outline, k, normal);
-            if sine < -STRAIGHT_SINE || (cosine < 0.0 && sine <= STRAIGHT_SINE) {
+            if sine < -COINCIDENCE_TOLERANCE || (cosine < 0.0 && sine <= COINCIDENCE_TOLERANCE) {
                 return false;
             }
             around += sine.atan2(cosine);
@@ -249,12 +244,13 @@ impl Outlines {
         (normal.dot(into.cross(out)) / scale, into.dot(out) / scale)
     }
 
-    fn finish(self, scene: &Scene) -> MergedTriangles {
+    fn finish(mut self, scene: &Scene) -> MergedTriangles {
         let mut polygons = Vec::new();
         // Indices of polygons, by representative triangle.
         let mut numbers = vec![None; self.loops.len()];
         for (t, outline) in self.loops.iter().enumerate() {
-            let bend = |&k: &usize| self.turn(outline, k, self.normals[t]).0 > STRAIGHT_SINE;
+            let bend =
+                |&k: &usize| self.turn(outline, k, self.normals[t]).0 > COINCIDENCE_TOLERANCE;
             let kept = (0..outline.len()).filter(bend);
             let corners = kept.map(|k| self.corners[outline[k] as usize]).collect();
             if let Some(polygon) = ConvexPolygon::new(corners, scene.triangles()[t].group) {
@@ -262,7 +258,7 @@ impl Outlines {
                 polygons.push(polygon);
             }
         }
-        let of_triangle = (0..self.loops.len()).map(|t| numbers[self.find(t)]).collect();
+        let of_triangle = (0..self.loops.len()).map(|t| numbers[self.joined.find(t)]).collect();
         MergedTriangles { polygons, of_triangle }
     }
 }

@@ -30,43 +30,10 @@ use super::point_visibility::{PointFactors, PointVisibility};
 use super::shaft::{Blocker, Shaft, fully_occludes};
 use super::unoccluded::unoccluded_exchange;
 use super::visual_events::{most_balanced_split, split_triangle};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::plane::Plane;
 use crate::geometry::quadrature::radon_nodes;
 use crate::sampling::hash::{split_mix64, unit_interval};
-
-/// Maximum number of cells of a sum; the remaining error is reported. Limits time and memory; plain
-/// choice.
-const MAX_CELLS: usize = 40_000;
-
-/// Error bound of a cell behind blockers, as a share of its unoccluded exchange, if it is the whole
-/// domain or an event plane halves it; in proportion less for smaller cells. Seven points can agree
-/// by chance; many cells cannot. Measured: at 0.1, the error of one pair in ten thousand was four
-/// times its estimate; at 0.25, of none.
-const COARSE_CELL_BOUND: f64 = 0.25;
-
-/// Share of a cell's area in which a sharp shadow may end undetected if all points of the rule see
-/// all or nothing of the target: the strip between a side and the nearest points has up to a tenth
-/// of the area.
-const RIM_AREA_SHARE: f64 = 0.1;
-
-/// Corners are sampled inside the cell, by this share of the way to its centroid, since blockers
-/// may touch the boundary. Plain choice.
-const CORNER_INSET: f64 = 1e-3;
-
-/// Visible or hidden flux below this share of the unoccluded flux counts as zero: above rounding.
-const NOTHING_SHARE: f64 = 1e-9;
-
-/// Minimum error estimate of a cell, as a share of its bound: a single cut without change proves
-/// little. Plain choice; no recorded measurement.
-const MIN_ESTIMATE_SHARE: f64 = 0.03;
-
-/// Error estimate requested of a sum, as a share of its tolerance, which applies to the bound: rows
-/// of thousands of factors then close to a tenth of the requested error.
-const ESTIMATE_SHARE: f64 = 0.1;
-
-/// Maximum offset of cuts in two from the middle, as a share of the side, so that errors along a
-/// line of cells are independent. Plain choice.
-const CUT_JITTER: f64 = 0.1;
 
 /// An occluded pair of polygons: one of the two, the domain, in cells.
 pub(super) struct OccludedPair {
@@ -170,8 +137,11 @@ impl Cell {
         let balance = most_balanced_split(&pair.event_planes, &self.corners)
             .map_or(0.0, |(balance, _)| balance);
         let rim = self.largest_corner_deviation(pair, degree_5, visibility);
-        let unseen = COARSE_CELL_BOUND * degree_5.unoccluded * balance.max(area / pair.area)
-            + RIM_AREA_SHARE * area * rim;
+        // Seven points can agree by chance, many cells cannot. Measured with 0.1: the error of one
+        // pair in ten thousand was four times its estimate; with 0.25, of none. A sharp shadow may
+        // end undetected in the strip between a side and the nearest points, up to a tenth of the
+        // area.
+        let unseen = 0.25 * degree_5.unoccluded * balance.max(area / pair.area) + 0.1 * area * rim;
         self.flux = degree_5.visible;
         // Differences of the rules for visible and for hidden flux, plus the error that they may
         // miss.
@@ -200,14 +170,15 @@ impl Cell {
         flux: CellFlux,
         visibility: &mut PointVisibility,
     ) -> f64 {
-        let nothing = NOTHING_SHARE * flux.unoccluded;
+        let nothing = COINCIDENCE_TOLERANCE * flux.unoccluded;
         if flux.visible > nothing && flux.unoccluded - flux.visible > nothing {
             return 0.0;
         }
         let centroid = self.corners.iter().sum::<DVec3>() / 3.0;
         let mut largest = 0.0_f64;
         for corner in &self.corners {
-            let point = corner.lerp(centroid, CORNER_INSET);
+            // Blockers may touch the boundary.
+            let point = corner.lerp(centroid, 1e-3);
             let factors = self.factors_from(point, pair, visibility);
             let deviation = if flux.visible > nothing {
                 factors.unoccluded - factors.visible
@@ -237,7 +208,8 @@ impl Cell {
         let change = parts.iter().map(|part| part.flux).sum::<f64>() - self.flux;
         let share = change.abs() / (parts.len() as f64).sqrt();
         for part in &mut parts {
-            let least = MIN_ESTIMATE_SHARE * part.error_bound;
+            // A single cut without change proves little. Plain choice.
+            let least = 0.03 * part.error_bound;
             part.error_estimate = share.max(least).min(part.error_bound);
         }
         parts
@@ -250,7 +222,7 @@ impl Cell {
         let square = |side: &(DVec3, DVec3, DVec3)| side.0.distance_squared(side.1);
         let longest = sides.iter().max_by(|x, y| square(x).total_cmp(&square(y)));
         let &(p, q, opposite) = longest.unwrap_or(&sides[0]);
-        let share = (0.5 - CUT_JITTER) + 2.0 * CUT_JITTER * unit_interval(self.seed);
+        let share = 0.4 + 0.2 * unit_interval(self.seed);
         let middle = p.lerp(q, share);
         [[p, middle, opposite], [middle, q, opposite]]
     }
@@ -304,12 +276,13 @@ impl SquaredErrors {
     }
 
     fn are_within(&self, tolerance: f64) -> bool {
-        self.bound <= tolerance.powi(2) && self.estimate <= (ESTIMATE_SHARE * tolerance).powi(2)
+        // Rows of thousands of factors then close to a tenth of the requested error.
+        self.bound <= tolerance.powi(2) && self.estimate <= (0.1 * tolerance).powi(2)
     }
 }
 
 /// The sum of A₁F₁₂ over all `pairs`: cells are cut until the error bound of the sum is at most
-/// `tolerance` and its estimate a tenth of that, or [`MAX_CELLS`] are reached.
+/// `tolerance` and its estimate a tenth of that, or 40 000 cells are reached.
 pub(super) fn integrate_adaptively(
     pairs: &mut [OccludedPair],
     tolerance: f64,
@@ -323,7 +296,8 @@ pub(super) fn integrate_adaptively(
             heap.push(HeapEntry { error_bound: cell.error_bound, pair, cell: index });
         }
     }
-    while !squared_errors.are_within(tolerance) && heap.len() < MAX_CELLS {
+    // Limits time and memory; the remaining error is reported.
+    while !squared_errors.are_within(tolerance) && heap.len() < 40_000 {
         let Some(HeapEntry { error_bound, pair, cell }) = heap.pop() else { break };
         if error_bound == 0.0 {
             break;

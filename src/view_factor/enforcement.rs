@@ -29,13 +29,6 @@ pub struct EnforcementReport {
     pub closure_left: f64,
 }
 
-/// Maximum number of steps of the symmetric scaling (a Sinkhorn iteration); each about halves the
-/// error, so that a few dozen suffice unless zeros keep a row from closing. Plain choice.
-const MAX_SINKHORN_STEPS: usize = 2000;
-
-/// Accepted relative closure error of a row: rounding of a sum of a thousand terms.
-const CLOSURE_TOLERANCE: f64 = 1e-13;
-
 /// [`ViewFactors::enforced`].
 pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) {
     let n = matrix.areas.len();
@@ -157,14 +150,17 @@ fn row_sum(row: &ExchangeRow, x: impl Fn(usize) -> f64) -> f64 {
 /// B. Uçar 2014, see [`ViewFactors::enforced`]).
 fn scaling(exchange: &[ExchangeRow], lost: &[f64], areas: &[f64]) -> Vec<f64> {
     let mut x = vec![1.0; areas.len()];
-    for _ in 0..MAX_SINKHORN_STEPS {
+    // Each about halves the error, so that a few dozen suffice unless zeros keep a row from
+    // closing.
+    for _ in 0..2000 {
         // A group without area emits nothing.
         let ratio = |i: usize| match areas[i] > 0.0 {
             true => x[i] * (row_sum(&exchange[i], |j| x[j]) + lost[i]) / areas[i],
             false => 0.0,
         };
         let ratios: Vec<f64> = (0..areas.len()).into_par_iter().map(ratio).collect();
-        if ratios.iter().all(|r| *r == 0.0 || (r - 1.0).abs() <= CLOSURE_TOLERANCE) {
+        // Rounding of a sum of a thousand terms.
+        if ratios.iter().all(|r| *r == 0.0 || (r - 1.0).abs() <= 1e-13) {
             break;
         }
         for (x, ratio) in x.iter_mut().zip(ratios) {

@@ -35,28 +35,6 @@ use crate::sampling::hash::split_mix64;
 /// uncertain. Measured: 13 µs, where a shaft takes 8 µs.
 const MIN_SHADOW_RAYS: u32 = 32;
 
-/// Maximum number of shadow rays where a shaft has many blockers; above, points are tried. Plain
-/// choice.
-const MAX_SHADOW_RAYS: f64 = 1000.0;
-
-/// Cost of a point's view, and of one blocker of it, in shadow rays: some 1 µs and 0.25 µs, from
-/// measured 10 to 16 µs with 40 to 70 blockers, where a ray takes 0.4 µs.
-const POINT_COST: f64 = 2.5;
-const BLOCKER_COST: f64 = 0.6;
-
-/// Number of blockers in a shaft up to which all are used; above, the blockers hit by rays are
-/// likely fewer. Plain choice.
-const FEW_BLOCKERS: usize = 64;
-
-/// Number of known blockers above which points cost more than rays. Plain choice.
-const MAX_KNOWN_BLOCKERS: usize = 256;
-
-/// Rays per set, initial and maximum number of sets: limits time, and the remaining error is
-/// reported. Plain choice.
-const SET_RAYS: u32 = 1 << 16;
-const FIRST_SETS: usize = 16;
-const MAX_SETS: usize = 1 << 12;
-
 /// Data for estimating the exchange of pairs.
 pub(super) struct PairEstimator<'a> {
     pub fronts: &'a Fronts,
@@ -121,8 +99,9 @@ impl PairEstimator<'_> {
         if shadow_rays <= f64::from(MIN_SHADOW_RAYS) {
             return from_shadow_rays(&pair);
         }
-        let Some(between) = self.blockers.few_within(&pair.shaft(), FEW_BLOCKERS) else {
-            return match shadow_rays <= MAX_SHADOW_RAYS {
+        // Of more, those that rays hit are likely fewer. Plain choice, as is the number of rays.
+        let Some(between) = self.blockers.few_within(&pair.shaft(), 64) else {
+            return match shadow_rays <= 1000.0 {
                 true => from_shadow_rays(&pair),
                 false => self.past_known([s, t], pair, unoccluded, tolerance, seed, visibility),
             };
@@ -133,7 +112,9 @@ impl PairEstimator<'_> {
         if between.iter().any(|blocker| fully_occludes(blocker, &pair.a, &pair.b)) {
             return Estimate::default();
         }
-        let points_cost = POINT_COST + BLOCKER_COST * between.len() as f64;
+        // In shadow rays of 0.4 µs: a point's view takes some 1 µs, and 0.25 µs a blocker, from
+        // measured 10 to 16 µs with 40 to 70 blockers.
+        let points_cost = 2.5 + 0.6 * between.len() as f64;
         if shadow_rays <= 2.0 * f64::from(MIN_POINTS) * points_cost {
             return from_shadow_rays(&pair);
         }
@@ -155,7 +136,8 @@ impl PairEstimator<'_> {
         let (small, large) = if is_first { (s, t) } else { (t, s) };
         let known = self.known[small as usize];
         let between = self.blockers.of_these_within(known, &pair.shaft());
-        if between.len() > MAX_KNOWN_BLOCKERS {
+        // With more, points cost more than rays. Plain choice.
+        if between.len() > 256 {
             return self.sets_of_rays([small, large], tolerance);
         }
         let past_known = if between.is_empty() {
@@ -180,16 +162,17 @@ impl PairEstimator<'_> {
         let area = self.polygon(s).area;
         let mut means: Vec<f64> = vec![];
         loop {
-            let more = means.len().max(FIRST_SETS);
+            let more = means.len().max(16);
             let seeds = (means.len()..means.len() + more).map(|k| split_mix64(k as u64));
             let seeds: Vec<u64> = seeds.collect();
-            let mean = |&seed: &u64| area * self.caster.share(s, t, SET_RAYS, seed);
+            let mean = |&seed: &u64| area * self.caster.share(s, t, 1 << 16, seed);
             means.par_extend(seeds.par_iter().map(mean));
             let count = means.len() as f64;
             let value = means.iter().sum::<f64>() / count;
             let squares: f64 = means.iter().map(|mean| (mean - value).powi(2)).sum();
             let error = (squares / (count * (count - 1.0))).sqrt();
-            if error <= tolerance || means.len() >= MAX_SETS {
+            // Limits time, and the remaining error is reported.
+            if error <= tolerance || means.len() >= 1 << 12 {
                 return Estimate { value, error };
             }
         }

@@ -17,16 +17,12 @@ use super::cubature::{Cell, OccludedPair};
 use super::matrix::Estimate;
 use super::point_visibility::PointVisibility;
 use super::shaft::{Blocker, Shaft, fully_occludes};
-use super::tolerances::{CONTACT_HEIGHT, SAME_POSITION};
+use super::tolerances::CONTACT_HEIGHT;
 use super::unoccluded::unoccluded_exchange;
 use super::visual_events::{event_planes, parts_between_planes, standing_on};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::{clip, fan, max_distance, merge_close_corners, polygon_area};
 use crate::sampling::hash::split_mix64;
-
-/// Ratio of the extents of two polygons below which the shorter one is the domain: all that it
-/// receives may come from a spot of the longer that no cell of that one samples. Plain choice; no
-/// recorded measurement.
-const MIN_EXTENT_RATIO: f64 = 0.25;
 
 /// The exchange between two polygons before any refinement.
 pub(super) enum PairVisibility {
@@ -36,14 +32,6 @@ pub(super) enum PairVisibility {
     Unoccluded(Estimate),
     /// Blockers are between them.
     Occluded(Box<OccludedPair>),
-}
-
-/// One of two polygons, clipped to the part in front of the other's plane.
-struct End {
-    corners: Vec<DVec3>,
-    normal: DVec3,
-    /// Blockers that stand on it.
-    standing: Vec<Blocker>,
 }
 
 /// Two convex polygons that face one another: each clipped to the part in front of the other's
@@ -66,8 +54,8 @@ impl FacingPair {
         }
         let mut a = clip(&s.corners, at_t, t.normal);
         let mut b = clip(&t.corners, at_s, s.normal);
-        merge_close_corners(&mut a, SAME_POSITION);
-        merge_close_corners(&mut b, SAME_POSITION);
+        merge_close_corners(&mut a, COINCIDENCE_TOLERANCE);
+        merge_close_corners(&mut b, COINCIDENCE_TOLERANCE);
         let both = a.len() > 2 && b.len() > 2;
         both.then_some(FacingPair { a, a_normal: s.normal, b, b_normal: t.normal })
     }
@@ -88,14 +76,21 @@ impl FacingPair {
         FacingPair { a: b, a_normal: b_normal, b: a, b_normal: a_normal }
     }
 
-    /// Whether integrating over `a` rather than over `b` is cheaper with the blockers `between`.
+    /// Whether to integrate over `a` rather than over `b` with the blockers `between`: the one that
+    /// is much shorter; else the one on which fewer blockers stand, since visibility jumps less
+    /// there; else the smaller one.
     pub fn is_better_from_a(&self, between: &[Blocker]) -> bool {
-        let end = |corners: &[DVec3], normal| End {
-            corners: corners.to_vec(),
-            normal,
-            standing: standing_on(corners, normal, between),
+        let [extent_a, extent_b] =
+            [&self.a, &self.b].map(|corners| max_distance(corners, corners[0]));
+        // All that the shorter one receives may come from a spot of the longer that no cell of that
+        // one samples. Plain choice.
+        if extent_a.min(extent_b) < 0.25 * extent_a.max(extent_b) {
+            return extent_a <= extent_b;
+        }
+        let rank = |corners: &[DVec3], normal: DVec3| {
+            (standing_on(corners, normal, between).len(), polygon_area(corners))
         };
-        is_better_domain(&end(&self.a, self.a_normal), &end(&self.b, self.b_normal))
+        rank(&self.a, self.a_normal) <= rank(&self.b, self.b_normal)
     }
 
     /// Their mutual visibility with all blockers `between`, clipped to their shaft; `seed` makes
@@ -112,14 +107,36 @@ impl FacingPair {
         if between.iter().any(|blocker| fully_occludes(blocker, &self.a, &self.b)) {
             return PairVisibility::Hidden;
         }
-        let FacingPair { a, a_normal, b, b_normal } = self;
-        let standing_on_a = standing_on(&a, a_normal, between);
-        let standing_on_b = standing_on(&b, b_normal, between);
-        let a = End { corners: a, normal: a_normal, standing: standing_on_a };
-        let b = End { corners: b, normal: b_normal, standing: standing_on_b };
-        let (domain, target) = if is_better_domain(&a, &b) { (a, b) } else { (b, a) };
-        let occluded = occluded_pair(domain, target, between, visibility, seed);
+        let pair = if self.is_better_from_a(between) { self } else { self.swapped() };
+        let occluded = pair.occluded_from_a(between, visibility, seed);
         PairVisibility::Occluded(Box::new(occluded))
+    }
+
+    /// The pair with the domain `a` cut into cells: between the planes of the blockers that stand
+    /// on it, then into triangles.
+    fn occluded_from_a(
+        self,
+        between: &[Blocker],
+        visibility: &mut PointVisibility,
+        seed: u64,
+    ) -> OccludedPair {
+        let FacingPair { a: domain, a_normal: normal, b: target, b_normal: target_normal } = self;
+        let mut pair = OccludedPair {
+            area: polygon_area(&domain),
+            normal,
+            event_planes: event_planes(&target, between, &domain),
+            target,
+            target_normal,
+            cells: Vec::new(),
+        };
+        let standing = standing_on(&domain, normal, between);
+        let parts = parts_between_planes(domain, &standing);
+        for (triangle, k) in parts.iter().flat_map(|part| fan(part)).zip(0..) {
+            let cell_seed = split_mix64(seed.wrapping_add(k));
+            let cell = Cell::new(&pair, triangle, between, cell_seed, visibility);
+            pair.cells.push(cell);
+        }
+        pair
     }
 }
 
@@ -142,44 +159,4 @@ impl PairVisibility {
 /// `origin`.
 fn reaches_before(polygon: &ConvexPolygon, other: &ConvexPolygon, origin: DVec3) -> bool {
     polygon.corners.iter().any(|&p| other.normal.dot(p - origin) > CONTACT_HEIGHT)
-}
-
-/// Whether `a` rather than `b` is the domain: the one that is much shorter; else the one on which
-/// fewer blockers stand, since visibility jumps less there; else the smaller one.
-fn is_better_domain(a: &End, b: &End) -> bool {
-    let extent_a = max_distance(&a.corners, a.corners[0]);
-    let extent_b = max_distance(&b.corners, b.corners[0]);
-    if extent_a.min(extent_b) < MIN_EXTENT_RATIO * extent_a.max(extent_b) {
-        extent_a <= extent_b
-    } else {
-        let rank_a = (a.standing.len(), polygon_area(&a.corners));
-        let rank_b = (b.standing.len(), polygon_area(&b.corners));
-        rank_a <= rank_b
-    }
-}
-
-/// The pair with its domain cut into cells: between the planes of the blockers that stand on it,
-/// then into triangles.
-fn occluded_pair(
-    domain: End,
-    target: End,
-    between: &[Blocker],
-    visibility: &mut PointVisibility,
-    seed: u64,
-) -> OccludedPair {
-    let mut pair = OccludedPair {
-        area: polygon_area(&domain.corners),
-        normal: domain.normal,
-        event_planes: event_planes(&target.corners, between, &domain.corners),
-        target: target.corners,
-        target_normal: target.normal,
-        cells: Vec::new(),
-    };
-    let parts = parts_between_planes(domain.corners, &domain.standing);
-    for (triangle, k) in parts.iter().flat_map(|part| fan(part)).zip(0..) {
-        let cell_seed = split_mix64(seed.wrapping_add(k));
-        let cell = Cell::new(&pair, triangle, between, cell_seed, visibility);
-        pair.cells.push(cell);
-    }
-    pair
 }

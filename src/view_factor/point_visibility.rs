@@ -18,13 +18,9 @@ use glam::DVec3;
 
 use super::shaft::Blocker;
 use crate::form_factor::closed_form::lambert;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::polygon::{PLANE_TOLERANCE, split_through_origin};
-
-/// Boxes around shadows are enlarged by this share of the distance to the farthest corner of the
-/// target: well above rounding. A blocker nearer to the point, along the target's normal, than this
-/// share of the target's distance has no bounded shadow.
-const SHADOW_MARGIN: f64 = 1e-9;
 
 /// A convex region of the target that is visible so far.
 struct Region {
@@ -79,7 +75,8 @@ impl PointVisibility {
         let reach = self.corners.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let depth = self.corners.first().map_or(0.0, |v| -facing.dot(*v));
         for blocker in blockers {
-            let shadow = shadow_bounds(point, blocker, facing, depth, SHADOW_MARGIN * reach);
+            let shadow =
+                shadow_bounds(point, blocker, facing, depth, COINCIDENCE_TOLERANCE * reach);
             let mut regions = self.visible_regions.iter();
             let reaches_any = regions.any(|region| region.bounds.overlaps(&shadow));
             if reaches_any && self.set_shadow_cone(point, blocker) {
@@ -162,7 +159,7 @@ impl PointVisibility {
 /// plane is at `depth` in front of the point and faces `facing`. Unbounded where all of the blocker
 /// is beside the point or behind it.
 fn shadow_bounds(point: DVec3, blocker: &Blocker, facing: DVec3, depth: f64, margin: f64) -> Aabb {
-    let least = SHADOW_MARGIN * depth;
+    let least = COINCIDENCE_TOLERANCE * depth;
     let mut bounds = Aabb::EMPTY;
     let Some(&last) = blocker.corners.last() else { return bounds };
     let mut before = last - point;

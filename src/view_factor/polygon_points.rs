@@ -2,23 +2,17 @@
 
 use glam::DVec3;
 
-use super::tolerances::SAME_POSITION;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::fan;
 use crate::sampling::hash::split_mix64;
 
-/// Maximum number of points of a scrambled set; further points come from further sets.
-const SET_SIZE: u32 = 1 << 16;
-
-/// Half a step between the coordinates of a set, which are multiples of 2⁻²⁴: no point is on the
-/// boundary.
-const HALF_STEP: f64 = 0.5 / (1 << 24) as f64;
-
 /// Point `k` of a scrambled Sobol set in four dimensions, in (0, 1)⁴; every `seed` gives another
 /// set (B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Of a power-of-two
-/// number of points, both halves are as evenly distributed as the whole.
+/// number of points up to 2¹⁶, both halves are as evenly distributed as the whole.
 pub(super) fn scrambled_point(k: u32, seed: u64) -> [f64; 4] {
-    let set = split_mix64(seed.wrapping_add(u64::from(k / SET_SIZE))) as u32;
-    sobol_burley::sample_4d(k % SET_SIZE, 0, set).map(|x| f64::from(x) + HALF_STEP)
+    let set = split_mix64(seed.wrapping_add(u64::from(k >> 16))) as u32;
+    // Half a step between the coordinates, multiples of 2⁻²⁴: no point is on the boundary.
+    sobol_burley::sample_4d(k & 0xffff, 0, set).map(|x| f64::from(x) + 0.5 / f64::from(1 << 24))
 }
 
 /// A convex polygon to sample: maps the unit square piecewise onto it, preserving area and so even
@@ -41,7 +35,7 @@ impl PolygonPoints {
     /// For a polygon with area.
     pub fn new(polygon: &[DVec3]) -> PolygonPoints {
         if let &[a, b, c, d] = polygon
-            && (a + c - b - d).length() <= SAME_POSITION * (c - a).length()
+            && (a + c - b - d).length() <= COINCIDENCE_TOLERANCE * (c - a).length()
         {
             let edges = [b - a, d - a];
             let all = Piece { origin: a, edges, is_parallelogram: true, end: 1.0 };

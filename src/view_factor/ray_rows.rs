@@ -13,7 +13,6 @@
 //! A factor with only the *known* blockers is too large. The second half of the rays estimates the
 //! excess without bias, since the known blockers do not depend on it.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -23,6 +22,7 @@ use super::convex_polygons::in_units;
 use super::fronts::Fronts;
 use super::polygon_points::{PolygonPoints, scrambled_point};
 use super::tolerances::CONTACT_HEIGHT;
+use crate::sampling::hemisphere::cosine_direction;
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
@@ -75,8 +75,8 @@ impl<'a> RayCaster<'a> {
         fronts: &'a Fronts,
         blockers: Vec<Option<u32>>,
     ) -> RayCaster<'a> {
-        let place = in_units(scene, unit);
-        let corners = (0..scene.triangles().len()).map(|t| scene.corners(t).map(&place));
+        let position = in_units(scene, unit);
+        let corners = (0..scene.triangles().len()).map(|t| scene.corners(t).map(&position));
         let rays = RayScene::new(corners).with_covered_backs(|t| scene.is_back_covered(t));
         RayCaster { fronts, rays, blockers }
     }
@@ -163,14 +163,10 @@ impl<'a> RayCaster<'a> {
     ) {
         let polygon = &self.fronts.polygons[s as usize];
         let points = PolygonPoints::new(&polygon.corners);
-        let (x, y) = polygon.normal.any_orthonormal_pair();
         for k in rays {
             let [u, v, radius2, turn] = scrambled_point(k, seed);
             let from = points.at(u, v);
-            // Malley's method, as in `sampling::hemisphere`.
-            let (sin, cos) = (TAU * turn).sin_cos();
-            let across = radius2.sqrt() * (x * cos + y * sin);
-            let direction = across + polygon.normal * (1.0 - radius2).sqrt();
+            let direction = cosine_direction(polygon.normal, [radius2, turn]);
             if let Some(hit) = self.first_hit(s, from, direction, CONTACT_HEIGHT) {
                 meets(from, direction, &hit);
             }

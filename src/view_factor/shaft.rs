@@ -15,7 +15,8 @@
 
 use glam::DVec3;
 
-use super::tolerances::{CONTACT_HEIGHT, MIN_LEANING_EDGE, SAME_POSITION, SLIVER_WIDTH};
+use super::tolerances::CONTACT_HEIGHT;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::aabb::Aabb;
 use crate::geometry::plane::Plane;
 use crate::geometry::polygon::{clip, max_distance, merge_close_corners, polygon_area};
@@ -55,9 +56,9 @@ impl Shaft {
                 return None;
             }
         }
-        merge_close_corners(&mut kept, SAME_POSITION);
+        merge_close_corners(&mut kept, COINCIDENCE_TOLERANCE);
         let extent = max_distance(&kept, kept[0]);
-        (polygon_area(&kept) > SLIVER_WIDTH * extent).then_some(kept)
+        (polygon_area(&kept) > 4.0 * CONTACT_HEIGHT * extent).then_some(kept)
     }
 
     /// Whether a part of a box may be strictly within the shaft; conservative.
@@ -77,7 +78,7 @@ fn add_supporting_planes(a: &[DVec3], normal: DVec3, b: &[DVec3], planes: &mut V
         b.iter().partition(|p| normal.dot(**p - origin) <= CONTACT_HEIGHT);
     for (k, &start) in a.iter().enumerate() {
         let edge = a[(k + 1) % a.len()] - start;
-        if edge.length() < MIN_LEANING_EDGE * size {
+        if edge.length() < 1e-4 * size {
             continue;
         }
         let along = edge.normalize_or_zero();

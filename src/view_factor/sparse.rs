@@ -10,7 +10,7 @@
 //! Time grows with the number of polygons and of pairs that see one another, memory with the
 //! latter.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -27,32 +27,8 @@ use super::scene_polygons::ScenePolygons;
 use super::shared_work::share_out;
 use crate::scene::Scene;
 
-/// Ratio of the standard error to the requested error: 19 of 20 factors are within the latter.
-const ERROR_SHARE: f64 = 0.5;
-
-/// Rays of a polygon times the requested error: a factor equal to the error is hit by a few. Plain
-/// choice; fewer leave more to shadow rays, more take longer themselves.
-const RAYS_TIMES_ERROR: f64 = 1.6;
-
-/// Minimum number of rays of a polygon, so that half of them are significant; maximum, to limit
-/// time.
-const MIN_RAYS: f64 = 64.0;
-const MAX_RAYS: f64 = (1 << 24) as f64;
-
 /// Polygons between two progress calls. Plain choice.
 const BATCH: usize = 256;
-
-/// Number of pairs in one work item. Plain choice.
-const PAIRS_AT_A_TIME: usize = 64;
-
-/// Number of polygons whose rays predict the number of factors, and total number of these rays:
-/// some seconds. Plain choice.
-const PREDICTING_POLYGONS: RangeInclusive<usize> = 16..=256;
-const PREDICTING_RAYS: usize = 1 << 24;
-
-/// Maximum memory per factor, bytes: ray hits, rows and matrix. Measured: 61, 84 and 87 with 2, 5
-/// and 15 million factors.
-const BYTES_OF_FACTOR: usize = 90;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
 /// many polygons.
@@ -62,19 +38,22 @@ pub(super) fn predicted_size(scene: &Scene, polygons: ScenePolygons, error: f64)
     let count = fronts.polygons.len();
     // A pair exists if rays of either hit the other: equivalent to twice the rays from one.
     let first_half = 4 * rays_a_polygon(error);
-    let (least, most) = PREDICTING_POLYGONS.into_inner();
-    let drawn = (PREDICTING_RAYS / first_half as usize).clamp(least, most).min(count);
+    // Some seconds of rays.
+    let drawn = ((1 << 24) / first_half as usize).clamp(16, 256).min(count);
     let met = |k: usize| {
         let s = k * count / drawn;
         caster.first_half(s as u32, first_half).fronts.len()
     };
     let met: usize = (0..drawn).into_par_iter().map(met).sum();
     let factors = (met as f64 / drawn.max(1) as f64 * count as f64).ceil() as usize;
-    MatrixSize { factors, bytes: BYTES_OF_FACTOR * factors }
+    // Ray hits, rows and matrix. Measured: 61, 84 and 87 bytes with 2, 5 and 15 million factors.
+    MatrixSize { factors, bytes: 90 * factors }
 }
 
 fn rays_a_polygon(error: f64) -> u32 {
-    let rays = (RAYS_TIMES_ERROR / error).clamp(MIN_RAYS, MAX_RAYS) as u32;
+    // A factor equal to the error is hit by a few rays. Fewer leave more to shadow rays, more take
+    // longer themselves. Half of 64 are significant; 2²⁴ limit the time. Plain choice.
+    let rays = (1.6 / error).clamp(64.0, f64::from(1 << 24)) as u32;
     rays.next_power_of_two()
 }
 
@@ -108,7 +87,7 @@ pub(super) fn make(
     let mut done = 2 * count;
     for batch in wanted.chunks(BATCH * making.ranks.size()) {
         // The number of pairs of polygons varies by a factor of a thousand.
-        let pieces = |&s: &u32| later[s as usize].chunks(PAIRS_AT_A_TIME).map(move |c| (s, c));
+        let pieces = |&s: &u32| later[s as usize].chunks(64).map(move |c| (s, c));
         let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
         let of_piece = |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
         let exchanges = share_out(&pieces, making.ranks, of_piece);
@@ -185,7 +164,7 @@ fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) 
     for &Count { polygon: t, rays } in later {
         let ((share_s, area_s), (share_t, area_t)) = (area_share(s), area_share(t));
         // Errors of the pairs of two groups are independent: squares add up.
-        let tolerance = ERROR_SHARE * error * area_s.min(area_t) * (share_s * share_t).sqrt();
+        let tolerance = 0.5 * error * area_s.min(area_t) * (share_s * share_t).sqrt();
         let area = estimator.exchange([s, t], rays, tolerance, &mut visibility);
         if area.value > 0.0 || area.error > 0.0 {
             exchanges.push(Exchange::new(fronts.group(t) as u32, area));

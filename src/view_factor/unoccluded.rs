@@ -19,14 +19,6 @@ use crate::geometry::quadrature::{
 /// [`quadrature`](crate::geometry::quadrature), and checked below.
 const FAR_ERROR: f64 = 6e-8;
 
-/// Maximum absolute error of the closed form, as a share of the area of the smaller polygon (see
-/// [`polygon_to_polygon`]).
-const CLOSED_FORM_ERROR: f64 = 1e-13;
-
-/// Four corners make a parallelogram if both diagonals have the same middle, within this share of
-/// one of them: rounding, far below [`FAR_ERROR`].
-const PARALLELOGRAM_TOLERANCE: f64 = 1e-12;
-
 /// A₁F₁₂ and its error for two convex polygons, unit normals given, that face one another entirely
 /// with nothing between them, in squares of the unit of length.
 pub(super) fn unoccluded_exchange(
@@ -39,7 +31,8 @@ pub(super) fn unoccluded_exchange(
         return Estimate { value, error: FAR_ERROR * value };
     }
     let area = polygon_area(a);
-    let error = CLOSED_FORM_ERROR * area.min(polygon_area(b));
+    // See `polygon_to_polygon`.
+    let error = 1e-13 * area.min(polygon_area(b));
     Estimate { value: polygon_to_polygon(a, b) * area, error }
 }
 
@@ -56,7 +49,11 @@ fn far_exchange(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3) -> O
     if gap < THREE_POINT_MIN_GAP * radius {
         return None;
     }
-    let rules = if gap < TWO_POINT_MIN_GAP * radius { THREE_POINTS } else { TWO_POINTS };
+    let rules = if gap < TWO_POINT_MIN_GAP * radius {
+        Rules { straight: &GAUSS_LEGENDRE_3, from_tip: &GAUSS_JACOBI_3 }
+    } else {
+        Rules { straight: &GAUSS_LEGENDRE_2, from_tip: &GAUSS_JACOBI_2 }
+    };
     let nodes_a = nodes(a, rules);
     let nodes_b = nodes(b, rules);
     let mut sum = 0.0;
@@ -89,16 +86,13 @@ struct Rules {
     from_tip: &'static [Node],
 }
 
-const TWO_POINTS: Rules = Rules { straight: &GAUSS_LEGENDRE_2, from_tip: &GAUSS_JACOBI_2 };
-const THREE_POINTS: Rules = Rules { straight: &GAUSS_LEGENDRE_3, from_tip: &GAUSS_JACOBI_3 };
-
 /// Points and weights over a polygon, weights adding up to its area: a product rule over a
 /// parallelogram, else one over each triangle of a fan.
 fn nodes(polygon: &[DVec3], rules: Rules) -> Vec<(DVec3, f64)> {
     let mut nodes = Vec::new();
+    // Rounding.
     if let [a, b, c, d] = *polygon
-        && (a + c - b - d).abs().max_element()
-            <= PARALLELOGRAM_TOLERANCE * (c - a).abs().max_element()
+        && (a + c - b - d).abs().max_element() <= 1e-12 * (c - a).abs().max_element()
     {
         let area = (b - a).cross(d - a).length();
         for u in rules.straight {

@@ -21,29 +21,17 @@ use super::pair_visibility::FacingPair;
 use super::point_visibility::{PointFactors, PointVisibility};
 use super::polygon_points::{PolygonPoints, scrambled_point};
 use super::shaft::Blocker;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::polygon_area;
 
 /// Parts of the point set: each is evenly distributed for its number of points.
 const PARTS: usize = 8;
 
-/// Factor by which two standard errors of a mean of eight exceed those of a large sample for the
-/// same coverage, 19 of 20 times: Student's t for 7 degrees of freedom and 95 %, over 2.
-const STUDENT_FACTOR: f64 = 2.365 / 2.0;
-
-/// Initial and maximum number of points of a part: limits time, and the remaining error is
-/// reported. Plain choice.
-const FIRST_POINTS: u32 = 2;
-const MAX_POINTS: u32 = 512;
-
-/// Visible shares that differ by less than this from each other, from 0 or from 1 count as equal:
-/// above rounding.
-const NOTHING_SHARE: f64 = 1e-9;
-
 /// Minimum number of points of a pair.
-pub(super) const MIN_POINTS: u32 = PARTS as u32 * FIRST_POINTS;
+pub(super) const MIN_POINTS: u32 = 2 * PARTS as u32;
 
 /// A₁F₁₂ of `pair` past all blockers `between`, from points of its first polygon, with a standard
-/// error of `tolerance` if eight times [`MAX_POINTS`] suffice; `unoccluded` is the value without
+/// error of `tolerance` if 4096 points suffice; `unoccluded` is the value without
 /// blockers.
 pub(super) fn visible_mean(
     pair: &FacingPair,
@@ -57,7 +45,8 @@ pub(super) fn visible_mean(
     let points = PolygonPoints::new(&pair.a);
     let penumbra = narrowest_penumbra(pair, &between);
     let area = polygon_area(&pair.a);
-    let (mut parts, mut known, mut count) = ([Seen::default(); PARTS], 0, FIRST_POINTS);
+    let (mut parts, mut known, mut count) =
+        ([Seen::default(); PARTS], 0, MIN_POINTS / PARTS as u32);
     loop {
         for (part, seen) in (0..).zip(&mut parts).skip(known) {
             for k in part * count..(part + 1) * count {
@@ -71,7 +60,8 @@ pub(super) fn visible_mean(
         let spacing = (area / f64::from(PARTS as u32 * count)).sqrt();
         let share = visible_share(&parts, count, (spacing / penumbra).min(1.0));
         let mean = Estimate { value: unoccluded * share.value, error: unoccluded * share.error };
-        if mean.error <= tolerance || count >= MAX_POINTS {
+        // Limits time; the remaining error is reported.
+        if mean.error <= tolerance || count >= 512 {
             return mean;
         }
         // All of them are the first half of twice the number.
@@ -124,7 +114,9 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
     // of the others; or the opposite value, where all see all or nothing.
     let points = f64::from(count) * PARTS as f64;
     let range = high - low;
-    let unmet = match range < NOTHING_SHARE && (low < NOTHING_SHARE || high > 1.0 - NOTHING_SHARE) {
+    let unmet = match range < COINCIDENCE_TOLERANCE
+        && (low < COINCIDENCE_TOLERANCE || high > 1.0 - COINCIDENCE_TOLERANCE)
+    {
         true => 2.0 / points,
         false => 0.5 * range / points,
     };
@@ -136,7 +128,8 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
 /// evenly distributed points has an error of n^(−5/4) or less (of n cells √n have errors of the
 /// order of n^(−3/2)), so that the error of all is 8^(−3/4) of that of independent parts.
 fn dependence(sharpness: f64) -> f64 {
-    (STUDENT_FACTOR * sharpness).max((PARTS as f64).powf(-0.75))
+    // Student's t for 7 degrees of freedom and 95 %, over the 2 of a large sample.
+    (2.365 / 2.0 * sharpness).max((PARTS as f64).powf(-0.75))
 }
 
 /// Minimum distance on the first polygon of `pair` over which the visibility of the other may

@@ -21,24 +21,13 @@
 use glam::DVec3;
 
 use super::shaft::Blocker;
-use super::tolerances::{SAME_DIRECTION_SQUARED, SAME_POSITION};
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::plane::Plane;
 use crate::geometry::polygon::{clip, fan};
-
-/// A blocker stands on a plane if two of its corners are lower than this share of its height over
-/// the plane. Plain choice; no recorded measurement.
-const MAX_FOOT_HEIGHT: f64 = 1e-2;
 
 /// Maximum number of blockers of a pair that yield event planes, and that cut a domain before it is
 /// cut into cells: limits time. Plain choice.
 const MAX_EVENT_BLOCKERS: usize = 12;
-
-/// Maximum number of event planes of a pair: limits time. Plain choice.
-const MAX_EVENT_PLANES: usize = 64;
-
-/// An event plane that leaves at most this share of a cell's width on one side is not used for a
-/// cut. Plain choice.
-const MIN_BALANCE: f64 = 1e-3;
 
 /// The planes through two parallel edges, one of a blocker, one of the target or of another
 /// blocker, that pass through `domain`.
@@ -51,9 +40,9 @@ pub(super) fn event_planes(target: &[DVec3], blockers: &[Blocker], domain: &[DVe
             for &earlier in &earlier_edges {
                 let Some(plane) = plane_through_parallel(edge, earlier) else { continue };
                 let (low, high) = plane.signed_distance_range(domain);
-                let crosses = low < -SAME_POSITION && high > SAME_POSITION;
+                let crosses = low < -COINCIDENCE_TOLERANCE && high > COINCIDENCE_TOLERANCE;
                 let is_new = || !planes.iter().any(|known| is_same_plane(known, &plane));
-                if crosses && planes.len() < MAX_EVENT_PLANES && is_new() {
+                if crosses && planes.len() < 64 && is_new() {
                     planes.push(plane);
                 }
             }
@@ -74,7 +63,7 @@ fn directed_edges(polygon: &[DVec3]) -> Vec<DirectedEdge> {
 
 /// The plane through two edges, if they are parallel and not on one line.
 fn plane_through_parallel((a, along): DirectedEdge, (b, other): DirectedEdge) -> Option<Plane> {
-    if along.cross(other).length_squared() >= SAME_DIRECTION_SQUARED {
+    if along.cross(other).length_squared() >= COINCIDENCE_TOLERANCE.powi(2) {
         return None;
     }
     let normal = (b - a).cross(along).try_normalize()?;
@@ -84,8 +73,8 @@ fn plane_through_parallel((a, along): DirectedEdge, (b, other): DirectedEdge) ->
 /// Whether both are the same plane, with either orientation.
 fn is_same_plane(a: &Plane, b: &Plane) -> bool {
     let sign = a.normal.dot(b.normal).signum();
-    (a.normal * sign - b.normal).length_squared() <= SAME_DIRECTION_SQUARED
-        && (a.offset * sign - b.offset).abs() <= SAME_POSITION
+    (a.normal * sign - b.normal).length_squared() <= COINCIDENCE_TOLERANCE.powi(2)
+        && (a.offset * sign - b.offset).abs() <= COINCIDENCE_TOLERANCE
 }
 
 /// Both sides of a triangle cut by a plane, as triangles.
@@ -105,7 +94,7 @@ pub(super) fn most_balanced_split<'a>(
         let (low, high) = plane.signed_distance_range(corners);
         ((-low).min(high) / (high - low), plane)
     };
-    let balanced = event_planes.iter().map(balance).filter(|(balance, _)| *balance > MIN_BALANCE);
+    let balanced = event_planes.iter().map(balance).filter(|(balance, _)| *balance > 1e-3);
     balanced.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -115,7 +104,7 @@ pub(super) fn standing_on(polygon: &[DVec3], normal: DVec3, blockers: &[Blocker]
     let stands = |blocker: &&Blocker| {
         let heights = blocker.corners.iter().map(|p| normal.dot(p - origin));
         let top = heights.clone().fold(0.0, f64::max);
-        heights.filter(|height| *height <= MAX_FOOT_HEIGHT * top).count() > 1
+        heights.filter(|height| *height <= 1e-2 * top).count() > 1
     };
     blockers.iter().filter(stands).take(MAX_EVENT_BLOCKERS).cloned().collect()
 }

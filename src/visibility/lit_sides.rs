@@ -10,7 +10,7 @@
 //!   │  ╱   ╲     │               dark sky only.
 //!   │ ╱ ┌──t──┐  │
 //!   │   │ ↓↗↘ │  │  → nothing    Single rays pass through seams: a side is lit if the walks from
-//!   └───┴─────┴──┘               its sheet reach light, and its own do not contradict.
+//!   └───┴─────┴──┘               its sheet reach light, and its own do too.
 //! ```
 //!
 //! A **sheet** is a set of connected sides of triangles, across edges shared by exactly two
@@ -32,31 +32,13 @@ use crate::sampling::hash::split_mix64;
 use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
 use closed_rooms::closed_rooms;
 use repeated::repeated_triangles;
-use sheets::{Answers, Sheets, SideIndex};
+use sheets::{Sheets, SideIndex, SideStatistics};
 use walks::Walks;
 
 /// A sheet is dark if a smaller share of the walks from it reaches light. The share is 3 to 5 % in
 /// the gap between the Cornell box's lamp and its ceiling, and almost 0 through seams; in the
 /// second of two rooms, which has no lamp, it is 25 to 40 %.
 const LIT_SHARE: f64 = 0.1;
-
-/// A side from which no walk reaches light is dark if the probability of that, given the share of
-/// the walks from its sheet that do, is below this.
-const OBJECTION: f64 = 0.05;
-
-/// A triangle from which no walk reaches light is flipped if the share of walks from the sheet of
-/// its back that do exceeds that of its front by this factor. Plain choice: a part of a screen that
-/// is inside of a body need not be flipped.
-const FAR_MORE: f64 = 2.0;
-
-/// A second side is not made for light below this share of the mean: an error of that whole amount
-/// is 0.2 % in the error measure, which counts nothing as darker than a twentieth of the mean.
-const MIN_IRRADIANCE: f64 = 1e-4;
-
-/// Number of points on a back at which covering fronts are searched, and the share of its area that
-/// may stay uncovered. Plain choice.
-const COVERED_PLACES: u32 = 64;
-const OPEN_SHARE: f64 = 1e-6;
 
 impl Scene {
     /// The same scene with [`Sides`] applied: triangles of [`Sides::Auto`] are flipped so that
@@ -124,7 +106,7 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     let sheets = Sheets::new(scene);
     let walks = Walks::new(scene, sides, &sheets);
     let all: Vec<SideIndex> = (0..2 * count).filter(|_| walks.has_light()).collect();
-    let light = sheets.ask(&all, |side, rng| {
+    let light = sheets.sample(&all, |side, rng| {
         let start = walks.random_start(side, rng)?;
         walks.walk_to_light(start, side, rng)
     });
@@ -142,7 +124,7 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
             (Sides::Auto, Some(shines_from_back)) => shines_from_back,
             // A translucent triangle has both sides and is never flipped.
             (Sides::Auto, None) if is_translucent => false,
-            (Sides::Auto, None) => walks.has_light() && lit.is_rather_back(t) && !is_room[t],
+            (Sides::Auto, None) => walks.has_light() && lit.faces_backward(t) && !is_room[t],
             _ => false,
         };
         let (is_other_lit, other) =
@@ -168,27 +150,29 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
 /// The sides that light reaches.
 struct LitSides<'a> {
     is_lit: Vec<bool>,
-    light: &'a Answers<'a>,
+    light: &'a SideStatistics<'a>,
     /// Minimum irradiance for a second side, W/m² summed over the channels.
     least: f64,
 }
 
 impl<'a> LitSides<'a> {
-    /// From the results `light` of walks from the `asked` sides, both of each triangle; all others
-    /// are dark.
-    fn new(scene: &Scene, light: &'a Answers, asked: &[SideIndex]) -> LitSides<'a> {
+    /// From the results `light` of walks from the `sampled` sides, both of each triangle; all
+    /// others are dark.
+    fn new(scene: &Scene, light: &'a SideStatistics, sampled: &[SideIndex]) -> LitSides<'a> {
         let mut is_lit = vec![false; 2 * scene.triangles().len()];
         let (mut flux, mut lit_area) = (0.0, 0.0);
-        for sides in asked.chunks_exact(2) {
-            let objects = |&side: &SideIndex| {
+        for sides in sampled.chunks_exact(2) {
+            // Whether no walk from the side itself reaches light, and that has a probability below
+            // 5 % given the share of its sheet.
+            let is_darker = |&side: &SideIndex| {
                 let (own, share) = (light.of(side), light.of_sheet(side).share());
-                own.hits == 0.0 && (1.0 - share).powf(own.places) < OBJECTION
+                own.hits == 0.0 && (1.0 - share).powf(own.points) < 0.05
             };
             // Where no walk from either side reaches light and that is improbable for one if lit,
             // both are dark.
             let neither = sides.iter().all(|&side| light.of(side).hits == 0.0);
-            let is_dark = neither && sides.iter().any(objects);
-            for side in sides.iter().filter(|&side| !is_dark && !objects(side)) {
+            let is_dark = neither && sides.iter().any(is_darker);
+            for side in sides.iter().filter(|&side| !is_dark && !is_darker(side)) {
                 is_lit[*side] = light.of_sheet(*side).share() >= LIT_SHARE;
                 if is_lit[*side] && scene.material(side / 2).scatters() {
                     flux += light.of(*side).mean() * scene.solid_area(side / 2);
@@ -196,16 +180,18 @@ impl<'a> LitSides<'a> {
                 }
             }
         }
-        LitSides { is_lit, light, least: MIN_IRRADIANCE * flux / lit_area }
+        // Light of that whole amount is an error of 0.2 %, since the measure counts nothing as
+        // darker than a twentieth of the mean.
+        LitSides { is_lit, light, least: 1e-4 * flux / lit_area }
     }
 
     /// Whether light reaches the back of triangle `t` and not its front; where it reaches neither,
     /// whether it reaches far more of the back's sheet.
-    fn is_rather_back(&self, t: usize) -> bool {
+    fn faces_backward(&self, t: usize) -> bool {
         match [2 * t, 2 * t + 1].map(|side| self.is_lit[side]) {
             [false, false] => {
                 let [front, back] = [2 * t, 2 * t + 1].map(|s| self.light.of_sheet(s).share());
-                back >= LIT_SHARE && back > FAR_MORE * front
+                back >= LIT_SHARE && back > 2.0 * front
             }
             [is_front_lit, is_back_lit] => is_back_lit && !is_front_lit,
         }
@@ -222,7 +208,8 @@ fn is_in_the_way(scene: &Scene, walks: &Walks, t: usize) -> bool {
     let (back, mut rng) = (2 * t + 1, Rng::with_seed(split_mix64(t as u64)));
     let (corners, normal) = (scene.corners(t), scene.normal(t));
     let (mut open, mut covers, mut reached) = (vec![corners.to_vec()], vec![], 0);
-    for _ in 0..COVERED_PLACES {
+    let points = 64;
+    for _ in 0..points {
         let at = walks.random_point(t, &mut rng);
         let Some(cover) = walks.front_before(at, back) else { return false };
         if !covers.contains(&cover) {
@@ -234,7 +221,7 @@ fn is_in_the_way(scene: &Scene, walks: &Walks, t: usize) -> bool {
         }
         reached += u32::from(walks.walk_to_light(at, back, &mut rng).is_some());
     }
+    // Slivers between outlines stay open by rounding.
     let left: f64 = open.iter().map(|part| polygon_area(part)).sum();
-    left <= OPEN_SHARE * scene.area(t)
-        && f64::from(reached) >= LIT_SHARE * f64::from(COVERED_PLACES)
+    left <= 1e-6 * scene.area(t) && f64::from(reached) >= LIT_SHARE * f64::from(points)
 }

@@ -6,15 +6,14 @@
 //!
 //! | constant | value | in units of | used by |
 //! |---|---|---|---|
-//! | [`RAY_START`] | 1e-6 | √area of the patch or triangle | rays from points on surfaces |
-//! | [`SEGMENT_START`] | 1e-6 | the segment | occlusion between two points |
-//! | [`SEGMENT_END`] | 1e-9 | the segment | occlusion between two points |
-//! | [`NEAR_PLANE`] | 1e-4 | √area of the patch | hemicubes on a GPU |
+//! | [`RAY_START`] | 1e-6 | √area of the patch, or the segment | rays from points on surfaces |
+//! | [`COINCIDENCE_TOLERANCE`] | 1e-9 | the segment | end of a segment between two points |
+//! | [`SURFACE_LIFT`] | 1e-4 | √area of the patch | near plane of hemicubes on a GPU |
 //! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element | gather points |
 //! | [`MIN_LIFT_ULPS`] | 1024 | steps of coordinates | gather points of tiny elements |
 //! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather |
-//! | [`PATH_CONTACT`] | 1e-9 | the scene's diagonal | paths from points on triangles |
-//! | [`PATH_CONTACT_ULPS`] | 64 | steps of coordinates | paths far from the origin |
+//! | [`path_contact`] | 1e-9 | the scene's diagonal | paths from points on triangles |
+//! | [`path_contact`] | 64 | steps of coordinates | paths far from the origin |
 //!
 //! Reasons for the differences: rays in 64 bits need only be above rounding, 1e-6 of a patch in
 //! scenes up to 1e9 patch sizes from the origin; at the end of a segment only the target itself is
@@ -27,21 +26,16 @@
 //!
 //! The shares are plain choices within these bounds; no recorded measurement.
 
+use crate::geometry::COINCIDENCE_TOLERANCE;
+use crate::scene::Scene;
+
 /// Start distance of rays from a point on a surface, in units of the square root of the area of its
-/// patch or triangle.
+/// patch or triangle; share of a segment between two points that tests of occlusion skip at the
+/// start.
 pub(crate) const RAY_START: f64 = 1e-6;
 
-/// Share of the segment that tests of occlusion between two points skip at the start.
-pub(crate) const SEGMENT_START: f64 = 1e-6;
-
-/// Share of the segment that tests of occlusion between two points skip at the end.
-pub(crate) const SEGMENT_END: f64 = 1e-9;
-
-/// Near plane of a hemicube, in units of the square root of its patch's area.
-pub(crate) const NEAR_PLANE: f64 = 1e-4;
-
 /// Height of a gather point above its surface, in units of the square root of the area of the
-/// smallest element there.
+/// smallest element there; distance of the near plane of a hemicube, in that of its patch.
 pub(crate) const SURFACE_LIFT: f64 = 1e-4;
 
 /// Minimum height of a gather point, in steps between 64-bit coordinates of the scene.
@@ -50,9 +44,7 @@ pub(crate) const MIN_LIFT_ULPS: f64 = 1024.0;
 /// Minimum distance of hits from a gather point, as a share of its height.
 pub(crate) const NEAR_OF_LIFT: f64 = 0.25;
 
-/// Maximum distance, as a share of the scene's diagonal, at which surfaces are in contact with the
-/// start of a path.
-pub(crate) const PATH_CONTACT: f64 = 1e-9;
-
-/// The same, in steps between 64-bit coordinates of the scene.
-pub(crate) const PATH_CONTACT_ULPS: f64 = 64.0;
+/// Distance, scene unit, at which surfaces are in contact with the start of a path.
+pub(crate) fn path_contact(scene: &Scene) -> f64 {
+    (COINCIDENCE_TOLERANCE * scene.bounds().diagonal()).max(64.0 * scene.coordinate_ulp())
+}

@@ -9,8 +9,8 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::cut_outs::CutOuts;
-use super::offset;
 use super::ray_scene::RayScene;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::scene::{Rgb, Scene};
 
 /// The panes of a scene, for rays.
@@ -21,14 +21,6 @@ pub(crate) struct Panes {
     /// Transmittance per channel of each of its triangles.
     transmittance: Vec<Rgb>,
 }
-
-/// A hit with a barycentric weight below this is on the edge between two triangles, which both
-/// report it: above the tolerance of the hits, [`super::triangle_plane::BARYCENTRIC_TOLERANCE`].
-const SEAM: f64 = 1e-11;
-
-/// Hits on such edges whose distances differ by at most this share are the same: rounding of the
-/// distances is some 1e-15.
-const SAME_PLACE: f64 = 1e-9;
 
 impl Panes {
     /// The panes of `scene`.
@@ -68,10 +60,12 @@ impl Panes {
     fn passed(&self, rays: &RayScene, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
         let passed = Cell::new(Rgb::ONE);
         let seams: RefCell<Vec<(f64, Rgb)>> = RefCell::default();
-        let reach = reach.start..reach.end * (1.0 - offset::SEGMENT_END);
+        let reach = reach.start..reach.end * (1.0 - COINCIDENCE_TOLERANCE);
         rays.occluded(from, direction, reach, |hit| {
             let share = self.transmittance[hit.triangle];
-            if hit.u.min(hit.v).min(1.0 - hit.u - hit.v) > SEAM {
+            // The edge between two triangles, which both report: above the tolerance of the hits,
+            // 1e-12.
+            if hit.u.min(hit.v).min(1.0 - hit.u - hit.v) > 1e-11 {
                 passed.set(passed.get() * share);
             } else {
                 seams.borrow_mut().push((hit.distance, share));
@@ -81,7 +75,8 @@ impl Panes {
         let (mut passed, seams) = (passed.get(), seams.into_inner());
         for (k, &(distance, share)) in seams.iter().enumerate() {
             let same = |other: &(f64, Rgb)| {
-                other.1 == share && (other.0 - distance).abs() <= SAME_PLACE * distance.abs()
+                other.1 == share
+                    && (other.0 - distance).abs() <= COINCIDENCE_TOLERANCE * distance.abs()
             };
             if !seams[..k].iter().any(same) {
                 passed *= share;

@@ -22,9 +22,6 @@ use glam::{DVec3, Vec3A, Vec4};
 use super::ray32::{Ray32, SCENE_SIZE, splat};
 use super::sah_tree::MAX_LEAF_SIZE;
 
-/// The margin, as a share of positions times edges: 64 roundings.
-const MARGIN: f32 = 32.0 * f32::EPSILON;
-
 /// Up to four triangles in the hierarchy's unit; unused slots are NaN and never hit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePack {
@@ -73,7 +70,8 @@ impl TrianglePack {
         let s = [0, 1, 2].map(|axis| o[axis] - self.corner[axis]);
         let [a, b] = &self.edges;
         let v = cross(&s, a);
-        let margin = MARGIN * (SCENE_SIZE + origin.abs().max_element()) * self.longest;
+        // 64 roundings.
+        let margin = 32.0 * f32::EPSILON * (SCENE_SIZE + origin.abs().max_element()) * self.longest;
         PackSeen {
             normal: cross(b, a),
             u: cross(b, &s),

@@ -17,9 +17,6 @@ use super::ray32::{BoxPlanes, Ray32, splat};
 use super::sah_tree::{MAX_LEVELS, SahTree};
 use super::triangle_pack::TrianglePack;
 
-/// Maximum number of open boxes: per level all boxes of a node except the one entered.
-const MAX_OPEN: usize = (WIDTH - 1) * MAX_LEVELS as usize + WIDTH;
-
 #[derive(Debug)]
 pub(super) struct WideBvh {
     /// The root first.
@@ -109,7 +106,9 @@ impl WideBvh {
         mut may_meet: impl FnMut(usize) -> Option<f32>,
     ) {
         let origin = splat(ray.origin);
-        let mut open: ArrayVec<OpenBox, MAX_OPEN> = ArrayVec::new();
+        // At most all boxes of a node per level, except the one entered.
+        let mut open: ArrayVec<OpenBox, { (WIDTH - 1) * MAX_LEVELS as usize + WIDTH }> =
+            ArrayVec::new();
         let mut child = root;
         loop {
             match child.kind() {

@@ -166,7 +166,7 @@ impl HemicubeRows {
     /// The faces of the hemicube over `patch`.
     fn views(&self, mesh: &Mesh, patch: NodeId) -> [View; 5] {
         let frame = Frame::new(mesh.normal(patch), rotation(patch));
-        let near = self.coordinates.length(mesh.area(patch).sqrt() * offset::NEAR_PLANE);
+        let near = self.coordinates.length(mesh.area(patch).sqrt() * offset::SURFACE_LIFT);
         let centre = mesh.centroid(patch);
         let [eye, eye_low] = self.coordinates.parts(centre);
         let own_triangle = self.draw_list.position_of[mesh.triangle(patch)];

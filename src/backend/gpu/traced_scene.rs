@@ -21,6 +21,7 @@ use super::memory::Memory;
 use super::split_float::SplitFloat;
 use crate::error::Error;
 use crate::gather::lights::{Light, Lights, NO_LIGHT};
+use crate::geometry::barycentric::WHOLE;
 use crate::scene::{Rgb, Scene, SkyMap, Sun};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
@@ -290,7 +291,7 @@ impl TracedArrays {
         let mut has_holes = vec![false; count];
         for t in 0..count {
             let Some(mask) = scene.mask(t) else { continue };
-            let corners = Scene::WHOLE.map(|c| mask.in_texels(scene.texture_place(t, c)));
+            let corners = WHOLE.map(|c| mask.in_texels(scene.texture_point(t, c)));
             if !corners.iter().all(|place| place.is_finite()) {
                 continue;
             }

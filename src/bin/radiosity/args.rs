@@ -129,11 +129,11 @@ pub fn end() -> Result<(), Stop> {
 
 /// `r,g,b`, or one number for all three.
 pub fn rgb(text: &str) -> Parsed<Rgb> {
-    const EXPECTED: &str = "r,g,b, or one number for all three";
-    match list(EXPECTED)(text)?[..] {
+    let expected = "r,g,b, or one number for all three";
+    match list(expected)(text)?[..] {
         [grey] => Ok(Rgb::splat(grey)),
         [r, g, b] => Ok(Rgb::new(r, g, b)),
-        _ => Err(give(EXPECTED)),
+        _ => Err(give(expected)),
     }
 }
 
@@ -239,6 +239,15 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
         let remedy = "choose a folder that exists and can be written";
         Error::new(ErrorKind::File, place, e.to_string(), remedy).with_source(e)
     })
+}
+
+/// A CSV file of rows of one length, the first of them the names of the columns.
+pub fn csv(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
+    let mut table = csv::Writer::from_writer(vec![]);
+    for row in rows {
+        table.write_record(row).expect("rows of one length");
+    }
+    table.into_inner().expect("a vector takes all bytes")
 }
 
 /// Writes a file; errors name it.

@@ -18,20 +18,6 @@ use crate::report::Report;
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
 
-/// The error that a bake goes to where nothing says how far.
-const DEFAULT_ERROR: f64 = 0.05;
-
-/// What is said of a scene that stays dark, and what to do about it.
-const DARK: (&str, &str) = (
-    "no light reaches any surface",
-    "nothing emits, and no opening lets a sky in; name a material that emits with --emit \
-     MATERIAL=r,g,b, or look at which way surfaces face",
-);
-
-/// The same where all surfaces are black.
-const BLACK: (&str, &str) =
-    ("no surface reflects or emits anything", "give materials a `Kd`, or --emit MATERIAL=r,g,b");
-
 /// Bakes the radiosity of a scene at the vertices of a mesh
 #[derive(Args)]
 #[command(after_help = "\
@@ -123,7 +109,7 @@ impl Bake {
             (None, Some(error), _) => Target::ErrorEach(error),
             (None, None, Some(time)) => Target::Seconds(time.as_secs_f64()),
             (None, None, None) => match self.gather {
-                None if self.set.is_empty() => Target::Error(DEFAULT_ERROR),
+                None if self.set.is_empty() => Target::Error(0.05),
                 gather => Target::Settings(gather.unwrap_or(Gather::None)),
             },
         }
@@ -181,8 +167,20 @@ impl Bake {
             let scene = baked.mesh.scene();
             let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
             let is_black = !(0..scene.triangles().len()).any(reflects);
-            let (found, remedy) = if is_black { BLACK } else { DARK };
-            eprintln!("warning: {found}: {remedy}");
+            eprintln!(
+                "warning: {}",
+                match is_black {
+                    true => {
+                        "no surface reflects or emits anything: give materials a `Kd`, or --emit \
+                         MATERIAL=r,g,b"
+                    }
+                    false => {
+                        "no light reaches any surface: nothing emits, and no opening lets a sky \
+                         in; name a material that emits with --emit MATERIAL=r,g,b, or look at \
+                         which way surfaces face"
+                    }
+                }
+            );
         }
         let sky = self.reading.sky.words(baked.mesh.scene());
         if self.reading.sky.is_default() {

@@ -61,10 +61,6 @@ const FINER: u32 = 3;
 /// Share of a font's size by which plotters draws text too high.
 const TEXT_TOO_HIGH: f64 = 0.17;
 
-/// Length of a tick, and the least distance of numbers on an axis, in pixels.
-const TICK: f64 = 5.0;
-const NUMBERS_APART: f64 = 16.0;
-
 /// A PNG image of this width and height with what `draw` draws.
 pub fn png(
     (width, height): (u32, u32),
@@ -148,17 +144,17 @@ impl Canvas<'_> {
             Side::Right => (1.0, 0.0, HPos::Left),
             Side::Below => (0.0, 1.0, HPos::Center),
         };
-        let mut last = f64::NEG_INFINITY;
+        let (tick, mut last) = (5.0, f64::NEG_INFINITY);
         for (value, text) in scale.ticks() {
             let share = scale.share(value);
             let (x, y) = (low.0 + share * (high.0 - low.0), low.1 + share * (high.1 - low.1));
             let along = |d: f64| (x + d * dx, y + d * dy);
             self.line(&[along(-across), (x, y)], LIGHT, 1.0)?;
-            self.line(&[(x, y), along(TICK)], BLACK, 1.0)?;
+            self.line(&[(x, y), along(tick)], BLACK, 1.0)?;
             let way = share * (high.0 - low.0).hypot(high.1 - low.1);
-            if way - last >= NUMBERS_APART {
+            if way - last >= 16.0 {
                 let away = if side == Side::Below { 12.0 } else { 4.0 };
-                self.text(&text, along(TICK + away), Font::new(14.0, GREY).anchor(anchor))?;
+                self.text(&text, along(tick + away), Font::new(14.0, GREY).anchor(anchor))?;
                 last = way;
             }
         }

@@ -18,9 +18,6 @@ use crate::args::{self, Parsed, Stop, numbers, value};
 use crate::light::{Light, LightOptions};
 use crate::{interrupt, progress};
 
-/// Height above floors, m: that of desks.
-const DESK_HEIGHT: f64 = 0.8;
-
 /// A length for people.
 const METRES: &str = "a length in metres";
 
@@ -117,7 +114,8 @@ impl Options {
         let up = self.light.reading.sky.up().unwrap_or_else(|| up_axis(scene));
         let (task, floor) = (self.settings(0.0), self.settings(GridSettings::default().strip));
         if self.groups.is_empty() && self.planes.is_empty() {
-            let height = self.height.unwrap_or(DESK_HEIGHT);
+            // That of desks, m.
+            let height = self.height.unwrap_or(0.8);
             let grids = MeasuringGrid::above_floors(scene, up, height, &floor)?;
             if grids.is_empty() {
                 let found = format!("nothing is large enough where {up} is up");
@@ -169,9 +167,7 @@ impl Options {
             self.draw(measured, &statistics, place, &self.file(&format!("{number}.png")))?;
         }
         progress::of_writing(&self.file(".csv"), |path| {
-            let bytes = table::csv(measured, self.quantity())
-                .map_err(|e| cannot_make(path, e.to_string()))?;
-            args::write_file(path, &bytes)
+            args::write_file(path, &table::csv(measured, self.quantity()))
         })
     }
 
@@ -185,7 +181,11 @@ impl Options {
         let (quantity, metre) = (self.quantity(), self.metre);
         let picture = Picture { measured, statistics, quantity, place, metre };
         progress::of_writing(file, |path| {
-            args::write_file(path, &picture.png().map_err(|found| cannot_make(path, found))?)
+            let png = picture.png().map_err(|found| {
+                let place = path.display().to_string();
+                Error::new(ErrorKind::File, place, found, "please report it")
+            })?;
+            args::write_file(path, &png)
         })
     }
 
@@ -208,8 +208,4 @@ impl Options {
 /// A grid this many metres above what it is named after.
 fn raised(grid: MeasuringGrid, height: f64) -> Placed {
     (format!("{height} m above {}", grid.name), grid)
-}
-
-fn cannot_make(file: &Path, found: impl Into<String>) -> Error {
-    Error::new(ErrorKind::File, file.display().to_string(), found, "please report it")
 }

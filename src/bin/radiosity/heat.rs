@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use radiosity::heat::{HeatBalance, HeatSettings};
 use radiosity::io::read_npz;
-use radiosity::{Error, ErrorKind, Scene, ViewFactors};
+use radiosity::{Error, Scene, ViewFactors};
 
 use crate::args::{self, List, Stop, list, value};
 use crate::progress;
@@ -132,34 +132,15 @@ fn print_balance(matrix: &ViewFactors, balance: &HeatBalance) {
 
 /// Writes a line a group.
 fn write(path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(), Error> {
-    let table = || -> csv::Result<()> {
-        let mut table = csv::Writer::from_path(path)?;
-        table.write_record([
-            "group",
-            "area",
-            "temperature",
-            "radiosity",
-            "irradiance",
-            "net_flux",
-            "standard_error",
-        ])?;
-        for ((name, area), group) in matrix.names.iter().zip(&matrix.areas).zip(&balance.groups) {
-            let numbers = [
-                Some(*area),
-                group.temperature,
-                Some(group.radiosity),
-                Some(group.irradiance),
-                Some(group.net_flux.value),
-                Some(group.net_flux.error),
-            ];
-            let numbers = numbers.map(|number| number.map_or(String::new(), |x| x.to_string()));
-            table.write_record(std::iter::once(name).chain(&numbers))?;
-        }
-        Ok(table.flush()?)
-    };
-    table().map_err(|e| {
-        let remedy = "choose a folder that exists, can be written and has room";
-        let found = format!("cannot be written: {e}");
-        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-    })
+    let names = "group area temperature radiosity irradiance net_flux standard_error".split(' ');
+    let head = names.map(String::from).collect();
+    let groups = matrix.names.iter().zip(&matrix.areas).zip(&balance.groups);
+    let lines = groups.map(|((name, area), group)| {
+        let temperature = group.temperature.map_or(String::new(), |t| t.to_string());
+        let flux = group.net_flux;
+        let numbers = [group.radiosity, group.irradiance, flux.value, flux.error];
+        let start = [name.clone(), area.to_string(), temperature];
+        start.into_iter().chain(numbers.map(|number| number.to_string())).collect()
+    });
+    args::write_file(path, &args::csv(std::iter::once(head).chain(lines)))
 }

@@ -10,16 +10,6 @@ use crate::args::{DeviceOptions, SHARE, value};
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
 
-/// Error of the light over that of what is measured in it: what vertices are off by is averaged
-/// over all that a point sees. That of a gather pass over the next one's, as in a bake.
-const LIGHT_COARSENING: f64 = 3.0;
-
-/// Error of the light at most: what is missed altogether is not averaged. Chosen by hand.
-const MAX_LIGHT_ERROR: f64 = 0.3;
-
-/// Noise of what is measured over its error. Chosen by hand.
-const NOISE_SHARE: f64 = 0.5;
-
 /// The light, and how exact what is measured in it is to be.
 #[derive(Args)]
 pub struct LightOptions {
@@ -46,7 +36,7 @@ impl LightOptions {
 
     /// The noise that what is measured may have, as a share of it.
     pub fn noise(&self) -> f64 {
-        (NOISE_SHARE * self.error).min(1.0)
+        (0.5 * self.error).min(1.0)
     }
 
     /// The scene of an OBJ file. Prints warnings.
@@ -58,7 +48,10 @@ impl LightOptions {
     pub fn bake(&self, scene: Scene) -> Result<Light, Error> {
         let device = self.device.open()?;
         interrupt::catch();
-        let error = (LIGHT_COARSENING * self.error).min(MAX_LIGHT_ERROR.max(self.error));
+        // The light may be three times further off than what is measured in it, as one gather pass
+        // than the next: errors of vertices are averaged over all that a point sees. Light that is
+        // missed altogether is not averaged; hence 0.3 at most. Plain choice.
+        let error = (3.0 * self.error).min(self.error.max(0.3));
         let unshot = Cell::new(Solver::default().unshot);
         let baked = progress::of_bake(
             || unshot.get(),

@@ -16,9 +16,6 @@ use crate::args::{self, Parsed, give};
 const LUMINAIRE: &str =
     "FILE@x,y,z, with :AIM and :C0 behind it where needed, both x,y,z, and *SCALE";
 
-/// Bytes that a list may have.
-const MAX_LIST_BYTES: u64 = 64 << 20;
-
 /// Luminaires that the options name.
 #[derive(Args)]
 pub struct LuminaireOptions {
@@ -156,7 +153,7 @@ impl Luminaires {
             Error::new(kind, path.display().to_string(), found, remedy)
         };
         let length = std::fs::metadata(path).map_or(0, |about| about.len());
-        if length > MAX_LIST_BYTES {
+        if length > 64 << 20 {
             return Err(wrong(ErrorKind::File, format!("{length} bytes")));
         }
         let bytes = std::fs::read(path)

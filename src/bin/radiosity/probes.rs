@@ -137,19 +137,15 @@ fn json(grid: &ProbeGrid, probes: &[Probe]) -> Vec<u8> {
 
 /// A line a probe, with a header.
 fn csv(probes: &[Probe]) -> Vec<u8> {
-    let mut out = b"x,y,z,inside,backs,escaped,deviation".to_vec();
-    for k in 0..9 {
-        out.extend(format!(",r{k},g{k},b{k}").bytes());
-    }
-    out.push(b'\n');
-    for probe in probes {
-        let [x, y, z] = probe.position.to_array();
-        let inside = u8::from(probe.is_inside());
-        let Probe { backface, escaped, deviation, .. } = probe;
-        let start = format!("{x},{y},{z},{inside},{backface},{escaped},{deviation}");
-        let numbers = probe.irradiance.coefficients.iter().flat_map(DVec3::to_array);
-        let line: String = numbers.map(|number| format!(",{number}")).collect();
-        out.extend(format!("{start}{line}\n").bytes());
-    }
-    out
+    let names = "x,y,z,inside,backs,escaped,deviation".split(',').map(String::from);
+    let coefficients = (0..9).flat_map(|k| ["r", "g", "b"].map(|channel| format!("{channel}{k}")));
+    let line = |probe: &Probe| {
+        let inside = f64::from(u8::from(probe.is_inside()));
+        let start = [inside, probe.backface, probe.escaped, probe.deviation];
+        let coefficients = probe.irradiance.coefficients.iter().flat_map(DVec3::to_array);
+        let numbers = probe.position.to_array().into_iter().chain(start).chain(coefficients);
+        numbers.map(|number| number.to_string()).collect()
+    };
+    let head = names.chain(coefficients).collect();
+    args::csv(std::iter::once(head).chain(probes.iter().map(line)))
 }

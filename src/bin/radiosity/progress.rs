@@ -34,14 +34,6 @@ const STEPS: u64 = 1000;
 /// Between lines where standard error is no terminal. Chosen by hand.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Between redraws of what has no share. Chosen by hand.
-const TICK: Duration = Duration::from_millis(200);
-
-/// Time and share of a stage from which on it is said how long the rest takes. Chosen by hand:
-/// before, the figure jumps.
-const LEFT_AFTER: Duration = Duration::from_secs(1);
-const LEFT_SHARE: f64 = 0.02;
-
 /// Takes the progress of a bake.
 pub type OfBake<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
 
@@ -166,7 +158,7 @@ impl Display {
         bar.set_message(stage.to_string());
         let lines = bar.is_hidden().then(|| Lines::new(stage));
         if lines.is_none() {
-            bar.enable_steady_tick(TICK);
+            bar.enable_steady_tick(Duration::from_millis(200));
         }
         Display { bar, lines, stage: stage.to_string(), start: Instant::now(), error: None }
     }
@@ -215,7 +207,8 @@ fn with_error(text: &str, error: Option<f64>) -> String {
 
 /// `text`, and how long the rest of a stage takes of which this share is done.
 fn with_time_left(text: &str, share: f64, elapsed: Duration) -> String {
-    if share < LEFT_SHARE || elapsed < LEFT_AFTER {
+    // Before that, the figure jumps.
+    if share < 0.02 || elapsed < Duration::from_secs(1) {
         return text.to_string();
     }
     let left = elapsed.as_secs_f64() * (1.0 - share) / share;

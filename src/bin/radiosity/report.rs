@@ -153,7 +153,7 @@ impl Report {
             let ErrorEstimate { total, uncertainty, .. } = g.estimate;
             format!("{} {:.1} ± {:.1} %", name(g.group), 100.0 * total, 100.0 * uncertainty)
         };
-        let worst: Vec<String> = worst.iter().take(WORST_GROUPS).map(line).collect();
+        let worst: Vec<String> = worst.iter().take(4).map(line).collect();
         let mut lines = vec![];
         if baked.groups.len() > 1 {
             lines.push(format!("groups     worst: {}", worst.join(", ")));
@@ -295,9 +295,6 @@ impl Report {
         lines.join("\n")
     }
 }
-
-/// Groups that the table names.
-const WORST_GROUPS: usize = 4;
 
 /// The parts of an estimate.
 fn parts(error: &ErrorEstimate) -> Value {

@@ -258,17 +258,17 @@ fn bad(option: &str, found: String, remedy: &str) -> Error {
 
 /// `x,y,z`, not zero.
 fn direction(text: &str) -> Parsed<DVec3> {
-    const EXPECTED: &str = "a direction x,y,z that is not zero";
-    let direction = DVec3::from_array(args::numbers(EXPECTED)(text)?);
-    direction.try_normalize().ok_or_else(|| give(EXPECTED))
+    let expected = "a direction x,y,z that is not zero";
+    let direction = DVec3::from_array(args::numbers(expected)(text)?);
+    direction.try_normalize().ok_or_else(|| give(expected))
 }
 
 /// `x,y,z=IRRADIANCE`.
 fn sun_towards(text: &str) -> Parsed<GivenSun> {
-    const EXPECTED: &str = "x,y,z=IRRADIANCE: the direction towards the sun, and W/m²";
-    let (direction, irradiance) = text.split_once('=').ok_or_else(|| give(EXPECTED))?;
-    let direction = DVec3::from_array(args::numbers(EXPECTED)(direction)?);
-    let irradiance = args::rgb(irradiance).map_err(|_| give(EXPECTED))?;
+    let expected = "x,y,z=IRRADIANCE: the direction towards the sun, and W/m²";
+    let (direction, irradiance) = text.split_once('=').ok_or_else(|| give(expected))?;
+    let direction = DVec3::from_array(args::numbers(expected)(direction)?);
+    let irradiance = args::rgb(irradiance).map_err(|_| give(expected))?;
     Ok((SunPlace::Towards(direction), irradiance))
 }
 

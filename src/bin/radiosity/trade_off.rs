@@ -85,25 +85,12 @@ struct Results {
     adapter: String,
 }
 
-/// Runs shorter than this many seconds are timed [`ROUNDS`] times, and the least time counts: other
-/// programs may use the machine too. Chosen by hand; no measurement kept.
-const SHORT_RUN: f64 = 4.0;
-
-/// How often short runs are timed.
-const ROUNDS: u32 = 3;
-
-/// The error of the run before all others, which compiles shaders and is not timed.
-const WARM_UP_ERROR: f64 = 0.3;
-
 /// What bakes are made of and with.
 struct Bench {
     scene: Arc<Scene>,
     device: Backend,
     measure: Measure,
 }
-
-/// Errors below this are all alike: 0.0001 %.
-const LEAST_ERROR: f64 = 1e-6;
 
 impl Options {
     /// Runs the command.
@@ -117,7 +104,7 @@ impl Options {
         let results = self.results(Arc::new(scene))?;
         if !results.runs.is_empty() {
             say!("{}", results.text());
-            self.write("csv", results.csv().as_bytes())?;
+            self.write("csv", &results.csv())?;
         }
         if interrupt::stopped() {
             eprintln!("stopped: the table has the runs that were finished; there is no chart");
@@ -141,7 +128,8 @@ impl Options {
         let runs = runs::runs(&scene, self.quick);
         let bench = Bench { scene: scene.clone(), device: self.device.open()?, measure };
         interrupt::catch();
-        bench.bake("warming up", &Target::Error(WARM_UP_ERROR))?;
+        // Compiles shaders, and is not timed.
+        bench.bake("warming up", &Target::Error(0.3))?;
         let runs = bench.measure_all(runs, &mut verifier)?;
         Ok(Results {
             front: front(&runs),
@@ -187,10 +175,12 @@ impl Bench {
             eprintln!("{name}: {:.2} s, error {:.2} %", one.seconds, 100.0 * one.error.value);
             all.push((run, one));
         }
-        for round in 1..ROUNDS {
-            let name = format!("short runs again, {} of {ROUNDS} times", round + 1);
+        let rounds = 3;
+        for round in 1..rounds {
+            let name = format!("short runs again, {} of {rounds} times", round + 1);
             eprintln!("{name}");
-            for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < SHORT_RUN) {
+            // Other programs may use the machine too: the least time of a short run counts.
+            for (run, one) in all.iter_mut().filter(|(_, one)| one.seconds < 4.0) {
                 let seconds = self.bake(&name, &run.target)?.timings.total();
                 if interrupt::stopped() {
                     return Ok(all);
@@ -232,7 +222,7 @@ impl Measured {
 
     /// The error, or its standard error where that is larger: a smaller error is not told from it.
     fn known_error(&self) -> f64 {
-        self.error.value.max(self.error.standard_error).max(LEAST_ERROR)
+        self.error.value.max(self.error.standard_error).max(1e-6)
     }
 }
 

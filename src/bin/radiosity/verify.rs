@@ -21,14 +21,6 @@ use crate::{interrupt, progress};
 use points::Points;
 use verdict::verdict;
 
-/// Maximum number of groups that are named as those of the tail, and least share of its squared
-/// error that each has.
-const TAIL_GROUPS: usize = 3;
-const MIN_TAIL_SHARE: f64 = 0.05;
-
-/// Groups in the printed table at most.
-const MAX_PRINTED: usize = 20;
-
 /// Measures the error of a solution of a scene, by path tracing
 #[derive(Args)]
 #[command(after_help = "\
@@ -104,7 +96,7 @@ impl Options {
                 let traced = points.trace(&scene, self.paths.get(), self.seed, json)?;
                 say!("{}", traced.summary());
                 if let Some(file) = &self.csv {
-                    args::write_file(file, traced.csv().as_bytes())?;
+                    args::write_file(file, &traced.csv())?;
                 }
             }
             (None, Some(ply)) => self.verify(&scene, &luminaires, ply)?,
@@ -127,9 +119,9 @@ impl Options {
     fn verify(&self, scene: &Scene, luminaires: &Luminaires, ply: &Path) -> Result<(), Error> {
         let start = Instant::now();
         let solution = progress::of_reading(ply, || read_ply(ply))?;
-        let told = Told::of(&solution, ply);
-        told.check_sky(scene, self.reading.sky.words(scene), ply)?;
-        told.check_luminaires(&luminaires.report(), ply)?;
+        let claimed = Claimed::of(&solution, ply);
+        claimed.check_sky(scene, self.reading.sky.words(scene), ply)?;
+        claimed.check_luminaires(&luminaires.report(), ply)?;
         interrupt::catch();
         let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings(), |progress| {
@@ -137,14 +129,14 @@ impl Options {
                 interrupt::flow()
             })
         })?;
-        let lines = lines(scene, &found, &told);
+        let lines = lines(scene, &found, &claimed);
         say!("{}", table(&lines));
         say!("{}", self.end(scene, &found, start.elapsed()));
-        if let Some(verdict) = verdict(told.total(), found.error) {
+        if let Some(verdict) = verdict(claimed.total(), found.error) {
             say!("{verdict}");
         }
         if let Some(file) = &self.csv {
-            args::write_file(file, csv(&lines).as_bytes())?;
+            args::write_file(file, &csv(&lines))?;
         }
         self.points_ply
             .iter()
@@ -210,7 +202,7 @@ fn tail_groups(scene: &Scene, found: &Verification) -> String {
         let share = 100.0 * group.tail_share;
         format!("{share:.0} % of it on {}", scene.groups()[group.group])
     };
-    let most = groups.iter().take(TAIL_GROUPS).filter(|g| g.tail_share >= MIN_TAIL_SHARE);
+    let most = groups.iter().take(3).filter(|g| g.tail_share >= 0.05);
     let names: Vec<String> = most.map(|group| name(group)).collect();
     if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) }
 }
@@ -223,26 +215,24 @@ fn time(text: &str) -> Parsed<Limit> {
     text.parse().ok().and_then(limit).ok_or_else(|| give("seconds, such as 10, or inf"))
 }
 
-/// Twice what an error is rounded by in the comment of a PLY file.
-const COMMENT_ROUNDING: f64 = 1e-5;
-
-/// What the report of a bake says of its error.
+/// The error that the report of a bake claims.
 #[derive(Default)]
-struct Told(Json);
+struct Claimed(Json);
 
-impl Told {
+impl Claimed {
     /// From the JSON file of the same name as `ply`, if it is of the same bake as the `solution`
     /// there; else what that says itself, if anything.
-    fn of(solution: &VertexMesh, ply: &Path) -> Told {
+    fn of(solution: &VertexMesh, ply: &Path) -> Claimed {
         let file = ply.with_extension("json");
         let text = std::fs::read(&file).unwrap_or_default();
-        let report = Told(serde_json::from_slice(&text).unwrap_or_default());
+        let report = Claimed(serde_json::from_slice(&text).unwrap_or_default());
         let Some(own) = solution.comments.iter().find_map(|comment| estimated_error(comment))
         else {
             return report;
         };
         match report.total() {
-            Some(total) if (total - own).abs() <= COMMENT_ROUNDING => return report,
+            // Twice the rounding of the comment.
+            Some(total) if (total - own).abs() <= 1e-5 => return report,
             Some(total) => eprintln!(
                 "warning: {} is of another bake, with an error of {:.2} %, for {:.2} % here: left \
                  aside",
@@ -252,7 +242,7 @@ impl Told {
             ),
             None => (),
         }
-        Told(json!({ "error": { "total": own } }))
+        Claimed(json!({ "error": { "total": own } }))
     }
 
     /// Refuses a solution that was baked under another sky than that of `scene`.
@@ -313,12 +303,12 @@ struct Line {
     area_share: f64,
     hidden_share: f64,
     points: usize,
-    told: Option<f64>,
+    claimed: Option<f64>,
     error: Option<Estimate>,
 }
 
 /// Groups, the worst first, and all together.
-fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
+fn lines(scene: &Scene, found: &Verification, claimed: &Claimed) -> Vec<Line> {
     let line = |group: &GroupError| {
         let name = &scene.groups()[group.group];
         Line {
@@ -326,7 +316,7 @@ fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
             area_share: group.area_share,
             hidden_share: group.hidden_share,
             points: group.points,
-            told: told.group(name),
+            claimed: claimed.group(name),
             error: group.error,
         }
     };
@@ -338,16 +328,16 @@ fn lines(scene: &Scene, found: &Verification, told: &Told) -> Vec<Line> {
         area_share: 1.0,
         hidden_share: found.hidden_share,
         points: found.points.len(),
-        told: told.total(),
+        claimed: claimed.total(),
         error: found.error,
     });
     lines
 }
 
-/// The table as text, cut after [`MAX_PRINTED`] groups.
+/// The table as text, cut after 20 groups.
 fn table(lines: &[Line]) -> String {
     let Some((all, groups)) = lines.split_last() else { return String::new() };
-    let (shown, rest) = groups.split_at(groups.len().min(MAX_PRINTED));
+    let (shown, rest) = groups.split_at(groups.len().min(20));
     let lengths = shown.iter().map(|line| line.name.chars().count());
     let width = lengths.max().unwrap_or(0).clamp(5, 40);
     let percent = |share: Option<f64>| share.map_or("–".into(), |x| format!("{:.2}", 100.0 * x));
@@ -362,7 +352,7 @@ fn table(lines: &[Line]) -> String {
             100.0 * line.area_share,
             100.0 * line.hidden_share,
             line.points,
-            percent(line.told)
+            percent(line.claimed)
         )
     };
     let mut out = format!(
@@ -377,32 +367,28 @@ fn table(lines: &[Line]) -> String {
 }
 
 /// The table as CSV, errors as shares.
-fn csv(lines: &[Line]) -> String {
-    let mut out =
-        "group,area_share,points,told,measured,standard_error,told/measured\n".to_string();
+fn csv(lines: &[Line]) -> Vec<u8> {
+    let head = "group,area_share,hidden_share,points,told,measured,standard_error,told/measured";
     let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
-    for line in lines {
-        let quoted = format!("\"{}\"", line.name.replace('"', "\"\""));
-        let name = if line.name.contains([',', '"', '\n', '\r']) { &quoted } else { &line.name };
-        let _ = writeln!(
-            out,
-            "{name},{},{},{},{},{},{},{}",
-            line.area_share,
-            line.hidden_share,
-            line.points,
-            number(line.told),
+    let rows = lines.iter().map(|line| {
+        vec![
+            line.name.clone(),
+            line.area_share.to_string(),
+            line.hidden_share.to_string(),
+            line.points.to_string(),
+            number(line.claimed),
             number(line.error.map(|error| error.value)),
             number(line.error.map(|error| error.standard_error)),
-            number(line.ratio())
-        );
-    }
-    out
+            number(line.ratio()),
+        ]
+    });
+    args::csv(std::iter::once(head.split(',').map(String::from).collect()).chain(rows))
 }
 
 impl Line {
-    /// What was told over what was measured, where that is not zero.
+    /// The claimed error over the measured one, where that is not zero.
     fn ratio(&self) -> Option<f64> {
         let measured = self.error.map(|error| error.value).filter(|&value| value > 0.0)?;
-        Some(self.told? / measured)
+        Some(self.claimed? / measured)
     }
 }

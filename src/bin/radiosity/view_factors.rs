@@ -22,9 +22,6 @@ use crate::progress;
 /// Groups whose factors are printed at most.
 pub const MAX_PRINTED: usize = 16;
 
-/// Above the rounding of a sum of thousands of factors.
-const ROUNDING_OF_SUMS: f64 = 1e-12;
-
 /// Makes view factors between the groups of scenes
 #[derive(Args)]
 #[command(after_help = "\
@@ -227,7 +224,8 @@ pub fn print_checks(m: &ViewFactors) {
         say!("bounds: kept");
     }
     let ErrorStats { max: excess, at: (row, _), .. } = checks.row_sums;
-    if excess > ROUNDING_OF_SUMS {
+    // Above the rounding of sums of thousands of factors.
+    if excess > 1e-12 {
         let error = m.open[row].error;
         say!("sums of rows: above 1 by up to {excess:.1e} ± {error:.1e}, in {}", name(row));
     } else {

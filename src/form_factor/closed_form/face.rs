@@ -9,11 +9,6 @@ use super::lambert::lambert;
 use crate::geometry::polygon::{clip, fan, max_distance};
 use crate::geometry::quadrature::{collapsed_point, gauss_legendre_for_gap};
 
-/// Gap in radii above which cubature replaces Lambert's formula, which loses the ratio of distance
-/// to size in digits; in cubature nothing cancels. At the switch the relative error of the formula
-/// is 64 · 2e-16 times a few.
-const MAX_LAMBERT_GAP: f64 = 64.0;
-
 /// A convex planar polygon with its unit normal and a sphere around it.
 pub(super) struct Face {
     pub corners: Vec<DVec3>,
@@ -37,7 +32,9 @@ impl Face {
     /// face are entirely in front of each other.
     pub fn factor_from(&self, point: DVec3, normal: DVec3) -> f64 {
         let gap = point.distance(self.centre) - self.radius;
-        if gap < MAX_LAMBERT_GAP * self.radius {
+        // Lambert's formula loses the ratio of distance to size in digits, with a relative error of
+        // 64 · 2e-16 times a few here; in cubature nothing cancels.
+        if gap < 64.0 * self.radius {
             return lambert(point, normal, &self.corners);
         }
         self.integrate(gap, |y| {

@@ -7,11 +7,6 @@ use super::face::Face;
 use crate::geometry::polygon::{area_vector, clip, polygon_area};
 use crate::geometry::quadrature::SIX_POINT_MIN_GAP;
 
-/// Maximum ratio of radii for the contour integral, which loses this ratio in digits. For larger
-/// ratios the larger polygon is halved. Equal to [`SIX_POINT_MIN_GAP`], so that halving ends with
-/// parts that are either of similar size or far away.
-const MAX_RADIUS_RATIO: f64 = SIX_POINT_MIN_GAP;
-
 /// Form factor between two unoccluded polygons, averaged over the whole area of `from`: the share
 /// of the light leaving `from` that arrives at the front of `to`.
 ///
@@ -56,8 +51,10 @@ fn exchange_area(p: &Face, q: &Face) -> f64 {
     let (small, large) = if p.radius <= q.radius { (p, q) } else { (q, p) };
     let gap = p.centre.distance(q.centre) - p.radius - q.radius;
     if gap >= SIX_POINT_MIN_GAP * small.radius {
+        // The contour integral loses the ratio of radii in digits. With this bound halving ends
+        // with parts that are either of similar size or far apart.
         small.integrate(gap, |x| large.factor_from(x, small.normal))
-    } else if large.radius > MAX_RADIUS_RATIO * small.radius {
+    } else if large.radius > SIX_POINT_MIN_GAP * small.radius {
         large.halves().map(|half| exchange_area(small, &half)).sum()
     } else {
         contour_integral(p, q)

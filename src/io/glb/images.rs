@@ -26,7 +26,7 @@ pub(super) struct Images {
 
 /// A textured material as it looks under one light.
 pub(super) struct Image {
-    pub png: Vec<u8>,
+    png: Vec<u8>,
     /// Factor of the image, whose brightest channel is 1, for that look.
     peak: f64,
     /// The colour of the material's mean in that light, linear.
@@ -58,9 +58,9 @@ impl Images {
         Ok(Images { of_materials })
     }
 
-    /// In the order of materials.
-    pub fn iter(&self) -> impl Iterator<Item = &Image> {
-        self.of_materials.values()
+    /// All of them as PNG, in the order of materials.
+    pub fn into_files(self) -> impl Iterator<Item = Vec<u8>> {
+        self.of_materials.into_values().map(|image| image.png)
     }
 
     pub fn get(&self, material: u32) -> Option<&Image> {
@@ -70,11 +70,6 @@ impl Images {
     /// Index of a material's image among all.
     pub fn number(&self, material: u32) -> Option<usize> {
         self.of_materials.keys().position(|&known| known == material)
-    }
-
-    /// Total number of bytes.
-    pub fn length(&self) -> u64 {
-        self.iter().map(|image| image.png.len() as u64).sum()
     }
 }
 

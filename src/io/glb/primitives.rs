@@ -52,11 +52,6 @@ impl<'a> Shown<'a> {
 /// A face of the surface, and its triangle of the scene.
 type Face = ([u32; 3], usize);
 
-/// Distance of texture coordinates below which they belong to one vertex: a hundredth of a texel of
-/// a large image, and far more than the rounding difference of two triangles' coordinates along
-/// their common side.
-const SEAM: f64 = 1.0 / (1 << 20) as f64;
-
 /// The faces of `light` by group, then material, in the order of the scene's.
 pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     let (surface, mesh) = (&light.surface, &light.mesh);
@@ -70,7 +65,7 @@ pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
     let mut primitives = vec![];
     for (k, ((group, material), faces)) in faces.into_iter().enumerate() {
         primitives.push(if faces.iter().all(|&(_, t)| has_texture_coordinates(light, t)) {
-            textured(light, (group, material), &faces)
+            textured(light, group, material, &faces)
         } else {
             let mut vertices = vec![];
             let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
@@ -110,7 +105,8 @@ fn has_texture_coordinates(light: &GatheredMesh, t: usize) -> bool {
 /// The primitive of `faces`, each with its triangle of the scene.
 fn textured<'a>(
     light: &'a GatheredMesh,
-    (group, material): (u32, u32),
+    group: u32,
+    material: u32,
     faces: &[Face],
 ) -> Primitive<'a> {
     let (surface, scene) = (&light.surface, light.mesh.scene());
@@ -119,11 +115,13 @@ fn textured<'a>(
     let (mut vertices, mut places) = (vec![], vec![]);
     let mut number = |v: u32, t: usize| {
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
-        let place = scene.texture_place(t, barycentric);
+        let place = scene.texture_point(t, barycentric);
         let frame = shown.and_then(|shown| shown.frame());
         let place = frame.map_or(place, |map| place * map.scale + map.offset);
         let place = DVec2::new(place.x, 1.0 - place.y);
-        let cell = (place / SEAM).round().to_array().map(|x| x as i64);
+        // Nearer coordinates are one vertex: a hundredth of a texel of a large image, far more than
+        // the rounding difference of two triangles along their common side.
+        let cell = (place / 2f64.powi(-20)).round().to_array().map(|x| x as i64);
         *numbers.entry((v, cell)).or_insert_with(|| {
             vertices.push(v);
             places.push(place.as_vec2());

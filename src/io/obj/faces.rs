@@ -1,15 +1,14 @@
 //! The faces of an OBJ file as triangles of a scene.
 //!
-//! tobj returns the faces by models, one for each run of lines with one material, and renumbers the
-//! vertices of each; the colour of a vertex holds its number in the file. Here the faces get back
-//! that numbering and the notes of [`super::statements`], and are cut into triangles.
+//! tobj returns the faces by models, and renumbers the vertices of each. Here the faces get back
+//! the file's numbering and the notes of [`super::statements`], and are cut into triangles.
 
 use glam::{DVec2, DVec3};
 
 use super::super::mtl::MtlMaterial;
 use super::super::text;
 use super::ObjFile;
-use super::statements::FaceNote;
+use super::statements::{FaceNote, MaterialUse};
 use crate::error::Error;
 use crate::geometry::triangulation::{triangulate, triangulate_anyhow};
 use crate::scene::{Material, Triangle, Warning, WarningKind};
@@ -40,18 +39,11 @@ impl ObjFile<'_> {
         let textured =
             with_coordinates || self.library.materials.iter().any(MtlMaterial::has_images);
         let (mut face, mut bare) = (0, 0);
-        for tobj::Model { mesh, name } in models {
-            // A model without a face has no number.
-            let number = name.parse().ok();
-            let Some(&used) = number.and_then(|k: usize| self.statements.models.get(k)) else {
-                continue;
-            };
-            let by_name = used.map_or(named[named.len() - 1], |k| named[k as usize]);
-            let known = mesh.material_id.filter(|_| used.is_some());
-            let material = known.map_or(by_name, |id| id as u32);
-            // The number of each vertex in the file is its colour.
-            let numbers: Vec<u32> =
-                mesh.vertex_color.iter().step_by(3).map(|&n| n as u32).collect();
+        let order = std::mem::take(&mut self.statements.vertex_order);
+        let mut order = &order[..];
+        for tobj::Model { mesh, .. } in models {
+            let numbers;
+            (numbers, order) = order.split_at(mesh.positions.len() / 3);
             for (&number, p) in numbers.iter().zip(mesh.positions.chunks_exact(3)) {
                 geometry.positions[number as usize] = DVec3::new(p[0], p[1], p[2]);
             }
@@ -61,10 +53,13 @@ impl ObjFile<'_> {
                 let corners = &mesh.indices[start..start + arity(k)];
                 let corners: Vec<u32> = corners.iter().map(|&i| numbers[i as usize]).collect();
                 let places = textured.then(|| texture_coordinates(&mesh, start, corners.len()));
-                let FaceNote { group, smoothing, .. } = self.statements.faces[face];
+                let FaceNote { group, smoothing, material, .. } = self.statements.faces[face];
+                let MaterialUse { name, known } = self.statements.material_uses[material as usize];
+                let by_name = name.map_or(named[named.len() - 1], |k| named[k as usize]);
+                let material = known.unwrap_or(by_name);
                 let like = Triangle { group, material, smoothing, ..Default::default() };
                 self.cut(face, &corners, places.as_deref(), like, &mut geometry)?;
-                bare += usize::from(used.is_none());
+                bare += usize::from(name.is_none());
                 (start, k, face) = (start + corners.len(), k + 1, face + 1);
             }
         }

@@ -3,20 +3,17 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::super::mtl::MtlMaterial;
 use super::super::specular::SpecularSurfaces;
-use super::super::textures::{TextureStatement, Textures};
+use super::super::textures::{TextureStatement, Textures, Unread};
 use super::repairs::Repairs;
 use super::statements::UNKNOWN_MATERIAL;
 use super::{ObjFile, ObjSettings};
 use crate::error::{Error, ErrorKind, nearest, quoted};
-use crate::scene::texture::{MaterialTextures, TextureMap};
+use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
 use crate::scene::{Material, Rgb, Specular, Triangle, WarningKind};
-
-/// Maximum transmittance of a textured material, as a fraction of the texture's reflectance plus
-/// transmittance: the remaining reflectance gives the distribution over the texture.
-const MAX_TRANSMITTED: f64 = 0.99;
 
 impl ObjFile<'_> {
     /// The textures of `materials`, whose reflectance and exitance become the means of these; empty
@@ -32,58 +29,50 @@ impl ObjFile<'_> {
         let library = (0u32..).zip(self.library.materials.iter().zip(materials));
         for (index, (mtl, material)) in library.filter(|(index, _)| used.contains(index)) {
             let place = || self.library.place(mtl, self.files);
-            let emitted = settings.emit.iter().any(|(name, _)| *name == material.name);
-            for (k, statement) in mtl.textures.iter().enumerate() {
-                let Some(statement) = statement else { continue };
-                if k == 0 && mtl.is_black(settings) {
-                    continue;
-                }
-                let statement = TextureStatement::parse(statement);
-                let name = statement.name.as_str();
-                if statement.more {
-                    let done = "`-s`, `-o` and `-clamp` count alone";
-                    self.repairs.note_at(WarningKind::TextureOptions, place, name, done)?;
-                }
-                let texture = match images.get(name) {
-                    Ok(texture) => texture,
-                    Err(unread) => {
-                        let done = unread.and_so("`Kd` and `Ke` count alone");
-                        self.repairs.note_at(unread.kind, place, name, done)?;
-                        continue;
-                    }
+            let mut maps = MaterialTextures::default();
+            let mut map = |statement: &str| {
+                let without = "`Kd` and `Ke` count alone";
+                let find = |name: &str| images.get(name).map(Some);
+                texture_map(statement, find, &mut self.repairs, place, without)
+            };
+            let is_given = |colour: &Rgb| *colour != Rgb::ZERO;
+            if let Some(statement) = mtl.textures[0].as_deref().filter(|_| !mtl.is_black(settings))
+                && let Some(map) = map(statement)?
+            {
+                let ceiling = settings.max_reflectance.min(mtl.diffuse_room(settings));
+                let mut factor = match mtl.reflectance.filter(is_given) {
+                    Some(_) => material.albedo(),
+                    None => Rgb::splat(ceiling),
                 };
-                let written = if k == 0 { mtl.reflectance } else { mtl.radiance };
-                let most = settings.max_reflectance.min(mtl.diffuse_room(settings));
-                let factor = match written.filter(|&colour| colour != Rgb::ZERO) {
-                    None if k == 0 => Rgb::splat(most),
-                    None => Rgb::ONE,
-                    Some(_) if k == 0 => material.albedo(),
-                    Some(radiance) => radiance,
-                };
-                let TextureStatement { scale, offset, clamped, .. } = statement;
-                let (factor, ceiling) = match k {
-                    0 => (factor, most),
-                    _ => (PI * factor.max(Rgb::ZERO), f64::MAX),
-                };
-                let mut factor = factor;
-                if k == 0 && material.is_translucent() {
-                    // The transmittance is a fraction of the texture's total.
-                    let all = factor * texture.whole_mean();
+                if material.is_translucent() {
+                    // The transmittance is a fraction of the texture's total; the remaining
+                    // reflectance gives the distribution over the texture.
+                    let all = factor * map.texture.whole_mean();
                     let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
-                    let share = share.min(Rgb::splat(MAX_TRANSMITTED));
+                    let share = share.min(Rgb::splat(0.99));
                     material.transmittance = share * all;
                     factor *= Rgb::ONE - share;
                 }
-                let mean = factor * texture.whole_mean();
-                let map = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
-                if k == 0 {
-                    all.entry(index).or_default().reflectance = Some(map);
-                } else if !emitted {
-                    all.entry(index).or_default().exitance = Some(map);
-                }
+                let mean = factor * map.texture.whole_mean();
+                maps.reflectance = Some(TextureMap { factor, ceiling, mean, ..map });
             }
-            if let Some(mask) = mask(mtl, &mut images, &mut self.repairs, place)? {
-                all.entry(index).or_default().mask = Some(mask);
+            if let Some(statement) = &mtl.textures[1]
+                && let Some(map) = map(statement)?
+                && !settings.emit.iter().any(|(name, _)| *name == material.name)
+            {
+                let radiance = mtl.radiance.filter(is_given).unwrap_or(Rgb::ONE);
+                let factor = PI * radiance.max(Rgb::ZERO);
+                let mean = factor * map.texture.whole_mean();
+                maps.exitance = Some(TextureMap { factor, mean, ..map });
+            }
+            if let Some(statement) = &mtl.mask {
+                let colours = mtl.textures[0].as_deref();
+                let colours = colours.map(|colours| TextureStatement::parse(colours).name);
+                let find = |name: &str| images.mask(name, colours.as_deref());
+                maps.mask = texture_map(statement, find, &mut self.repairs, place, "it is opaque")?;
+            }
+            if maps.reflectance.is_some() || maps.exitance.is_some() || maps.mask.is_some() {
+                all.insert(index, maps);
             }
         }
         Ok(all)
@@ -200,40 +189,38 @@ impl ObjFile<'_> {
     }
 }
 
-/// The mask of a material at this `place`; none without a mask or without a hole.
-fn mask(
-    mtl: &MtlMaterial,
-    images: &mut Textures,
+/// The image that `find` reads for the `statement` of a material at this `place`, as it lies on
+/// surfaces, with a factor of 1; none if there is nothing to show, or if it cannot be read: then
+/// what counts `without` it is reported.
+fn texture_map(
+    statement: &str,
+    find: impl FnOnce(&str) -> Result<Option<Arc<Texture>>, Unread>,
     repairs: &mut Repairs,
     place: impl Fn() -> String,
+    without: &str,
 ) -> Result<Option<TextureMap>, Error> {
-    let Some(statement) = &mtl.mask else { return Ok(None) };
     let TextureStatement { name, scale, offset, clamped, more } =
         TextureStatement::parse(statement);
     if more {
-        repairs.note_at(
-            WarningKind::TextureOptions,
-            &place,
-            &name,
-            "`-s`, `-o` and `-clamp` count alone",
-        )?;
+        let done = "`-s`, `-o` and `-clamp` count alone";
+        repairs.note_at(WarningKind::TextureOptions, &place, &name, done)?;
     }
-    let colours = mtl.textures[0].as_deref().map(|colours| TextureStatement::parse(colours).name);
-    match images.mask(&name, colours.as_deref()) {
-        Ok(texture) => Ok(texture.map(|texture| TextureMap {
-            texture,
-            factor: Rgb::ONE,
-            ceiling: 1.0,
-            mean: Rgb::ONE,
-            scale,
-            offset,
-            clamped,
-        })),
+    let texture = match find(&name) {
+        Ok(texture) => texture,
         Err(unread) => {
-            repairs.note_at(unread.kind, place, &name, unread.and_so("it is opaque"))?;
-            Ok(None)
+            repairs.note_at(unread.kind, place, &name, unread.and_so(without))?;
+            None
         }
-    }
+    };
+    Ok(texture.map(|texture| TextureMap {
+        texture,
+        factor: Rgb::ONE,
+        ceiling: f64::MAX,
+        mean: Rgb::ONE,
+        scale,
+        offset,
+        clamped,
+    }))
 }
 
 impl MtlMaterial {

@@ -1,10 +1,10 @@
 //! The pass over an OBJ file before tobj: data that tobj does not return or accept.
 //!
 //! ```text
-//!   lines of the file ──► Statements ──► lines for tobj ──► tobj ──► models
-//!                             │ line numbers, smoothing groups, group names,
-//!                             ▼ skipped statements
-//!                           notes by face and by model
+//!   lines of the file ──► Statements ──► v, vt, f ──► tobj ──► positions, corners of faces
+//!                             │
+//!                             ▼
+//!                           notes by face: line, group, smoothing group, material
 //! ```
 //!
 //! tobj reads the lines one by one through [`LineFeed`]; the text is not kept. The changes to the
@@ -12,31 +12,23 @@
 //!
 //! | statement | input of tobj | reason: tobj |
 //! |---|---|---|
-//! | `v` | the number of the vertex as its colour | numbers vertices anew in each model |
+//! | `v` | three numbers | takes three more for a colour |
 //! | `f` | corners counted from 1, `v` or `v/vt` | accepts bad indices, reports no line |
 //! | `vt` | the same; before the first, a `vt` of NaN | gives corners without one that of another |
-//! | `o`, `g` | the number of a model, from here | makes a model for each, and copies its name |
+//! | `o`, `g`, `usemtl` | nothing; a `g` after many corners | keeps 24 bytes a corner until then |
 //! | `l`, `p` | nothing | makes faces of lines |
-//! | `usemtl`, `mtllib` | the same, after one space | splits at a space only |
+//!
+//! Each `g` ends a model, in which tobj numbers vertices by their first use;
+//! [`Statements::vertex_order`] is that order.
 
 use std::collections::HashMap;
-use std::io::{self, BufRead, Read, Write as _};
+use std::io::{self, Read, Write as _};
 
+use super::super::mtl::Library;
 use super::super::text::{Line, finite, words};
 use super::repairs::Repairs;
 use crate::error::{Error, quoted};
 use crate::scene::WarningKind;
-
-/// Group of the faces before any `o` or `g` line.
-const DEFAULT_GROUP: &str = "default";
-
-/// Number of corners after which a new model begins: tobj keeps 24 bytes or more for each until
-/// then. Plain choice.
-const MODEL_CORNERS: usize = 1 << 14;
-
-/// Maximum number of bytes of a group's name that its facets repeat; a longer one would be stored
-/// once per face, which is more memory than the file's size explains. Plain choice.
-const MAX_FACET_GROUP_NAME: usize = 64;
 
 /// Treatment of faces whose material is unknown.
 pub(super) const UNKNOWN_MATERIAL: &str = "they are grey, reflectance 0.5";
@@ -48,6 +40,17 @@ pub(super) struct FaceNote {
     pub smoothing: Option<u32>,
     /// Index into the groups.
     pub group: u32,
+    /// Index into [`Statements::material_uses`].
+    pub material: u32,
+}
+
+/// A `usemtl` line with faces.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub(super) struct MaterialUse {
+    /// Index into the names of materials; none before the first line, and for one without a name.
+    pub name: Option<u32>,
+    /// Index into the materials of the libraries, if one above the line defines it.
+    pub known: Option<u32>,
 }
 
 /// Names in the order of their first use.
@@ -73,8 +76,9 @@ impl Names {
 #[derive(Default)]
 pub(super) struct Statements {
     pub faces: Vec<FaceNote>,
-    /// Of each model of tobj, by its name: the material of its faces, as an index into `materials`.
-    pub models: Vec<Option<u32>>,
+    pub material_uses: Vec<MaterialUse>,
+    /// Numbers of the vertices from 0, in the order of tobj's models: by first use in each.
+    pub vertex_order: Vec<u32>,
     pub groups: Names,
     /// Names of materials that faces use.
     pub materials: Names,
@@ -85,20 +89,25 @@ pub(super) struct Statements {
     group_name: String,
     group: Option<u32>,
     material_name: String,
-    material: Option<u32>,
+    material: MaterialUse,
     material_line: u32,
     smoothing: Option<u32>,
-    /// Corners passed to tobj for the current model.
+    /// Per vertex, the last model that uses it, counted from 1.
+    last_model: Vec<u32>,
+    /// Number of models before the current one, and of corners in it.
+    models: u32,
     model_corners: usize,
     /// Vertex and texture coordinate of each corner of a face, counted from 1; 0 for none.
     corners: Vec<[u32; 2]>,
 }
 
 impl Statements {
-    /// Processes `line`, and appends its replacement for tobj to `out`.
+    /// Processes `line`, which comes after those that load the `library` so far, and appends its
+    /// replacement for tobj to `out`.
     pub fn line(
         &mut self,
         line: &Line,
+        library: &Library,
         repairs: &mut Repairs,
         out: &mut Vec<u8>,
     ) -> Result<(), Error> {
@@ -110,16 +119,14 @@ impl Statements {
             "f" => self.face(line, rest, repairs, out)?,
             "o" | "g" => (self.group_name, self.group) = (rest.into(), None),
             "usemtl" => {
-                (self.material_name, self.material) = (rest.into(), None);
+                self.material_name = rest.into();
+                self.material = MaterialUse { name: None, known: library.find(rest) };
                 self.material_line = line.number as u32;
                 if rest.is_empty() {
                     repairs.note(WarningKind::UnknownMaterial, line, "", UNKNOWN_MATERIAL)?;
-                } else {
-                    emit(out, format_args!("usemtl {rest}\n"));
                 }
             }
             "s" => self.smooth(line, rest, repairs)?,
-            "mtllib" => emit(out, format_args!("mtllib {rest}\n")),
             "p" | "l" => passed_over(repairs, WarningKind::PointsAndLines)?,
             "vn" | "" => {}
             "vp" | "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm"
@@ -157,9 +164,9 @@ impl Statements {
             })?;
         }
         self.vertices += 1;
-        let number = self.vertices - 1;
+        self.last_model.push(0);
         if used == 3 {
-            emit(out, format_args!("v {} {} {} {number} 0 0\n", words[0], words[1], words[2]));
+            emit(out, format_args!("v {} {} {}\n", words[0], words[1], words[2]));
             return Ok(());
         }
         let [x, y, z] = [0, 1, 2].map(|k| numbers[k] / numbers[3]);
@@ -167,7 +174,7 @@ impl Statements {
             let found = format!("weight {}", numbers[3]);
             return Err(line.parse_error(found, "leave the fourth number out"));
         }
-        emit(out, format_args!("v {x:e} {y:e} {z:e} {number} 0 0\n"));
+        emit(out, format_args!("v {x:e} {y:e} {z:e}\n"));
         Ok(())
     }
 
@@ -213,12 +220,21 @@ impl Statements {
         if self.corners.len() < given {
             repairs.note(WarningKind::RepeatedCorner, line, "", "taken for one")?;
         }
-        self.begin_model(out);
+        if self.model_corners >= 1 << 14 {
+            emit(out, format_args!("g\n"));
+            (self.models, self.model_corners) = (self.models + 1, 0);
+        }
         self.model_corners += self.corners.len();
         let (line, smoothing, group) = (line.number as u32, self.smoothing, self.current_group());
-        self.faces.push(FaceNote { line, smoothing, group });
+        let material = self.current_material();
+        self.faces.push(FaceNote { line, smoothing, group, material });
         emit(out, format_args!("f"));
         for &[vertex, texture_coordinate] in &self.corners {
+            let last = &mut self.last_model[vertex as usize - 1];
+            if *last != self.models + 1 {
+                *last = self.models + 1;
+                self.vertex_order.push(vertex - 1);
+            }
             emit(out, format_args!(" {vertex}"));
             if self.texture_coordinates > 0 {
                 emit(out, format_args!("/{}", texture_coordinate + 1));
@@ -236,8 +252,9 @@ impl Statements {
             let count = &mut counts[face.group as usize];
             *count += 1;
             let name = &of_file[face.group as usize];
+            // A long name in every face is more memory than the file's size explains.
             self.groups.list.push(match name.len() {
-                0..=MAX_FACET_GROUP_NAME => format!("{name}/{count}"),
+                0..=64 => format!("{name}/{count}"),
                 _ => format!("group {}/{count}", face.group + 1),
             });
             face.group = number;
@@ -247,25 +264,24 @@ impl Statements {
     /// Index of the current group of faces.
     fn current_group(&mut self) -> u32 {
         *self.group.get_or_insert_with(|| {
-            let name = if self.group_name.is_empty() { DEFAULT_GROUP } else { &self.group_name };
+            let name = if self.group_name.is_empty() { "default" } else { &self.group_name };
             self.groups.index(name)
         })
     }
 
-    /// Begins a new model if the material changes, or if the last one is large.
-    fn begin_model(&mut self, out: &mut Vec<u8>) {
-        if self.material.is_none() && !self.material_name.is_empty() {
-            let material = self.materials.index(&self.material_name);
-            if material as usize == self.first_use.len() {
+    /// Index of the current material's use.
+    fn current_material(&mut self) -> u32 {
+        if self.material.name.is_none() && !self.material_name.is_empty() {
+            let name = self.materials.index(&self.material_name);
+            if name as usize == self.first_use.len() {
                 self.first_use.push(self.material_line);
             }
-            self.material = Some(material);
+            self.material.name = Some(name);
         }
-        if self.models.last() != Some(&self.material) || self.model_corners >= MODEL_CORNERS {
-            emit(out, format_args!("g {}\n", self.models.len()));
-            self.models.push(self.material);
-            self.model_corners = 0;
+        if self.material_uses.last() != Some(&self.material) {
+            self.material_uses.push(self.material);
         }
+        self.material_uses.len() as u32 - 1
     }
 
     /// Vertex, which must exist, and texture coordinate, if it exists, of a corner.
@@ -343,23 +359,13 @@ impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> LineFeed<F> {
 
 impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> Read for LineFeed<F> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let count = self.fill_buf()?.read(bytes)?;
-        self.consume(count);
-        Ok(count)
-    }
-}
-
-impl<F: FnMut(&mut Vec<u8>) -> io::Result<()>> BufRead for LineFeed<F> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.at == self.buffer.len() {
             self.buffer.clear();
             self.at = 0;
             (self.fill)(&mut self.buffer)?;
         }
-        Ok(&self.buffer[self.at..])
-    }
-
-    fn consume(&mut self, count: usize) {
+        let count = (&self.buffer[self.at..]).read(bytes)?;
         self.at += count;
+        Ok(count)
     }
 }

@@ -19,22 +19,13 @@ use glam::DVec3;
 
 use super::super::text::{Line, finite, physical_lines, place};
 use super::numbers::{Comma, Numbers};
-use super::planes::{Planes, SAME};
+use super::planes::{ANGLE_TOLERANCE, Planes};
 use super::{Photometry, name_of};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Opening, Pole};
 
 /// Lines before those of the sets of lamps.
 const HEADER: usize = 26;
-
-/// Lines of a set of lamps.
-const LAMP_LINES: usize = 6;
-
-/// Maximum number of sets of lamps: the format's own limit.
-const MAX_SETS: f64 = 20.0;
-
-/// Ratios before the angles.
-const DIRECT_RATIOS: usize = 10;
 
 pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     let mut warnings = vec![];
@@ -58,11 +49,11 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         factor = 1.0;
     }
     let sets = field(26).number("the number of sets of lamps")?;
-    if !(0.0..=MAX_SETS).contains(&sets) || sets.fract() != 0.0 {
+    if !(0.0..=20.0).contains(&sets) || sets.fract() != 0.0 {
         let found = format!("{sets} sets of lamps");
         return Err(field(26).error(found, "give a whole number from 0 to 20"));
     }
-    let lamps: Vec<Line> = rest.by_ref().take(LAMP_LINES * sets as usize).collect();
+    let lamps: Vec<Line> = rest.by_ref().take(6 * sets as usize).collect();
     let lamp = |k: usize| Field { file, number: HEADER + k, line: lamps.get(k - 1) };
     let is_absolute = lamp(1).number_or_zero() < 0.0;
     let flux = lamp(3).number_or_zero().abs();
@@ -72,7 +63,7 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         warnings.push("lamps without flux: intensities are taken for candela".into());
     }
     let mut numbers = Numbers::new(file, rest, Comma::IsDecimal);
-    numbers.list(DIRECT_RATIOS, "a direct ratio")?;
+    numbers.list(10, "a direct ratio")?;
     let azimuths = numbers.list(plane_count, "a C-angle")?;
     let angles = numbers.list(polar_count, "an angle γ")?;
     let values = numbers.rest();
@@ -110,12 +101,14 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
 
 /// The C-angles, out of `azimuths`, of the planes that a file of this `symmetry` stores, in order.
 fn measured(symmetry: u8, azimuths: &[f64]) -> Vec<f64> {
-    let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + SAME);
+    let up_to = |last: f64| azimuths.iter().copied().filter(move |&a| a <= last + ANGLE_TOLERANCE);
     match symmetry {
         1 => azimuths.iter().copied().take(1).collect(),
         2 => up_to(180.0).collect(),
         3 => {
-            let from_270 = azimuths.iter().filter(|a| (270.0 - SAME..360.0 - SAME).contains(*a));
+            let from_270 = azimuths
+                .iter()
+                .filter(|a| (270.0 - ANGLE_TOLERANCE..360.0 - ANGLE_TOLERANCE).contains(*a));
             from_270.map(|a| a - 360.0).chain(up_to(90.0)).collect()
         }
         4 => up_to(90.0).collect(),
@@ -128,7 +121,9 @@ fn unfold(symmetry: u8, planes: &mut Planes) -> Result<(), String> {
     let Some([first, last]) = planes.span().filter(|_| planes.planes.len() > 1) else {
         return Ok(());
     };
-    let is = |from: f64, to: f64| (first - from).abs() < SAME && (last - to).abs() < SAME;
+    let is = |from: f64, to: f64| {
+        (first - from).abs() < ANGLE_TOLERANCE && (last - to).abs() < ANGLE_TOLERANCE
+    };
     match symmetry {
         1 => {}
         2 if is(0.0, 180.0) => planes.mirror_at_last(),

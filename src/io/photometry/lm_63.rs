@@ -17,13 +17,10 @@ use glam::DVec3;
 
 use super::super::text::{Line, physical_lines};
 use super::numbers::{Comma, Numbers};
-use super::planes::{Planes, SAME};
+use super::planes::{ANGLE_TOLERANCE, Planes};
 use super::{Photometry, name_of};
 use crate::error::{Error, ErrorKind};
 use crate::scene::{IntensityDistribution, Opening, Pole};
-
-/// Metres of a foot.
-const FOOT: f64 = 0.3048;
 
 /// Whether `text` is an LM-63 file: by its first line, or by a line for the tilt.
 pub fn is_lm_63(text: &str) -> bool {
@@ -173,7 +170,7 @@ impl Header {
             }
         };
         let metres = match numbers.next("the type of units")? {
-            1.0 => FOOT,
+            1.0 => 0.3048,
             2.0 => 1.0,
             other => {
                 warnings.push(format!("units of type {other} are taken for metres"));
@@ -236,7 +233,7 @@ impl Header {
 /// Planes of type C, completed to a full turn.
 fn unfold_c(planes: &mut Planes, warnings: &mut Vec<String>) -> Result<(), Error> {
     let Some([first, last]) = planes.span() else { return Ok(()) };
-    let is = |a: f64, b: f64| (a - b).abs() < SAME;
+    let is = |a: f64, b: f64| (a - b).abs() < ANGLE_TOLERANCE;
     match (first, last) {
         _ if planes.planes.len() == 1 => {}
         (a, b) if is(b - a, 360.0) => {}
@@ -267,7 +264,7 @@ fn unfold_c(planes: &mut Planes, warnings: &mut Vec<String>) -> Result<(), Error
 
 /// Planes from 0° on, with their mirror images at 0°; others unchanged.
 fn unfolded_at_zero(mut planes: Planes) -> Planes {
-    if planes.span().is_some_and(|[first, _]| first.abs() < SAME) {
+    if planes.span().is_some_and(|[first, _]| first.abs() < ANGLE_TOLERANCE) {
         planes.planes.iter_mut().for_each(|plane| plane.0 = -plane.0);
         planes.planes.reverse();
         planes.mirror_at_last();

@@ -13,7 +13,7 @@ pub struct Planes {
 }
 
 /// Largest difference of equal angles in files, degrees.
-pub const SAME: f64 = 1e-3;
+pub const ANGLE_TOLERANCE: f64 = 1e-3;
 
 impl Planes {
     /// Scales intensities by `factor`; negative ones, such as an instrument's noise, become 0.
@@ -63,7 +63,7 @@ impl Planes {
     pub fn can_close(&self) -> bool {
         let widest = self.planes.windows(2).map(|p| p[1].0 - p[0].0).fold(0.0, f64::max);
         let open = self.span().map(|[first, last]| first + 360.0 - last);
-        open.is_some_and(|open| open > 0.0 && open <= widest + SAME)
+        open.is_some_and(|open| open > 0.0 && open <= widest + ANGLE_TOLERANCE)
     }
 
     /// Adds the first plane once more, a turn further.

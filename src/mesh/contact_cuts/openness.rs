@@ -23,13 +23,6 @@ const OPENNESS_RAYS: u32 = 128;
 /// Rays per batch, a divisor of [`OPENNESS_RAYS`].
 const RAYS_AT_ONCE: u32 = 4;
 
-/// Fractions of a segment's length at which both its sides are tested.
-const OPENNESS_PLACES: [f64; 3] = [0.2, 0.5, 0.8];
-
-/// Distance from a side, as a fraction of the triangle's height over it, that counts as 0: about
-/// the rounding of coordinates in single precision.
-const ON_SIDE: f64 = 1e-7;
-
 /// Tests on which sides of a contact segment light may fall.
 pub(super) struct Openness {
     rays: Arc<RayScene>,
@@ -62,13 +55,13 @@ impl Openness {
             self.beside.iter().filter(|&&beside| line[0].distance(line[1]) >= beside);
         long_enough.any(|&beside| {
             let [from, to] = part_of_length(beside, ends.map(on_plane), line);
-            OPENNESS_PLACES.into_iter().any(|share| {
-                let place = from.lerp(to, share) + self.above * beside * normal;
-                let sides = [across, -across].map(|away| (place + beside * away, away));
-                match sides.map(|(beside, _)| self.is_open(beside, normal)) {
+            [0.2, 0.5, 0.8].into_iter().any(|share| {
+                let point = from.lerp(to, share) + self.above * beside * normal;
+                let at = |away: DVec3| point + beside * away;
+                match [across, -across].map(|away| self.is_open(at(away), normal)) {
                     [true, true] => true,
-                    [true, false] => self.is_slit(sides[0]),
-                    [false, true] => self.is_slit(sides[1]),
+                    [true, false] => self.is_slit(at(across), across),
+                    [false, true] => self.is_slit(at(-across), -across),
                     [false, false] => false,
                 }
             })
@@ -77,18 +70,18 @@ impl Openness {
 
     /// Whether another wall is nearer than the finest element edge, seen `away` from the wall
     /// beside.
-    fn is_slit(&self, (place, away): (DVec3, DVec3)) -> bool {
+    fn is_slit(&self, point: DVec3, away: DVec3) -> bool {
         let [_, finest] = self.beside;
-        self.rays.occluded(place, away, 0.0..finest, |_| true)
+        self.rays.occluded(point, away, 0.0..finest, |_| true)
     }
 
-    fn is_open(&self, place: DVec3, normal: DVec3) -> bool {
+    fn is_open(&self, point: DVec3, normal: DVec3) -> bool {
         // Most points are in the open, which the first few rays show.
         let most = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);
         while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
             let directions = self.directions.directions_in(cast..cast + RAYS_AT_ONCE, normal, 0.5);
-            self.rays.closest_hits(place, directions, 0.0, None, |_, hit| {
+            self.rays.closest_hits(point, directions, 0.0, None, |_, hit| {
                 backs += u32::from(hit.is_some_and(|hit| !hit.front));
             });
             cast += RAYS_AT_ONCE;
@@ -100,7 +93,8 @@ impl Openness {
 /// Whether a part of a triangle, by its ends in barycentric coordinates, is one of its sides: there
 /// is no cut where a neighbour begins.
 fn is_on_side(ends: &[DVec2; 2]) -> bool {
-    let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < ON_SIDE);
+    // About the rounding of coordinates in single precision.
+    let from_side = |side: fn(&DVec2) -> f64| ends.iter().all(|p| side(p).abs() < 1e-7);
     from_side(|p| p.x) || from_side(|p| p.y) || from_side(|p| 1.0 - p.x - p.y)
 }
 

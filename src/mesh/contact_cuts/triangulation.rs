@@ -12,23 +12,9 @@ use super::snapping::{Cuts, LatticePoint, STEPS};
 use crate::mesh::Side;
 use crate::scene::Piece;
 
-/// Fraction of their triangle's area below which pieces are left out: the rounding of where
-/// segments cross. Their neighbours are not connected.
-const MIN_AREA_SHARE: f64 = 1e-10;
-
 /// Weights are rounded to multiples of one over this: finer than the lattice, so that its points
 /// are unchanged, and near-equal intersections of segments merge.
 const ROUNDING: f64 = 4.0 * STEPS as f64;
-
-/// Angle below which pieces are refined by further points, degrees: below 20.7 this terminates
-/// (Ruppert 1995).
-const LEAST_ANGLE: f64 = 20.0;
-
-/// Least area of pieces refined for their angles, in units of the finest edge squared.
-const LEAST_AREA: f64 = 0.1;
-
-/// Maximum number of points added to a triangle.
-const MAX_POINTS: usize = 1000;
 
 /// A triangle to be cut.
 pub(super) struct CutTriangle {
@@ -74,13 +60,14 @@ impl CutTriangle {
         }
         // In these coordinates the whole triangle has half the stretch as area.
         let area = 0.5 * (b - a).cross(c - a).length();
-        let least_area = LEAST_AREA * self.finest.powi(2) / area * stretch / 2.0;
+        let least_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
+        // Below 20.7 degrees it terminates (Ruppert 1995).
         triangulation.refine(
             RefinementParameters::new()
                 .keep_constraint_edges()
                 .with_min_required_area(least_area)
-                .with_max_additional_vertices(MAX_POINTS)
-                .with_angle_limit(AngleLimit::from_deg(LEAST_ANGLE)),
+                .with_max_additional_vertices(1000)
+                .with_angle_limit(AngleLimit::from_deg(20.0)),
         );
         let weights_of = |edge: DirectedEdgeHandle<'_, _, _, _, _>| {
             let Point2 { x, y }: Point2<f64> = edge.from().position();
@@ -88,7 +75,8 @@ impl CutTriangle {
         };
         let is_sliver = |edges: [DirectedEdgeHandle<'_, _, _, _, _>; 3]| {
             let [p, q, r] = edges.map(|edge| DVec2::from_array(weights_of(edge)));
-            (q - p).perp_dot(r - p) < MIN_AREA_SHARE
+            // The rounding of where segments cross.
+            (q - p).perp_dot(r - p) < 1e-10
         };
         let pieces = triangulation.inner_faces().filter_map(|face| {
             let edges = face.adjacent_edges();

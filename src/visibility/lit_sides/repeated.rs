@@ -18,12 +18,12 @@ pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
         let winding = (scene.exitance(t) != Rgb::ZERO).then_some(winding);
         let key = (corners, winding, triangle.material, triangle.group);
         let first = *known.entry(key).or_insert(t);
-        let place = |t: usize, p: DVec3| {
+        let point = |t: usize, p: DVec3| {
             let k = scene.corners(t).iter().position(|&q| q == p);
-            k.zip(scene.texture_coordinates(t)).map(|(k, places)| places[k].to_array())
+            k.zip(scene.texture_coordinates(t)).map(|(k, points)| points[k].to_array())
         };
         let same_texture =
-            || scene.corners(t).into_iter().all(|p| same(place(t, p), place(first, p)));
+            || scene.corners(t).into_iter().all(|p| same(point(t, p), point(first, p)));
         let material = scene.material(t);
         let is_concerned = material.sides == Sides::Auto || material.is_translucent();
         is_concerned && first != t && same_texture()

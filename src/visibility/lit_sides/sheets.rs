@@ -10,23 +10,12 @@ use crate::scene::Scene;
 /// A side of a triangle: twice its index, plus one for its back.
 pub type SideIndex = usize;
 
-/// Minimum number of points on each side of a triangle: enough to overrule the result of its sheet
-/// if most points of that agree. Plain choice, as are the numbers below.
-const PLACES: f64 = 4.0;
-
-/// For large triangles: number of points in proportion to area, over all triangles, on one side.
-const PLACES_OVER_ALL: f64 = 2048.0;
-
-/// For few sheets: maximum number of points per sheet, and total number over all sheets.
-const PLACES_OF_SHEET: f64 = 128.0;
-const PLACES_OF_SHEETS: f64 = 16384.0;
-
 /// The sheets of a scene.
 pub struct Sheets {
     /// Per side, the first side of its sheet.
     first: Vec<SideIndex>,
     /// Per side, the number of sample points on it.
-    places: Vec<usize>,
+    points: Vec<usize>,
 }
 
 impl Sheets {
@@ -35,88 +24,91 @@ impl Sheets {
         let mut sizes = vec![0u32; first.len()];
         first.iter().for_each(|&side| sizes[side] += 1);
         let count = sizes.iter().filter(|&&size| size > 0).count();
-        let of_sheet = (PLACES_OF_SHEETS / count as f64).min(PLACES_OF_SHEET);
+        let of_sheet = (16384.0 / count as f64).min(128.0);
         let total_area: f64 = (0..scene.triangles().len()).map(|t| scene.area(t)).sum();
-        let places = |(side, &first): (SideIndex, &SideIndex)| {
-            let of_area = PLACES_OVER_ALL * scene.area(side / 2) / total_area;
+        let points = |(side, &first): (SideIndex, &SideIndex)| {
+            let of_area = 2048.0 * scene.area(side / 2) / total_area;
             let of_sheet = of_sheet / f64::from(sizes[first]);
-            PLACES.max(of_area).max(of_sheet).ceil() as usize
+            // Enough on each side to overrule the result of its sheet if most of them agree, more
+            // on large triangles, and more where there are few sheets: 128 each, and 16384 in all
+            // at most. Plain choice.
+            of_area.max(4.0).max(of_sheet).ceil() as usize
         };
-        let places = first.iter().enumerate().map(places).collect();
-        Sheets { first, places }
+        let points = first.iter().enumerate().map(points).collect();
+        Sheets { first, points }
     }
 
     /// Calls `find` for the sample points on each of `sides`, with a random sequence of its own per
     /// side.
-    pub fn ask(
+    pub fn sample(
         &self,
         sides: &[SideIndex],
         find: impl Fn(SideIndex, &mut Rng) -> Option<f64> + Sync,
-    ) -> Answers<'_> {
+    ) -> SideStatistics<'_> {
         let from_side = |&side: &SideIndex| {
             let mut rng = Rng::with_seed(split_mix64(side as u64));
-            let mut found = Found { places: self.places[side] as f64, ..Found::default() };
-            for value in (0..self.places[side]).filter_map(|_| find(side, &mut rng)) {
-                found.hits += 1.0;
-                found.sum += value;
+            let mut samples = Samples { points: self.points[side] as f64, ..Samples::default() };
+            for value in (0..self.points[side]).filter_map(|_| find(side, &mut rng)) {
+                samples.hits += 1.0;
+                samples.sum += value;
             }
-            (side, found)
+            (side, samples)
         };
-        let found: Vec<(SideIndex, Found)> = sides.par_iter().map(from_side).collect();
-        let mut of_sides = vec![Found::default(); self.first.len()];
+        let samples: Vec<(SideIndex, Samples)> = sides.par_iter().map(from_side).collect();
+        let mut of_sides = vec![Samples::default(); self.first.len()];
         let mut of_sheets = of_sides.clone();
-        for (side, found) in found {
+        for (side, samples) in samples {
             let sheet = &mut of_sheets[self.first[side]];
-            sheet.places += found.places;
-            sheet.hits += found.hits;
-            sheet.sum += found.sum;
-            of_sides[side] = found;
+            sheet.points += samples.points;
+            sheet.hits += samples.hits;
+            sheet.sum += samples.sum;
+            of_sides[side] = samples;
         }
-        Answers { sheets: self, of_sides, of_sheets }
+        SideStatistics { sheets: self, of_sides, of_sheets }
     }
 }
 
 /// Results of the sample points on sides.
-pub struct Answers<'a> {
+pub struct SideStatistics<'a> {
     sheets: &'a Sheets,
     /// Per side; empty for sides that were not sampled.
-    of_sides: Vec<Found>,
+    of_sides: Vec<Samples>,
     /// By the first side of each sheet.
-    of_sheets: Vec<Found>,
+    of_sheets: Vec<Samples>,
 }
 
-impl Answers<'_> {
+impl SideStatistics<'_> {
     /// The result of a side that was sampled.
-    pub fn of(&self, side: SideIndex) -> Found {
+    pub fn of(&self, side: SideIndex) -> Samples {
         self.of_sides[side]
     }
 
     /// The result of the sampled sides of its sheet.
-    pub fn of_sheet(&self, side: SideIndex) -> Found {
+    pub fn of_sheet(&self, side: SideIndex) -> Samples {
         self.of_sheets[self.sheets.first[side]]
     }
 }
 
 /// Results at some points.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Found {
+pub struct Samples {
     /// Number of points.
-    pub places: f64,
+    pub points: f64,
     /// Number of points with a value.
     pub hits: f64,
     /// Sum of the values.
     sum: f64,
 }
 
-impl Found {
+impl Samples {
     /// Share of the points with a value.
     pub fn share(self) -> f64 {
-        self.hits / self.places
+        self.hits / self.points
     }
 
     /// Mean value; points without one count as 0.
     pub fn mean(self) -> f64 {
-        self.sum / self.places
+        self.sum / self.points
     }
 }
 

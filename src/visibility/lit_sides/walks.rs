@@ -1,7 +1,7 @@
 //! Random walks from sides of triangles to the light.
 
 use std::cell::Cell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::iter::{once, repeat_with};
 use std::sync::Arc;
 
@@ -11,33 +11,14 @@ use rustc_hash::FxHashMap;
 
 use super::repeated::lamps_of_other_sides;
 use super::sheets::{Sheets, SideIndex};
+use crate::geometry::FILE_TOLERANCE;
+use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::{Rgb, Scene, Sides};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
-
-/// Maximum number of bounces of a walk. Through a door of a thirtieth of a room's area 40 % of the
-/// walks get out within this number. Plain choice.
-const MAX_BOUNCES: usize = 16;
-
-/// Ratio of the mean free path at the back of a lamp to that at its front above which the lamp
-/// emits from its back. Lamps right below a ceiling and bulbs wound inside out are far above; a
-/// lamp that lights a ceiling, with the room below it ten times as high as the gap, is not. Rays
-/// that hit a lamp do not count, such as those within a body that emits all around. Plain choice.
-const FURTHER: f64 = 16.0;
-
-/// Below this cosine rounding decides whether a lamp in a point's own plane is visible.
-const GRAZES: f64 = 1e-10;
-
-/// Maximum distance of coinciding surfaces, as a share of the square root of a triangle's area, as
-/// for covered backs; minimum cosine between their normals.
-const SAME_PLACE: f64 = 1e-4;
-const ALIKE: f64 = 0.999;
-
-/// Maximum number of points of a triangle tried to find one outside of holes. Plain choice.
-const MAX_TRIES: usize = 1000;
 
 /// The scene that walks traverse.
 pub struct Walks<'a> {
@@ -83,8 +64,7 @@ impl<'a> Walks<'a> {
             brightest,
             fluxes: AreaSampler::new(scene.luminaires().iter().map(|l| l.flux().element_sum())),
             lamps,
-            contact: (offset::PATH_CONTACT * scene.bounds().diagonal())
-                .max(offset::PATH_CONTACT_ULPS * scene.coordinate_ulp()),
+            contact: offset::path_contact(scene),
         };
         walks.shining_backs = walks.find_shining_backs(sheets);
         walks
@@ -122,7 +102,7 @@ impl<'a> Walks<'a> {
 
     fn find_shining_backs(&self, sheets: &Sheets) -> FxHashMap<usize, bool> {
         let sides: Vec<SideIndex> = self.lamps.iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
-        let free = sheets.ask(&sides, |side, rng| {
+        let free = sheets.sample(&sides, |side, rng| {
             let start = self.random_start(side, rng)?;
             let direction = self.random_direction(side, rng);
             let (at, met) = self.next(start, side, direction)?;
@@ -133,8 +113,12 @@ impl<'a> Walks<'a> {
             let both = [2 * t, other.map_or(2 * t + 1, |other| 2 * other)];
             let [front, back] = both.map(|side| free.of_sheet(side).mean());
             // The back of the lamp is covered by the other one.
-            let asked = if other.is_some() { self.sides_of_material(t) } else { self.sides_of(t) };
-            (t, asked == Sides::Auto && back > FURTHER * front)
+            let given = if other.is_some() { self.sides_of_material(t) } else { self.sides_of(t) };
+            // Mean free paths. Lamps right below a ceiling and bulbs wound inside out are far above
+            // this ratio; a lamp that lights a ceiling, with the room below it ten times as high as
+            // the gap, is not. Rays that hit a lamp do not count, such as those within a body that
+            // emits all around.
+            (t, given == Sides::Auto && back > 16.0 * front)
         };
         self.lamps.iter().map(shines_from_back).collect()
     }
@@ -143,7 +127,8 @@ impl<'a> Walks<'a> {
     /// light that a walk from there reaches; `None` if it reaches none.
     pub fn walk_to_light(&self, mut at: DVec3, mut side: SideIndex, rng: &mut Rng) -> Option<f64> {
         let mut throughput = 1.0;
-        for _ in 0..MAX_BOUNCES {
+        // Through a door of a thirtieth of a room's area 40 % of the walks get out. Plain choice.
+        for _ in 0..16 {
             let direct = self.irradiance_of_lamp(at, side, rng);
             let direct = direct.or_else(|| self.irradiance_of_luminaire(at, side, rng));
             if let Some(irradiance) = direct.or_else(|| self.irradiance_of_sun(at, side, rng)) {
@@ -188,10 +173,10 @@ impl<'a> Walks<'a> {
     /// that one.
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
-        let reach = (SAME_PLACE * self.scene.area(t).sqrt()).max(self.contact);
+        let reach = (FILE_TOLERANCE * self.scene.area(t).sqrt()).max(self.contact);
         let found = Cell::new(None);
         self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
-            let alike = self.normals[hit.triangle].dot(normal) > ALIKE;
+            let alike = self.normals[hit.triangle].dot(normal) > 0.999;
             let counts = hit.front && hit.triangle != t && alike;
             if counts {
                 found.set(Some(hit.triangle));
@@ -209,11 +194,8 @@ impl<'a> Walks<'a> {
 
     /// A cosine-distributed direction from a side.
     fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
-        let (normal, turn) = (self.normal(side), TAU * rng.f64());
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let square = rng.f64();
-        let across = turn.cos() * tangent + turn.sin() * bitangent;
-        square.sqrt() * across + (1.0 - square).sqrt() * normal
+        let turn = rng.f64();
+        cosine_direction(self.normal(side), [rng.f64(), turn])
     }
 
     /// The hit of a ray from a point on a side, and the side that it hits.
@@ -271,8 +253,9 @@ impl<'a> Walks<'a> {
         let (direction, distance) = to.normalize_and_length();
         let cosine = self.normal(side).dot(direction);
         let facing = -self.normal(2 * lamp + usize::from(self.shining_backs[&lamp])).dot(direction);
-        // Negated, so that NaN, for a point on the lamp, counts as not visible.
-        if !(cosine > GRAZES && facing > GRAZES) {
+        // Below 1e-10 rounding decides whether a lamp in the point's own plane is visible. Negated,
+        // so that NaN, for a point on the lamp, counts as not visible.
+        if !(cosine > 1e-10 && facing > 1e-10) {
             return None;
         }
         let between = self.contact..distance - self.contact;
@@ -291,9 +274,9 @@ impl<'a> Walks<'a> {
     /// nothing is solid.
     pub fn random_point(&self, t: usize, rng: &mut Rng) -> DVec3 {
         let [a, b, c] = self.scene.corners(t);
-        let place = fold_to_triangle([rng.f64(), rng.f64()]);
-        let others = repeat_with(|| fold_to_triangle([rng.f64(), rng.f64()])).take(MAX_TRIES);
-        let [u, v] = self.scene.first_solid(t, once(place).chain(others)).unwrap_or(place);
+        let position = fold_to_triangle([rng.f64(), rng.f64()]);
+        let others = repeat_with(|| fold_to_triangle([rng.f64(), rng.f64()])).take(1000);
+        let [u, v] = self.scene.first_solid(t, once(position).chain(others)).unwrap_or(position);
         a + u * (b - a) + v * (c - a)
     }
 }

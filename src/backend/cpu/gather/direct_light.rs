@@ -12,11 +12,11 @@ use super::scene_rays::SceneRays;
 use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
 use crate::gather::GatherPoint;
+use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::clip;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::sampling::rotation::second_rotation;
 use crate::scene::{Rgb, Sun};
-use crate::visibility::offset;
 use crate::visibility::ray_scene::Hit;
 
 /// The lights and the sun that rays are sent to from one point.
@@ -163,7 +163,7 @@ impl<'a> DirectLight<'a> {
             // A first hit on another part of the light counts as visible.
             let near = point.near / to.length();
             let other = |h: &Hit| !(lights.of_triangle[h.triangle] == light && h.front);
-            let reach = near..1.0 - offset::SEGMENT_END;
+            let reach = near..1.0 - COINCIDENCE_TOLERANCE;
             if !is_hole && !rays.surfaces.occluded(point.position, to, reach.clone(), other) {
                 out.seen += factor * rays.panes.transmittance(point.position, to, reach);
             }

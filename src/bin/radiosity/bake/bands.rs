@@ -9,10 +9,7 @@ use radiosity::{BakeResult, BandLight, Bands, Error, ErrorKind, Luminaire, Scene
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::{interrupt, progress};
-
-/// The name that stands for all materials that the file does not name.
-const ALL_OTHERS: &str = "*";
+use crate::{args, interrupt, progress};
 
 /// A file of bands.
 #[derive(Deserialize)]
@@ -140,14 +137,14 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         spectrum.values(&bands).map_err(|(found, remedy)| wrong(place(), found, remedy))
     };
     let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
-    if let Some(name) = materials.keys().find(|name| *name != ALL_OTHERS && !known(name)) {
+    if let Some(name) = materials.keys().find(|name| *name != "*" && !known(name)) {
         let found = format!("material '{name}', which is not there");
         return Err(wrong(file, found, "name materials as the scene does"));
     }
     let mut of_bands = vec![];
     for material in scene.materials() {
         let name = &material.name;
-        let entry = materials.get(name).or_else(|| materials.get(ALL_OTHERS)).ok_or_else(|| {
+        let entry = materials.get(name).or_else(|| materials.get("*")).ok_or_else(|| {
             let remedy = "give it an entry, or one for all others, *";
             wrong(file.clone(), format!("nothing of material '{name}'"), remedy)
         })?;
@@ -215,24 +212,16 @@ pub fn write_table(path: &Path, light: &BandLight) -> Result<(), Error> {
         ("irradiance", &light.irradiance),
         ("error", &light.noise),
     ];
-    let table = || -> csv::Result<()> {
-        let mut table = csv::Writer::from_path(path)?;
-        let names = columns.iter().flat_map(|(what, _)| {
-            light.bands.iter().map(move |band| format!("{what}_{}", band.name))
-        });
-        table.write_record(["x", "y", "z"].map(String::from).into_iter().chain(names))?;
-        for (v, position) in light.surface.positions.iter().enumerate() {
-            let values = columns.iter().flat_map(|(_, values)| &values[v * count..][..count]);
-            let numbers = position.to_array().into_iter().chain(values.copied());
-            table.write_record(numbers.map(|number| number.to_string()))?;
-        }
-        Ok(table.flush()?)
+    let name = |what: &str| -> Vec<String> {
+        light.bands.iter().map(|band| format!("{what}_{}", band.name)).collect()
     };
-    table().map_err(|e| {
-        let remedy = "choose a folder that exists, can be written and has room";
-        let found = format!("cannot be written: {e}");
-        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-    })
+    let mut head = ["x", "y", "z"].map(String::from).to_vec();
+    head.extend(columns.iter().flat_map(|(what, _)| name(what)));
+    let lines = light.surface.positions.iter().enumerate().map(|(v, position)| {
+        let values = columns.iter().flat_map(|(_, values)| &values[v * count..][..count]);
+        position.to_array().iter().chain(values).map(f64::to_string).collect()
+    });
+    args::write_file(path, &args::csv(std::iter::once(head).chain(lines)))
 }
 
 /// What the report tells of each band: its error and its sweeps, by name.

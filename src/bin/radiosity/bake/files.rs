@@ -17,9 +17,6 @@ use crate::progress;
 /// Rays along a pixel's side.
 pub const SAMPLES: u32 = 4;
 
-/// Rays of a pixel that gathers where no vertex does.
-const PIXEL_RAYS: u32 = 2048;
-
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Format {
@@ -237,7 +234,8 @@ impl Files {
         if !self.pixel_gather {
             return self.interpolated(camera, &baked.light);
         }
-        let rays = baked.settings.gather.as_ref().map_or(PIXEL_RAYS, |gather| gather.rays);
+        // Without a gather: rays for an error of about 1.5 %.
+        let rays = baked.settings.gather.as_ref().map_or(2048, |gather| gather.rays);
         let mut gather =
             progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
         let image = progress::of_count("pixels gathered for the picture", |report| {
@@ -258,14 +256,14 @@ impl Files {
 
 /// Eye, target, degrees and, if there are three more numbers, the direction up.
 pub fn camera(text: &str) -> Parsed<Camera> {
-    const EXPECTED: &str = "7 numbers with commas between them, eye, target and degrees, or 10: \
+    let expected = "7 numbers with commas between them, eye, target and degrees, or 10: \
                             the direction up behind them";
-    let mut numbers = args::list(EXPECTED)(text)?;
+    let mut numbers = args::list(expected)(text)?;
     if numbers.len() == 7 {
         numbers.extend([0.0, 1.0, 0.0]);
     }
     if numbers.len() != 10 {
-        return Err(give(EXPECTED));
+        return Err(give(expected));
     }
     let point = |k: usize| DVec3::from_slice(&numbers[k..k + 3]);
     Ok(Camera { eye: point(0), target: point(3), up: point(7), vertical_fov: numbers[6] })

@@ -2,16 +2,6 @@
 
 use plotters::prelude::RGBColor;
 
-/// Intervals between round numbers, at most, on a scale that is not logarithmic.
-const INTERVALS: f64 = 12.0;
-
-/// From this ratio of the largest to the least value on a scale of colours is logarithmic, as where
-/// the sun shines on a part.
-const LOGARITHMIC_FROM: f64 = 20.0;
-
-/// Share of the largest value that a logarithmic scale of colours goes down to.
-const DARKEST: f64 = 1e-4;
-
 /// Viridis (S. van der Walt and N. Smith 2015) at eight even places, from dark to bright.
 const COLOURS: [[f64; 3]; 8] = [
     [68.0, 1.0, 84.0],
@@ -36,7 +26,7 @@ pub struct Scale {
 impl Scale {
     /// From 0 to `high`, which is above 0.
     pub fn up_to(high: f64) -> Scale {
-        let step = round_step(high / (INTERVALS / 2.0));
+        let step = round_step(high / 6.0);
         let count = (high / step * (1.0 + 1e-9)) as u32;
         let round = (0..=count).map(|k| f64::from(k) * step).collect();
         Scale { low: 0.0, high, round, is_logarithmic: false }
@@ -44,12 +34,13 @@ impl Scale {
 
     /// For colours of values from `low` to `high`: from a round number below to one above.
     pub fn of_colours(low: f64, high: f64) -> Scale {
-        if high > 0.0 && low * LOGARITHMIC_FROM < high {
-            return Scale::logarithmic(low.max(DARKEST * high), high);
+        // Logarithmic where values differ by a factor of 20, as where the sun shines on a part.
+        if high > 0.0 && low * 20.0 < high {
+            return Scale::logarithmic(low.max(1e-4 * high), high);
         }
         // Where all is alike the scale still has a width.
         let span = (high - low).max(1e-3 * high.abs()).max(f64::MIN_POSITIVE.sqrt());
-        let step = round_step(span / INTERVALS);
+        let step = round_step(span / 12.0);
         let first = (low / step).floor();
         let last = (high / step).ceil().max(first + 1.0);
         let round = (0..=(last - first) as u32).map(|k| (first + f64::from(k)) * step).collect();

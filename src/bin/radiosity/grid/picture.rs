@@ -8,24 +8,9 @@ use radiosity::grid::{GridStatistics, MeasuredGrid, Quantity};
 use crate::canvas::scale::Scale;
 use crate::canvas::{self, BLACK, Canvas, Drawn, Font, GREY, Side};
 
-/// Longest side of the map, and what is around it, in pixels.
-const MAP: f64 = 720.0;
+/// Left and upper margin of the map, pixels.
 const LEFT: f64 = 70.0;
 const TOP: f64 = 92.0;
-const RIGHT: f64 = 150.0;
-const BOTTOM: f64 = 64.0;
-
-/// Least width and height of the map, and least width of the lines of text, in pixels.
-const NARROWEST: f64 = 120.0;
-const TEXT: f64 = 560.0;
-
-/// The scale of colours: its distance from the map, its width and its steps.
-const SCALE_AWAY: f64 = 28.0;
-const SCALE_WIDTH: f64 = 22.0;
-const STEPS: u32 = 128;
-
-/// What has no value.
-const NOTHING: RGBColor = RGBColor(226, 226, 226);
 
 /// A grid as it is drawn.
 pub struct Picture<'a> {
@@ -43,9 +28,10 @@ impl Picture<'_> {
     pub fn png(&self) -> Result<Vec<u8>, String> {
         let metres = self.measured.grid.plane.edges.map(|edge: DVec3| edge.length() / self.metre);
         let longest = metres[0].max(metres[1]);
-        let map = metres.map(|edge| (MAP * edge / longest).max(NARROWEST).round());
-        let width = LEFT + map[0].max(TEXT - LEFT) + RIGHT;
-        let size = (width as u32, (TOP + map[1] + BOTTOM) as u32);
+        let map = metres.map(|edge| (720.0 * edge / longest).max(120.0).round());
+        // At least as wide as the lines of text.
+        let width = LEFT + map[0].max(490.0) + 150.0;
+        let size = (width as u32, (TOP + map[1] + 64.0) as u32);
         canvas::png(size, |canvas| self.draw(canvas, map, metres))
     }
 
@@ -69,7 +55,8 @@ impl Picture<'_> {
         let x = |column: usize| LEFT + width * column as f64 / columns as f64;
         let y = |row: usize| bottom - height * row as f64 / rows as f64;
         for (k, value) in self.measured.measured(self.quantity).enumerate() {
-            let colour = value.map_or(NOTHING, |[value, _]| Scale::colour(scale.share(value)));
+            let colour = value
+                .map_or(RGBColor(226, 226, 226), |[value, _]| Scale::colour(scale.share(value)));
             let (column, row) = (k % columns, k / columns);
             canvas.fill([x(column), y(row + 1), x(column + 1), y(row)], colour)?;
         }
@@ -80,14 +67,13 @@ impl Picture<'_> {
         let font = Font::new(14.0, GREY).anchor(HPos::Center);
         canvas.text("metres", (LEFT + width / 2.0, bottom + 42.0), font)?;
 
-        let left = right + SCALE_AWAY;
+        let (left, beside, steps) = (right + 28.0, right + 50.0, 128);
         let at = |share: f64| bottom - height * share;
-        for k in 0..STEPS {
-            let [low, high] = [k, k + 1].map(|k| f64::from(k) / f64::from(STEPS));
-            let place = [left, at(high), left + SCALE_WIDTH, at(low)];
+        for k in 0..steps {
+            let [low, high] = [k, k + 1].map(|k| f64::from(k) / f64::from(steps));
+            let place = [left, at(high), beside, at(low)];
             canvas.fill(place, Scale::colour((low + high) / 2.0))?;
         }
-        let beside = left + SCALE_WIDTH;
         canvas.axis(&scale, [(beside, bottom), (beside, TOP)], Side::Right, 0.0)?;
         canvas.text(self.quantity.unit(), (left, TOP - 16.0), Font::new(14.0, BLACK).bold())
     }

@@ -8,9 +8,6 @@ use radiosity::{Error, ErrorKind};
 
 use crate::view_factors::is_facet_of;
 
-/// The name that stands for all groups that no line names.
-const ALL_OTHERS: &str = "*";
-
 /// One line.
 struct Line {
     surface: Surface,
@@ -90,7 +87,7 @@ pub fn read(path: &Path, names: &[String], bands: usize) -> Result<Vec<Surface>,
     for name in names {
         let whole = name.rsplit_once('/').map(|(whole, _)| whole);
         let whole = whole.filter(|whole| is_facet_of(name, whole));
-        let candidates = [Some(name.as_str()), whole, Some(ALL_OTHERS)];
+        let candidates = [Some(name.as_str()), whole, Some("*")];
         let known = candidates.into_iter().flatten().find(|key| lines.contains_key(*key));
         let Some(line) = known.and_then(|key| lines.get_mut(key)) else {
             let remedy = "give it a line, or one for all others, *";
@@ -99,7 +96,7 @@ pub fn read(path: &Path, names: &[String], bands: usize) -> Result<Vec<Surface>,
         line.is_used = true;
         surfaces.push(line.surface.clone());
     }
-    let is_unused = |(name, line): &(&String, &Line)| !line.is_used && *name != ALL_OTHERS;
+    let is_unused = |(name, line): &(&String, &Line)| !line.is_used && *name != "*";
     if let Some((name, line)) = lines.iter().filter(is_unused).min_by_key(|(_, l)| &l.place) {
         let found = format!("group '{name}', which is not there");
         return Err(wrong(&line.place, found, "name groups as the scene does"));

@@ -8,30 +8,17 @@ use super::runs::percent;
 use crate::canvas::scale::Scale;
 use crate::canvas::{self, At, BLACK, Canvas, Drawn, Font, GREY, LIGHT, Side};
 
-const SIZE: (u32, u32) = (1200, 820);
-
-/// Left, top, right and bottom of the axes, in pixels.
-const FRAME: [f64; 4] = [95.0, 124.0, 1180.0, 750.0];
-
 const FRONT: RGBColor = RGBColor(31, 95, 168);
 const TARGET: RGBColor = RGBColor(205, 72, 20);
-
-/// Factor by which the axis of time begins before the fastest run: room for its label.
-const ROOM: f64 = 1.5;
-
-/// Distance of a label from its mark, and least distance of labels: down, or else across; pixels.
-const AWAY: f64 = 12.0;
-const LABELS_APART: f64 = 17.0;
-const LABEL_WIDTH: f64 = 150.0;
 
 impl Results {
     /// The chart as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, String> {
-        canvas::png(SIZE, |canvas| self.draw(canvas))
+        canvas::png((1200, 820), |canvas| self.draw(canvas))
     }
 
     fn draw(&self, canvas: &Canvas) -> Drawn {
-        let [left, top, right, bottom] = FRAME;
+        let [left, top, right, bottom] = [95.0, 124.0, 1180.0, 750.0];
         let title = format!("What a bake of {} costs and how far it is off", self.scene);
         canvas.text(&title, (left, 28.0), Font::new(26.0, BLACK).bold())?;
         let tail = 100.0 * self.measure.tail;
@@ -69,20 +56,21 @@ impl Results {
         }
         let front: Vec<At> = self.front.iter().map(|&k| of_run(k)).collect();
         canvas.line(&front, FRONT, 2.0)?;
-        // Below the front, where no fixed settings are.
+        // Below the front, where no fixed settings are; labels need 150 by 17 pixels.
+        let away = 12.0;
         let font = Font::new(15.0, FRONT).anchor(HPos::Right);
         let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for (&k, &(x, y)) in self.front.iter().zip(&front) {
             canvas.dot((x, y), 6.0, FRONT)?;
-            let is_apart = x - last.0 >= LABEL_WIDTH;
-            last = (x, if is_apart { y + AWAY } else { f64::max(y + AWAY, last.1 + LABELS_APART) });
-            canvas.text(&self.runs[k].0.name(), (x - AWAY / 2.0, last.1), font)?;
+            let below = y + away;
+            last = (x, if x - last.0 >= 150.0 { below } else { below.max(last.1 + 17.0) });
+            canvas.text(&self.runs[k].0.name(), (x - away / 2.0, last.1), font)?;
         }
         for k in runs.filter(|&k| asked(k).is_some()) {
             let (x, y) = of_run(k);
             canvas.diamond((x, y), 11.0, TARGET)?;
             let font = Font::new(16.0, TARGET).bold();
-            canvas.text(&self.runs[k].0.name(), (x + AWAY, y - AWAY), font)?;
+            canvas.text(&self.runs[k].0.name(), (x + away, y - away), font)?;
         }
         Ok(())
     }
@@ -96,13 +84,14 @@ impl Results {
         let targets = self.runs.iter().filter_map(|(run, _)| run.target.error());
         let errors = self.runs.iter().map(|(_, m)| m.known_error()).chain(targets);
         let (least, largest) = ends(&mut errors.map(|error| 100.0 * error));
-        (Scale::logarithmic(fastest / ROOM, slowest), Scale::logarithmic(least, largest))
+        // Room for the label of the fastest run.
+        (Scale::logarithmic(fastest / 1.5, slowest), Scale::logarithmic(least, largest))
     }
 }
 
 fn legend(canvas: &Canvas, y: f64) -> Drawn {
     let font = Font::new(16.0, BLACK);
-    let [_, best, asked] = [100.0, 245.0, 585.0].map(|x| (x, y));
+    let [best, asked] = [245.0, 585.0].map(|x| (x, y));
     canvas.dot((100.0, y), 5.0, LIGHT)?;
     canvas.text("fixed settings", (114.0, y), font)?;
     canvas.dot(best, 6.0, FRONT)?;

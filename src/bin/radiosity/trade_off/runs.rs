@@ -37,10 +37,8 @@ impl Run {
 }
 
 /// A setting that is varied: its name, the values that the function is called with, which changes
-/// settings and gives the new value in words. The first [`QUICK`] values are those of quick runs.
+/// settings and gives the new value in words. The first two values are those of quick runs.
 type Variation = (&'static str, &'static [f64], fn(&mut BakeSettings, f64) -> String);
-
-const QUICK: usize = 2;
 
 /// Factors of the value meant for the error, but for counts. The values meant for it are left out.
 const VARIATIONS: [Variation; 7] = [
@@ -106,7 +104,7 @@ pub fn runs(scene: &Scene, quick: bool) -> Vec<Run> {
     let base = meant_for(base_error);
     let varied = VARIATIONS.iter().flat_map(|&(knob, values, change)| {
         let base = &base;
-        values.iter().take(if quick { QUICK } else { values.len() }).map(move |&value| {
+        values.iter().take(if quick { 2 } else { values.len() }).map(move |&value| {
             let mut settings = base.clone();
             (knob, change(&mut settings, value), settings)
         })

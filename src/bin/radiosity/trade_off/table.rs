@@ -1,6 +1,7 @@
 //! The table of a trade-off, a line a run: as text for the terminal, and as CSV with all settings.
 
 use super::Results;
+use crate::args;
 use crate::bake::settings;
 
 impl Results {
@@ -33,13 +34,16 @@ impl Results {
     }
 
     /// A row a run under a row of column names; shares, not per cent.
-    pub fn csv(&self) -> String {
-        let rows: Vec<Vec<(&str, String)>> = (0..self.runs.len()).map(|k| self.row(k)).collect();
-        let names =
-            rows.iter().take(1).map(|row| row.iter().map(|cell| cell.0.to_string()).collect());
-        let cells = rows.iter().map(|row| row.iter().map(|cell| cell.1.clone()).collect());
-        let line = |words: Vec<String>| words.join(",") + "\n";
-        names.chain(cells).map(line).collect()
+    pub fn csv(&self) -> Vec<u8> {
+        let mut rows = vec![];
+        for k in 0..self.runs.len() {
+            let (names, cells): (Vec<&str>, Vec<String>) = self.row(k).into_iter().unzip();
+            if k == 0 {
+                rows.push(names.into_iter().map(String::from).collect());
+            }
+            rows.push(cells);
+        }
+        args::csv(rows)
     }
 
     /// Columns and cells of run `k`.

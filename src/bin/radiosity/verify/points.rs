@@ -8,7 +8,7 @@ use radiosity::verify::{PathTracer, Reflected, SurfacePoint, Verification};
 use radiosity::{Error, ErrorKind, Rgb, Scene};
 use serde_json::Value;
 
-use crate::progress;
+use crate::{args, progress};
 
 /// Points of a file.
 pub struct Points(Vec<Point>);
@@ -117,15 +117,13 @@ impl TracedPoints {
     }
 
     /// Position, radiosity and standard error, a line a point.
-    pub fn csv(&self) -> String {
-        let mut out =
-            "x,y,z,radiosity_r,radiosity_g,radiosity_b,error_r,error_g,error_b\n".to_string();
-        for (point, (radiosity, error)) in self.points.0.iter().zip(&self.found) {
+    pub fn csv(&self) -> Vec<u8> {
+        let head = "x,y,z,radiosity_r,radiosity_g,radiosity_b,error_r,error_g,error_b";
+        let lines = self.points.0.iter().zip(&self.found).map(|(point, (radiosity, error))| {
             let numbers = [point.position, *radiosity, *error].map(|v| v.to_array()).concat();
-            let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
-            out += &(words.join(",") + "\n");
-        }
-        out
+            numbers.iter().map(f64::to_string).collect()
+        });
+        args::csv(std::iter::once(head.split(',').map(String::from).collect()).chain(lines))
     }
 }
 

@@ -61,32 +61,32 @@ impl Format {
         if groups <= MAX_DENSE_GROUPS { vec![Format::Csv, Format::List] } else { vec![Format::Npz] }
     }
 
+    fn name(self) -> &'static str {
+        FORMATS.iter().find(|(_, format)| *format == self).map_or("", |(name, _)| name)
+    }
+
     /// # Errors
     /// [`ErrorKind::Setting`] where so many groups are too many for a square table.
     pub fn check(self, groups: usize) -> Result<(), Error> {
-        let (name, is_dense) = match self {
-            Format::Csv => ("csv", true),
-            Format::Npy => ("npy", true),
-            Format::List => ("list", false),
-            Format::MatrixMarket => ("mtx", false),
-            Format::Npz => ("npz", false),
-        };
+        let is_dense = matches!(self, Format::Csv | Format::Npy);
         if is_dense && groups > MAX_DENSE_GROUPS {
             let found = format!("a square table of {groups} groups");
             let remedy = format!("above {MAX_DENSE_GROUPS} take list, mtx or npz");
-            return Err(Error::new(ErrorKind::Setting, format!("--format {name}"), found, remedy));
+            return Err(Error::new(
+                ErrorKind::Setting,
+                format!("--format {}", self.name()),
+                found,
+                remedy,
+            ));
         }
         Ok(())
     }
 
     pub fn path(self, stem: &Path) -> PathBuf {
-        stem.with_added_extension(match self {
-            Format::Csv => "csv",
-            Format::List => "list.csv",
-            Format::MatrixMarket => "mtx",
-            Format::Npy => "npy",
-            Format::Npz => "npz",
-        })
+        match self {
+            Format::List => stem.with_added_extension("list.csv"),
+            _ => stem.with_added_extension(self.name()),
+        }
     }
 
     pub fn write(self, stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {

@@ -13,11 +13,6 @@ use super::{ToError, group_indices};
 use crate::args::{self, Parsed, Stop, give};
 use crate::{interrupt, progress};
 
-/// Between two writings of what is done: at least, and in times of what the last one took, so that
-/// it takes a twentieth of the time at most. Chosen by hand.
-const MIN_INTERVAL: Duration = Duration::from_secs(1);
-const WRITINGS: u32 = 20;
-
 /// `A..B`.
 pub fn range(text: &str) -> Parsed<Range<usize>> {
     let ends = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
@@ -62,12 +57,14 @@ impl ToError {
             false => None,
         };
         interrupt::catch();
-        let (mut written, mut interval, mut failure) = (Instant::now(), MIN_INTERVAL, None);
+        let second = Duration::from_secs(1);
+        let (mut written, mut interval, mut failure) = (Instant::now(), second, None);
         let part = self.make(scene, &groups, rows, done, |part| {
             if written.elapsed() > interval {
                 let start = Instant::now();
                 failure = write_rows(checkpoint, part).err();
-                interval = MIN_INTERVAL.max(WRITINGS * start.elapsed());
+                // Writing takes a twentieth of the time at most.
+                interval = second.max(20 * start.elapsed());
                 written = Instant::now();
             }
             match failure {
