@@ -1,1 +1,2 @@
 mod point_irradiance;
+mod shadow_edges;
