@@ -25,10 +25,6 @@ pub(super) const SCENE_SIZE: f32 = 1e5;
 /// a 32-bit coordinate (6e-8 each).
 const BOX_MARGIN: f32 = 1e-6 * SCENE_SIZE;
 
-/// Minimum magnitude of components of directions, so that none has an infinite inverse. Across the
-/// scene the error is below any rounding.
-const MIN_COMPONENT: f32 = 1e-20;
-
 /// Conversion from the scene's unit to the hierarchy's.
 #[derive(Debug)]
 pub(super) struct LocalUnit {
@@ -81,8 +77,9 @@ impl LocalUnit {
     pub fn ray(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> (Ray32, f64) {
         let length = direction.abs().max_element();
         let unit = (direction * length.recip()).as_vec3a();
-        let small = unit.abs().cmplt(Vec3A::splat(MIN_COMPONENT));
-        let unit = Vec3A::select(small, Vec3A::splat(MIN_COMPONENT).copysign(unit), unit);
+        // No component has an infinite inverse. Across the scene the error is below any rounding.
+        let min = Vec3A::splat(1e-20);
+        let unit = Vec3A::select(unit.abs().cmplt(min), min.copysign(unit), unit);
         let (signs, length) = (unit.is_negative_bitmask() as usize, length * self.scale);
         let start = -rounded_up(-reach.start * length);
         let ray = Ray32 {
