@@ -7,15 +7,6 @@
 // the path goes on. A light counts with its share of both densities (balance heuristic: Veach and
 // Guibas 1995). The path ends at the first surface that is not near, in the field's light.
 
-// Vertices of a path at most: of those that are left a share of the light below albedo^128 ends in
-// the field's light although the surface is near.
-const MAX_VERTICES: u32 = 128u;
-// Paths go on with this probability at most.
-const MAX_SURVIVAL: f32 = 0.999;
-// Height of a vertex above its triangle, in units of the scene's size: some four times the rounding
-// of coordinates in the triangle test, half of which a ray may have from there.
-const LIFT: f32 = 9.5367432e-7;
-
 var<private> random_state: u32;
 
 // A hash of 32 bits: PCG-RXS-M-XS (Jarzynski and Olano 2020).

@@ -2,7 +2,6 @@
 
 const MAX_EXPLICIT_LIGHTS: u32 = 8u;
 const NO_LIGHT: u32 = 0xffffffffu;
-const ANY_LIGHT: u32 = 0xfffffffeu;   // of no triangle: any hit hides the sun
 const PI: f32 = 3.14159265;
 
 struct TracedLight {

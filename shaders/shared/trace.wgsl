@@ -3,20 +3,10 @@
 // two parts each: see shared/corner.wgsl. Boxes are wider than their contents by more than
 // rounding.
 
-const NOTHING: u32 = 0xffffffffu;
-const LEAF: u32 = 0x80000000u;        // a leaf: this, its triangles less one << 29, the first one
-const FAR: f32 = 1e30;
 const TURN: f32 = 6.2831853;
 const STACK: u32 = 33u;               // levels of the hierarchy, plus two
-// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
-const ROUNDING: f32 = 5e-7;
 
-const BACK_IS_COVERED: u32 = 1u;      // flags of a triangle: rays do not hit its back
-const HAS_HOLES: u32 = 2u;            // a mask defines its solid part
-// From this bit on: 1 plus the row of its material's transmittance, if light leaves its other side.
-const ROW_OF_FLAGS: u32 = 2u;
-
-struct Node {
+struct TraceNode {
     low_a: vec3f,         // the first child's box
     child_a: u32,         // a node, or a leaf
     high_a: vec3f,
@@ -38,7 +28,7 @@ struct TracedTriangle {
     extent: f32,          // maximum edge length
 }
 
-struct TracedScene {
+struct TracedSceneInfo {
     panes: u32,           // root of the hierarchy of clear panes, or NOTHING
     lights: u32,          // number of lights
     sky_side: u32,        // pieces of the sky along the edge of a square; 0 if it is uniform
@@ -61,16 +51,14 @@ struct TracedScene {
     padding_8: u32,
 }
 
-@group(0) @binding(0) var<storage, read> nodes: array<Node>;
+@group(0) @binding(0) var<storage, read> nodes: array<TraceNode>;
 @group(0) @binding(1) var<storage, read> triangles: array<TracedTriangle>;
-@group(0) @binding(2) var<uniform> scene: TracedScene;
+@group(0) @binding(2) var<uniform> scene: TracedSceneInfo;
 // Per triangle with holes three texels: texture coordinates, in texels of the mask, of its first
 // and second corner; those of the third, and the mask's first word and width; its height, and
 // whether it ends at its border instead of being repeated.
 @group(0) @binding(3) var mask_places: texture_2d<f32>;
 @group(0) @binding(4) var masks: texture_2d<u32>;   // a bit per texel, 32 per word: 1 where solid
-
-const TEXELS_A_LINE: u32 = 2048u;     // of textures that are read as arrays
 
 struct Ray {
     origin: vec3f,
@@ -119,7 +107,7 @@ fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
 }
 
 fn place_of_mask(k: u32) -> vec4f {
-    return textureLoad(mask_places, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0);
+    return textureLoad(mask_places, vec2u(k % TEXELS_PER_LINE, k / TEXELS_PER_LINE), 0);
 }
 
 // Whether a triangle's mask is solid there.
@@ -138,7 +126,7 @@ fn is_solid(index: u32, u: f32, v: f32) -> bool {
     let first = u32(c.z);
     let texel = cell.y * u32(size.x) + cell.x;
     let word = first + texel / 32u;
-    let bits = textureLoad(masks, vec2u(word % TEXELS_A_LINE, word / TEXELS_A_LINE), 0).x;
+    let bits = textureLoad(masks, vec2u(word % TEXELS_PER_LINE, word / TEXELS_PER_LINE), 0).x;
     return ((bits >> (texel % 32u)) & 1u) != 0u;
 }
 

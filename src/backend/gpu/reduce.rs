@@ -9,7 +9,7 @@
 //! A thread adds up a strip of [`STRIP`] pixels of one column; the sums are added by integer
 //! atomics, so that their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
-use super::layout::{Reduction, STRIP, WORKGROUP};
+use super::layout::{LANES, Reduction, STRIP};
 use super::memory::Memory;
 use super::pipeline;
 use super::render_targets::RenderTargets;
@@ -99,7 +99,7 @@ impl Reduce {
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bindings, &[]);
-        pass.dispatch_workgroups(pixels.div_ceil(WORKGROUP), (3 * pixels).div_ceil(STRIP), count);
+        pass.dispatch_workgroups(pixels.div_ceil(LANES), (3 * pixels).div_ceil(STRIP), count);
     }
 }
 

@@ -1,9 +1,12 @@
 //! Sources of the shaders; shared parts are in `shaders/shared`.
 
-/// Shaders begin with their shared parts.
+use super::layout::constants_wgsl;
+
+/// Shaders begin with the shared constants and their shared parts.
 macro_rules! shader {
-    ($file:literal, $($shared:literal),*) => {
+    ($file:literal $(, $shared:literal)*) => {
         concat!(
+            constants_wgsl!(),
             $(include_str!(concat!("../../../shaders/shared/", $shared)),)*
             include_str!(concat!("../../../shaders/", $file)),
         )
@@ -11,7 +14,7 @@ macro_rules! shader {
 }
 
 pub const ITEM_BUFFER_WGSL: &str = shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
-pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
+pub const REDUCE_WGSL: &str = shader!("reduce.wgsl");
 
 /// Ray-casting shaders begin with ray–scene intersection.
 macro_rules! ray_shader {

@@ -478,10 +478,10 @@ pub fn picture(width: usize, device: &[char], twin: &[char], wrong: &[bool]) -> 
 
 /// A symbol for an item: `.` for nothing, `#` for a back, then digits and letters, repeatedly.
 pub fn symbol(item: u32) -> char {
-    const CELLS: &[u8; 62] = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+    let cells = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
     match item {
         super::layout::OPEN => '.',
         super::layout::BACK => '#',
-        cell => CELLS[(cell - super::layout::FIRST_CELL) as usize % 62].into(),
+        cell => cells[(cell - super::layout::FIRST_FRONT) as usize % 62].into(),
     }
 }

@@ -14,7 +14,7 @@ use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, Vec3A};
 
 use super::layout::{
-    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, ROW_OF_FLAGS, TEXELS_A_LINE, TraceNode,
+    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, ROW_OF_FLAGS, TEXELS_PER_LINE, TraceNode,
     TracedLight, TracedSceneInfo, TracedTriangle,
 };
 use super::memory::Memory;
@@ -183,12 +183,14 @@ impl TracedArrays {
             }
         }
         if nodes.is_empty() {
-            // The root is a leaf, or there are no triangles.
+            // The root is a leaf, or there are no triangles; the other child is an empty leaf in a
+            // box that no ray hits: a point beyond `FAR`.
+            let none = || Child { bounds: [[1e31; 3]; 2], node: LEAF };
             let root = match tree.order.is_empty() {
-                true => Child::NONE,
+                true => none(),
                 false => Child { bounds: bounds(0), node: child(0) },
             };
-            nodes.push(pair([root, Child::NONE]));
+            nodes.push(pair([root, none()]));
         }
         self.nodes.extend(nodes);
     }
@@ -318,11 +320,6 @@ struct Child {
     node: u32,
 }
 
-impl Child {
-    /// An empty leaf in a box that no ray hits: a point beyond the farthest end.
-    const NONE: Child = Child { bounds: [[1e31; 3]; 2], node: LEAF };
-}
-
 fn pair([a, b]: [Child; 2]) -> TraceNode {
     let ([low_a, high_a], [low_b, high_b]) = (a.bounds, b.bounds);
     TraceNode {
@@ -351,15 +348,12 @@ fn sky_texels(map: &SkyMap, radiance_unit: f64) -> Vec<[f32; 4]> {
     map.pieces().iter().map(texel).collect()
 }
 
-/// Margin of boxes, in units of the scene's size: four roundings of a coordinate, which is at most
-/// half of that. The margin of the hierarchy itself is in its own unit.
-const BOX_MARGIN: f32 = 2.4e-7;
-
 impl SplitFloat {
-    /// A box for rays, with the margin.
+    /// A box for rays, with a margin in units of the scene's size: four roundings of a coordinate,
+    /// which is at most half of that. The margin of the hierarchy itself is in its own unit.
     fn widened(&self, [low, high]: [DVec3; 2]) -> [[f32; 3]; 2] {
         let [low, high] = [low, high].map(|p| Vec3A::from_array(self.parts(p)[0]));
-        [(low - BOX_MARGIN).to_array(), (high + BOX_MARGIN).to_array()]
+        [(low - 2.4e-7).to_array(), (high + 2.4e-7).to_array()]
     }
 
     /// Triangle `t` of `scene`, which belongs to this light.
@@ -381,4 +375,4 @@ impl SplitFloat {
     }
 }
 
-const _: () = assert!(NO_LIGHT == u32::MAX && TEXELS_A_LINE.is_power_of_two());
+const _: () = assert!(NO_LIGHT == u32::MAX && TEXELS_PER_LINE.is_power_of_two());

@@ -4,12 +4,12 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 
 use super::field::{OnElement, field_at};
-use super::gather_state::{LANES, PointState, RaySums, SOURCES, Visible, added_up};
+use super::gather_state::{PointState, RaySums, Visible, added_up};
 use super::lights::{passed, ray_from};
 use super::near_field::is_near;
 use super::sky::from_sky;
-use super::trace::{FAR, Hit, Ray, meet, nearest, turned};
-use crate::backend::gpu::layout::{GatherSettings, NOTHING, TracedLight, TracedPoint};
+use super::trace::{Hit, Ray, meet, nearest, turned};
+use crate::backend::gpu::layout::{FAR, GatherSettings, LANES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
 
@@ -90,7 +90,7 @@ impl HemisphereRays<'_> {
             for k in 0..state.light_count as usize {
                 if state.lights[k].is_wide != 0 {
                     let of_light = sum(&|f| vector(f.lights[k].seen, f.lights[k].all));
-                    let out = &mut state.visible[half * SOURCES + k];
+                    let out = &mut state.visible[half][k];
                     out.seen = (Vec3::from(out.seen) + of_light.truncate()).to_array();
                     out.all += of_light.w;
                 }

@@ -8,9 +8,6 @@ use super::trace::{Ray, is_solid, meet, walk};
 use crate::backend::gpu::layout::{HAS_HOLES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
-/// Light of no triangle: the sun is hidden by any hit.
-pub const ANY_LIGHT: u32 = 0xffff_fffe;
-
 /// Transmittance of clear panes between the ray's near distance and `end`.
 pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
     let mut share = Vec3::ONE;

@@ -4,22 +4,18 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::gather_state::{LANES, PointState, RankedLight, added_up};
+use super::gather_state::{PointState, RankedLight, added_up};
 use super::hemisphere_rays::{HemisphereRays, range};
-use super::lights::{ANY_LIGHT, passed, ray_from, to_light};
+use super::lights::{passed, ray_from, to_light};
 use super::near_field::{is_covered, is_near};
 use super::sky::{from_sky, towards_sun};
-use super::trace::{FAR, Hit, is_hidden, nearest, nearest_but, turned};
+use super::trace::{Hit, is_hidden, nearest, nearest_but, turned};
 use crate::backend::gpu::layout::{
-    GatherSettings, NOTHING, ROW_OF_FLAGS, TracedPoint, TracedTriangle,
+    ANY_LIGHT, FAR, GatherSettings, LANES, LIFT, MAX_SURVIVAL, MAX_VERTICES, NOTHING, ROW_OF_FLAGS,
+    TracedPoint, TracedTriangle,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::NO_LIGHT;
-
-const MAX_VERTICES: u32 = 128;
-const MAX_SURVIVAL: f32 = 0.999;
-/// Height of a vertex above its triangle.
-const LIFT: f32 = 9.536_743e-7;
 
 /// Random numbers of one path.
 #[derive(Clone, Copy, Debug)]
@@ -56,10 +52,6 @@ pub struct Shift<'a> {
 }
 
 impl Shift<'_> {
-    /// No deviation.
-    pub const NONE: Shift<'static> =
-        Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
-
     fn direction(&self, direction: Vec3) -> Vec3 {
         (self.turned)(direction, self.across)
     }
@@ -83,11 +75,12 @@ pub fn follow_paths(
 ) {
     let [from, middle, to] = range(state.ray_count, state, settings);
     let covered = covered_halves(state);
+    let none = Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
     let mut lanes = [[Vec4::ZERO; LANES as usize]; 2];
     for k in from..to {
         let half = usize::from(k >= middle);
         if covered[half] {
-            let found = near_light(rays, point, k, state, Shift::NONE);
+            let found = near_light(rays, point, k, state, none);
             let lane = &mut lanes[half][((k - from) % LANES) as usize];
             *lane = (lane.truncate() + found).extend(lane.w.max(found.length()));
         }

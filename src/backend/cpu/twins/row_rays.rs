@@ -5,8 +5,10 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::element::element_at;
 use super::lights::passed;
-use super::trace::{FAR, Hit, Ray, nearest_but, turned};
-use crate::backend::gpu::layout::{BACK, FIRST_ELEMENT, NOTHING, OPEN, RowSettings, TracedPatch};
+use super::trace::{Hit, Ray, nearest_but, turned};
+use crate::backend::gpu::layout::{
+    BACK, FAR, FIRST_FRONT, NOTHING, OPEN, RowSettings, TracedPatch,
+};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
 /// Bindings of the shader.
@@ -58,7 +60,7 @@ impl RowRays<'_> {
             if hit.front {
                 let index = scene.triangles[hit.triangle as usize].index;
                 let at = element_at(self.quadtrees, index, Vec2::new(hit.u, hit.v));
-                slot = FIRST_ELEMENT + at.element;
+                slot = FIRST_FRONT + at.element;
             }
         }
         let end = if hit.triangle != NOTHING { hit.distance } else { FAR };

@@ -4,13 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 
-use crate::backend::gpu::layout::{BACK_IS_COVERED, HAS_HOLES, LEAF, NOTHING};
+use crate::backend::gpu::layout::{BACK_IS_COVERED, FAR, HAS_HOLES, LEAF, NOTHING, ROUNDING};
 use crate::backend::gpu::traced_scene::TracedArrays;
-
-pub const FAR: f32 = 1e30;
-
-/// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
-const ROUNDING: f32 = 5e-7;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {

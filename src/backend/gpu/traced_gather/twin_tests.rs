@@ -4,10 +4,11 @@
 
 use std::f32::consts::PI;
 
+use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::*;
-use crate::backend::cpu::twins::gather_state::{PointState, SOURCES, SUN};
+use crate::backend::cpu::twins::gather_state::{PointState, SUN};
 use crate::backend::cpu::twins::hemisphere_rays::{Found, HemisphereRays, range};
 use crate::backend::cpu::twins::light_rays;
 use crate::backend::cpu::twins::lights::{ray_from, rotated_sobol};
@@ -15,13 +16,13 @@ use crate::backend::cpu::twins::near_paths::{
     self, Shift, chance_of, choose_light, covered_halves,
 };
 use crate::backend::cpu::twins::rank_lights::{
-    MIN_IRRADIANCE_SHARE, Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
+    Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
 };
 use crate::backend::cpu::twins::settle::{Settled, settle};
 use crate::backend::cpu::twins::sky::towards_sun;
 use crate::backend::cpu::twins::trace::nearest;
 use crate::backend::gpu::field::{element_texels, quadtrees};
-use crate::backend::gpu::layout::{NOTHING, POINT_STATE_BYTES, TracedLight};
+use crate::backend::gpu::layout::{MIN_IRRADIANCE_SHARE, NOTHING, POINT_STATE_BYTES, TracedLight};
 use crate::backend::gpu::test_support::{
     gpu, lamp_within_ceiling, narrow_gap, on_sides, places, random_radiosity, read_buffer, shifts,
     traced_scenes, turned_by, under_sky_and_sun,
@@ -501,7 +502,7 @@ fn numbers(found: &Found) -> [f32; NUMBERS] {
 }
 
 /// Range of the possible results of rays.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 struct Spread {
     /// Width of the range of each value, over all rays; for the largest rays minimum and maximum.
     widths: [f64; NUMBERS],
@@ -511,9 +512,6 @@ struct Spread {
 }
 
 impl Spread {
-    const NONE: Spread =
-        Spread { widths: [0.0; NUMBERS], largest: [[0.0; 2]; 2], unsure: 0, rays: 0 };
-
     /// Adds one ray, whose result is within the range of these.
     fn add(&mut self, found: &[[f32; NUMBERS]]) {
         let mut low = found[0];
@@ -559,7 +557,7 @@ fn compare_rays(
         let mut twin = *was;
         rays.cast_rays(point, settings, &mut twin);
         let [from, middle, to] = range(was.ray_count, was, settings);
-        let mut spreads = [Spread::NONE; 2];
+        let mut spreads = [Spread::zeroed(); 2];
         for k in from..to {
             let direction = rays.direction(k, point);
             let found = shifts.iter().map(|&(across, origin)| {
@@ -574,8 +572,7 @@ fn compare_rays(
             let roundings = spread.rays as f64 / 64.0 + 6.0 + 40.0;
             let of = |state: &PointState| {
                 let mut found = Found { sums: state.rays[half], ..Default::default() };
-                let visible = &state.visible[half * SOURCES..][..SOURCES - 1];
-                found.lights.copy_from_slice(visible);
+                found.lights.copy_from_slice(&state.visible[half][..SUN]);
                 numbers(&found)
             };
             let (found, expected) = (of(is), of(&twin));
@@ -601,10 +598,9 @@ fn compare_rays(
         }
         let rest = PointState { rays: is.rays, visible: is.visible, ..*was };
         assert_eq!(*is, rest, "{what}: nothing else is written");
-        for k in (0..SOURCES).filter(|&k| k == SUN || was.lights[k].is_wide == 0) {
-            for k in [k, k + SOURCES] {
-                assert_eq!(is.visible[k], was.visible[k], "{what}: light {k} is not wide");
-            }
+        for k in (0..=SUN).filter(|&k| k == SUN || was.lights[k].is_wide == 0) {
+            let visible = |state: &PointState| state.visible.map(|half| half[k]);
+            assert_eq!(visible(is), visible(was), "{what}: light {k} is not wide");
         }
     };
     (0..passes.points.len()).into_par_iter().for_each(compare);
@@ -721,7 +717,7 @@ fn paths_choose_lights_with_their_chance() {
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
-    const POINTS: usize = 32;
+    let count = 32;
     let (gpu, mesh) = (gpu(), narrow_gap());
     let (corners, reflected) = random_radiosity(&mesh);
     let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
@@ -746,7 +742,7 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
             let position = DVec3::from_array(place) + shift;
             GatherPoint { position, normal: normals[side], near: 2.5e-5 }
         };
-        let points: Vec<GatherPoint> = (0..POINTS).map(near_by).collect();
+        let points: Vec<GatherPoint> = (0..count).map(near_by).collect();
         let traced: Vec<TracedPoint> = points.iter().map(|p| device.traced_point(p)).collect();
         let buffers =
             device.gpu.tracing.field(&device.scene, &field, || device.gpu.memory()).unwrap();
@@ -757,9 +753,9 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
         let [found, expected] = [&found, &expected].map(|samples| {
             // Without what lights bring by themselves.
             let reflected = samples.iter().map(|s| s.irradiance - s.direct);
-            let mean = reflected.clone().sum::<Rgb>() / POINTS as f64;
+            let mean = reflected.clone().sum::<Rgb>() / count as f64;
             let sum: Rgb = reflected.map(|light| (light - mean) * (light - mean)).sum();
-            (mean, sum / (POINTS * (POINTS - 1)) as f64)
+            (mean, sum / (count * (count - 1)) as f64)
         });
         let off = found.0 - expected.0;
         let error = (found.1 + expected.1).map(f64::sqrt);
@@ -858,8 +854,7 @@ fn compare_shadow_rays(
             }
             for (half, widths) in widths.iter().enumerate() {
                 let roundings = f64::from(rays[half]) / 64.0 + 6.0 + 40.0;
-                let k = half * SOURCES + source;
-                let (found, expected) = (is.visible[k], twin.visible[k]);
+                let (found, expected) = (is.visible[half][source], twin.visible[half][source]);
                 let numbers = found.seen.into_iter().chain([found.all]);
                 let numbers = numbers.zip(expected.seen.into_iter().chain([expected.all]));
                 for ((found, expected), &width) in numbers.zip(widths) {
@@ -876,8 +871,8 @@ fn compare_shadow_rays(
         let mut rest = PointState { visible: is.visible, ..*was };
         assert_eq!(*is, rest, "{what}: nothing else is written");
         for source in light_rays::sources(arrays, was) {
-            for k in [source, source + SOURCES] {
-                rest.visible[k] = was.visible[k];
+            for half in 0..2 {
+                rest.visible[half][source] = was.visible[half][source];
             }
         }
         assert_eq!(rest, *was, "{what}: no other light is written");
@@ -899,7 +894,7 @@ fn rays_to_lights_end_at_their_plane() {
     for (point, state) in passes.points.iter().zip(passes.states()) {
         let mut twin = rank_lights(&passes.arrays, point, &passes.whole());
         light_rays::cast_rays(&passes.arrays, point, &passes.whole(), &mut twin);
-        for visible in [state, twin].iter().flat_map(|state| &state.visible) {
+        for visible in [state, twin].iter().flat_map(|state| state.visible.as_flattened()) {
             assert_eq!(visible.seen, [visible.all; 3], "{point:?}");
             lit += usize::from(visible.all > 0.0);
         }
@@ -1042,7 +1037,7 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
         sums.near_light = [(); 3].map(|_| sums.near * random());
         sums.near_largest = random();
     }
-    for visible in &mut state.visible {
+    for visible in state.visible.as_flattened_mut() {
         visible.all = 1.0 + random();
         visible.seen = [(); 3].map(|_| visible.all * (1.0 - apart * random()));
     }

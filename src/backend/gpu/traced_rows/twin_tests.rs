@@ -8,7 +8,7 @@ use super::*;
 use crate::backend::cpu::twins::compact_rows::compact_rows;
 use crate::backend::cpu::twins::row_rays::{RowRays, amount};
 use crate::backend::cpu::twins::trace::turned;
-use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_A_LINE};
+use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_PER_LINE};
 use crate::backend::gpu::test_support::{
     gpu, on_sides, read_buffer, room_with_doubled_leaf, shifts, traced_scenes, turned_by,
 };
@@ -53,7 +53,7 @@ fn row_rays_equal_their_twin() {
     let (mut open, mut back, mut dimmed) = (0, 0, 0);
     for (name, mesh) in traced_scenes() {
         // Some lanes idle; directions in two lines of their texture.
-        let count = TEXELS_A_LINE + 500;
+        let count = TEXELS_PER_LINE + 500;
         let mut rows = open_rows(&gpu, &mesh, count);
         let lights = Lights::new(mesh.shared_scene());
         let (arrays, quadtrees) = (TracedArrays::new(&lights), quadtrees(&mesh));
@@ -277,7 +277,7 @@ fn rows_have_the_same_bits_in_any_batches() {
             assert!(alone == all[k..=k], "{name}: patch {k} alone");
         }
         // Batches that exceed the capacity are made in two.
-        rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
+        rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_FRONT;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
         rows.buffers.patches_at_once = 3;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: three at once");
