@@ -275,8 +275,8 @@ impl<'m> FluxState<'m> {
     /// and accounted flux are equal.
     ///
     /// # Errors
-    /// [`ErrorKind::FormFactor`] when they differ by more than 1e-9 of the emitted: sums of some 10⁹
-    /// terms in f64 stay far below.
+    /// [`ErrorKind::FormFactor`] when they differ by more than 1e-9 of the emitted: sums of some
+    /// 10⁹ terms in f64 stay far below.
     pub fn recompute_and_verify_energy(&mut self) -> Result<(), Error> {
         self.ledger.unshot = self.flux.unshot.iter().map(|u| u.max(Rgb::ZERO)).sum();
         self.ledger.overshot = self.flux.unshot.iter().map(|u| (-*u).max(Rgb::ZERO)).sum();

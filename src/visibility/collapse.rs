@@ -5,7 +5,7 @@
 //!      ╱   ╲                  ╱ ╱ │ ╲          in proportion to its area. With C(n, i) for the
 //!     ●     ●       ──►     a  b  c  ●         cost of the tree below n with at most i roots:
 //!    ╱ ╲   ╱ ╲                      ╱ ╲
-//!   a   b c   ●                    d   e       C(n, i) = least of C(left, k) + C(right, i − k),
+//!   a   b c   ●                    d   e       C(n, i) = min of C(left, k) + C(right, i − k),
 //!            ╱ ╲                                         C(n, i − 1)
 //!           d   e                              C(n, 1) = C(n, 8) + area(n)
 //! ```

@@ -56,7 +56,7 @@ impl LocalUnit {
         LocalUnit { origin: bounds.centre(), scale: f64::from(SCENE_SIZE) / size }
     }
 
-    pub fn place(&self, point: DVec3) -> DVec3 {
+    pub fn to_local(&self, point: DVec3) -> DVec3 {
         (point - self.origin) * self.scale
     }
 
@@ -67,7 +67,7 @@ impl LocalUnit {
 
     /// Bounds of a triangle, with the margin.
     pub fn bounds(&self, corners: [DVec3; 3]) -> Aabb32 {
-        let [a, b, c] = corners.map(|corner| self.place(corner).as_vec3a());
+        let [a, b, c] = corners.map(|corner| self.to_local(corner).as_vec3a());
         Aabb32 { low: a.min(b).min(c) - BOX_MARGIN, high: a.max(b).max(c) + BOX_MARGIN }
     }
 
@@ -83,7 +83,7 @@ impl LocalUnit {
         let (signs, length) = (unit.is_negative_bitmask() as usize, length * self.scale);
         let start = -rounded_up(-reach.start * length);
         let ray = Ray32 {
-            origin: self.place(from).as_vec3a(),
+            origin: self.to_local(from).as_vec3a(),
             direction: unit,
             inverse: unit.recip(),
             near_sides: [signs & 1, signs >> 1 & 1, signs >> 2],
@@ -116,14 +116,14 @@ impl Ray32 {
         let inverse = splat(self.inverse);
         let [x, y, z] = self.near_sides.map(|side| side & 1);
         let (start, end) = (Vec4::splat(self.start), Vec4::splat(self.end));
-        let (mut met, mut entries) = (0, [[0.0; 4]; 2]);
+        let (mut hits, mut entries) = (0, [[0.0; 4]; 2]);
         for (half, entries) in entries.iter_mut().enumerate() {
             let at = |side, axis: usize| plane(side, axis, half) * inverse[axis];
             let entry = at(x, 0).max(at(y, 1)).max(at(z, 2).max(start));
             let exit = at(x ^ 1, 0).min(at(y ^ 1, 1)).min(at(z ^ 1, 2).min(end));
-            met |= entry.cmple(exit).bitmask() << (4 * half);
+            hits |= entry.cmple(exit).bitmask() << (4 * half);
             *entries = entry.to_array();
         }
-        (met, entries)
+        (hits, entries)
     }
 }

@@ -73,7 +73,7 @@ impl Openness {
     }
 
     fn is_open(&self, point: DVec3, normal: DVec3) -> bool {
-        // Most points are in the open, which the first 4 rays show: a divisor of the number of rays.
+        // Most points are in the open, which the first 4 rays show; 4 divides the number of rays.
         let batch = 4;
         let max_backs = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);

@@ -37,7 +37,7 @@ impl CutTriangle {
         let [a, b, c] = self.corners;
         // A power of two keeps points on a side exactly on it, and angles about right.
         let stretch = (b.distance(a) / c.distance(a)).log2().round().exp2();
-        let place = |[u, v]: LatticePoint| {
+        let position = |[u, v]: LatticePoint| {
             let [u, v] = [u, v].map(|k| f64::from(k) / f64::from(STEPS));
             Point2::new(u * stretch, v)
         };
@@ -48,14 +48,14 @@ impl CutTriangle {
             steps.sort_unstable();
             let on_side = |step: u32| [[step, 0], [STEPS - step, step], [0, STEPS - step]][k];
             for pair in steps.windows(2) {
-                let from = triangulation.insert(place(on_side(pair[0]))).ok()?;
-                let to = triangulation.insert(place(on_side(pair[1]))).ok()?;
+                let from = triangulation.insert(position(on_side(pair[0]))).ok()?;
+                let to = triangulation.insert(position(on_side(pair[1]))).ok()?;
                 triangulation.add_constraint(from, to);
             }
         }
         for &[from, to] in &cuts.segments {
-            let from = triangulation.insert(place(from)).ok()?;
-            let to = triangulation.insert(place(to)).ok()?;
+            let from = triangulation.insert(position(from)).ok()?;
+            let to = triangulation.insert(position(to)).ok()?;
             triangulation.add_constraint_and_split(from, to, |point| point);
         }
         // In these coordinates the whole triangle has half the stretch as area.
