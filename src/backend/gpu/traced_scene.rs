@@ -35,7 +35,7 @@ pub struct TracedScene {
     pub nodes: wgpu::Buffer,
     pub triangles: wgpu::Buffer,
     pub info: wgpu::Buffer,
-    pub mask_places: wgpu::TextureView,
+    pub mask_coordinates: wgpu::TextureView,
     pub masks: wgpu::TextureView,
     pub lights: wgpu::Buffer,
     pub lamps: wgpu::Buffer,
@@ -51,7 +51,7 @@ pub struct TracedArrays {
     pub nodes: Vec<TraceNode>,
     pub triangles: Vec<TracedTriangle>,
     pub info: TracedSceneInfo,
-    pub mask_places: Vec<[f32; 4]>,
+    pub mask_coordinates: Vec<[f32; 4]>,
     pub masks: Vec<u32>,
     pub lights: Vec<TracedLight>,
     pub lamps: Vec<Lamp>,
@@ -69,7 +69,7 @@ impl TracedScene {
             nodes: memory.storage("hierarchy", bytemuck::cast_slice(&arrays.nodes))?,
             triangles: memory.storage("triangles", bytemuck::cast_slice(&arrays.triangles))?,
             info: memory.uniform("scene", bytemuck::bytes_of(&arrays.info))?,
-            mask_places: memory.lines("places of masks", &arrays.mask_places)?,
+            mask_coordinates: memory.lines("coordinates of masks", &arrays.mask_coordinates)?,
             masks: memory.words("masks", &arrays.masks)?,
             lights: memory.storage("lights", bytemuck::cast_slice(&arrays.lights))?,
             lamps: memory.storage("lamps", bytemuck::cast_slice(&arrays.lamps))?,
@@ -84,7 +84,7 @@ impl TracedScene {
             (0, self.nodes.as_entire_binding()),
             (1, self.triangles.as_entire_binding()),
             (2, self.info.as_entire_binding()),
-            (3, wgpu::BindingResource::TextureView(&self.mask_places)),
+            (3, wgpu::BindingResource::TextureView(&self.mask_coordinates)),
             (4, wgpu::BindingResource::TextureView(&self.masks)),
         ]
     }
@@ -105,7 +105,7 @@ impl TracedArrays {
             nodes: vec![],
             triangles: Vec::with_capacity(scene.triangles().len()),
             info: TracedSceneInfo { panes: NOTHING, ..Zeroable::zeroed() },
-            mask_places: vec![[0.0; 4]],
+            mask_coordinates: vec![[0.0; 4]],
             masks: vec![0],
             lights: vec![],
             lamps: vec![],
@@ -289,7 +289,7 @@ impl TracedArrays {
             self.masks.extend(solid.chunks(32).map(word));
         }
         let count = scene.triangles().len();
-        self.mask_places = vec![[0.0; 4]; 3 * count];
+        self.mask_coordinates = vec![[0.0; 4]; 3 * count];
         let mut has_holes = vec![false; count];
         for t in 0..count {
             let Some(mask) = scene.mask(t) else { continue };
@@ -305,9 +305,9 @@ impl TracedArrays {
                 if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
             let [a, b, c] = corners.map(|place| (place - tile).as_vec2());
             let word = first_word[&scene.triangles()[t].material] as f32;
-            self.mask_places[3 * t] = [a.x, a.y, b.x, b.y];
-            self.mask_places[3 * t + 1] = [c.x, c.y, word, size[0] as f32];
-            self.mask_places[3 * t + 2] = [size[1] as f32, mask.clamped.into(), 0.0, 0.0];
+            self.mask_coordinates[3 * t] = [a.x, a.y, b.x, b.y];
+            self.mask_coordinates[3 * t + 1] = [c.x, c.y, word, size[0] as f32];
+            self.mask_coordinates[3 * t + 2] = [size[1] as f32, mask.clamped.into(), 0.0, 0.0];
             has_holes[t] = true;
         }
         has_holes

@@ -61,8 +61,8 @@ impl WideLight {
         point: &GatherPoint,
         min_rays: u32,
     ) -> bool {
-        // Of fewer than 8 expected rays there may be none (with a probability of e⁻⁸ for independent
-        // rays).
+        // Of fewer than 8 expected rays there may be none: of independent ones with a probability
+        // above e⁻⁸.
         if !light.convex || f64::from(min_rays) * unoccluded < 8.0 {
             return false;
         }

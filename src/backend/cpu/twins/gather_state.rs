@@ -11,8 +11,8 @@ pub const SUN: usize = MAX_EXPLICIT_LIGHTS;
 shared_structs! {
     /// Sums over rays.
     pub struct RaySums {
-        /// Light reflected by surfaces and from the sky, except for near surfaces and lights sampled
-        /// separately.
+        /// Light reflected by surfaces and from the sky, except for near surfaces and lights
+        /// sampled separately.
         pub light: [f32; 3],
         pub escaped: f32,
         /// Exitance of the other lights.

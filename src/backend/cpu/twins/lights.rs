@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::trace::{Ray, is_solid, meet, walk};
+use super::trace::{Ray, intersect, is_solid, walk};
 use crate::backend::gpu::layout::{HAS_HOLES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
@@ -15,7 +15,7 @@ pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
         return share;
     }
     walk(scene, scene.info.panes, ray, end, |k| {
-        let hit = meet(scene, k, ray, end, 0.0);
+        let hit = intersect(scene, k, ray, end, 0.0);
         if hit.triangle != NOTHING && hit.distance + hit.off < end {
             let row = scene.triangles[k as usize].light as usize;
             share *= Vec3::from(scene.lights[row].exitance);

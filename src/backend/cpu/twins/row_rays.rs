@@ -44,7 +44,7 @@ impl RowRays<'_> {
     }
 
     /// A ray, and its hit.
-    pub fn met(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
+    pub fn intersect(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
         let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
         let ray = Ray { origin, origin_low, direction, near: patch.near };
         (ray, nearest_but(self.scene, &ray, patch.own_triangle))
@@ -53,7 +53,7 @@ impl RowRays<'_> {
     /// The slot that a ray hits, and the transmittance of panes on the way.
     pub fn cast_ray(&self, patch: &TracedPatch, direction: Vec3) -> (u32, Vec3) {
         let scene = self.scene;
-        let (ray, hit) = self.met(patch, direction);
+        let (ray, hit) = self.intersect(patch, direction);
         let mut slot = OPEN;
         if hit.triangle != NOTHING {
             slot = BACK;
