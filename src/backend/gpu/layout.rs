@@ -15,6 +15,10 @@
 //!
 //! Members that a shader does not read pad the struct to WGSL's alignment.
 
+/// Name, offset and size of each member of a struct, and the size of the whole, bytes.
+#[cfg(test)]
+pub type Layout = (Vec<(String, usize, usize)>, usize);
+
 /// A struct of WGSL with the same layout.
 macro_rules! shared_structs {
     ($($(#[$doc:meta])* pub struct $name:ident {
@@ -31,8 +35,7 @@ macro_rules! shared_structs {
 
         #[cfg(test)]
         impl $name {
-            /// Name, offset and size of each member, and the size of the whole, bytes.
-            pub fn layout() -> (Vec<(String, usize, usize)>, usize) {
+            pub fn layout() -> $crate::backend::gpu::layout::Layout {
                 let member = |name: &str, offset, size| (name.to_string(), offset, size);
                 let members = vec![$(
                     member(
@@ -326,10 +329,7 @@ shared_constants! {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shaders::{
-        COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, ITEM_BUFFER_WGSL, LIGHT_RAYS_WGSL,
-        NEAR_PATHS_WGSL, RANK_LIGHTS_WGSL, REDUCE_WGSL, ROW_RAYS_WGSL, SETTLE_WGSL,
-    };
+    use super::super::shaders::SHADERS;
     use super::*;
     use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
     use crate::backend::cpu::twins::gather_state::{
@@ -342,18 +342,7 @@ mod tests {
     /// All shaders, parsed and checked: they need no capabilities beyond those of every WebGPU
     /// device.
     fn modules() -> [naga::Module; 9] {
-        let sources = [
-            ITEM_BUFFER_WGSL,
-            REDUCE_WGSL,
-            RANK_LIGHTS_WGSL,
-            HEMISPHERE_RAYS_WGSL,
-            LIGHT_RAYS_WGSL,
-            SETTLE_WGSL,
-            ROW_RAYS_WGSL,
-            COMPACT_ROWS_WGSL,
-            NEAR_PATHS_WGSL,
-        ];
-        sources.map(|source| {
+        SHADERS.map(|(_, source)| {
             let module = naga::front::wgsl::parse_str(source).expect("WGSL parses");
             let none = naga::valid::Capabilities::empty();
             naga::valid::Validator::new(naga::valid::ValidationFlags::all(), none)
@@ -363,9 +352,8 @@ mod tests {
         })
     }
 
-    /// The structs of a name, each as name, offset and size of each member, and the size of the
-    /// whole, bytes; at least one shader has it.
-    fn structs(modules: &[naga::Module], name: &str) -> Vec<(Vec<(String, usize, usize)>, usize)> {
+    /// The structs of a name; at least one shader has it.
+    fn structs(modules: &[naga::Module], name: &str) -> Vec<Layout> {
         let struct_of = |module: &naga::Module| {
             let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name))?;
             let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };

@@ -13,7 +13,6 @@ use super::layout::{LANES, Reduction, STRIP};
 use super::memory::Memory;
 use super::pipeline;
 use super::render_targets::RenderTargets;
-use super::shaders::REDUCE_WGSL;
 use crate::error::Error;
 use crate::hemicube;
 
@@ -57,7 +56,7 @@ impl Reduce {
         let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
         // Zero initially and after each batch.
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
-        let module = pipeline::shader(device, "reduce.wgsl", REDUCE_WGSL);
+        let module = pipeline::shader(device, "reduce.wgsl");
         let pipeline = pipeline::compute(device, &module, "reduce");
         let item_bytes = Reduce::items_bytes(resolution) * u64::from(hemicubes);
         let items = memory.buffer("items", item_bytes, usage)?;

@@ -60,12 +60,12 @@ impl CutTriangle {
         }
         // In these coordinates the whole triangle has half the stretch as area.
         let area = 0.5 * (b - a).cross(c - a).length();
-        let least_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
+        let min_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
         // Below 20.7 degrees it terminates (Ruppert 1995).
         triangulation.refine(
             RefinementParameters::new()
                 .keep_constraint_edges()
-                .with_min_required_area(least_area)
+                .with_min_required_area(min_area)
                 .with_max_additional_vertices(1000)
                 .with_angle_limit(AngleLimit::from_deg(20.0)),
         );
@@ -130,20 +130,17 @@ mod tests {
     use crate::mesh::contact_cuts::snapping::side_steps;
     use fastrand::Rng;
 
-    /// The triangle of the property below, scene unit.
-    const CORNERS: [DVec3; 3] =
-        [DVec3::new(1.0, 2.0, 3.0), DVec3::new(7.0, 1.0, 2.0), DVec3::new(2.0, 9.0, 8.0)];
-
     fn triangle(finest: f64) -> CutTriangle {
+        let corners = [[1.0, 2.0, 3.0], [7.0, 1.0, 2.0], [2.0, 9.0, 8.0]].map(DVec3::from_array);
         let side = |reversed| Side { id: 0, reversed };
-        CutTriangle { corners: CORNERS, sides: [side(false), side(true), side(false)], finest }
+        CutTriangle { corners, sides: [side(false), side(true), side(false)], finest }
     }
 
     #[test]
     fn pieces_cover_a_triangle_whatever_cuts_it() {
         let mut rng = Rng::with_seed(7);
         let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a) / 2.0;
-        let whole = area(CORNERS);
+        let whole = area(triangle(0.5).corners);
         for round in 0..500 {
             // Coarse lattices make points coincide and segments overlap or meet in one point.
             let coarse = STEPS >> rng.u32(1..12);
