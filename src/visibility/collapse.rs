@@ -17,7 +17,7 @@ use arrayvec::ArrayVec;
 
 use super::sah_tree::SahTree;
 
-/// Boxes in a wide node.
+/// Boxes in a wide node: two vectors of four 32-bit lanes.
 pub(super) const WIDTH: usize = 8;
 
 /// The optimal collapse below each node of a tree.

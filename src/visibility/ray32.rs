@@ -18,7 +18,8 @@ use crate::geometry::aabb::Aabb;
 
 use super::sah_tree::Aabb32;
 
-/// Longest side of the scene in the hierarchy's own unit.
+/// Longest side of the scene in the hierarchy's own unit. Plain choice: products of three of them
+/// and their inverses are far within the range of 32-bit numbers.
 pub(super) const SCENE_SIZE: f32 = 1e5;
 
 /// Margin of boxes on every side, in the hierarchy's unit: 1e-6 of the scene, several roundings of

@@ -17,7 +17,8 @@ use crate::scene::Scene;
 use crate::visibility::buried;
 use crate::visibility::ray_scene::RayScene;
 
-/// Number of rays that test whether a point is inside a solid.
+/// Number of rays that test whether a point is inside a solid: below 200, one front among them
+/// shows that it is not ([`buried::INSIDE`]). Plain choice.
 const OPENNESS_RAYS: u32 = 128;
 
 /// Tests on which sides of a contact segment light may fall.

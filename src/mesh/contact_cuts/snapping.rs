@@ -8,7 +8,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::mesh::contacts::{ContactSegment, part_inside};
 
-/// Steps of the lattice along a side.
+/// Steps of the lattice along a side: those of a 32-bit coordinate in a file.
 pub(super) const STEPS: u32 = 1 << 24;
 
 /// A point of a triangle on the lattice: the weights of its second and third corner, in steps.
